@@ -1,0 +1,129 @@
+"""Every error that softrobots raises on purpose, in one hierarchy.
+
+Each error says what came, what was required and what is available, and carries the same facts as attributes. All derive
+from `SoftRobotsError`; each also derives from the built-in exception that a caller would expect.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+
+class SoftRobotsError(Exception):
+    """Base of every error of this package."""
+
+
+class ParameterError(SoftRobotsError, ValueError):
+    """A value that is not acceptable: wrong shape, not finite, out of range, unknown option.
+
+    Attributes:
+        field: Name of the parameter.
+        value: What came.
+        requirement: What was required.
+    """
+
+    def __init__(self, field: str, value: Any, requirement: str) -> None:
+        """Say that `field` came as `value` although `requirement` was required."""
+        super().__init__(f"{field} = {_short(value)}: {field} must be {requirement}")
+        self.field = field
+        self.value = value
+        self.requirement = requirement
+
+
+class DescriptionError(SoftRobotsError, ValueError):
+    """A robot description (xacro or URDF) that cannot be made or read."""
+
+
+class NameNotFound(SoftRobotsError, LookupError):
+    """A joint, frame or option name that the robot does not have.
+
+    Attributes:
+        kind: What the name stands for, e.g. "frame".
+        name: The name that came.
+        available: The names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, available: Iterable[str]) -> None:
+        """Say that no `kind` is called `name`, and which ones there are."""
+        self.kind = kind
+        self.name = name
+        self.available = tuple(available)
+        near = difflib.get_close_matches(str(name), self.available, n=1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        super().__init__(f"no {kind} is called {name!r}{hint}; available: {', '.join(self.available) or 'none'}")
+
+    def __str__(self) -> str:
+        """Return the message itself (LookupError's children may quote it)."""
+        return str(self.args[0])
+
+
+class NotConverged(SoftRobotsError, RuntimeError):
+    """An iteration that ended without an answer; it carries the best iterate.
+
+    Attributes:
+        best: The best iterate: an `Equilibrium`, `LoadEstimate` or `IkSolution` that does not meet the tolerance.
+        residual: Its residual, in the unit that the message states.
+        iterations: How many iterations were spent.
+    """
+
+    def __init__(self, message: str, *, best: Any, residual: float, iterations: int) -> None:
+        """Say what did not converge and keep the best iterate."""
+        super().__init__(message)
+        self.best = best
+        self.residual = residual
+        self.iterations = iterations
+
+
+class EquilibriumNotFound(NotConverged):
+    """No static equilibrium was reached; `best` is an `Equilibrium` above the tolerance."""
+
+
+class LoadNotFound(NotConverged):
+    """No load explains the motor torques; `best` is a `LoadEstimate` above the tolerance."""
+
+
+class TargetUnreachable(NotConverged):
+    """No motor angles bring the loaded tip to the target.
+
+    `best` is the `IkSolution` nearest to the target, `residual` its distance [m].
+    """
+
+
+class NoCriticalLoad(SoftRobotsError, RuntimeError):
+    """The equilibrium path stays stable up to the largest load that was tried.
+
+    Attributes:
+        max_force: That load [N].
+    """
+
+    def __init__(self, message: str, *, max_force: float) -> None:
+        """Say how far the path was followed."""
+        super().__init__(message)
+        self.max_force = max_force
+
+
+class OutputExists(SoftRobotsError, FileExistsError):
+    """A file or a folder that is not empty stands where a result would be written."""
+
+
+class FileFormatError(SoftRobotsError, ValueError):
+    """A results or waypoint file that cannot be read."""
+
+
+class ViewerError(SoftRobotsError, RuntimeError):
+    """The browser view cannot be served."""
+
+
+class MissingDependency(SoftRobotsError, ImportError):
+    """A package of an optional extra is needed and not installed."""
+
+    def __init__(self, package: str, extra: str) -> None:
+        """Say what to type."""
+        super().__init__(f"{package} is not installed; it is part of an extra: pip install 'softrobots[{extra}]'")
+
+
+def _short(value: Any, limit: int = 120) -> str:
+    text = repr(value).replace("\n", " ")
+    return text if len(text) <= limit else text[: limit - 3] + "..."
