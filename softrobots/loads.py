@@ -1,0 +1,179 @@
+"""What pulls on a robot: dead wrenches at its frames, and gravity; and what they do in joint coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.checks import FloatArray, finite_array, read_only
+from softrobots.model import SoftModel
+
+EARTH_GRAVITY = (0.0, 0.0, -9.81)
+"""Gravity on the ground, world axes [m/s^2]."""
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class LoadTerm(NamedTuple):
+    """One wrench of a load."""
+
+    frame: str
+    """Name of the frame."""
+    wrench: FloatArray
+    """Wrench, shape (6,) [N, N m]."""
+    force: FloatArray
+    """Its force, shape (3,) [N]."""
+    force_cross_transposed: FloatArray
+    """Transpose of the cross matrix of the force, shape (3, 3) [N]."""
+    moment_cross: FloatArray | None
+    """Cross matrix of the moment, shape (3, 3) [N m]; None without a moment."""
+    norms: tuple[float, float]
+    """Norms of force [N] and moment [N m]."""
+
+    @classmethod
+    def of(cls, frame: str, wrench: FloatArray) -> LoadTerm:
+        """Prepare a wrench, shape (6,), at a frame."""
+        force, moment = wrench[:3], wrench[3:]
+        norms = (math.hypot(*force.tolist()), math.hypot(*moment.tolist()))
+        return cls(frame, wrench, force, cross_matrix(force).T, cross_matrix(moment) if norms[1] > 0.0 else None, norms)
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load case: dead wrenches (fixed in the world, they do not follow the robot) and gravity.
+
+    A force has a potential; a world-fixed *moment* has none.
+    """
+
+    wrenches: Mapping[str, FloatArray]
+    """Wrench by frame name, shape (6,): force [N] then moment [N m], world axes, at the origin of the frame."""
+    gravity: tuple[float, float, float] | None
+    """Gravity, world axes [m/s^2]; None: weightless."""
+
+    @classmethod
+    def of(cls, model: SoftModel, force: Any = None, *, wrench: Any = None, frame: str | None = None, gravity: Any = None) -> Load:
+        """Check a load against a model.
+
+        Args:
+            model: The robot.
+            force: Force at `frame`, shape (3,) [N], world axes.
+            wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several; added to `force`.
+            frame: Name of the frame; the tip by default.
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+
+        Returns:
+            The load.
+
+        Raises:
+            ParameterError: If a shape differs or a number is not finite.
+            NameNotFound: If a frame does not exist.
+        """
+        at = model.tip if frame is None else frame
+        model.frame_id(at)
+        total: dict[str, FloatArray] = {}
+        if force is not None:
+            total[at] = np.concatenate([finite_array("force", force, (3,), "N"), np.zeros(3)])
+        if wrench is not None:
+            several = wrench if isinstance(wrench, Mapping) else {at: wrench}
+            for name, value in several.items():
+                model.frame_id(name)
+                field = f"wrench[{name!r}]" if isinstance(wrench, Mapping) else "wrench"
+                total[name] = total.get(name, 0.0) + finite_array(field, value, (6,), "N, N m")
+        if gravity is None:
+            return cls({name: read_only(value) for name, value in total.items()}, None)
+        x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
+        return cls({name: read_only(value) for name, value in total.items()}, (x, y, z))
+
+    @property
+    def conservative(self) -> bool:
+        """Whether the load has a potential: no moment in it."""
+        return all(term.moment_cross is None for term in self.terms)
+
+    @cached_property
+    def terms(self) -> tuple[LoadTerm, ...]:
+        """The wrenches with the matrices that the statics needs of them."""
+        return tuple(LoadTerm.of(frame, wrench) for frame, wrench in self.wrenches.items())
+
+    def scaled(self, factor: float) -> Load:
+        """Return the load with every wrench and gravity multiplied by `factor`."""
+        gravity = None if self.gravity is None else tuple(factor * g for g in self.gravity)
+        return Load({name: read_only(factor * value) for name, value in self.wrenches.items()}, gravity)  # type: ignore[arg-type]
+
+    def plus(self, frame: str, wrench: FloatArray) -> Load:
+        """Return the load with one more wrench, shape (6,) [N, N m], at a frame."""
+        return Load({**self.wrenches, frame: read_only(self.wrenches.get(frame, 0.0) + wrench)}, self.gravity)
+
+
+class GeneralisedLoad(NamedTuple):
+    """A load in joint coordinates."""
+
+    torque: FloatArray
+    """Torque that the joints must carry, `sum J^T w - g(q)`, shape (nv,) [N m or N]."""
+    derivative: FloatArray
+    """Its derivative with respect to the joint coordinates, shape (nv, nv)."""
+    potential: float
+    """Potential energy of forces and gravity, `-sum f . p + U_g` [J]; moments have none and do not count."""
+    scale: float
+    """Size of the load, `sum |f| reach + |moment|` plus the norm of the gravity torque [N m]."""
+
+
+def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> GeneralisedLoad:
+    r"""Torque of a load in joint coordinates, with its exact derivative.
+
+    For a world-fixed force `f` at a point of a chain, with linear and angular Jacobian columns `v_i`, `w_i`,
+    the derivative of :math:`J_v^T f` is :math:`(f \times w_i) \cdot v_j` for `i <= j`, and symmetric.
+    For a world-fixed moment `mu` it is :math:`w_i \cdot (\mu \times w_j)` for `j < i`, else 0: not symmetric.
+    (Closed form of the kinematic Hessian; Pinocchio's own static derivatives take the load as a follower.)
+
+    Args:
+        model: The robot.
+        q: Configuration, shape (nq,), finite.
+        load: The load.
+
+    Returns:
+        Torque, derivative, potential and size.
+    """
+    pin_model, data = model.workspace(load.gravity)
+    nv = pin_model.nv
+    upper, strictly_upper = _triangles(nv)
+    pin.computeJointJacobians(pin_model, data, q)
+    torque: FloatArray = np.zeros(nv)
+    derivative: FloatArray = np.zeros((nv, nv))
+    potential = scale = 0.0
+    for term in load.terms:
+        frame = model.frame_id(term.frame)
+        jacobian = pin.getFrameJacobian(pin_model, data, frame, _AXES).reshape(6, nv)
+        torque += term.wrench @ jacobian
+        scale += term.norms[0] * model.reach + term.norms[1]
+        potential -= float(term.force @ pin.updateFramePlacement(pin_model, data, frame).translation)
+        angular = jacobian[3:]
+        products = angular.T @ (term.force_cross_transposed @ jacobian[:3])
+        derivative += products * upper
+        derivative += (products * strictly_upper).T
+        if term.moment_cross is not None:
+            derivative += (angular.T @ (term.moment_cross @ angular)) * strictly_upper.T
+    if load.gravity is not None:
+        derivative -= pin.computeGeneralizedGravityDerivatives(pin_model, data, q)
+        gravity_torque: FloatArray = data.g
+        torque -= gravity_torque
+        scale += math.sqrt(float(gravity_torque @ gravity_torque))
+        potential += pin.computePotentialEnergy(pin_model, data)
+    return GeneralisedLoad(torque, derivative, potential, scale)
+
+
+@lru_cache(maxsize=16)
+def _triangles(n: int) -> tuple[FloatArray, FloatArray]:
+    """Masks of the upper triangle with and without the diagonal, shape (n, n)."""
+    return read_only(np.triu(np.ones((n, n)))), read_only(np.triu(np.ones((n, n)), 1))
+
+
+def cross_matrix(vector: FloatArray) -> FloatArray:
+    """Matrix `[v]` with `[v] u = v x u`, shape (3, 3)."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
