@@ -1,2 +1,75 @@
-"""x"""
+"""Soft robots as rigid-body robot descriptions, with certified statics and inverse kinematics on Pinocchio."""
+
+from softrobots import inflated_beam
+from softrobots.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.errors import (
+    DescriptionError,
+    EquilibriumNotFound,
+    FileFormatError,
+    LoadNotFound,
+    MissingDependency,
+    NameNotFound,
+    NoCriticalLoad,
+    NotConverged,
+    OutputExists,
+    ParameterError,
+    SoftRobotsError,
+    TargetUnreachable,
+    ViewerError,
+)
+from softrobots.inverse_kinematics import IkSolution, solve_ik
+from softrobots.load_estimation import LoadEstimate, estimate_load
+from softrobots.loads import EARTH_GRAVITY, Load
+from softrobots.model import SoftModel, SpringGroup, load_model
+from softrobots.results_io import load, save, save_csv
+from softrobots.robots import ROBOTS, InflatableArm
+from softrobots.sensitivity import compliance, elastostatic_jacobian
+from softrobots.stability import critical_load
+from softrobots.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
+from softrobots.trajectory import Trajectory, follow_trajectory
+
 __version__ = "0.1.0"
+
+__all__ = [
+    "EARTH_GRAVITY",
+    "ROBOTS",
+    "DescriptionError",
+    "Equilibrium",
+    "EquilibriumNotFound",
+    "FileFormatError",
+    "IkSolution",
+    "InflatableArm",
+    "Load",
+    "LoadEstimate",
+    "LoadNotFound",
+    "MissingDependency",
+    "NameNotFound",
+    "NoCriticalLoad",
+    "NotConverged",
+    "OutputExists",
+    "ParameterError",
+    "Path3D",
+    "SoftModel",
+    "SoftRobotsError",
+    "SpringGroup",
+    "TargetUnreachable",
+    "Trajectory",
+    "ViewerError",
+    "__version__",
+    "compliance",
+    "critical_load",
+    "elastostatic_jacobian",
+    "estimate_load",
+    "follow_trajectory",
+    "inflated_beam",
+    "load",
+    "load_model",
+    "quintic",
+    "read_waypoints",
+    "save",
+    "save_csv",
+    "solve_equilibrium",
+    "solve_ik",
+    "straight_line",
+    "waypoints",
+]

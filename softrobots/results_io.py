@@ -1,0 +1,273 @@
+"""Saving and loading of results: NPZ files without pickle, and CSV tables of trajectories.
+
+A file holds the robot (URDF and springs), the load and the coordinates. Everything else is computed again on loading, and a
+file whose coordinates are not in the balance that it claims is refused.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray, finite_array, new_file, read_only
+from softrobots.equilibrium import Equilibrium, elastic_state, equilibrium_from_state
+from softrobots.errors import FileFormatError, ParameterError, SoftRobotsError
+from softrobots.inverse_kinematics import IkSolution
+from softrobots.load_estimation import LoadEstimate
+from softrobots.loads import Load
+from softrobots.model import SoftModel, load_model
+from softrobots.trajectory import Trajectory
+
+Result = Equilibrium | IkSolution | LoadEstimate | Trajectory
+"""What can be saved."""
+
+_FORMAT = 1
+
+
+def save(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Save a result as NPZ.
+
+    The file appears whole or not at all: it is written beside its place and moved there.
+
+    Args:
+        result: An equilibrium, load estimate, IK solution or trajectory.
+        path: File to write; `.npz` is added if it has no ending.
+        overwrite: Replace an existing file.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ParameterError: If the result is something else.
+        OutputExists: If the file exists and `overwrite` is false.
+    """
+    for kind, (cls, pack, _) in _KINDS.items():
+        if isinstance(result, cls):
+            break
+    else:
+        raise ParameterError("result", result, "an Equilibrium, IkSolution, LoadEstimate or Trajectory")
+    path = Path(path)
+    target = new_file(path if path.suffix else path.with_suffix(".npz"), overwrite=overwrite)
+    fields = {"format": np.array(_FORMAT), "kind": np.array(kind), **pack(result)}
+    write_atomically(target, lambda file: np.savez_compressed(file, **fields))
+    return target
+
+
+def load(path: str | Path) -> Result:
+    """Load a result saved by `save`.
+
+    Args:
+        path: The NPZ file.
+
+    Returns:
+        The result, with its model.
+
+    Raises:
+        FileFormatError: If the file cannot be read, is not one of ours, or does not hold what it claims.
+    """
+    path = Path(path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            fields = {name: file[name] for name in file.files}
+        kind = str(fields["kind"])
+        if int(fields["format"]) != _FORMAT or kind not in _KINDS:
+            raise FileFormatError(f"{path} holds {kind!r} in format {fields['format']}; known: {', '.join(_KINDS)} in format {_FORMAT}")
+        return _KINDS[kind][2](fields)
+    except FileFormatError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, SoftRobotsError) as error:
+        raise FileFormatError(f"cannot read a result from {path}: {error}") from error
+
+
+def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Save a trajectory as a CSV table, one line a waypoint, full precision.
+
+    Columns: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z` [m],
+    `tip_error` [m], one for each motor and spring [rad], `moment_<i>` [N m] for each inflated link.
+
+    Args:
+        trajectory: The trajectory.
+        path: File to write.
+        overwrite: Replace an existing file.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ParameterError: If it is no trajectory.
+        OutputExists: If the file exists and `overwrite` is false.
+    """
+    if not isinstance(trajectory, Trajectory):
+        raise ParameterError("trajectory", trajectory, "a Trajectory")
+    target = new_file(path, overwrite=overwrite)
+    model, moments = trajectory.model, trajectory.link_moments
+    names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error", *model.motor_joints, *model.spring_joints]
+    columns = [trajectory.times[:, None], trajectory.targets, trajectory.tip_positions, trajectory.tip_error[:, None]]
+    columns += [trajectory.q_motors, trajectory.q_springs]
+    if moments is not None:
+        names += [f"moment_{i + 1}" for i in range(moments.shape[1])]
+        columns.append(moments)
+
+    def write(file: IO[bytes]) -> None:
+        import io
+
+        text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+        writer = csv.writer(text)
+        writer.writerow(names)
+        writer.writerows([repr(value) for value in row] for row in np.hstack(columns).tolist())
+        text.flush()
+        text.detach()
+
+    write_atomically(target, write)
+    return target
+
+
+def write_atomically(target: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file beside its place and move it there; an interruption leaves the old file, or none.
+
+    Args:
+        target: The file.
+        write: Writes the content into an open binary file.
+    """
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(name).chmod(0o666 & ~mask)  # as an ordinary new file; mkstemp makes private ones
+        Path(name).replace(target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
+    wrenches = {name: wrench.tolist() for name, wrench in load.wrenches.items()}
+    said = {"springs": model.spring_table, "motors": model.motor_joints, "tip": model.tip}
+    return {
+        "urdf": np.array(model.urdf),
+        "model": np.array(json.dumps(said)),
+        "load": np.array(json.dumps({"wrenches": wrenches, "gravity": load.gravity})),
+    }
+
+
+def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
+    said, loaded = json.loads(str(fields["model"])), json.loads(str(fields["load"]))
+    springs = {str(name): (float(k), float(rest)) for name, (k, rest) in said["springs"].items()}
+    model = load_model(str(fields["urdf"]), springs=springs, motors=said["motors"], tip=said["tip"])
+    return model, Load.of(model, wrench=loaded["wrenches"], gravity=loaded["gravity"])
+
+
+def _pack_rows(equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
+    first = equilibria[0]
+    return _pack_model(first.model, first.load) | {
+        "q_motors": np.array([e.q_motors for e in equilibria]),
+        "q_springs": np.array([e.q_springs for e in equilibria]),
+        "residual": np.array([e.residual for e in equilibria]),
+        "tolerance": np.array([e.tolerance for e in equilibria]),
+        "iterations": np.array([e.iterations for e in equilibria]),
+        "solver": np.array([e.method for e in equilibria]),
+    }
+
+
+def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
+    model, load = _unpack_model(fields)
+    count = len(fields["q_motors"])
+    motors = finite_array("q_motors", fields["q_motors"], (count, model.n_motors), "rad")
+    springs = finite_array("q_springs", fields["q_springs"], (count, model.n_springs), "rad")
+    residual, tolerance = (finite_array(name, fields[name], (count,), "N m") for name in ("residual", "tolerance"))
+    equilibria = []
+    for row in range(count):
+        state = elastic_state(model, motors[row], springs[row], load)
+        made = equilibrium_from_state(
+            model, motors[row], load, state, method=str(fields["solver"][row]), iterations=int(fields["iterations"][row])
+        )
+        if made.residual > residual[row] + tolerance[row]:
+            raise FileFormatError(f"row {row} claims a residual of {residual[row]:.3g} N m, but it is {made.residual:.3g} N m")
+        equilibria.append(replace(made, tolerance=float(tolerance[row])))
+    return tuple(equilibria)
+
+
+def _pack_solution(solution: IkSolution) -> dict[str, Any]:
+    return _pack_rows((solution.equilibrium,)) | {
+        "target": solution.target,
+        "steps": np.array(solution.iterations),
+        "alternatives": np.array(solution.alternatives).reshape(-1, len(solution.q_motors)),
+    }
+
+
+def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
+    (equilibrium,) = _unpack_rows(fields)
+    target = finite_array("target", fields["target"], (3,), "m")
+    others = finite_array("alternatives", fields["alternatives"], (None, equilibrium.model.n_motors), "rad")
+    return IkSolution(
+        target=read_only(target),
+        equilibrium=equilibrium,
+        error=float(np.linalg.norm(equilibrium.tip_position - target)),
+        iterations=int(fields["steps"]),
+        alternatives=tuple(map(read_only, others)),
+    )
+
+
+def _pack_estimate(estimate: LoadEstimate) -> dict[str, Any]:
+    arrays = {name: getattr(estimate, name) for name in _ESTIMATE_SHAPES}
+    return _pack_rows((estimate.equilibrium,)) | {
+        **arrays,
+        "unobservable_directions": estimate.unobservable_directions,
+        "estimation": np.array(estimate.method),
+        "unexplained": np.array(estimate.residual),
+        "steps": np.array(estimate.iterations),
+        **({} if estimate.covariance is None else {"covariance": estimate.covariance}),
+    }
+
+
+_ESTIMATE_SHAPES: dict[str, tuple[int | None, ...]] = {"force": (3,), "measured_torques": (None,), "singular_values": (3,)}
+
+
+def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
+    def array(name: str, shape: tuple[int | None, ...]) -> FloatArray:
+        return read_only(finite_array(name, fields[name], shape))
+
+    (equilibrium,) = _unpack_rows(fields)
+    return LoadEstimate(
+        **{name: array(name, shape) for name, shape in _ESTIMATE_SHAPES.items()},
+        equilibrium=equilibrium,
+        method=str(fields["estimation"]),
+        unobservable_directions=array("unobservable_directions", (None, 3)),
+        covariance=array("covariance", (3, 3)) if "covariance" in fields else None,
+        residual=float(fields["unexplained"]),
+        iterations=int(fields["steps"]),
+    )
+
+
+def _pack_trajectory(trajectory: Trajectory) -> dict[str, Any]:
+    rows = _pack_rows(trajectory.equilibria)
+    return rows | {"times": trajectory.times, "targets": trajectory.targets, "following": np.array(trajectory.method)}
+
+
+def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
+    equilibria = _unpack_rows(fields)
+    return Trajectory(
+        times=read_only(finite_array("times", fields["times"], (len(equilibria),), "s")),
+        targets=read_only(finite_array("targets", fields["targets"], (len(equilibria), 3), "m")),
+        equilibria=equilibria,
+        method=str(fields["following"]),
+    )
+
+
+_KINDS: dict[str, tuple[type, Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Result]]] = {
+    "equilibrium": (Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
+    "ik_solution": (IkSolution, _pack_solution, _unpack_solution),
+    "load_estimate": (LoadEstimate, _pack_estimate, _unpack_estimate),
+    "trajectory": (Trajectory, _pack_trajectory, _unpack_trajectory),
+}

@@ -1,0 +1,143 @@
+"""When to be where: point-to-point motion on a straight line, and waypoints from a file."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number, read_only
+from softrobots.errors import FileFormatError, ParameterError
+
+_LARGEST_FILE = 100_000_000  # bytes
+
+
+@dataclass(frozen=True)
+class Path3D:
+    """Target positions over time."""
+
+    times: FloatArray
+    """Time of each waypoint, increasing, shape (n,) [s]."""
+    positions: FloatArray
+    """Target positions, shape (n, 3) [m], world axes."""
+    velocities: FloatArray
+    """Target velocities, shape (n, 3) [m/s]."""
+
+
+def quintic(share: Any) -> FloatArray:
+    """Share of the way covered after a share of the time: `10 s^3 - 15 s^4 + 6 s^5`.
+
+    Starts and ends at rest, without acceleration: first and second derivative vanish at both ends.
+
+    Args:
+        share: Share of the time, any shape, within [0, 1].
+
+    Returns:
+        Share of the way, same shape.
+
+    Raises:
+        ParameterError: If a share is outside [0, 1].
+    """
+    s = finite_array("share", share, (None,) * np.ndim(share))
+    if np.any((s < 0.0) | (s > 1.0)):
+        raise ParameterError("share", share, "within [0, 1]")
+    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
+
+
+def straight_line(start: Any, end: Any, duration: float, steps: int = 200) -> Path3D:
+    """Point-to-point motion on a straight line with the quintic time law.
+
+    Args:
+        start: First position, shape (3,) [m].
+        end: Last position, shape (3,) [m].
+        duration: Time from start to end [s], positive.
+        steps: Number of intervals; there are `steps + 1` waypoints.
+
+    Returns:
+        The path.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or not positive.
+    """
+    a, b = finite_array("start", start, (3,), "m"), finite_array("end", end, (3,), "m")
+    duration, steps = positive_number("duration", duration, "s"), positive_integer("steps", steps)
+    s = np.linspace(0.0, 1.0, steps + 1)
+    speed = 30.0 * s**2 * (1.0 - s) ** 2 / duration
+    return Path3D(
+        read_only(s * duration), read_only(a + quintic(s)[:, None] * (b - a)), read_only(speed[:, None] * (b - a))
+    )
+
+
+def waypoints(positions: Any, times: Any) -> Path3D:
+    """Path through given positions at given times; velocities by finite differences (second order inside).
+
+    Args:
+        positions: Target positions, shape (n, 3) [m], n >= 2.
+        times: Increasing times, shape (n,) [s].
+
+    Returns:
+        The path.
+
+    Raises:
+        ParameterError: If shapes do not fit, there are fewer than two waypoints, or times do not increase.
+    """
+    points = finite_array("positions", positions, (None, 3), "m")
+    moments = finite_array("times", times, (len(points),), "s")
+    if len(points) < 2:
+        raise ParameterError("positions", positions, "at least two waypoints")
+    if np.any(np.diff(moments) <= 0.0):
+        raise ParameterError("times", times, "increasing [s]")
+    velocities = np.gradient(points, moments, axis=0, edge_order=2 if len(points) > 2 else 1)
+    return Path3D(read_only(moments), read_only(points), read_only(np.asarray(velocities)))
+
+
+def read_waypoints(path: str | Path) -> Path3D:
+    """Read waypoints from a CSV file with a header line that names the columns `t, x, y, z` [s, m, m, m].
+
+    Other columns are ignored. Without a column `t` the waypoints are 0.05 s apart.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The path.
+
+    Raises:
+        FileFormatError: If the file cannot be read, lacks a column, or a cell is no finite number; names the line.
+        ParameterError: If there are fewer than two waypoints or times do not increase.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise FileFormatError(f"{path} has {path.stat().st_size} bytes; at most {_LARGEST_FILE} are read")
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file, skipinitialspace=True)
+            names = [name.strip() for name in reader.fieldnames or []]
+            reader.fieldnames = names
+            missing = [name for name in "xyz" if name not in names]
+            if missing:
+                raise FileFormatError(
+                    f"{path} lacks the column {', '.join(missing)}; its first line must name x, y, z and may name t "
+                    f"(it names {', '.join(names) or 'nothing'})"
+                )
+            columns = [name for name in ("t", "x", "y", "z") if name in names]
+            rows = [[_cell(row, name, path, reader.line_num) for name in columns] for row in reader]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FileFormatError(f"cannot read waypoints from {path}: {error}") from error
+    table = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
+    times = table[:, 0] if columns[0] == "t" else 0.05 * np.arange(len(table))
+    return waypoints(table[:, -3:], times)
+
+
+def _cell(row: dict[str, str | None], name: str, path: Path, line: int) -> float:
+    text = row.get(name)
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise FileFormatError(f"{path}, line {line}: {name} = {text!r}; a finite number is required")
+    return value

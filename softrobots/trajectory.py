@@ -1,0 +1,261 @@
+"""Following a path of targets with the loaded tip, waypoint by waypoint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softrobots import inflated_beam
+from softrobots.checks import FloatArray, choice, finite_array, positive_number, read_only
+from softrobots.equilibrium import Equilibrium, elastic_state, equilibrium_from_state, frame_placement, settle
+from softrobots.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
+from softrobots.inverse_kinematics import POSITION_TOLERANCE, LocalSolution, search, solve_ik, start_motors
+from softrobots.loads import Load
+from softrobots.model import SoftModel
+from softrobots.sensitivity import frame_jacobian, tip_motion
+
+METHODS = ("newton", "fixed_point", "paper")
+"""How `follow_trajectory` follows: exact steps with the springs settled by Newton or by the paper's recursion, or the paper's
+closed-loop inverse kinematics."""
+
+_WARM_DAMPING = 1e-6  # of the first step of a warm-started search, relative to the reach
+_HALVINGS = 6  # of the way between two waypoints before the search starts anew
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Motor coordinates over a path, with the loaded robot at every waypoint; can be saved with `softrobots.save`."""
+
+    times: FloatArray
+    """Time of each waypoint, shape (n,) [s]; the number of the waypoint if no times were given."""
+    targets: FloatArray
+    """Target positions, shape (n, 3) [m]."""
+    equilibria: tuple[Equilibrium, ...]
+    """The loaded robot at each waypoint."""
+    method: str
+    """How the path was followed."""
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self.equilibria[0].model
+
+    @cached_property
+    def q_motors(self) -> FloatArray:
+        """Motor coordinates, shape (n, n_motors) [rad or m]."""
+        return read_only(np.array([equilibrium.q_motors for equilibrium in self.equilibria]))
+
+    @cached_property
+    def q_springs(self) -> FloatArray:
+        """Spring coordinates, shape (n, n_springs) [rad or m]."""
+        return read_only(np.array([equilibrium.q_springs for equilibrium in self.equilibria]))
+
+    @cached_property
+    def tip_positions(self) -> FloatArray:
+        """Position of the loaded tip, shape (n, 3) [m]."""
+        return read_only(np.array([equilibrium.tip_position for equilibrium in self.equilibria]))
+
+    @cached_property
+    def tip_error(self) -> FloatArray:
+        """Distance of the loaded tip from its target, shape (n,) [m]."""
+        return read_only(np.linalg.norm(self.tip_positions - self.targets, axis=1))
+
+    @cached_property
+    def link_moments(self) -> FloatArray | None:
+        """Moment at each inflated link, shape (n, n_links) [N m]; None if the model names no inflated links."""
+        if not self.model.spring_groups:
+            return None
+        return read_only(np.array([equilibrium.link_moments for equilibrium in self.equilibria]))
+
+    @property
+    def required_pressure(self) -> float | None:
+        """Smallest gauge pressure at which no link wrinkles anywhere on the path [Pa], [Troise 2021] (3); None without links."""
+        if self.link_moments is None:
+            return None
+        largest = zip(self.link_moments.max(axis=0), self.model.spring_groups, strict=True)
+        return max(inflated_beam.required_pressure(moment, group.radius) for moment, group in largest)
+
+    @property
+    def wrinkling_margin(self) -> float | None:
+        """Share of the wrinkling moment that is left at the worst waypoint and link [-]; negative: a link wrinkles.
+
+        None without inflated links.
+        """
+        if self.link_moments is None:
+            return None
+        limits = np.array([group.wrinkling_moment for group in self.model.spring_groups])
+        if np.any(limits == 0.0):
+            raise ParameterError("pressure", 0.0, "positive in every link, for a wrinkling margin to exist")
+        return float(1.0 - (self.link_moments / limits).max())
+
+
+def follow_trajectory(
+    model: SoftModel,
+    targets: Any,
+    force: Any = None,
+    *,
+    wrench: Any = None,
+    frame: str | None = None,
+    gravity: Any = None,
+    q_motors0: Any = None,
+    elbow: str | None = None,
+    method: str = "newton",
+    tolerance: float = POSITION_TOLERANCE,
+    times: Any = None,
+    gain: float = 50.0,
+    progress: bool = False,
+) -> Trajectory:
+    """Find motor coordinates that move the loaded tip through target positions.
+
+    "newton" and "fixed_point" reach every waypoint within `tolerance`, each search starting from the last waypoint and its
+    elastostatic Jacobian. "paper" is [Troise 2021] (8, 9) in position form, `dq_m/dt = [J^#]_m (v_d + K e)` with the springs
+    by the fixed point at every step: it follows with a lag that depends on the gain. (With the 6 x 7 Jacobian that the paper
+    prints it diverges at useful gains: three motors cannot hold an orientation.) It starts exactly on the first target.
+
+    Args:
+        model: The robot, with at least one motor.
+        targets: Target positions, shape (n, 3) [m], world axes.
+        force: Force at `frame`, shape (3,) [N], constant over the path, world axes.
+        wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
+        frame: Frame of `force` and `wrench`; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        q_motors0: Motor coordinates near the first waypoint, shape (n_motors,) [rad or m]; zero by default.
+        elbow: "up" or "down" at the first waypoint; None: whatever changes `q_motors0` least.
+        method: "newton", "fixed_point" or "paper".
+        tolerance: Largest distance of the tip from a target [m]; not for "paper".
+        times: Increasing times of the waypoints, shape (n,) [s]; required by "paper".
+        gain: Gain `K` of "paper" [1/s].
+        progress: Show a progress bar on stderr.
+
+    Returns:
+        The trajectory.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or out of range.
+        NameNotFound: If a frame does not exist.
+        TargetUnreachable: If a waypoint cannot be reached; names it and how near the tip came.
+        EquilibriumNotFound: If the springs do not settle on the way ("paper").
+    """
+    choice("method", method, METHODS)
+    points = finite_array("targets", targets, (None, 3), "m")
+    if len(points) == 0:
+        raise ParameterError("targets", targets, "at least one target position [m]")
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    positive_number("gain", gain, "1/s")
+    start_motors(model, q_motors0)
+    if times is None:
+        if method == "paper":
+            raise ParameterError("times", times, "given for method='paper', which integrates over time")
+        moments: FloatArray = np.arange(len(points), dtype=np.float64)
+    else:
+        moments = finite_array("times", times, (len(points),), "s")
+        if np.any(np.diff(moments) <= 0.0):
+            raise ParameterError("times", times, "increasing [s]")
+    inner = "newton" if method == "newton" else "fixed_point"
+    first = solve_ik(
+        model,
+        points[0],
+        wrench=dict(load.wrenches),
+        gravity=gravity,
+        q_motors0=q_motors0,
+        elbow=elbow,
+        method=inner,
+        tolerance=tolerance,
+    ).equilibrium
+    steps = _paper_steps(model, points, moments, load, first, gain) if method == "paper" else _exact_steps(
+        model, points, load, first, inner, tolerance
+    )
+    equilibria = [first, *_with_progress(steps, len(points) - 1, method, progress)]
+    return Trajectory(read_only(moments), read_only(points), tuple(equilibria), method)
+
+
+def _with_progress(steps: Iterable[Equilibrium], total: int, label: str, progress: bool) -> Iterable[Equilibrium]:
+    if not progress:
+        return steps
+    from tqdm import tqdm
+
+    return tqdm(steps, total=total, desc=f"waypoints ({label})", unit="wp")
+
+
+def _exact_steps(
+    model: SoftModel, points: FloatArray, load: Load, first: Equilibrium, method: str, tolerance: float
+) -> Iterable[Equilibrium]:
+    state = elastic_state(model, first.q_motors, first.q_springs, load)
+    here = LocalSolution(first.q_motors, state, 0.0, 0)
+    for number, (last, target) in enumerate(zip(points[:-1], points[1:], strict=True), start=1):
+        reached = _advance(model, last, target, load, here, method, tolerance, _HALVINGS)
+        if reached is None:
+            here = _anew(model, target, load, here, method, tolerance, number, len(points))
+        else:
+            here = reached
+        yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
+
+
+def _advance(
+    model: SoftModel, last: FloatArray, target: FloatArray, load: Load, here: LocalSolution, method: str, tolerance: float, halvings: int
+) -> LocalSolution | None:
+    """Go from one waypoint to the next by its linear prediction and a search, over waypoints between if need be."""
+    jacobian = frame_jacobian(model, here.state.q, model.tip)[:3]
+    slope, follow = tip_motion(model, jacobian, here.state.tangent, here.state.joints.derivative)
+    step = np.linalg.pinv(slope, rcond=1e-6) @ (target - frame_placement(model, here.state.q, model.tip).translation)
+    if float(np.linalg.norm(step)) <= 0.5:
+        motors = np.clip(here.q_motors + step, *model.motor_limits.T)
+        springs = here.state.q_springs + follow @ (motors - here.q_motors)
+        found = search(
+            model, target, load, motors, springs, home=here.q_motors, method=method, tolerance=tolerance, damping=_WARM_DAMPING
+        )
+        if found is not None and found.error <= tolerance and float(np.abs(found.q_motors - here.q_motors).max()) <= 1.0:
+            return found
+    if halvings == 0:
+        return None
+    middle = 0.5 * (last + target)
+    half = _advance(model, last, middle, load, here, method, tolerance, halvings - 1)
+    return None if half is None else _advance(model, middle, target, load, half, method, tolerance, halvings - 1)
+
+
+def _anew(
+    model: SoftModel, target: FloatArray, load: Load, here: LocalSolution, method: str, tolerance: float, number: int, total: int
+) -> LocalSolution:
+    """Search a waypoint from everywhere when the way from the last one is blocked (a limit, a fold of the workspace)."""
+    gravity = load.gravity
+    try:
+        found = solve_ik(
+            model, target, wrench=dict(load.wrenches), gravity=gravity, q_motors0=here.q_motors, method=method, tolerance=tolerance
+        )
+    except TargetUnreachable as error:
+        raise TargetUnreachable(
+            f"waypoint {number} of {total}: {error}", best=error.best, residual=error.residual, iterations=error.iterations
+        ) from error
+    solution = found.equilibrium
+    state = elastic_state(model, solution.q_motors, solution.q_springs, load)
+    return LocalSolution(solution.q_motors, state, found.error, found.iterations)
+
+
+def _paper_steps(
+    model: SoftModel, points: FloatArray, times: FloatArray, load: Load, first: Equilibrium, gain: float
+) -> Iterable[Equilibrium]:
+    """Closed-loop inverse kinematics, explicit Euler, [Troise 2021] (8, 9) with the three position rows of the Jacobian."""
+    motors, springs, q = np.array(first.q_motors), np.array(first.q_springs), first.q
+    for number in range(1, len(points)):
+        interval = times[number] - times[number - 1]
+        velocity = (points[number] - points[number - 1]) / interval
+        error = points[number - 1] - frame_placement(model, q, model.tip).translation
+        inverse = np.linalg.pinv(frame_jacobian(model, q, model.tip)[:3])
+        motors = motors + interval * (inverse[model.motor_indices] @ (velocity + gain * error))
+        motors = np.clip(motors, *model.motor_limits.T)
+        state, spent = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
+        equilibrium = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
+        if not equilibrium.converged:
+            raise EquilibriumNotFound(
+                f"waypoint {number} of {len(points)}: the fixed point of method='paper' does not converge in {spent} iterations "
+                f"(residual {equilibrium.residual:.3g} N m)",
+                best=equilibrium,
+                residual=equilibrium.residual,
+                iterations=spent,
+            )
+        springs, q = np.array(state.q_springs), state.q
+        yield equilibrium
