@@ -19,8 +19,9 @@ from softrobots.errors import (
 )
 from softrobots.inverse_kinematics import IkSolution, solve_ik
 from softrobots.load_estimation import LoadEstimate, estimate_load
+from softrobots.loader import load_model
 from softrobots.loads import EARTH_GRAVITY, Load
-from softrobots.model import SoftModel, SpringGroup, load_model
+from softrobots.model import SoftModel, SpringGroup
 from softrobots.results_io import load, save, save_csv
 from softrobots.robots import ROBOTS, InflatableArm
 from softrobots.sensitivity import compliance, elastostatic_jacobian

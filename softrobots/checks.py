@@ -132,8 +132,8 @@ def new_file(path: str | Path, *, overwrite: bool) -> Path:
     return path
 
 
-def new_folder(path: str | Path) -> Path:
-    """Return `path` if it can be a folder of results, making it.
+def free_folder(path: str | Path) -> Path:
+    """Return `path` if it can become a folder of results; nothing is made yet.
 
     Args:
         path: A folder that does not exist or is empty.
@@ -148,5 +148,4 @@ def new_folder(path: str | Path) -> Path:
     if names:
         held = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
         raise OutputExists(f"{path} is not empty (it holds {held}); an output folder must be new or empty")
-    path.mkdir(parents=True, exist_ok=True)
     return path

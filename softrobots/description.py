@@ -175,7 +175,9 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         if role is not None:
             value = role.get("value", "")
             if value not in ROLES:
-                raise DescriptionError(f"joint {name} in {source} has the role {value!r}; one of {', '.join(ROLES)} is required")
+                raise DescriptionError(
+                    f"joint {name} in {source} has the role {value!r}; one of {', '.join(ROLES)} is required"
+                )
             roles[name] = value
     inflated = []
     for link in root.findall(f"{{{NAMESPACE}}}inflated_link"):

@@ -12,16 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
-from softrobots.equilibrium import (
-    METHODS,
-    TOLERANCE,
-    ElasticState,
-    Equilibrium,
-    equilibrium_from_state,
-    frame_placement,
-    largest_residual,
-    settle,
-)
+from softrobots.elastostatics import METHODS, TOLERANCE, ElasticState, largest_residual, settle
+from softrobots.equilibrium import Equilibrium, equilibrium_from_state, frame_placement
 from softrobots.errors import ParameterError, TargetUnreachable
 from softrobots.loads import Load
 from softrobots.model import SoftModel
@@ -135,7 +127,9 @@ def solve_ik(
             nearest = local
     if nearest is None:
         side = f" with the elbow {elbow}" if elbow else ""
-        raise ParameterError("target", target, f"reached from one of {starts} starts{side}: none gave a loaded equilibrium there")
+        raise ParameterError(
+            "target", target, f"reached from one of {starts} starts{side}: none gave a loaded equilibrium there"
+        )
     found.sort(key=lambda local: float(np.linalg.norm(local.q_motors - first)))
     best = found[0] if found else nearest
     solution = IkSolution(

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
-from softrobots.equilibrium import ElasticState, Equilibrium, elastic_state, equilibrium_from_state, largest_residual, settle
+from softrobots.elastostatics import ElasticState, elastic_state, largest_residual, settle
+from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import LoadNotFound, ParameterError
 from softrobots.loads import Load
 from softrobots.model import SoftModel
@@ -172,8 +173,8 @@ def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int
     model = problem.model
     force = np.zeros(3)
     state = problem.equilibrium(force, model.rest) or elastic_state(model, problem.motors, model.rest, problem.load(force))
-    damping, iteration = _FIRST_DAMPING * model.reach, 0
-    for iteration in range(most):
+    damping, spent = _FIRST_DAMPING * model.reach, 0
+    while spent < most:
         left, values, right, keep = problem.slope(state)
         missing = left[:, : len(values)].T @ problem.unexplained(state)
         size = float(np.linalg.norm(missing[keep]))
@@ -181,6 +182,7 @@ def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int
             break
         step = right[: len(values)][keep].T @ (missing[keep] * values[keep] / (values[keep] ** 2 + damping**2))
         trial = problem.equilibrium(force + step, state.q_springs)
+        spent += 1
         if trial is not None:
             left_over = left[:, : len(values)].T @ problem.unexplained(trial)
             if float(np.linalg.norm(left_over[keep])) < size:
@@ -188,7 +190,7 @@ def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int
                 damping = 0.1 * damping if damping > _LAST_DAMPING * model.reach else 0.0
                 continue
         damping = max(10.0 * damping, 10.0 * _LAST_DAMPING * model.reach)
-    return force, state, iteration
+    return force, state, spent
 
 
 def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
@@ -199,7 +201,9 @@ def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState
     for iteration in range(1, most + 1):
         jacobian = frame_jacobian(model, state.q, problem.frame)[:3]
         unloaded = elastic_state(model, problem.motors, springs, problem.base).joints.torque
-        found = np.linalg.lstsq(jacobian[:, model.motor_indices].T, problem.torques - unloaded[model.motor_indices], rcond=None)[0]
+        found = np.linalg.lstsq(
+            jacobian[:, model.motor_indices].T, problem.torques - unloaded[model.motor_indices], rcond=None
+        )[0]
         pull = unloaded + jacobian.T @ found
         springs = model.rest + pull[model.spring_indices] / model.stiffness
         moved = float(np.linalg.norm(found - force))
@@ -225,7 +229,12 @@ def _estimate(
     return LoadEstimate(
         force=read_only(force),
         equilibrium=equilibrium_from_state(
-            problem.model, problem.motors, problem.load(force), state, method="newton" if method == "newton" else "fixed_point", iterations=iterations
+            problem.model,
+            problem.motors,
+            problem.load(force),
+            state,
+            method="newton" if method == "newton" else "fixed_point",
+            iterations=iterations,
         ),
         measured_torques=read_only(problem.torques),
         method=method,

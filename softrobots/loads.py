@@ -57,7 +57,9 @@ class Load:
     """Gravity, world axes [m/s^2]; None: weightless."""
 
     @classmethod
-    def of(cls, model: SoftModel, force: Any = None, *, wrench: Any = None, frame: str | None = None, gravity: Any = None) -> Load:
+    def of(
+        cls, model: SoftModel, force: Any = None, *, wrench: Any = None, frame: str | None = None, gravity: Any = None
+    ) -> Load:
         """Check a load against a model.
 
         Args:

@@ -19,12 +19,14 @@ from typing import IO, Any
 import numpy as np
 
 from softrobots.checks import FloatArray, finite_array, new_file, read_only
-from softrobots.equilibrium import Equilibrium, elastic_state, equilibrium_from_state
+from softrobots.elastostatics import elastic_state
+from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import FileFormatError, ParameterError, SoftRobotsError
 from softrobots.inverse_kinematics import IkSolution
 from softrobots.load_estimation import LoadEstimate
+from softrobots.loader import load_model
 from softrobots.loads import Load
-from softrobots.model import SoftModel, load_model
+from softrobots.model import SoftModel
 from softrobots.trajectory import Trajectory
 
 Result = Equilibrium | IkSolution | LoadEstimate | Trajectory
@@ -50,14 +52,12 @@ def save(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
         ParameterError: If the result is something else.
         OutputExists: If the file exists and `overwrite` is false.
     """
-    for kind, (cls, pack, _) in _KINDS.items():
-        if isinstance(result, cls):
-            break
-    else:
+    kind = next((name for name, (cls, _, _) in _KINDS.items() if isinstance(result, cls)), None)
+    if kind is None:
         raise ParameterError("result", result, "an Equilibrium, IkSolution, LoadEstimate or Trajectory")
     path = Path(path)
     target = new_file(path if path.suffix else path.with_suffix(".npz"), overwrite=overwrite)
-    fields = {"format": np.array(_FORMAT), "kind": np.array(kind), **pack(result)}
+    fields = {"format": np.array(_FORMAT), "kind": np.array(kind), **_KINDS[kind][1](result)}
     write_atomically(target, lambda file: np.savez_compressed(file, **fields))
     return target
 
@@ -80,7 +80,9 @@ def load(path: str | Path) -> Result:
             fields = {name: file[name] for name in file.files}
         kind = str(fields["kind"])
         if int(fields["format"]) != _FORMAT or kind not in _KINDS:
-            raise FileFormatError(f"{path} holds {kind!r} in format {fields['format']}; known: {', '.join(_KINDS)} in format {_FORMAT}")
+            raise FileFormatError(
+                f"{path} holds {kind!r} in format {fields['format']}; known: {', '.join(_KINDS)} in format {_FORMAT}"
+            )
         return _KINDS[kind][2](fields)
     except FileFormatError as error:
         raise FileFormatError(f"{path}: {error}") from error

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
@@ -73,7 +71,9 @@ def frame_jacobian(model: SoftModel, q: FloatArray, frame: str) -> FloatArray:
     return np.asarray(jacobian).reshape(6, pin_model.nv)
 
 
-def tip_motion(model: SoftModel, jacobian: FloatArray, tangent: FloatArray, derivative: FloatArray) -> tuple[FloatArray, FloatArray]:
+def tip_motion(
+    model: SoftModel, jacobian: FloatArray, tangent: FloatArray, derivative: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """How tip and springs follow the motors at constant load, from matrices at an equilibrium.
 
     Args:
@@ -121,7 +121,9 @@ def _solve(tangent: FloatArray, right: FloatArray) -> FloatArray:
     try:
         return np.asarray(np.linalg.solve(tangent, right))
     except np.linalg.LinAlgError as error:
-        raise ParameterError("equilibrium", tangent, "away from a neutral equilibrium: its tangent stiffness is singular") from error
+        raise ParameterError(
+            "equilibrium", tangent, "away from a neutral equilibrium: its tangent stiffness is singular"
+        ) from error
 
 
 def _same_model(model: SoftModel, equilibrium: Equilibrium) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray, finite_array, positive_number
-from softrobots.equilibrium import ElasticState, elastic_state, largest_residual
+from softrobots.elastostatics import ElasticState, elastic_state, largest_residual
 from softrobots.errors import NoCriticalLoad, ParameterError
 from softrobots.loads import Load
 from softrobots.model import SoftModel
@@ -82,7 +82,9 @@ def critical_load(
         if there[1] <= 0.0:
             return _bisect(follow, here, low, high)
         here, low, step = there, high, min(1.5 * step, first_step + 0.25 * high)
-    raise NoCriticalLoad(f"the equilibrium stays stable up to {largest:.6g} N along {(unit / length).tolist()}", max_force=largest)
+    raise NoCriticalLoad(
+        f"the equilibrium stays stable up to {largest:.6g} N along {(unit / length).tolist()}", max_force=largest
+    )
 
 
 def _bisect(follow: Any, here: tuple[ElasticState, float], low: float, high: float) -> float:

@@ -66,9 +66,7 @@ def straight_line(start: Any, end: Any, duration: float, steps: int = 200) -> Pa
     duration, steps = positive_number("duration", duration, "s"), positive_integer("steps", steps)
     s = np.linspace(0.0, 1.0, steps + 1)
     speed = 30.0 * s**2 * (1.0 - s) ** 2 / duration
-    return Path3D(
-        read_only(s * duration), read_only(a + quintic(s)[:, None] * (b - a)), read_only(speed[:, None] * (b - a))
-    )
+    return Path3D(read_only(s * duration), read_only(a + quintic(s)[:, None] * (b - a)), read_only(speed[:, None] * (b - a)))
 
 
 def waypoints(positions: Any, times: Any) -> Path3D:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from softrobots import inflated_beam
 from softrobots.checks import FloatArray, choice, finite_array, positive_number, read_only
-from softrobots.equilibrium import Equilibrium, elastic_state, equilibrium_from_state, frame_placement, settle
+from softrobots.elastostatics import elastic_state, settle
+from softrobots.equilibrium import Equilibrium, equilibrium_from_state, frame_placement
 from softrobots.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.inverse_kinematics import POSITION_TOLERANCE, LocalSolution, search, solve_ik, start_motors
 from softrobots.loads import Load
@@ -73,7 +75,7 @@ class Trajectory:
 
     @property
     def required_pressure(self) -> float | None:
-        """Smallest gauge pressure at which no link wrinkles anywhere on the path [Pa], [Troise 2021] (3); None without links."""
+        """Smallest gauge pressure at which no link wrinkles on the path [Pa], [Troise 2021] (3); None without links."""
         if self.link_moments is None:
             return None
         largest = zip(self.link_moments.max(axis=0), self.model.spring_groups, strict=True)
@@ -166,8 +168,10 @@ def follow_trajectory(
         method=inner,
         tolerance=tolerance,
     ).equilibrium
-    steps = _paper_steps(model, points, moments, load, first, gain) if method == "paper" else _exact_steps(
-        model, points, load, first, inner, tolerance
+    steps = (
+        _paper_steps(model, points, moments, load, first, gain)
+        if method == "paper"
+        else _exact_steps(model, points, load, first, inner, tolerance)
     )
     equilibria = [first, *_with_progress(steps, len(points) - 1, method, progress)]
     return Trajectory(read_only(moments), read_only(points), tuple(equilibria), method)
@@ -178,7 +182,8 @@ def _with_progress(steps: Iterable[Equilibrium], total: int, label: str, progres
         return steps
     from tqdm import tqdm
 
-    return tqdm(steps, total=total, desc=f"waypoints ({label})", unit="wp")
+    bar: Iterable[Equilibrium] = tqdm(steps, total=total, desc=f"waypoints ({label})", unit="wp")
+    return bar
 
 
 def _exact_steps(
@@ -186,17 +191,21 @@ def _exact_steps(
 ) -> Iterable[Equilibrium]:
     state = elastic_state(model, first.q_motors, first.q_springs, load)
     here = LocalSolution(first.q_motors, state, 0.0, 0)
-    for number, (last, target) in enumerate(zip(points[:-1], points[1:], strict=True), start=1):
+    for number, (last, target) in enumerate(pairwise(points), start=1):
         reached = _advance(model, last, target, load, here, method, tolerance, _HALVINGS)
-        if reached is None:
-            here = _anew(model, target, load, here, method, tolerance, number, len(points))
-        else:
-            here = reached
+        here = reached or _anew(model, target, load, here, method, tolerance, number, len(points))
         yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
 
 
 def _advance(
-    model: SoftModel, last: FloatArray, target: FloatArray, load: Load, here: LocalSolution, method: str, tolerance: float, halvings: int
+    model: SoftModel,
+    last: FloatArray,
+    target: FloatArray,
+    load: Load,
+    here: LocalSolution,
+    method: str,
+    tolerance: float,
+    halvings: int,
 ) -> LocalSolution | None:
     """Go from one waypoint to the next by its linear prediction and a search, over waypoints between if need be."""
     jacobian = frame_jacobian(model, here.state.q, model.tip)[:3]
@@ -218,13 +227,26 @@ def _advance(
 
 
 def _anew(
-    model: SoftModel, target: FloatArray, load: Load, here: LocalSolution, method: str, tolerance: float, number: int, total: int
+    model: SoftModel,
+    target: FloatArray,
+    load: Load,
+    here: LocalSolution,
+    method: str,
+    tolerance: float,
+    number: int,
+    total: int,
 ) -> LocalSolution:
     """Search a waypoint from everywhere when the way from the last one is blocked (a limit, a fold of the workspace)."""
     gravity = load.gravity
     try:
         found = solve_ik(
-            model, target, wrench=dict(load.wrenches), gravity=gravity, q_motors0=here.q_motors, method=method, tolerance=tolerance
+            model,
+            target,
+            wrench=dict(load.wrenches),
+            gravity=gravity,
+            q_motors0=here.q_motors,
+            method=method,
+            tolerance=tolerance,
         )
     except TargetUnreachable as error:
         raise TargetUnreachable(
@@ -251,7 +273,7 @@ def _paper_steps(
         equilibrium = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
         if not equilibrium.converged:
             raise EquilibriumNotFound(
-                f"waypoint {number} of {len(points)}: the fixed point of method='paper' does not converge in {spent} iterations "
+                f"waypoint {number} of {len(points)}: the fixed point of method='paper' does not converge in {spent} steps "
                 f"(residual {equilibrium.residual:.3g} N m)",
                 best=equilibrium,
                 residual=equilibrium.residual,

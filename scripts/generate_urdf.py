@@ -1,0 +1,34 @@
+"""Generate the committed URDF files from xacro, or check that they are up to date."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import softrobots as sr
+from softrobots.paths import urdf_folder
+from softrobots.results_io import write_atomically
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Write every robot of `softrobots.ROBOTS` with its default parameters; with --check, only compare."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="write nothing; exit with status 1 if a file differs")
+    parser.add_argument("--output", type=Path, metavar="FOLDER", help="folder of the files (urdf/ of the project)")
+    arguments = parser.parse_args(argv)
+    folder = arguments.output or urdf_folder()
+    stale = 0
+    for name, robot in sr.ROBOTS.items():
+        path, text = folder / f"{name}.urdf", robot().urdf().encode("utf-8")
+        same = path.is_file() and path.read_bytes() == text
+        if not arguments.check and not same:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, lambda file, content=text: file.write(content))
+        stale += not same
+        print(f"{path}: {'up to date' if same else 'differs' if arguments.check else 'written'}")
+    return 1 if arguments.check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""Chromium without a window: pictures of viewer pages, for documentation and tests."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from softrobots.checks import new_file
+from softrobots.errors import MissingDependency, ViewerError
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome")
+_OPTIONS = (
+    "--no-sandbox",  # needed as root; only pages of this project are opened
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+)
+
+
+def find_chromium() -> str:
+    """Path of an installed Chromium.
+
+    Raises:
+        ViewerError: If there is none.
+    """
+    for name in _NAMES:
+        path = shutil.which(name)
+        if path:
+            return path
+    raise ViewerError(f"no browser found (looked for {', '.join(_NAMES)}); on Debian: apt-get install chromium")
+
+
+@contextlib.contextmanager
+def open_browser() -> Iterator[Any]:
+    """Run a headless Chromium with software WebGL; yields a Playwright `Browser`.
+
+    Raises:
+        ViewerError: If no Chromium is installed.
+        MissingDependency: If Playwright is not installed.
+    """
+    path = find_chromium()
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        raise MissingDependency("playwright", "dev") from error
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(_OPTIONS))
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height: int = 640, share: float = 0.0) -> Path:
+    """Take a picture of a self-contained viewer page.
+
+    Args:
+        html: The page.
+        png: File to write; an existing one is replaced.
+        width: Width [px].
+        height: Height [px].
+        share: Where the animation of the page is stopped, from 0 (start) to 1 (end).
+
+    Returns:
+        The path of the picture.
+
+    Raises:
+        ViewerError: If no Chromium is installed.
+        MissingDependency: If Playwright is not installed.
+    """
+    target = new_file(png, overwrite=True)
+    with open_browser() as browser:
+        page = browser.new_page(viewport={"width": width, "height": height})
+        page.goto(Path(html).resolve().as_uri())
+        show_share(page, share)
+        page.screenshot(path=str(target))
+    return target
+
+
+def show_share(page: Any, share: float) -> None:
+    """Wait until a viewer page has drawn its scene, and stop its animation at a share of its time, from 0 to 1."""
+    page.wait_for_function("() => viewer.scene_tree.find(['meshcat', 'softrobots', 'deformed']).object.children.length > 0")
+    page.wait_for_timeout(1500)
+    page.evaluate("share => { viewer.animator.pause(); viewer.animator.seek(share * viewer.animator.duration); }", share)
+    page.wait_for_timeout(500)

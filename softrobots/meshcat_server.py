@@ -1,0 +1,102 @@
+"""The meshcat server on loopback only; run as `python -m softrobots.meshcat_server` by the viewer.
+
+Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds 127.0.0.1 and ends
+when its standard input closes, which happens however the parent ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import subprocess
+import sys
+import threading
+from typing import Any
+
+from softrobots.errors import ViewerError
+
+LOOPBACK = "127.0.0.1"
+"""The only address that is served."""
+
+_REPLY_TIME = 30_000  # [ms], longest wait for an answer of the server
+
+
+def main() -> None:
+    """Serve until standard input closes; print `zmq_url=` and `web_url=` first."""
+    from meshcat.servers.zmqserver import ZMQWebSocketBridge
+    from tornado.web import Application
+
+    listen = Application.listen
+
+    def listen_on_loopback(self: Any, port: int, address: str | None = None, **options: Any) -> Any:
+        return listen(self, port, address=LOOPBACK, **options)
+
+    Application.listen = listen_on_loopback
+    bridge = ZMQWebSocketBridge()
+    print(f"zmq_url={bridge.zmq_url}\nweb_url={bridge.web_url}", flush=True)  # noqa: T201
+    quiet = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(quiet, sys.stdout.fileno())  # nobody reads on, and a full pipe would block the server
+    os.dup2(quiet, sys.stderr.fileno())
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    bridge.run()
+
+
+def _end_with_parent() -> None:
+    sys.stdin.buffer.read()
+    os._exit(0)
+
+
+def start_server() -> tuple[subprocess.Popen[bytes], str, str]:
+    """Start a server process.
+
+    Returns:
+        The process, its ZeroMQ address and its web address.
+
+    Raises:
+        ViewerError: If it ends before it serves.
+    """
+    server = subprocess.Popen(
+        [sys.executable, "-u", "-m", "softrobots.meshcat_server"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    found: dict[str, str] = {}
+    while server.stdout is not None and len(found) < 2:
+        line = server.stdout.readline().decode("utf-8", "replace")
+        if not line:
+            told = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
+            end_server(server)
+            raise ViewerError(f"the meshcat server ended before it served: {told}")
+        name, _, value = line.strip().partition("=")
+        found[name] = value
+    return server, found["zmq_url"], found["web_url"]
+
+
+def end_server(server: subprocess.Popen[bytes]) -> None:
+    """End a server process and wait for its end."""
+    server.terminate()
+    try:
+        server.wait(5.0)
+    except subprocess.TimeoutExpired:
+        server.kill()
+        server.wait()
+    for stream in (server.stdin, server.stdout, server.stderr):
+        if stream is not None:
+            stream.close()
+
+
+def connect(zmq_url: str) -> Any:
+    """Connect to a server; returns a `meshcat.Visualizer` whose calls fail rather than wait for ever."""
+    import meshcat
+    from zmq import SocketOption
+
+    with contextlib.redirect_stdout(io.StringIO()):  # meshcat prints the address; the caller does that
+        page = meshcat.Visualizer(zmq_url=zmq_url)
+    page.window.zmq_socket.setsockopt(SocketOption.RCVTIMEO, _REPLY_TIME)
+    return page
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+"""Shapes, colours and the legend of the browser view, in meshcat's terms."""
+
+from __future__ import annotations
+
+import html
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray
+from softrobots.errors import ViewerError
+from softrobots.scene import WRINKLING_COLOURS
+
+RIGID_COLOUR = (0.40, 0.50, 0.62, 0.20)
+"""Red, green, blue, opacity of the rigid arm."""
+PATH_COLOUR = 0x0072B2
+"""Blue of the path; blue and green are a pair that colour-blind people tell apart."""
+FORCE_COLOUR = 0x009E73
+"""Green of the forces."""
+
+
+def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:
+    """Meshcat's form of a coal shape, and the turn from its axes to coal's (meshcat's cylinders stand along y)."""
+    import coal
+    import meshcat.geometry as geometry
+
+    upright = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    if isinstance(shape, coal.Cylinder):
+        return geometry.Cylinder(2.0 * shape.halfLength, shape.radius), upright
+    if isinstance(shape, coal.Sphere):
+        return geometry.Sphere(shape.radius), np.eye(4)
+    if isinstance(shape, coal.Box):
+        return geometry.Box((2.0 * shape.halfSide).tolist()), np.eye(4)
+    if isinstance(shape, coal.BVHModelBase):
+        triangles = [shape.tri_indices(i) for i in range(shape.num_tris)]
+        return geometry.TriangularMeshGeometry(shape.vertices(), np.array([[t[0], t[1], t[2]] for t in triangles])), np.eye(4)
+    raise ViewerError(f"a {type(shape).__name__} cannot be drawn; boxes, cylinders, spheres and meshes can")
+
+
+def material(rgba: tuple[float, ...]) -> Any:
+    """Meshcat's material of a colour: red, green, blue, opacity."""
+    import meshcat.geometry as geometry
+
+    red, green, blue = (round(255 * value) for value in rgba[:3])
+    clear = rgba[3] < 1.0
+    return geometry.MeshPhongMaterial(
+        color=red << 16 | green << 8 | blue, opacity=rgba[3], transparent=clear, shininess=25, depthWrite=not clear
+    )
+
+
+def floor_lines(reach: float) -> FloatArray:
+    """Ends of floor lines along x, a sixth of the reach apart, shape (2 n, 3) [m]."""
+    offsets = np.linspace(-1.0, 1.0, 13) * reach
+    ends = [(x, y, -0.15 * reach) for y in offsets for x in (-reach, reach)]
+    return np.array(ends)
+
+
+def with_legend(page: str, title: str, *, colours: bool) -> str:
+    """Give a meshcat page a title and an explanation of what is drawn."""
+    rows = [
+        ("rgba(115,140,165,0.45)", "rigid arm, same motor angles"),
+        (f"#{PATH_COLOUR:06x}", "path of the tip"),
+        (f"#{FORCE_COLOUR:06x}", "force"),
+    ]
+    if colours:
+        above = 1.0
+        for least, rgb in WRINKLING_COLOURS:
+            shade = "#" + "".join(f"{round(255 * value):02x}" for value in rgb)
+            text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"
+            rows.append((shade, text))
+            above = least
+    boxes = "".join(
+        f'<div><span style="display:inline-block;width:1.1em;height:0.8em;margin-right:0.5em;background:{colour};'
+        f'border:1px solid #888"></span>{html.escape(text)}</div>'
+        for colour, text in rows
+    )
+    legend = (
+        '<div id="softrobots-legend" style="position:absolute;left:12px;top:10px;z-index:1;pointer-events:none;'
+        f'font:13px/1.5 sans-serif;color:#222"><div style="font-weight:bold">{html.escape(title)}</div>{boxes}</div>'
+    )
+    page = page.replace("<title>MeshCat</title>", f"<title>{html.escape(title)}</title>", 1)
+    return page.replace("<body>", "<body>" + legend, 1)

@@ -1,0 +1,231 @@
+"""Figures of trajectories, after Figures 10 and 11 of [Troise 2021]. Needs matplotlib (extra `plot`).
+
+Every function returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Lines differ in style as well as in
+colour, so that they can be told apart in grey.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.checks import FloatArray
+from softrobots.equilibrium import Equilibrium
+from softrobots.errors import MissingDependency, ParameterError
+from softrobots.model import SoftModel
+from softrobots.trajectory import Trajectory
+
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito, safe for colour-blind people
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+
+
+def require_matplotlib() -> Any:
+    """Return matplotlib's `Figure` class; call it early to learn whether plots can be made.
+
+    Raises:
+        MissingDependency: If matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingDependency("matplotlib", "plot") from error
+    return Figure
+
+
+def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
+    """Backbone of the arm at some waypoints, deformed and rigid, with the path: after [Troise 2021] Figure 10.
+
+    Args:
+        trajectory: The trajectory.
+        shown: How many poses, evenly spaced.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If it is no trajectory.
+        MissingDependency: If matplotlib is not installed.
+    """
+    figure = _figure(trajectory, (8.0, 6.4))
+    axes = figure.add_subplot(projection="3d")
+    model = trajectory.model
+    chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, shown).round().astype(int))
+    everything = [trajectory.tip_positions]
+    for count, place in enumerate(chosen):
+        equilibrium = trajectory.equilibria[place]
+        shade = 0.75 - 0.65 * count / max(len(chosen) - 1, 1)
+        loaded = backbone(model, equilibrium.q)
+        rigid = backbone(model, model.configuration(equilibrium.q_motors))
+        first = count == 0
+        axes.plot(*rigid.T, color="#7f7f7f", lw=1.0, ls=":", label="rigid arm, same motor angles" if first else None)
+        axes.plot(
+            *loaded.T,
+            color=(shade, shade, shade),
+            lw=2.5,
+            marker="o",
+            ms=3.5,
+            label="loaded arm, later is darker" if first else None,
+        )
+        everything.append(loaded)
+    axes.plot(*trajectory.tip_positions.T, color=_COLOURS[1], lw=2.0, label="path of the tip")
+    end = trajectory.equilibria[-1]
+    _force_arrow(axes, end)
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Loaded arm along the path")
+    points = np.vstack(everything)
+    centre, half = (points.max(0) + points.min(0)) / 2.0, max(float(np.ptp(points, axis=0).max()) / 2.0, 1e-3)
+    for name, middle in zip("xyz", centre, strict=True):
+        getattr(axes, f"set_{name}lim")(middle - half, middle + half)
+    axes.set_box_aspect((1, 1, 1))
+    axes.view_init(elev=22, azim=-62)
+    axes.legend(loc="upper left", fontsize=9)
+    return figure
+
+
+def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
+    """Motor angles that compensate the sag beside those of rigid inverse kinematics: after [Troise 2021] Figure 11.
+
+    Args:
+        trajectory: The compensated trajectory.
+        rigid: The trajectory of the unloaded arm through the same targets.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If one of them is no trajectory, or they differ in length.
+        MissingDependency: If matplotlib is not installed.
+    """
+    figure = _figure(trajectory, (8.0, 5.0))
+    _figure(rigid, (1.0, 1.0))
+    if len(rigid.times) != len(trajectory.times):
+        raise ParameterError("rigid", len(rigid.times), f"a trajectory with {len(trajectory.times)} waypoints")
+    axes = figure.add_subplot()
+    every = max(len(trajectory.times) // 10, 1)
+    for number, name in enumerate(trajectory.model.motor_joints):
+        colour, marker = _COLOURS[number % 6], _MARKERS[number % 6]
+        style = {"color": colour, "marker": marker, "markevery": every, "ms": 5}
+        axes.plot(trajectory.times, trajectory.q_motors[:, number], label=f"{name}, elastic", **style)
+        axes.plot(rigid.times, rigid.q_motors[:, number], ls="--", mfc="white", label=f"{name}, rigid", **style)
+    axes.set(xlabel="time [s]", ylabel="motor angle [rad]", title="Motor angles: elastic and rigid inverse kinematics")
+    axes.grid(alpha=0.3)
+    axes.legend(ncols=min(trajectory.model.n_motors, 3), fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    return figure
+
+
+def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
+    """Distance of the tip from its target over time, one line a method, logarithmic.
+
+    Args:
+        errors: Distance by label, each shape (n,) [m].
+        times: Times, shape (n,) [s].
+
+    Returns:
+        The figure.
+
+    Raises:
+        MissingDependency: If matplotlib is not installed.
+    """
+    figure = _new((8.0, 4.4))
+    axes = figure.add_subplot()
+    every = max(len(times) // 10, 1)
+    for number, (label, error) in enumerate(errors.items()):
+        axes.semilogy(
+            times,
+            np.maximum(error, 1e-16) * 1e3,
+            color=_COLOURS[number % 6],
+            ls=("-", "--", "-.", ":")[number % 4],
+            marker=_MARKERS[number % 6],
+            markevery=every,
+            ms=5,
+            label=label,
+        )
+    axes.set(xlabel="time [s]", ylabel="tip error [mm]", title="Distance of the loaded tip from its target")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=9)
+    return figure
+
+
+def link_moments(trajectory: Trajectory) -> Any:
+    """Moment at each inflated link over time, with the wrinkling moment at the pressure of the arm.
+
+    Args:
+        trajectory: A trajectory of a robot with inflated links.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If it is no trajectory or its robot names no inflated links.
+        MissingDependency: If matplotlib is not installed.
+    """
+    figure = _figure(trajectory, (8.0, 4.4))
+    moments = trajectory.link_moments
+    if moments is None:
+        raise ParameterError("trajectory", trajectory.model, "of a robot with inflated links")
+    axes = figure.add_subplot()
+    for number, moment in enumerate(moments.T):
+        axes.plot(
+            trajectory.times,
+            moment,
+            color=_COLOURS[number % 6],
+            ls=("-", "--", "-.", ":")[number % 4],
+            label=f"link {number + 1}",
+        )
+    limits = {(group.wrinkling_moment, group.pressure) for group in trajectory.model.spring_groups}
+    for limit, pressure in sorted(limits):
+        axes.axhline(limit, color="black", lw=1.0)
+        axes.annotate(
+            f"wrinkling moment at {pressure / 1e3:g} kPa",
+            (trajectory.times[0], limit),
+            xytext=(4, 4),
+            textcoords="offset points",
+            fontsize=9,
+        )
+    top = 1.12 * max(float(moments.max()), *(limit for limit, _ in limits))
+    axes.set(xlabel="time [s]", ylabel="moment [N m]", title="Moment at the springs of each link", ylim=(0.0, top))
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=9)
+    return figure
+
+
+def backbone(model: SoftModel, q: FloatArray) -> FloatArray:
+    """Origins of the joints from base to tip at a configuration, shape (n, 3) [m]; repeated points are dropped.
+
+    Args:
+        model: The robot.
+        q: Pinocchio's configuration, shape (nq,).
+    """
+    pin_model, data = model.workspace(None)
+    pin.forwardKinematics(pin_model, data, q)
+    frame = model.frame_id(model.tip)
+    points = [np.array(pin.updateFramePlacement(pin_model, data, frame).translation)]
+    joint = pin_model.frames[frame].parentJoint
+    while joint > 0:
+        point = np.array(data.oMi[joint].translation)
+        if float(np.linalg.norm(point - points[-1])) > 1e-12:
+            points.append(point)
+        joint = pin_model.parents[joint]
+    return np.array(points[::-1])
+
+
+def _force_arrow(axes: Any, equilibrium: Equilibrium) -> None:
+    tip = equilibrium.tip_position
+    wrench = equilibrium.load.wrenches.get(equilibrium.model.tip)
+    if wrench is None or not wrench[:3].any():
+        return
+    size = float(np.linalg.norm(wrench[:3]))
+    axes.quiver(
+        *tip, *(0.2 * equilibrium.model.reach * wrench[:3] / size), color=_COLOURS[2], lw=2.0, label=f"force, {size:.1f} N"
+    )
+
+
+def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:
+    if not isinstance(trajectory, Trajectory):
+        raise ParameterError("trajectory", trajectory, "a Trajectory")
+    return _new(size)
+
+
+def _new(size: tuple[float, float]) -> Any:
+    return require_matplotlib()(figsize=size, layout="constrained", dpi=120)

@@ -1,0 +1,337 @@
+"""The robot in the browser: meshcat on loopback, and self-contained HTML files."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray, finite_array, new_file, positive_number
+from softrobots.equilibrium import Equilibrium, frame_placement
+from softrobots.errors import ParameterError
+from softrobots.meshcat_server import connect, end_server, start_server
+from softrobots.meshcat_shapes import (
+    FORCE_COLOUR,
+    PATH_COLOUR,
+    RIGID_COLOUR,
+    floor_lines,
+    material,
+    meshcat_geometry,
+    with_legend,
+)
+from softrobots.model import SoftModel
+from softrobots.results_io import write_atomically
+from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
+from softrobots.trajectory import Trajectory
+
+ARROW_SCALE = 0.012
+"""Length of a force arrow [m/N]."""
+
+_FRAME_RATE = 30
+
+
+class Viewer:
+    """A meshcat page that shows one robot; a context manager that ends its server.
+
+    The deformed robot is opaque; the rigid one, with the same motors and relaxed springs, is translucent. Inflated links are
+    coloured by the share of the wrinkling moment that is left.
+    """
+
+    def __init__(self, model: SoftModel) -> None:
+        """Start a server on the first free loopback port from 7000 and draw the robot at rest.
+
+        Args:
+            model: The robot.
+
+        Raises:
+            ViewerError: If the server does not start or the robot has shapes that cannot be drawn.
+        """
+        self._model = model
+        self._scene = Scene(model)
+        self._server, zmq_url, self._url = start_server()
+        try:
+            self._page = connect(zmq_url)
+            self._root = self._page["softrobots"]
+            self._arrows: set[str] = set()
+            self._levels: dict[int, int] = {}
+            self._prepare()
+            self._draw_shapes()
+            self.show_configuration(model.configuration(np.zeros(model.n_motors)))
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Viewer:
+        """Return the viewer."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """End the server."""
+        self.close()
+
+    @property
+    def url(self) -> str:
+        """Address of the page; reachable from this machine only."""
+        return self._url
+
+    @property
+    def port(self) -> int:
+        """The port that is really used; 7000 if it was free."""
+        return int(self._url.split(":")[2].split("/")[0])
+
+    @property
+    def tunnel(self) -> str:
+        """Command to type on another machine to see the page there, at the same address."""
+        return f"ssh -L {self.port}:127.0.0.1:{self.port} {socket.gethostname()}"
+
+    def show(self, equilibrium: Equilibrium) -> None:
+        """Show a loaded robot: deformed and rigid, its forces as arrows, its links coloured.
+
+        Args:
+            equilibrium: An equilibrium of the viewer's robot.
+
+        Raises:
+            ParameterError: If it belongs to another robot.
+        """
+        self._check(equilibrium)
+        rigid = self._model.configuration(equilibrium.q_motors)
+        for group, q in (("deformed", equilibrium.q), ("rigid", rigid)):
+            for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
+                self._root[f"{group}/{shape.name}"].set_transform(transform)
+        for link in range(len(self._model.spring_groups)):
+            self._colour(link, wrinkling_level(equilibrium, link))
+        self._draw_arrows(equilibrium)
+
+    def show_configuration(self, q: FloatArray) -> None:
+        """Show the robot at a configuration of Pinocchio, shape (nq,), without load.
+
+        Raises:
+            ParameterError: If the shape differs or a number is not finite.
+        """
+        q = finite_array("q", q, (self._model.pinocchio.nq,))
+        for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
+            self._root[f"deformed/{shape.name}"].set_transform(transform)
+            self._root[f"rigid/{shape.name}"].set_transform(transform)
+
+    def trace(self, points: Any) -> None:
+        """Draw a path as dots.
+
+        Args:
+            points: Positions, shape (n, 3) [m].
+
+        Raises:
+            ParameterError: If the shape differs or a number is not finite.
+        """
+        import meshcat.geometry as geometry
+
+        positions = finite_array("points", points, (None, 3), "m")
+        rgb = np.array([PATH_COLOUR >> 16 & 255, PATH_COLOUR >> 8 & 255, PATH_COLOUR & 255]) / 255.0
+        colours = np.tile(rgb[:, None], (1, len(positions)))
+        cloud = geometry.PointCloud(positions.T.astype(np.float32), colours.astype(np.float32), size=0.012)
+        self._root["path"].set_object(cloud)
+
+    def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1) -> None:
+        """Play a trajectory as a meshcat animation, path and forces included; it starts by itself and can be scrubbed.
+
+        Args:
+            trajectory: A trajectory of the viewer's robot.
+            duration: Time of the animation [s]; the time of the trajectory by default.
+            repetitions: How often it plays.
+
+        Raises:
+            ParameterError: If it belongs to another robot, or the duration is not positive.
+        """
+        import meshcat.animation
+
+        if not isinstance(trajectory, Trajectory):
+            raise ParameterError("trajectory", trajectory, "a Trajectory")
+        self._check(trajectory.equilibria[0])
+        span = float(trajectory.times[-1] - trajectory.times[0])
+        seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
+        self.show(trajectory.equilibria[0])
+        self.trace(trajectory.tip_positions)
+        animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
+        for number, equilibrium in zip(_frames(trajectory, seconds), trajectory.equilibria, strict=True):
+            self._add_frame(animation, number, equilibrium)
+        self._page.set_animation(animation, play=True, repetitions=repetitions)
+
+    def html(self, title: str = "softrobots") -> str:
+        """Return the page as one self-contained HTML text that works offline, with its animation.
+
+        Args:
+            title: Title of the page.
+        """
+        return with_legend(self._page.static_html(), title, colours=bool(self._model.spring_groups))
+
+    def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
+        """Write `html` to a file.
+
+        Args:
+            path: The file.
+            title: Title of the page.
+            overwrite: Replace an existing file.
+
+        Returns:
+            The path.
+
+        Raises:
+            OutputExists: If the file exists and `overwrite` is false.
+        """
+        target = new_file(path, overwrite=overwrite)
+        page = self.html(title).encode("utf-8")
+        write_atomically(target, lambda file: file.write(page))
+        return target
+
+    def wait(self) -> None:
+        """Serve until Ctrl-C or until the server ends."""
+        with contextlib.suppress(KeyboardInterrupt):
+            while self._server.poll() is None:
+                time.sleep(0.2)
+
+    def close(self) -> None:
+        """End the server; the page stays as it is in browsers that show it."""
+        page = getattr(self, "_page", None)
+        if page is not None:
+            page.window.zmq_socket.close(linger=0)
+        end_server(self._server)
+
+    def _check(self, equilibrium: Equilibrium) -> None:
+        if not isinstance(equilibrium, Equilibrium):
+            raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
+        if equilibrium.model is not self._model:
+            raise ParameterError("equilibrium", equilibrium.model, f"of the robot that the viewer shows, {self._model!r}")
+
+    def _prepare(self) -> None:
+        """White background, a camera on the middle of the reach: meshcat's camera looks at the origin, so the scene moves."""
+        import meshcat.geometry as geometry
+
+        reach = self._model.reach
+        self._page["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
+        self._page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
+        self._page["/Axes"].set_property("visible", False)
+        self._page["/Grid"].set_property("visible", False)
+        shift = np.eye(4)
+        shift[:3, 3] = (-0.48 * reach, 0.0, -0.12 * reach)
+        self._root.set_transform(shift)
+        # meshcat's camera has y up: (x, z, -y) of the scene.
+        eye = reach * np.array([0.40, -0.92, 0.38])
+        self._page["/Cameras/default/rotated/<object>"].set_property("position", [eye[0], eye[2], -eye[1]])
+        ends = np.concatenate([floor_lines(reach), floor_lines(reach)[:, [1, 0, 2]]])
+        lines = geometry.PointsGeometry(ends.T.astype(np.float32))
+        self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
+
+    def _draw_shapes(self) -> None:
+
+        for shape in self._scene.shapes:
+            drawn, turn = meshcat_geometry(shape.geometry)
+            self._root[f"rigid/{shape.name}/body"].set_object(drawn, material(RIGID_COLOUR))
+            self._root[f"rigid/{shape.name}/body"].set_transform(turn)
+            node = self._root[f"deformed/{shape.name}"]
+            if shape.inflated_link is None:
+                node["body"].set_object(drawn, material(shape.colour))
+                node["body"].set_transform(turn)
+                continue
+            # One copy a colour, one of them visible: an animation can switch visibility, and nothing else of a material.
+            for level, (_, rgb) in enumerate(WRINKLING_COLOURS):
+                node[f"level_{level}"].set_object(drawn, material((*rgb, shape.colour[3])))
+                node[f"level_{level}"].set_transform(turn)
+                node[f"level_{level}"].set_property("visible", level == 0)
+            self._levels[shape.inflated_link] = 0
+
+    def _colour(self, link: int, level: int) -> None:
+        if self._levels.get(link, level) == level:
+            return
+        for shape in self._scene.shapes:
+            if shape.inflated_link == link:
+                self._root[f"deformed/{shape.name}/level_{self._levels[link]}"].set_property("visible", False)
+                self._root[f"deformed/{shape.name}/level_{level}"].set_property("visible", True)
+        self._levels[link] = level
+
+    def _draw_arrows(self, equilibrium: Equilibrium) -> None:
+        import meshcat.geometry as geometry
+
+        wanted = {name: wrench[:3] for name, wrench in equilibrium.load.wrenches.items() if wrench[:3].any()}
+        for name in self._arrows - wanted.keys():
+            self._root[f"load/{name}"].delete()
+        self._arrows = set(wanted)
+        for name, force in wanted.items():
+            length = ARROW_SCALE * float(np.linalg.norm(force))
+            width = 0.009 * self._model.reach
+            green = geometry.MeshLambertMaterial(color=FORCE_COLOUR)
+            node = self._root[f"load/{name}"]
+            for part, drawn, height in (
+                ("shaft", geometry.Cylinder(length, width), 0.5 * length),
+                ("head", geometry.Cylinder(4.0 * width, radiusTop=0.0, radiusBottom=2.5 * width), length + 2.0 * width),
+            ):
+                node[part].set_object(drawn, green)
+                raised = np.eye(4)
+                raised[1, 3] = height
+                node[part].set_transform(raised)
+            node.set_transform(_arrow_pose(equilibrium, name, force))
+
+    def _add_frame(self, animation: Any, number: int, equilibrium: Equilibrium) -> None:
+        rigid = self._model.configuration(equilibrium.q_motors)
+        for group, q in (("deformed", equilibrium.q), ("rigid", rigid)):
+            for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
+                animation.at_frame(self._root[f"{group}/{shape.name}"], number).set_transform(transform)
+        for name in self._arrows:
+            pose = _arrow_pose(equilibrium, name, equilibrium.load.wrenches[name][:3])
+            animation.at_frame(self._root[f"load/{name}"], number).set_transform(pose)
+        for shape in self._scene.shapes:
+            if shape.inflated_link is None:
+                continue
+            shown = wrinkling_level(equilibrium, shape.inflated_link)
+            for level in range(len(WRINKLING_COLOURS)):
+                node = self._root[f"deformed/{shape.name}/level_{level}"]
+                animation.at_frame(node, number).set_property("visible", "boolean", level == shown)
+
+
+def view(model: SoftModel, result: Equilibrium | Trajectory | None = None) -> Viewer:
+    """Open a viewer and show a result in it.
+
+    Args:
+        model: The robot.
+        result: An equilibrium to show or a trajectory to play; the robot at rest by default.
+
+    Returns:
+        The viewer; print its `url` and `tunnel`, and `close` it at the end (or use it in a `with` statement).
+
+    Raises:
+        ParameterError: If the result is something else or belongs to another robot.
+        ViewerError: If the server does not start.
+    """
+    viewer = Viewer(model)
+    try:
+        if isinstance(result, Trajectory):
+            viewer.animate(result)
+        elif result is not None:
+            viewer.show(result)
+    except BaseException:
+        viewer.close()
+        raise
+    return viewer
+
+
+def _arrow_pose(equilibrium: Equilibrium, frame: str, force: FloatArray) -> FloatArray:
+    """Pose with y along the force, at the frame, (4, 4)."""
+    along = force / np.linalg.norm(force)
+    aside = np.eye(3)[int(np.argmin(np.abs(along)))]
+    first = np.cross(along, aside)
+    first /= np.linalg.norm(first)
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([first, along, np.cross(first, along)])
+    pose[:3, 3] = frame_placement(equilibrium.model, equilibrium.q, frame).translation
+    return pose
+
+
+def _frames(trajectory: Trajectory, seconds: float) -> list[int]:
+    """Frame numbers of the waypoints, in proportion to their times."""
+    span = float(trajectory.times[-1] - trajectory.times[0])
+    share = (trajectory.times - trajectory.times[0]) / (span or 1.0)
+    numbers = np.rint(share * seconds * _FRAME_RATE).astype(int)
+    return [int(number) for number in numbers]
