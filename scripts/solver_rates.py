@@ -58,7 +58,9 @@ def main(argv: list[str] | None = None) -> int:
     """Measure the rates and print them as two tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=10_000, help="random cases a load (%(default)s)")
-    parser.add_argument("--loads", type=float, nargs="+", default=[18, 50, 100, 150, 200], help="force sizes [N] (18 50 100 150 200)")
+    parser.add_argument(
+        "--loads", type=float, nargs="+", default=[18, 50, 100, 150, 200], help="force sizes [N] (18 50 100 150 200)"
+    )
     parser.add_argument("--estimation-loads", type=float, nargs="+", default=[5, 18, 50], help="force sizes [N] (5 18 50)")
     parser.add_argument("--seed", type=int, default=0, help="of the random cases (%(default)s)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the rates to a new file")

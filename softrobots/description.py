@@ -109,8 +109,10 @@ def expand(xacro_file: str | Path, arguments: Mapping[str, str] | None = None) -
         try:
             document = xacro.process_file(str(path), mappings=given)
         except Exception as error:  # xacro raises whatever its expressions raise
-            told = f"{path.name} cannot be expanded with {dict(arguments or {})}: {error}; declared: {', '.join(declared)}"
-            raise DescriptionError(told) from error
+            reason = str(error).split("\n")[0].strip()  # the rest is a trace of xacro's expressions
+            raise DescriptionError(
+                f"{path.name} cannot be expanded with {dict(arguments or {})}: {reason}; declared: {', '.join(declared)}"
+            ) from error
     for comment in [node for node in document.childNodes if node.nodeType == node.COMMENT_NODE]:
         if any(mark in comment.data for mark in _BANNER):
             document.removeChild(comment)

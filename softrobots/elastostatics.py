@@ -167,8 +167,8 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
         if step is None:  # neutral equilibrium: balanced, neither stable nor unstable
             break
         slope = float(state.residual @ step)
-        terms = abs(state.energy) + abs(state.joints.potential) + stiffness * float(state.q_springs @ state.q_springs)
-        rounding = _ROUNDING * terms
+        # The terms of the energy are as large as this even where they cancel (a tip that is folded back to the base).
+        rounding = _ROUNDING * (state.joints.scale + stiffness * float(state.q_springs @ state.q_springs))
         scale = 1.0
         trial = case.state(state.q_springs + step)
         spent += 1

@@ -6,8 +6,6 @@ when its standard input closes, which happens however the parent ends.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
 import subprocess
 import sys
@@ -87,15 +85,21 @@ def end_server(server: subprocess.Popen[bytes]) -> None:
             stream.close()
 
 
-def connect(zmq_url: str) -> Any:
+def connect(zmq_url: str, web_url: str) -> Any:
     """Connect to a server; returns a `meshcat.Visualizer` whose calls fail rather than wait for ever."""
     import meshcat
-    from zmq import SocketOption
+    from meshcat.visualizer import ViewerWindow
 
-    with contextlib.redirect_stdout(io.StringIO()):  # meshcat prints the address; the caller does that
-        page = meshcat.Visualizer(zmq_url=zmq_url)
-    page.window.zmq_socket.setsockopt(SocketOption.RCVTIMEO, _REPLY_TIME)
-    return page
+    class Window(ViewerWindow):  # type: ignore[misc]
+        """Meshcat's window without its second socket, which nobody closes, and without its message on stdout."""
+
+        def __init__(self) -> None:
+            self.server_proc = None
+            self.zmq_url, self.web_url = zmq_url, web_url
+            self.connect_zmq()
+            self.zmq_socket.rcvtimeo = _REPLY_TIME
+
+    return meshcat.Visualizer(window=Window())
 
 
 if __name__ == "__main__":

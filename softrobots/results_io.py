@@ -56,7 +56,8 @@ def save(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
     if kind is None:
         raise ParameterError("result", result, "an Equilibrium, IkSolution, LoadEstimate or Trajectory")
     path = Path(path)
-    target = new_file(path if path.suffix else path.with_suffix(".npz"), overwrite=overwrite)
+    named = path if path.suffix or path.is_dir() else path.with_suffix(".npz")
+    target = new_file(named, overwrite=overwrite)
     fields = {"format": np.array(_FORMAT), "kind": np.array(kind), **_KINDS[kind][1](result)}
     write_atomically(target, lambda file: np.savez_compressed(file, **fields))
     return target
@@ -76,7 +77,7 @@ def load(path: str | Path) -> Result:
     """
     path = Path(path)
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as handle, np.load(handle, allow_pickle=False) as file:
             fields = {name: file[name] for name in file.files}
         kind = str(fields["kind"])
         if int(fields["format"]) != _FORMAT or kind not in _KINDS:
@@ -86,7 +87,7 @@ def load(path: str | Path) -> Result:
         return _KINDS[kind][2](fields)
     except FileFormatError as error:
         raise FileFormatError(f"{path}: {error}") from error
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, SoftRobotsError) as error:
+    except (OSError, ValueError, KeyError, EOFError, TypeError, AttributeError, zipfile.BadZipFile, SoftRobotsError) as error:
         raise FileFormatError(f"cannot read a result from {path}: {error}") from error
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,9 +12,13 @@ from softrobots.elastostatics import ElasticState, elastic_state, largest_residu
 from softrobots.errors import NoCriticalLoad, ParameterError
 from softrobots.loads import Load
 from softrobots.model import SoftModel
+from softrobots.sensitivity import frame_jacobian
 
 _NEWTON_STEPS = 12
-_SHORTEST_STEP = 1e-10  # relative to the load reached
+_SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
+_LARGEST_MOVE = 0.1  # [rad] of a spring between two points of the path
+_NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the one at zero force, may vanish in the next step
+_STIFF = 1e-9  # eigenvalues above this, relative to the stiffest spring, count for the prediction
 
 
 def critical_load(
@@ -28,7 +33,8 @@ def critical_load(
     """Smallest force along a direction at which the equilibrium stops being stable.
 
     Follows the equilibrium from zero force, without leaving its path, until the smallest eigenvalue of the tangent
-    stiffness crosses zero (a pitchfork, as of an axially pushed straight arm) or the path turns back (a limit point).
+    stiffness crosses zero (a pitchfork, as of an axially pushed straight arm) or the path turns back (a limit point). A push
+    that is oblique, however little, may bend the robot smoothly where the exact one buckles it, and then has no limit.
 
     Args:
         model: The robot.
@@ -61,57 +67,84 @@ def critical_load(
     push = np.concatenate([unit / length, np.zeros(3)])
     at = model.tip if frame is None else frame
 
-    def follow(magnitude: float, start: FloatArray) -> tuple[ElasticState, float] | None:
-        """Equilibrium on the path near `start` and its smallest eigenvalue; None if Newton leaves the path."""
-        state = _track(model, motors, constant.plus(at, magnitude * push), start)
-        return None if state is None else (state, float(np.linalg.eigvalsh(state.tangent)[0]))
+    def follow(magnitude: float, last: _Point) -> _Point | None:
+        """The point of the path at a force, from a point nearby; None if Newton leaves the path."""
+        guess = last.state.q_springs + (magnitude - last.force) * last.slope
+        state = _correct(model, motors, constant.plus(at, magnitude * push), guess, last.state.q_springs)
+        return None if state is None else _point(model, state, magnitude, push, at)
 
-    here = follow(0.0, model.rest)
-    if here is None or here[1] <= 0.0:
+    first_state = _correct(model, motors, constant, model.rest, model.rest, largest_move=np.inf)
+    here = None if first_state is None else _point(model, first_state, 0.0, push, at)
+    if here is None or here.softest <= 0.0:
         raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
     first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
-    low = 0.0
-    while low < largest:
-        high = min(low + step, largest)
-        there = follow(high, here[0].q_springs)
-        if there is None:
-            step *= 0.25
-            if step < _SHORTEST_STEP * max(low, first_step):
-                return low  # the path turns back here: a limit point
-            continue
-        if there[1] <= 0.0:
-            return _bisect(follow, here, low, high)
-        here, low, step = there, high, min(1.5 * step, first_step + 0.25 * high)
-    raise NoCriticalLoad(
-        f"the equilibrium stays stable up to {largest:.6g} N along {(unit / length).tolist()}", max_force=largest
-    )
+    nearly_zero = _NEARLY_ZERO * here.softest
+    while here.force < largest:
+        there = follow(min(here.force + step, largest), here)
+        if there is None or (here.softest > nearly_zero and there.softest < 0.5 * here.softest):
+            step *= 0.5  # too far to tell this path from a neighbour
+            if step < _SHORTEST_STEP * max(here.force, first_step):
+                return here.force  # the path turns back here: a limit point
+        elif there.softest <= 0.0:
+            return _bisect(follow, here, there.force)
+        else:
+            here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
+    along = (unit / length).tolist()
+    raise NoCriticalLoad(f"the equilibrium stays stable up to {largest:.6g} N along {along}", max_force=largest)
 
 
-def _bisect(follow: Any, here: tuple[ElasticState, float], low: float, high: float) -> float:
+class _Point(NamedTuple):
+    """A point of the equilibrium path."""
+
+    force: float
+    state: ElasticState
+    softest: float
+    """Smallest eigenvalue of the tangent stiffness."""
+    slope: FloatArray
+    """Derivative of the springs with respect to the force."""
+
+
+def _point(model: SoftModel, state: ElasticState, force: float, push: FloatArray, frame: str) -> _Point:
+    pull = push @ frame_jacobian(model, state.q, frame)[:, model.spring_indices]
+    values, vectors = np.linalg.eigh(state.tangent)
+    slope = vectors @ ((vectors.T @ pull) / np.where(np.abs(values) > _STIFF * model.stiffest, values, np.inf))
+    return _Point(force, state, float(values[0]), slope)
+
+
+def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high: float) -> float:
     """Narrow the bracket of the zero of the smallest eigenvalue down to rounding."""
-    while high - low > 1e-14 * high:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        state = follow(middle, here[0].q_springs)
-        if state is not None and state[1] > 0.0:
-            here, low = state, middle
+    while True:
+        middle = 0.5 * (here.force + high)
+        if not here.force < middle < high:
+            return middle
+        there = follow(middle, here)
+        if there is not None and there.softest > 0.0:
+            here = there
         else:
             high = middle
-    return 0.5 * (low + high)
 
 
-def _track(model: SoftModel, motors: FloatArray, load: Load, start: FloatArray) -> ElasticState | None:
-    """Plain Newton from a point of the path; None if it does not converge nearby."""
-    state = elastic_state(model, motors, start, load)
+def _correct(
+    model: SoftModel,
+    motors: FloatArray,
+    load: Load,
+    guess: FloatArray,
+    last: FloatArray,
+    *,
+    largest_move: float = _LARGEST_MOVE,
+) -> ElasticState | None:
+    """Plain Newton from a prediction; None if it does not converge, or not near the prediction and the last point."""
+    state = elastic_state(model, motors, guess, load)
+    predicted = float(np.abs(guess - last).max(initial=0.0))
     for _ in range(_NEWTON_STEPS):
         if state.error <= largest_residual(state.joints, 1e-12):
-            return state if float(np.abs(state.q_springs - start).max()) < 0.2 else None
+            moved, missed = (float(np.abs(state.q_springs - other).max(initial=0.0)) for other in (last, guess))
+            return state if moved <= largest_move and missed <= max(0.5 * predicted, 0.1 * largest_move) else None
         try:
             step = np.linalg.solve(state.tangent, -state.residual)
         except np.linalg.LinAlgError:
             return None
-        if float(np.abs(step).max()) > 0.2:
+        if float(np.abs(step).max()) > max(largest_move, 0.5):
             return None
         state = elastic_state(model, motors, state.q_springs + step, load)
     return None

@@ -55,7 +55,7 @@ class Viewer:
         self._scene = Scene(model)
         self._server, zmq_url, self._url = start_server()
         try:
-            self._page = connect(zmq_url)
+            self._page = connect(zmq_url, self._url)
             self._root = self._page["softrobots"]
             self._arrows: set[str] = set()
             self._levels: dict[int, int] = {}

@@ -1,0 +1,64 @@
+"""Shared fixtures, and the rule about tools that may be missing: with CI=true a missing one fails its test."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+
+
+def missing(what: str) -> None:
+    """Fail in CI, skip elsewhere, with the reason."""
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"{what} is missing, and CI must have it")
+    pytest.skip(f"{what} is not installed")
+
+
+@pytest.fixture
+def tool() -> Callable[[str], ModuleType]:
+    """Import an optional tool, or fail or skip the test."""
+
+    def load(name: str) -> ModuleType:
+        try:
+            return importlib.import_module(name)
+        except ImportError:
+            missing(name)
+            raise
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def arm() -> sr.SoftModel:
+    """The paper's arm: two links, three motors, four springs."""
+    return sr.load_model(sr.InflatableArm())
+
+
+@pytest.fixture(scope="session")
+def odd_arm() -> sr.SoftModel:
+    """Three links that differ in everything, with rest angles."""
+    return sr.load_model(
+        sr.InflatableArm(
+            link_lengths=(0.5, 0.4, 0.3),
+            hinge_offset=(0.03, 0.05, 0.02),
+            radius=(0.06, 0.05, 0.04),
+            stiffness=(250.0, 120.0, 80.0),
+            rest_side=(0.05, -0.02, 0.0),
+            rest_up=(-0.1, 0.03, 0.06),
+            pressure=(60e3, 50e3, 40e3),
+        )
+    )
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20210312)

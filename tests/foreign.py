@@ -1,0 +1,29 @@
+"""Robots of other people: URDF without our tags."""
+
+from __future__ import annotations
+
+INERTIAL = '<inertial><mass value="0.5"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
+
+
+LIMIT = '<limit lower="-2" upper="2" effort="10" velocity="1"/>'
+
+
+def joint(name: str, parent: str, child: str, axis: str, kind: str = "revolute", xyz: str = "0.3 0 0") -> str:
+    limit = "" if kind == "continuous" else LIMIT
+    return (
+        f'<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="0.1 0.2 0.3"/><parent link="{parent}"/>'
+        f'<child link="{child}"/><axis xyz="{axis}"/>{limit}</joint><link name="{child}">{INERTIAL}</link>'
+    )
+
+
+# A continuous shoulder, an elbow, a sprung wrist and a sprung slider; a side branch with a joint of its own.
+BRANCHED = (
+    f'<robot name="foreign"><link name="base">{INERTIAL}</link>'
+    + joint("shoulder", "base", "upper", "0 0 1", "continuous")
+    + joint("elbow", "upper", "lower", "0 1 0")
+    + joint("wrist", "lower", "hand", "0 0 1")
+    + joint("slider", "hand", "finger", "1 0 0", "prismatic")
+    + joint("gripper", "upper", "side", "0 1 0", xyz="0 0.2 0")
+    + "</robot>"
+)
+SPRINGS = {"wrist": (20.0, 0.1), "slider": 800.0}

@@ -1,0 +1,287 @@
+"""The description: xacro, the dataclass and the committed URDF say the same; what they say is physically consistent."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+import softrobots as sr
+from softrobots.description import NAMESPACE, declared_arguments, expand, parse_xml, read_tags
+from softrobots.paths import urdf_folder, xacro_folder
+from tests.oracles import tube_points
+
+XACRO = xacro_folder() / sr.InflatableArm.XACRO
+ODD = {"link_lengths": (0.5, 0.4, 0.3), "hinge_offset": (0.03, 0.05, 0.02), "stiffness": (250.0, 120.0, 80.0), "rest_up": 0.1}
+
+
+def without_banner(text: str) -> str:
+    """Drop the four comments that the xacro command puts on top."""
+    lines = text.splitlines(keepends=True)
+    return "".join([lines[0], *lines[5:]])
+
+
+@pytest.mark.parametrize("name", sr.ROBOTS)
+def test_committed_urdf_is_what_xacro_generates(name: str) -> None:
+    assert (urdf_folder() / f"{name}.urdf").read_bytes() == sr.ROBOTS[name]().urdf().encode("utf-8")
+
+
+@pytest.mark.parametrize("parameters", [{}, ODD])
+def test_xacro_command_alone_gives_the_same_urdf(parameters: dict) -> None:
+    robot = sr.InflatableArm(**parameters)
+    given_arguments = [f"{name}:={value}" for name, value in robot.xacro_arguments().items()] if parameters else []
+    command = [str(Path(sys.executable).parent / "xacro"), str(XACRO), *given_arguments]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert without_banner(printed) == robot.urdf()
+
+
+def test_defaults_of_dataclass_and_xacro_agree() -> None:
+    declared = declared_arguments(XACRO)
+    fields = {field.name: field.default for field in dataclasses.fields(sr.InflatableArm)}
+    assert list(declared) == list(fields)
+    for name, default in fields.items():
+        text = declared[name]
+        numbers = [float(n) for n in text.split()] if name == "rgba" else ast.literal_eval(text)
+        assert np.array_equal(numbers, default), name
+
+
+def test_every_argument_says_meaning_unit_and_source() -> None:
+    lines = XACRO.read_text(encoding="utf-8").splitlines()
+    for number, line in enumerate(lines):
+        if "<xacro:arg " in line:
+            comment = lines[number - 1]
+            assert comment.strip().startswith("<!--"), line
+            assert "[" in comment, line
+            assert "Source:" in comment, line
+
+
+def test_mass_centre_and_inertia_are_those_of_two_capped_tubes() -> None:
+    """Cutting hinge, shoulder and tip out of the wall changes nothing: compared with a cloud of point masses.
+
+    The cloud has 400 slices of 24 points: midpoint sums of x^2 err by 1/(4 400^2) = 1.6e-6 relative.
+    """
+    robot = sr.InflatableArm(link_lengths=(0.6, 0.4), radius=(0.055, 0.045), cap_mass=(0.1, 0.07))
+    model = sr.load_model(robot)
+    clouds = []
+    for start, length, radius, cap in ((0.0, 0.6, 0.055, 0.1), (0.6, 0.4, 0.045, 0.07)):
+        wall = 1300.0 * 2 * np.pi * radius * 0.0005 * length
+        points, masses = tube_points(length, radius, wall, cap)
+        clouds.append((points + [start, 0.0, 0.0], masses))
+    points, masses = np.vstack([p for p, _ in clouds]), np.concatenate([m for _, m in clouds])
+    total, centre = masses.sum(), masses @ points / masses.sum()
+    arm = points - centre
+    inertia = np.einsum(
+        "i,ijk->jk", masses, np.einsum("i,jk->ijk", (arm**2).sum(1), np.eye(3)) - np.einsum("ij,ik->ijk", arm, arm)
+    )
+    data = model.pinocchio.createData()
+    pin.ccrba(model.pinocchio, data, pin.neutral(model.pinocchio), np.zeros(model.pinocchio.nv))
+    assert sum(body.mass for body in model.pinocchio.inertias[1:]) == pytest.approx(total, rel=1e-12)
+    assert np.allclose(data.com[0], centre, atol=1e-12)
+    assert np.allclose(np.array(data.Ig.inertia), inertia, rtol=5e-6, atol=1e-12)
+
+
+link = st.fixed_dictionaries(
+    {
+        "link_lengths": st.floats(0.15, 2.0),
+        "share": st.floats(0.02, 0.9),
+        "radius": st.floats(0.01, 0.1),
+        "wall_thickness": st.floats(2e-4, 1e-3),
+        "stiffness": st.floats(0.1, 1e5),
+        "rest_side": st.floats(-1.5, 1.5),
+        "rest_up": st.floats(-1.5, 1.5),
+        "pressure": st.floats(0.0, 1e5),
+        "density": st.floats(500.0, 2000.0),
+        "cap_mass": st.floats(0.0, 1.0),
+    }
+)
+
+
+@given(st.lists(link, min_size=1, max_size=6))
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_any_valid_arm_obeys_the_rules_of_portable_urdf(links: list[dict]) -> None:
+    """Positive mass above 1e-6 kg, triangle inequality, finite limits, unique names, both copies of every spring."""
+    columns = {name: [item[name] for item in links] for name in links[0] if name != "share"}
+    offsets = [item["share"] * item["link_lengths"] for item in links]
+    walls = [2 * np.pi * item["radius"] * item["wall_thickness"] * item["density"] * item["link_lengths"] for item in links]
+    assume(min(wall * min(item["share"], 1 - item["share"]) for wall, item in zip(walls, links, strict=True)) > 2.1e-5)
+    root = ElementTree.fromstring(sr.InflatableArm(**columns, hinge_offset=offsets).urdf())
+    assert root.get("version") is None
+    assert root[0].tag == "mujoco"
+    assert root.find("link").get("name") == "world"
+    names = [element.get("name") for element in root if element.tag in ("link", "joint")]
+    assert len(set(names)) == len(names)
+    assert all(name.isascii() for name in names)
+    for body in root.findall("link")[1:]:
+        mass = float(body.find("inertial/mass").get("value"))
+        tensor = body.find("inertial/inertia")
+        a, b, c = sorted(float(tensor.get(key)) for key in ("ixx", "iyy", "izz"))
+        assert mass > 1e-6, body.get("name")
+        assert a > 1e-15
+        assert a + b >= c
+    springs = {}
+    for joint in root.findall("joint"):
+        if joint.get("type") == "fixed":
+            continue
+        assert joint.get("type") == "revolute"
+        limit = {key: float(joint.find("limit").get(key)) for key in ("lower", "upper", "effort", "velocity")}
+        assert limit["lower"] < limit["upper"]
+        assert min(limit["effort"], limit["velocity"]) > 0.0
+        assert np.isfinite(list(limit.values())).all()
+        spring = joint.find(f"{{{NAMESPACE}}}spring")
+        role = joint.find(f"{{{NAMESPACE}}}role").get("value")
+        assert role == ("motor" if spring is None else "spring")
+        if spring is not None:
+            springs[joint.get("name")] = (spring.get("stiffness"), spring.get("rest"))
+    copies = {
+        gazebo.get("reference"): (gazebo.find("springStiffness").text, gazebo.find("springReference").text)
+        for gazebo in root.findall("gazebo")
+        if gazebo.find("springStiffness") is not None
+    }
+    assert copies == springs
+    assert len(springs) == 2 * len(links)
+
+
+def test_many_links_expand() -> None:
+    """Recursion by halves: a linear one dies at about 300 links (measured), and costs more than in proportion."""
+    model = sr.load_model(sr.InflatableArm(link_lengths=(0.2,) * 90))
+    assert model.n_motors == 91
+    assert model.n_springs == 180
+
+
+def test_yourdfpy_finds_the_file_valid(tmp_path: Path) -> None:
+    import yourdfpy
+
+    robot = yourdfpy.URDF.load(str(urdf_folder() / "inflatable_arm.urdf"))
+    assert robot.validate()
+
+
+def test_collision_shapes_across_a_hinge_do_not_touch(arm: sr.SoftModel) -> None:
+    """Links i and i + 2 around the tiny hinge link: with every spring at 0.4 rad no pair of shapes is nearer than 1 cm."""
+    model = arm.pinocchio
+    geometry = pin.buildGeomFromUrdfString(model, arm.urdf, pin.GeometryType.COLLISION)
+    geometry.addAllCollisionPairs()
+    data = geometry.createData()
+    pin.computeDistances(model, model.createData(), geometry, data, arm.configuration([0.3, 0.4, -0.9], [0.4, 0.4, 0.4, 0.4]))
+    assert min(result.min_distance for result in data.distanceResults) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"radios": "0.05"}, "no argument 'radios'; declared: link_lengths, hinge_offset, radius"),
+        ({"radius": 0.05}, "xacro arguments are text"),
+        ({"radius": "abc"}, "abc.*declared: link_lengths"),
+        ({"radius": "[0.05,0.05,0.05]"}, "radius has 3 values"),
+        ({"radius": "nan"}, "finite numbers are required"),
+        ({"stiffness": "-1"}, "stiffness .* required > 0"),
+        ({"pressure": "-1"}, "pressure .* required >= 0"),
+        ({"rest_up": "2.0"}, "rest_up .* required <="),
+        ({"hinge_offset": "0.6"}, "hinge_offset .* required below link_lengths"),
+        ({"hinge_offset": "1e-5"}, "too light"),
+        ({"rgba": "1 0 0 1, 0 1 0 1, 0 0 1 1"}, "rgba has 3 colours"),
+        ({"motor_limit": "[1,2]"}, "motor_limit has 2 values"),
+        ({"link_lengths": ""}, "could not convert"),
+        ({"density": "__import__('os')"}, "could not convert"),
+    ],
+)
+def test_bad_arguments_of_the_xacro_file_are_refused(arguments: dict, message: str) -> None:
+    with pytest.raises(sr.DescriptionError, match=message):
+        expand(XACRO, arguments)
+
+
+def test_files_that_are_no_robot_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(sr.DescriptionError, match="without links; is it a file of macros"):
+        expand(xacro_folder() / "macros" / "joints.xacro")
+    with pytest.raises(sr.DescriptionError, match="cannot read the xacro file"):
+        expand(tmp_path / "missing.xacro")
+    broken = tmp_path / "broken.xacro"
+    broken.write_text("<robot", encoding="utf-8")
+    with pytest.raises(sr.DescriptionError, match="not well-formed"):
+        expand(broken)
+    with pytest.raises(sr.DescriptionError, match="document type"):
+        parse_xml('<!DOCTYPE r [<!ENTITY a "b">]><robot name="r"/>', "text")
+    with pytest.raises(sr.DescriptionError, match="unexpanded xacro"):
+        read_tags(XACRO.read_text(encoding="utf-8"))
+
+
+def robot_with(joint: str = "", inside: str = "") -> str:
+    return f'<robot name="r" xmlns:softrobots="{NAMESPACE}"><joint name="j" type="revolute">{joint}</joint>{inside}</robot>'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<mujoco/>", "root tag <mujoco>; <robot> is required"),
+        (robot_with('<softrobots:spring stiffness="0" rest="0"/>'), "positive one is required"),
+        (robot_with('<softrobots:spring stiffness="inf" rest="0"/>'), "finite number is required"),
+        (robot_with('<softrobots:spring stiffness="10"/>'), "rest = None; a finite number"),
+        (robot_with('<softrobots:role value="tendon"/>'), "role 'tendon'; one of motor, spring, section, locked"),
+        (robot_with(inside='<softrobots:inflated_link springs="k" radius="1" pressure="1"/>'), "names the springs k"),
+    ],
+)
+def test_malformed_tags_are_refused(text: str, message: str) -> None:
+    with pytest.raises(sr.DescriptionError, match=message):
+        read_tags(text)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "field"),
+    [
+        ({"link_lengths": ()}, "link_lengths"),
+        ({"link_lengths": (0.6, -0.1)}, "link_lengths"),
+        ({"link_lengths": (0.6, float("nan"))}, "link_lengths"),
+        ({"link_lengths": "0.6"}, "link_lengths"),
+        ({"hinge_offset": 0.6}, "hinge_offset"),
+        ({"hinge_offset": 0.0}, "hinge_offset"),
+        ({"hinge_offset": (0.03, 0.03, 0.03)}, "hinge_offset"),
+        ({"radius": 0.0}, "radius"),
+        ({"radius": None}, "radius"),
+        ({"wall_thickness": -1e-4}, "wall_thickness"),
+        ({"stiffness": -172.0}, "stiffness"),
+        ({"stiffness": (172.0, 0.0)}, "stiffness"),
+        ({"stiffness": float("inf")}, "stiffness"),
+        ({"rest_up": 1.6}, "rest_up"),
+        ({"rest_side": (-1.6, 0.0)}, "rest_side"),
+        ({"pressure": -1.0}, "pressure"),
+        ({"density": 0.0}, "density"),
+        ({"cap_mass": -0.1}, "cap_mass"),
+        ({"spring_damping": -1.0}, "spring_damping"),
+        ({"rgba": (1.0, 0.0, 0.0)}, "rgba"),
+        ({"rgba": (1.0, 0.0, 0.0, 2.0)}, "rgba"),
+        ({"rgba": "red"}, "rgba"),
+        ({"motor_limit": 0.0}, "motor_limit"),
+        ({"motor_effort": "50"}, "motor_effort"),
+        ({"motor_velocity": -2.0}, "motor_velocity"),
+        ({"base_mass": 0.0}, "base_mass"),
+    ],
+)
+def test_bad_parameters_of_the_arm_are_refused(parameters: dict, field: str) -> None:
+    with pytest.raises(sr.ParameterError, match=field) as caught:
+        sr.InflatableArm(**parameters)
+    assert caught.value.field == field
+
+
+def test_arm_computes_volume_and_tank() -> None:
+    robot = sr.InflatableArm()
+    assert robot.n_links == 2
+    assert robot.volume == pytest.approx(2 * np.pi * 0.055**2 * 0.6, rel=1e-14)
+    # The paper's tank of 30 MPa: p V / (p_t - p), in vacuum.
+    assert robot.tank_volume(30e6) == pytest.approx(50e3 * robot.volume / (30e6 - 50e3), rel=1e-14)
+    with pytest.raises(sr.ParameterError, match="the same in all links"):
+        sr.InflatableArm(pressure=(50e3, 40e3)).tank_volume(30e6)
+
+
+def test_parameters_are_frozen_and_keyword_only() -> None:
+    with pytest.raises(TypeError):
+        sr.InflatableArm((0.6, 0.6))
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        sr.InflatableArm().radius = 0.1

@@ -1,0 +1,159 @@
+"""One inflated link: closed forms against quadrature, the paper's table, fits on data with a known answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from softrobots import ParameterError, inflated_beam
+from tests.oracles import PRINTED_WRINKLING_MOMENTS
+
+TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}
+
+
+@pytest.mark.parametrize(("pressure", "printed"), PRINTED_WRINKLING_MOMENTS.items())
+def test_wrinkling_moment_reproduces_table_3(pressure: float, printed: float) -> None:
+    assert round(inflated_beam.wrinkling_moment(pressure, 0.055), 2) == printed
+
+
+def test_required_pressure_of_the_papers_example() -> None:
+    # theory 1.4: (3) gives 42.7 kPa exactly for 17.51 N m, and 50 kPa is the first tabulated pressure above it.
+    assert inflated_beam.required_pressure(17.51, 0.055) == pytest.approx(42.65e3, abs=10.0)
+    assert inflated_beam.required_tabulated_pressure(17.51, 0.055) == 50e3
+    assert inflated_beam.required_tabulated_pressure(30.0, 0.055) is None
+
+
+@pytest.mark.parametrize(("pressure", "modulus"), [(10e3, 140.15e6), (60e3, 136.76e6)])
+def test_young_modulus_reproduces_the_papers_range(pressure: float, modulus: float) -> None:
+    mean = np.mean([row.stiffness for row in inflated_beam.TABLE_3])  # unrounded
+    found = inflated_beam.young_modulus_from_stiffness(mean, pressure=pressure, **TUBE)
+    assert found == pytest.approx(modulus, abs=0.005e6)  # theory prints two decimals of MPa
+
+
+@given(
+    st.floats(1e5, 1e10),
+    st.floats(0.0, 2e5),
+    st.floats(0.05, 3.0),
+    st.floats(0.01, 0.3),
+    st.floats(1e-3, 0.09),
+    st.floats(-0.9, 0.5),
+)
+def test_modulus_and_stiffness_are_inverse(
+    modulus: float, pressure: float, length: float, radius: float, thin: float, nu: float
+) -> None:
+    tube = {"length": length, "radius": radius, "wall_thickness": thin * radius, "poisson_ratio": nu}
+    stiffness = inflated_beam.stiffness_from_young_modulus(modulus, pressure=pressure, **tube)
+    # Where pressure carries most of the load the modulus is the small difference of large terms: condition number.
+    softened = inflated_beam.stiffness_from_young_modulus(0.999 * modulus, pressure=pressure, **tube)
+    condition = 1e-3 / max((stiffness - softened) / stiffness, 1e-12)
+    found = inflated_beam.young_modulus_from_stiffness(stiffness, pressure=pressure, **tube)
+    assert found == pytest.approx(modulus, rel=1e-13 * max(condition, 1.0) * 100)
+
+
+def test_deflection_integrates_moment_and_shear() -> None:
+    """v(x) is the double integral of M / ((E + P/S) I) plus the shear angle: the sign that the paper prints fails this."""
+    pressure, modulus, force = 30e3, 138e6, 12.0
+    cap, wall = pressure * np.pi * 0.055**2, 2 * np.pi * 0.055 * 0.0005
+    bending = (modulus + cap / wall) * np.pi * 0.055**3 * 0.0005
+    shear = cap + 0.5 * modulus / 2.6 * wall
+    for x in (0.0, 0.1, 0.35, 0.6):
+        curved = quad(lambda s, x=x: (x - s) * force * (0.6 - s) / bending, 0.0, x, epsabs=1e-14)[0]
+        found = inflated_beam.deflection(x, force, pressure=pressure, young_modulus=modulus, **TUBE)
+        assert float(found) == pytest.approx(curved + force * x / shear, rel=1e-12, abs=1e-15)
+
+
+def test_deflection_of_an_unpressurised_stiff_tube_is_euler_bernoulli() -> None:
+    second_moment = np.pi * 0.055**3 * 0.0005
+    found = inflated_beam.deflection(6.0, 1.0, length=6.0, radius=0.055, wall_thickness=0.0005, pressure=0.0, young_modulus=1e9)
+    shear_share = 6.0 / (0.5 * 1e9 / 2.6 * 2 * np.pi * 0.055 * 0.0005)
+    assert float(found) - shear_share == pytest.approx(6.0**3 / (3 * 1e9 * second_moment), rel=1e-12)
+
+
+def test_moment_is_odd_and_saturates() -> None:
+    angles = np.linspace(-0.3, 0.3, 61)
+    moments = inflated_beam.moment(angles, stiffness=170.0, max_moment=20.0)
+    assert np.allclose(moments, -moments[::-1])
+    assert moments.max() == 20.0
+    inside = np.abs(angles) < 20.0 / 170.0
+    assert np.allclose(np.gradient(moments, angles)[inside][1:-1], 170.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_fit_recovers_known_parameters_within_three_standard_errors(seed: int, sign: float) -> None:
+    random = np.random.default_rng(seed)
+    true_k, true_max, noise, pressure = 169.44, 21.76, 0.15, 50e3
+    angle = sign * np.linspace(0.0, 0.25, 400)
+    clean = np.sign(angle) * np.minimum(true_k * np.abs(angle), true_max)
+    fit = inflated_beam.fit_characterisation(angle, clean + noise * random.normal(size=400), pressure=pressure, radius=0.055)
+    below = np.abs(angle) * true_k < inflated_beam.wrinkling_moment(pressure, 0.055)
+    exact_std = noise / np.sqrt(np.sum(angle[below] ** 2))  # of a slope through the origin
+    assert fit.stiffness == pytest.approx(true_k, abs=3 * exact_std)
+    assert fit.stiffness_std == pytest.approx(exact_std, rel=0.2)  # a standard deviation from 200 points: 5 % at one sigma
+    assert fit.max_moment == pytest.approx(true_max, abs=3 * noise / np.sqrt(fit.n_saturated))
+    assert fit.wrinkling_moment == pytest.approx(20.53, abs=0.005)
+
+
+def test_fit_without_saturation_says_so() -> None:
+    angle = np.linspace(0.0, 0.1, 50)
+    fit = inflated_beam.fit_characterisation(angle, 166.66 * angle, pressure=60e3, radius=0.055)
+    assert (fit.max_moment, fit.mean_moment_above_wrinkling, fit.n_saturated) == (None, None, 0)
+    assert fit.stiffness == pytest.approx(166.66, rel=1e-13)
+
+
+def test_plain_average_lies_below_the_plateau() -> None:
+    angle = np.linspace(0.0, 0.3, 300)
+    moments = inflated_beam.moment(angle, stiffness=150.0, max_moment=9.45)
+    fit = inflated_beam.fit_characterisation(angle, moments, pressure=20e3, radius=0.055)
+    assert fit.mean_moment_above_wrinkling < fit.max_moment == pytest.approx(9.45, rel=1e-12)
+
+
+def test_tank_conserves_gas() -> None:
+    """Isothermal ideal gas: the amount before equals the amount after, ambient gas in nothing (empty tubes)."""
+    volume, pressure, tank, ambient = 0.0114, 50e3, 30e6, 101325.0
+    size = inflated_beam.tank_volume(volume, pressure, tank, ambient_pressure=ambient)
+    assert (tank + ambient) * size == pytest.approx((pressure + ambient) * (size + volume), rel=1e-13)
+    assert inflated_beam.tank_pressure(volume, pressure, size, ambient_pressure=ambient) == pytest.approx(tank, rel=1e-13)
+    assert inflated_beam.volume(0.6, 0.055) == pytest.approx(np.pi * 0.055**2 * 0.6)
+
+
+GOOD = {"pressure": 30e3, "young_modulus": 138e6, **TUBE}
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: inflated_beam.wrinkling_moment(-1.0, 0.05), "pressure"),
+        (lambda: inflated_beam.wrinkling_moment(1e4, 0.0), "radius"),
+        (lambda: inflated_beam.wrinkling_moment(float("nan"), 0.05), "pressure"),
+        (lambda: inflated_beam.required_pressure(-1.0, 0.05), "moment"),
+        (lambda: inflated_beam.required_tabulated_pressure(float("inf"), 0.05), "moment"),
+        (lambda: inflated_beam.deflection(0.7, 1.0, **GOOD), "position"),
+        (lambda: inflated_beam.deflection([-0.1, 0.2], 1.0, **GOOD), "position"),
+        (lambda: inflated_beam.deflection(0.1, float("nan"), **GOOD), "force"),
+        (lambda: inflated_beam.deflection(0.1, 1.0, **(GOOD | {"poisson_ratio": 0.6})), "poisson_ratio"),
+        (lambda: inflated_beam.deflection(0.1, 1.0, **(GOOD | {"wall_thickness": 0.02})), "wall_thickness"),
+        (lambda: inflated_beam.deflection(0.1, 1.0, **(GOOD | {"length": -0.6})), "length"),
+        (lambda: inflated_beam.stiffness_from_young_modulus(0.0, pressure=1e4, **TUBE), "young_modulus"),
+        (lambda: inflated_beam.young_modulus_from_stiffness(-5.0, pressure=1e4, **TUBE), "stiffness"),
+        (lambda: inflated_beam.young_modulus_from_stiffness(1e-3, pressure=6e4, **TUBE), "stiffness"),
+        (lambda: inflated_beam.moment([0.1, float("inf")], stiffness=170.0, max_moment=20.0), "angle"),
+        (lambda: inflated_beam.moment(0.1, stiffness=0.0, max_moment=20.0), "stiffness"),
+        (lambda: inflated_beam.moment(0.1, stiffness=170.0, max_moment=-1.0), "max_moment"),
+        (lambda: inflated_beam.fit_characterisation([0.1, 0.2], [1.0], pressure=1e4, radius=0.05), "moment"),
+        (lambda: inflated_beam.fit_characterisation([0.1, 0.2], [1.0, 2.0], pressure=1e4, radius=0.05), "moment"),
+        (lambda: inflated_beam.fit_characterisation([0.1, 0.2, 0.3], [-1.0, -2.0, -3.0], pressure=1e4, radius=0.05), "moment"),
+        (lambda: inflated_beam.fit_characterisation([0.1], [1.0], pressure=0.0, radius=0.05), "pressure"),
+        (lambda: inflated_beam.volume(-0.6, 0.05), "length"),
+        (lambda: inflated_beam.tank_volume(0.01, 5e4, 4e4), "tank_pressure"),
+        (lambda: inflated_beam.tank_volume(0.01, 5e4, 3e7, ambient_pressure=-1.0), "ambient_pressure"),
+        (lambda: inflated_beam.tank_pressure(0.01, 5e4, 0.0), "tank_volume"),
+    ],
+)
+def test_bad_input_is_refused(call, field: str) -> None:
+    with pytest.raises(ParameterError, match=field) as caught:
+        call()
+    assert caught.value.field == field

@@ -1,0 +1,77 @@
+"""Geometry of the arm against the paper's Denavit-Hartenberg tables and against yourdfpy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.equilibrium import frame_placement
+from softrobots.paths import urdf_folder
+from softrobots.sensitivity import frame_jacobian
+from tests.oracles import flexible_jacobian, flexible_table, rigid_table
+
+# The last DH frame has its z axis along -y of the arm; the tip frame of the URDF has z up.
+TIP_TO_DH = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+ROUNDING = 1e-12  # the issue's bound; seven rotations and 1.2 m give about 1e-15
+
+
+def angles_of(motors: np.ndarray, springs: np.ndarray) -> np.ndarray:
+    """Seven DH angles: motors are joints 1, 2, 5 and springs 3, 4, 6, 7 of Table 2."""
+    return np.array([motors[0], motors[1], springs[0], springs[1], motors[2], springs[2], springs[3]])
+
+
+def test_joints_are_named_and_ordered_base_to_tip(arm: sr.SoftModel) -> None:
+    assert arm.motor_joints == ("motor_1", "motor_2", "motor_3")
+    assert arm.spring_joints == ("spring_1_side", "spring_1_up", "spring_2_side", "spring_2_up")
+    assert arm.reach == pytest.approx(1.2, rel=1e-15)
+
+
+def test_tip_pose_is_that_of_table_2(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    for _ in range(100):
+        motors, springs = rng.uniform(-np.pi, np.pi, 3), rng.uniform(-1.5, 1.5, 4)
+        found = frame_placement(arm, arm.configuration(motors, springs), "tip").homogeneous
+        assert np.abs(found @ TIP_TO_DH - flexible_table(angles_of(motors, springs))[-1]).max() < ROUNDING
+
+
+def test_tip_pose_with_springs_at_zero_is_that_of_table_1(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    for _ in range(100):
+        motors = rng.uniform(-np.pi, np.pi, 3)
+        found = frame_placement(arm, arm.configuration(motors, np.zeros(4)), "tip").homogeneous
+        assert np.abs(found @ TIP_TO_DH - rigid_table(motors)).max() < ROUNDING
+
+
+def test_jacobian_is_that_of_equation_4(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    columns = [0, 1, 4, 2, 3, 5, 6]  # motors, then springs, among the DH joints
+    for _ in range(100):
+        motors, springs = rng.uniform(-np.pi, np.pi, 3), rng.uniform(-1.5, 1.5, 4)
+        found = frame_jacobian(arm, arm.configuration(motors, springs), "tip")
+        found = found[:, np.r_[arm.motor_indices, arm.spring_indices]]
+        assert np.abs(found - flexible_jacobian(angles_of(motors, springs))[:, columns]).max() < ROUNDING
+
+
+def test_yourdfpy_places_every_link_where_pinocchio_does(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    import yourdfpy
+
+    robot = yourdfpy.URDF.load(str(urdf_folder() / "inflatable_arm.urdf"))
+    for _ in range(20):
+        motors, springs = rng.uniform(-np.pi, np.pi, 3), rng.uniform(-1.5, 1.5, 4)
+        q = arm.configuration(motors, springs)
+        names = (*arm.motor_joints, *arm.spring_joints)
+        robot.update_cfg(dict(zip(names, np.r_[motors, springs], strict=True)))
+        for link in robot.link_map:
+            theirs = robot.get_transform(link, "world")
+            assert np.abs(frame_placement(arm, q, link).homogeneous - theirs).max() < 1e-12, link
+
+
+def test_file_text_and_robot_load_to_the_same_model(arm: sr.SoftModel, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(sr.InflatableArm().urdf(), encoding="utf-8")
+    for source in (path, str(path), path.read_text(encoding="utf-8")):
+        model = sr.load_model(source)
+        assert model.pinocchio == arm.pinocchio
+        assert model.spring_table == arm.spring_table
+        assert model.spring_groups == arm.spring_groups
+        assert (model.motor_joints, model.tip) == (arm.motor_joints, arm.tip)

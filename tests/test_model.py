@@ -1,0 +1,171 @@
+"""Loading: our files, other people's files, and everything that is refused."""
+
+from __future__ import annotations
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import softrobots as sr
+from softrobots.equilibrium import frame_placement
+from softrobots.loader import MAX_DOF
+from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+
+
+def test_springs_of_the_caller_on_a_foreign_file() -> None:
+    model = sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
+    assert set(model.motor_joints) == {"shoulder", "elbow", "gripper"}
+    assert model.spring_table == {"wrist": (20.0, 0.1), "slider": (800.0, 0.0)}
+    assert model.spring_groups == ()
+    assert model.reach == pytest.approx(4 * 0.3)
+    unlimited = model.motor_limits[model.motor_joints.index("shoulder")]
+    assert unlimited.tolist() == [-np.inf, np.inf]
+
+
+def test_a_continuous_joint_takes_an_angle() -> None:
+    """Pinocchio stores cosine and sine; the same robot with a revolute shoulder has the same geometry."""
+    model = sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
+    limited = BRANCHED.replace('"continuous"><', '"revolute"><limit lower="-9" upper="9" effort="1" velocity="1"/><')
+    twin = sr.load_model(limited, springs=SPRINGS, tip="finger")
+    assert (model.pinocchio.nq, twin.pinocchio.nq) == (6, 5)
+    motors = dict(shoulder=2.2, elbow=-0.4, gripper=0.3)
+    poses = [
+        frame_placement(m, m.configuration([motors[name] for name in m.motor_joints], [0.2, 0.05]), "finger").homogeneous
+        for m in (model, twin)
+    ]
+    assert np.allclose(*poses, atol=1e-15)
+    found = [
+        sr.solve_equilibrium(m, [motors[name] for name in m.motor_joints], (1, 2, 3), gravity=sr.EARTH_GRAVITY)
+        for m in (model, twin)
+    ]
+    assert np.allclose(found[0].q_springs, found[1].q_springs, atol=1e-14)
+
+
+def test_joints_that_are_not_named_are_locked() -> None:
+    model = sr.load_model(BRANCHED, springs=SPRINGS, motors=["elbow"], tip="finger")
+    assert model.motor_joints == ("elbow",)
+    assert model.pinocchio.nv == 3
+    full = sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
+    motors = [0.7 if name == "elbow" else 0.0 for name in full.motor_joints]
+    a = frame_placement(model, model.configuration([0.7]), "finger").homogeneous
+    assert np.allclose(a, frame_placement(full, full.configuration(motors), "finger").homogeneous, atol=1e-15)
+
+
+def test_a_rigid_robot_is_loaded_when_said_so() -> None:
+    model = sr.load_model(BRANCHED, springs={}, tip="finger")
+    assert model.n_springs == 0
+    result = sr.solve_equilibrium(model, np.zeros(5), (1.0, 2.0, 3.0))
+    assert result.stable
+    assert result.residual == 0.0
+
+
+def test_springs_of_the_caller_replace_those_of_the_file(arm: sr.SoftModel) -> None:
+    model = sr.load_model(sr.InflatableArm(), springs={"spring_1_up": (99.0, 0.2)})
+    assert model.spring_joints == ("spring_1_up",)
+    assert model.n_motors == 6
+    assert model.spring_groups == ()
+
+
+def test_results_cannot_be_changed(arm: sr.SoftModel) -> None:
+    for array in (arm.stiffness, arm.rest, arm.motor_limits, arm.spring_limits):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+
+
+def test_a_model_survives_pickling(arm: sr.SoftModel) -> None:
+    twin = pickle.loads(pickle.dumps(arm))
+    assert twin.spring_table == arm.spring_table
+    a, b = (sr.solve_equilibrium(m, (0.3, 0.6, -0.8), (0, 10, -15)).q_springs for m in (arm, twin))
+    assert np.array_equal(a, b)
+
+
+def test_threads_share_a_model_and_get_identical_bytes(arm: sr.SoftModel) -> None:
+    def job(number: int) -> bytes:
+        random = np.random.default_rng(number)
+        gravity = (0.0, 0.0, -9.81) if number % 2 else tuple(random.normal(size=3))
+        found = sr.solve_equilibrium(arm, random.uniform(-3, 3, 3), random.normal(size=3) * 20, gravity=gravity)
+        return found.q_springs.tobytes() + found.motor_torques.tobytes()
+
+    alone = [job(number) for number in range(200)]
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(job, range(200))) == alone
+
+
+def test_gravity_of_one_call_does_not_leak_into_the_next(arm: sr.SoftModel) -> None:
+    before = sr.solve_equilibrium(arm, (0, 0.5, 0), (0, 1, 0)).q_springs
+    sr.solve_equilibrium(arm, (0, 0.5, 0), (0, 1, 0), gravity=(0, 0, -100))
+    assert np.array_equal(sr.solve_equilibrium(arm, (0, 0.5, 0), (0, 1, 0)).q_springs, before)
+    assert np.array_equal(arm.pinocchio.gravity.linear, pin.Model().gravity.linear)
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "error", "message"),
+    [
+        (BRANCHED, {}, sr.DescriptionError, r"no joint springs.*shoulder, elbow.*springs=\{\}"),
+        (BRANCHED, {"springs": {"wirst": 10.0}}, sr.NameNotFound, r"'wirst' \(did you mean 'wrist'\?\); available: .*wrist"),
+        (BRANCHED, {"springs": {"wrist": -1.0}}, sr.ParameterError, "springs.*positive"),
+        (BRANCHED, {"springs": {"wrist": (1.0, float("nan"))}}, sr.ParameterError, "finite"),
+        (BRANCHED, {"springs": ["wrist"]}, sr.ParameterError, "mapping"),
+        (BRANCHED, {"springs": SPRINGS}, sr.DescriptionError, r"2 ends \(.*finger.*\); say which frame is the tip"),
+        (BRANCHED, {"springs": SPRINGS, "tip": "fingr"}, sr.NameNotFound, "'fingr'.*did you mean 'finger'"),
+        (BRANCHED, {"springs": SPRINGS, "motors": ["elbw"]}, sr.NameNotFound, "'elbw'.*did you mean 'elbow'"),
+        (BRANCHED, {"springs": SPRINGS, "motors": ["wrist"]}, sr.ParameterError, "without a spring"),
+        (BRANCHED, {"springs": SPRINGS, "motors": ["elbow", "elbow"]}, sr.ParameterError, "repetition"),
+        (BRANCHED, {"springs": SPRINGS, "motors": "elbow"}, sr.ParameterError, "list of joint names"),
+        ("<robot name='r'><link name='a'/><link name='b'/></robot>", {"springs": {}}, sr.DescriptionError, "Pinocchio refuses"),
+        ("<mujoco/>", {"springs": {}}, sr.DescriptionError, "root tag <mujoco>"),
+        ("<robot", {}, sr.DescriptionError, "not well-formed"),
+        ("no_such_file.urdf", {}, sr.DescriptionError, "cannot read 'no_such_file.urdf'"),
+        (42, {}, sr.ParameterError, "a robot, a path, or URDF text"),
+        (
+            f'<robot name="f"><link name="a">{INERTIAL}</link>' + joint("j", "a", "b", "0 0 1", "floating") + "</robot>",
+            {"springs": {}},
+            sr.DescriptionError,
+            "revolute, continuous and prismatic",
+        ),
+    ],
+)
+def test_what_cannot_be_loaded_is_refused(source: object, options: dict, error: type, message: str) -> None:
+    with pytest.raises(error, match=message) as caught:
+        sr.load_model(source, **options)
+    assert isinstance(caught.value, sr.SoftRobotsError)
+
+
+def test_too_many_coordinates_are_refused() -> None:
+    with pytest.raises(sr.DescriptionError, match=f"at most {MAX_DOF} are supported"):
+        sr.load_model(sr.InflatableArm(link_lengths=(0.1,) * 101))
+
+
+def test_a_folder_and_a_binary_file_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(sr.DescriptionError, match="cannot read"):
+        sr.load_model(tmp_path)
+    binary = tmp_path / "x.urdf"
+    binary.write_bytes(bytes(range(256)))
+    with pytest.raises(sr.DescriptionError, match="cannot read"):
+        sr.load_model(binary)
+
+
+@pytest.mark.parametrize(
+    ("motors", "springs", "field"),
+    [
+        ((0.0, 0.0), None, "q_motors"),
+        ((0.0, 0.0, float("nan")), None, "q_motors"),
+        ("abc", None, "q_motors"),
+        (((0.0, 0.0, 0.0),), None, "q_motors"),
+        ((0.0, 0.0, 0.0), (0.0,), "q_springs"),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, float("inf")), "q_springs"),
+    ],
+)
+def test_bad_coordinates_are_refused(arm: sr.SoftModel, motors: object, springs: object, field: str) -> None:
+    with pytest.raises(sr.ParameterError, match=field):
+        arm.configuration(motors, springs)
+
+
+def test_unknown_frames_are_refused_with_the_known_ones(arm: sr.SoftModel) -> None:
+    with pytest.raises(sr.NameNotFound, match=r"'tipp' \(did you mean 'tip'\?\); available: .*hinge_1") as caught:
+        arm.frame_id("tipp")
+    assert caught.value.available[-1] == "tip"

@@ -1,0 +1,158 @@
+"""Saved results come back equal, old files survive, foreign and altered files are refused."""
+
+from __future__ import annotations
+
+import csv
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.results_io import write_atomically
+
+FORCE = (0.0, 10.0, -15.0)
+
+
+@pytest.fixture(scope="module")
+def results(arm: sr.SoftModel) -> dict[str, object]:
+    motors = (0.3, 0.6, -0.8)
+    state = sr.solve_equilibrium(arm, motors, FORCE, wrench={"link_1": (1, 0, 0, 0, 0, 0.5)}, gravity=sr.EARTH_GRAVITY)
+    path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 8)
+    return {
+        "equilibrium": state,
+        "ik_solution": sr.solve_ik(arm, (0.7, 0.2, 0.4), FORCE),
+        "load_estimate": sr.estimate_load(arm, motors, sr.solve_equilibrium(arm, motors, FORCE).motor_torques, torque_std=0.1),
+        "trajectory": sr.follow_trajectory(arm, path.positions, FORCE, times=path.times),
+    }
+
+
+def same(one: object, other: object, path: str = "") -> None:
+    """Compare two results field by field; arrays to the last bit, the model by its URDF and springs."""
+    assert type(one) is type(other), path
+    if isinstance(one, sr.SoftModel):
+        assert (one.urdf, one.spring_table, one.motor_joints, one.tip) == (
+            other.urdf, other.spring_table, other.motor_joints, other.tip,
+        )  # fmt: skip
+    elif isinstance(one, np.ndarray):
+        assert np.array_equal(one, other), path
+    elif isinstance(one, tuple):
+        assert len(one) == len(other)
+        for number, (a, b) in enumerate(zip(one, other, strict=True)):
+            same(a, b, f"{path}[{number}]")
+    elif isinstance(one, dict):
+        assert one.keys() == other.keys()
+        for key in one:
+            same(one[key], other[key], f"{path}[{key}]")
+    elif hasattr(one, "__dataclass_fields__"):
+        for name in one.__dataclass_fields__:
+            same(getattr(one, name), getattr(other, name), f"{path}.{name}")
+    else:
+        assert one == other, path
+
+
+@pytest.mark.parametrize("kind", ["equilibrium", "ik_solution", "load_estimate", "trajectory"])
+def test_what_is_saved_comes_back_equal(results: dict, kind: str, tmp_path: Path) -> None:
+    file = sr.save(results[kind], tmp_path / kind)
+    assert file.suffix == ".npz"
+    same(results[kind], sr.load(file))
+
+
+def test_springs_said_by_the_caller_come_back(tmp_path: Path) -> None:
+    from tests.foreign import BRANCHED, SPRINGS
+
+    model = sr.load_model(BRANCHED, springs=SPRINGS, motors=["elbow"], tip="finger")
+    state = sr.solve_equilibrium(model, (0.3,), (0, 0, -2))
+    same(state, sr.load(sr.save(state, tmp_path / "a.npz")))
+
+
+def test_nothing_is_overwritten_silently(results: dict, tmp_path: Path) -> None:
+    file = sr.save(results["equilibrium"], tmp_path / "a.npz")
+    before = file.read_bytes()
+    with pytest.raises(sr.OutputExists, match=r"a\.npz exists"):
+        sr.save(results["trajectory"], file)
+    assert file.read_bytes() == before
+    sr.save(results["trajectory"], file, overwrite=True)
+    assert isinstance(sr.load(file), sr.Trajectory)
+    with pytest.raises(sr.OutputExists, match="is a folder"):
+        sr.save(results["trajectory"], tmp_path)
+    table = sr.save_csv(results["trajectory"], tmp_path / "a.csv")
+    with pytest.raises(sr.OutputExists, match=r"a\.csv exists"):
+        sr.save_csv(results["trajectory"], table)
+
+
+def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    file.write_bytes(b"old")
+
+    def interrupted(handle) -> None:
+        handle.write(b"half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(file, interrupted)
+    assert file.read_bytes() == b"old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_csv_holds_the_trajectory_in_full_precision(results: dict, tmp_path: Path) -> None:
+    trajectory = results["trajectory"]
+    file = sr.save_csv(trajectory, tmp_path / "new" / "a.csv")
+    with file.open(newline="") as handle:
+        rows = list(csv.DictReader(handle))
+    assert len(rows) == 9
+    assert [float(row["motor_2"]) for row in rows] == trajectory.q_motors[:, 1].tolist()
+    assert [float(row["moment_1"]) for row in rows] == trajectory.link_moments[:, 0].tolist()
+    assert np.array_equal(sr.read_waypoints(file).positions, trajectory.targets)  # readable as waypoints
+
+
+def altered(file: Path, target: Path, **changes: np.ndarray) -> Path:
+    with np.load(file) as data:
+        fields = dict(data) | changes
+    np.savez(target, **fields)
+    return target
+
+
+def test_files_that_do_not_hold_what_they_claim_are_refused(results: dict, tmp_path: Path) -> None:
+    file = sr.save(results["equilibrium"], tmp_path / "a.npz")
+    with np.load(file) as data:
+        springs = data["q_springs"]
+    bad = tmp_path / "bad.npz"
+    for changes, message in (
+        ({"q_springs": springs + 1e-3}, "claims a residual"),
+        ({"q_springs": springs * np.nan}, "finite"),
+        ({"q_springs": springs[:, :2]}, "q_springs"),
+        ({"kind": np.array("banana")}, "holds 'banana'"),
+        ({"format": np.array(99)}, "format 99"),
+        ({"urdf": np.array("<robot/>")}, "cannot read a result"),
+        ({"model": np.array("{")}, "cannot read a result"),
+        ({"load": np.array('{"wrenches": {"nowhere": [0,0,0,0,0,0]}, "gravity": null}')}, "nowhere"),
+        ({"q_motors": np.array([{"a": 1}], dtype=object)}, "cannot read a result"),  # pickle inside
+    ):
+        with pytest.raises(sr.FileFormatError, match=message):
+            sr.load(altered(file, bad, **changes))
+
+
+def test_files_that_are_not_ours_are_refused(tmp_path: Path) -> None:
+    for name, content in (("a.npz", b""), ("b.npz", b"not a zip"), ("c.npz", b"PK\x03\x04" + bytes(100))):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(sr.FileFormatError):
+            sr.load(tmp_path / name)
+    with zipfile.ZipFile(tmp_path / "d.npz", "w") as archive:
+        archive.writestr("readme.txt", "hello")
+    with pytest.raises(sr.FileFormatError):
+        sr.load(tmp_path / "d.npz")
+    np.save(tmp_path / "e.npy", np.zeros(3))
+    with pytest.raises(sr.FileFormatError):
+        sr.load(tmp_path / "e.npy")
+    with pytest.raises(sr.FileFormatError, match="cannot read"):
+        sr.load(tmp_path / "missing.npz")
+
+
+def test_other_objects_are_refused(arm: sr.SoftModel, results: dict, tmp_path: Path) -> None:
+    with pytest.raises(sr.ParameterError, match="Equilibrium, IkSolution, LoadEstimate or Trajectory"):
+        sr.save(arm, tmp_path / "a.npz")
+    with pytest.raises(sr.ParameterError, match="a Trajectory"):
+        sr.save_csv(results["equilibrium"], tmp_path / "a.csv")
+    assert list(tmp_path.iterdir()) == []

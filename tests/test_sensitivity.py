@@ -1,0 +1,88 @@
+"""Derivatives of equilibria against central differences of solved equilibria, and reciprocity."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import softrobots as sr
+from tests.oracles import central_difference
+
+# Step 1e-5 on equilibria solved to 1e-13: truncation 1e-10, rounding 1e-13 * 20 / 172 / 1e-5 = 1e-9; bound of the issue 1e-6.
+RELATIVE = 1e-6
+
+
+def cases(rng: np.random.Generator, count: int = 6) -> list[tuple[np.ndarray, np.ndarray, tuple | None]]:
+    gravities = (None, sr.EARTH_GRAVITY)
+    return [(rng.uniform(-2, 2, 3), 15 * rng.normal(size=3), gravities[i % 2]) for i in range(count)]
+
+
+def test_elastostatic_jacobian_matches_solved_equilibria(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    for motors, force, gravity in cases(rng):
+        found = sr.elastostatic_jacobian(arm, sr.solve_equilibrium(arm, motors, force, gravity=gravity))
+
+        def tip(q: np.ndarray, force=force, gravity=gravity) -> np.ndarray:
+            return sr.solve_equilibrium(arm, q, force, gravity=gravity, tolerance=1e-13).tip_position
+
+        expected = central_difference(tip, motors, 1e-5)
+        assert np.abs(found - expected).max() < RELATIVE * np.abs(expected).max()
+
+
+def test_elastostatic_jacobian_with_a_moment(arm: sr.SoftModel) -> None:
+    motors, wrench = np.array([0.3, 0.6, -0.8]), np.array([5.0, 10.0, -8.0, 3.0, -2.0, 4.0])
+    found = sr.elastostatic_jacobian(arm, sr.solve_equilibrium(arm, motors, wrench=wrench))
+    expected = central_difference(
+        lambda q: sr.solve_equilibrium(arm, q, wrench=wrench, tolerance=1e-13).tip_position, motors, 1e-5
+    )
+    assert np.abs(found - expected).max() < RELATIVE * np.abs(expected).max()
+
+
+def test_compliance_matches_solved_equilibria(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    for motors, force, gravity in cases(rng):
+        start = sr.solve_equilibrium(arm, motors, force, gravity=gravity, tolerance=1e-13)
+        rotation = start.transform_tip_to_world.rotation
+
+        def pose(extra: np.ndarray, motors=motors, force=force, gravity=gravity, rotation=rotation) -> np.ndarray:
+            wrench = np.r_[force, np.zeros(3)] + extra
+            moved = sr.solve_equilibrium(arm, motors, wrench=wrench, gravity=gravity, tolerance=1e-13).transform_tip_to_world
+            return np.r_[moved.translation, pin.log3(moved.rotation @ rotation.T)]
+
+        expected = central_difference(pose, np.zeros(6), 1e-3)  # truncation (1e-3 / 172)^2
+        found = sr.compliance(arm, start)
+        assert np.abs(found - expected).max() < RELATIVE * np.abs(expected).max()
+
+
+def test_compliance_is_reciprocal_for_forces_and_positive(odd_arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    """Maxwell-Betti: symmetric; a stable robot never moves against a push: no negative eigenvalue."""
+    start = sr.solve_equilibrium(odd_arm, rng.uniform(-1, 1, 4), (5, -5, -10), gravity=sr.EARTH_GRAVITY)
+    found = sr.compliance(odd_arm, start)
+    assert np.abs(found - found.T).max() < 1e-15
+    assert np.linalg.eigvalsh(found).min() > -1e-15
+
+
+def test_jacobian_of_the_unloaded_arm_is_the_rigid_one(arm: sr.SoftModel) -> None:
+    from tests.oracles import rigid_table
+
+    motors = np.array([0.3, 0.6, -0.8])
+    found = sr.elastostatic_jacobian(arm, sr.solve_equilibrium(arm, motors))
+    assert np.allclose(found, central_difference(lambda q: rigid_table(q)[:3, 3], motors), atol=1e-9)
+
+
+def test_bad_input_is_refused(arm: sr.SoftModel, odd_arm: sr.SoftModel) -> None:
+    start = sr.solve_equilibrium(arm, (0, 0, 0), (0, 0, 1))
+    for function in (sr.elastostatic_jacobian, sr.compliance):
+        with pytest.raises(sr.ParameterError, match="equilibrium of the model given"):
+            function(odd_arm, start)
+        with pytest.raises(sr.ParameterError, match="an Equilibrium of the model"):
+            function(arm, start.q)
+
+
+def test_a_neutral_equilibrium_has_no_derivative() -> None:
+    """Stiffness 1 N m/rad on one planar spring pushed by exactly k / l2: the tangent is exactly singular."""
+    text = sr.InflatableArm(link_lengths=(0.75,), hinge_offset=0.25, stiffness=1.0).urdf()
+    model = sr.load_model(text, springs={"spring_1_up": 1.0})
+    balanced = sr.solve_equilibrium(model, (0, 0, 0), (-2.0, 0, 0))  # k / l2 = 1 / 0.5
+    assert not balanced.stable
+    with pytest.raises(sr.ParameterError, match="neutral"):
+        sr.compliance(model, balanced)

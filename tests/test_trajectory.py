@@ -1,0 +1,197 @@
+"""Trajectories: the time law's calculus, every waypoint reached, the paper's method as the paper's theory predicts it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.trajectory import METHODS
+
+FORCE = (0.0, 10.0, -15.0)
+PATH = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
+
+
+def test_quintic_starts_and_ends_at_rest_without_acceleration() -> None:
+    """The only quintic with s = 0, 1 and two vanishing derivatives at both ends, solved from those conditions."""
+    conditions = [[float(t**k) for k in range(6)] for t in (0, 1)]
+    conditions += [[k * float(t) ** max(k - 1, 0) for k in range(6)] for t in (0, 1)]
+    conditions += [[k * (k - 1) * float(t) ** max(k - 2, 0) for k in range(6)] for t in (0, 1)]
+    coefficients = np.linalg.solve(np.array(conditions), [0, 1, 0, 0, 0, 0])
+    share = np.linspace(0, 1, 57)
+    assert np.allclose(sr.quintic(share), np.polynomial.polynomial.polyval(share, coefficients), atol=1e-12)
+
+
+def test_straight_line_is_straight_and_its_velocity_is_its_derivative() -> None:
+    path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 3.0, 4000)
+    span = np.array([0.6, 0.7, -0.4])
+    assert np.allclose(np.cross(path.positions - path.positions[0], span), 0.0, atol=1e-15)
+    assert np.allclose(path.positions[[0, -1]], [[0.4, -0.5, 0.6], [1.0, 0.2, 0.2]], atol=1e-15)
+    assert np.allclose(np.gradient(path.positions, path.times, axis=0)[1:-1], path.velocities[1:-1], atol=1e-6)
+    assert np.abs(path.velocities).max(0) == pytest.approx(1.875 * np.abs(span) / 3.0, rel=1e-12)  # 15/8 at half time
+
+
+@pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
+@pytest.mark.parametrize("method", ["newton", "fixed_point"])
+def test_every_waypoint_is_reached(arm: sr.SoftModel, method: str, gravity: tuple | None) -> None:
+    found = sr.follow_trajectory(arm, PATH.positions, FORCE, method=method, times=PATH.times, elbow="up", gravity=gravity)
+    assert found.tip_error.max() <= 1e-9
+    assert all(state.stable for state in found.equilibria)
+    assert np.abs(np.diff(found.q_motors, axis=0)).max() < 0.05  # one branch, no jump
+    for number in (0, 37, 100):  # afresh, from relaxed springs
+        again = sr.solve_equilibrium(arm, found.q_motors[number], FORCE, gravity=gravity)
+        assert np.allclose(again.tip_position, PATH.positions[number], atol=2e-9)
+
+
+def test_methods_agree_on_the_motor_angles(arm: sr.SoftModel) -> None:
+    """The paper's method with small steps and a high gain approaches the exact answer in proportion to 1 / gain."""
+    exact = sr.follow_trajectory(arm, PATH.positions, FORCE, elbow="up")
+    fine = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 1600)
+    errors = []
+    for gain in (100.0, 200.0):
+        paper = sr.follow_trajectory(arm, fine.positions, FORCE, elbow="up", method="paper", times=fine.times, gain=gain)
+        errors.append(np.abs(paper.q_motors[::16] - exact.q_motors).max())
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
+    assert errors[1] < 0.02
+
+
+def test_the_papers_method_lags_as_measured(arm: sr.SoftModel) -> None:
+    """theory 1.4: on a 0.5 m move in 1 s the largest error falls from centimetres to millimetres over gains 5 to 100."""
+    path = sr.straight_line((0.9, -0.2, 0.1), (0.6, 0.2, 0.1), 1.0, 400)
+    largest = []
+    for gain in (5, 10, 50, 100):
+        found = sr.follow_trajectory(arm, path.positions, FORCE, method="paper", times=path.times, gain=gain, elbow="up")
+        largest.append(1e3 * found.tip_error.max())
+    assert largest == sorted(largest, reverse=True)
+    assert 50 < largest[0] < 200
+    assert 2 < largest[-1] < 15
+
+
+def test_moments_pressure_and_margin(arm: sr.SoftModel) -> None:
+    """The default trajectory of the script: link 1 within 10 % of the paper's 17.51 N m, and 50 kPa as in the paper."""
+    found = sr.follow_trajectory(arm, PATH.positions, FORCE, elbow="up")
+    largest = found.link_moments.max(axis=0)
+    assert largest[0] == pytest.approx(17.51, rel=0.1)
+    assert found.required_pressure == pytest.approx(largest[0] / (np.pi**2 / 4 * 0.055**3), rel=1e-12)
+    assert found.wrinkling_margin == pytest.approx(1 - largest[0] / sr.inflated_beam.wrinkling_moment(50e3, 0.055), rel=1e-12)
+    assert sr.inflated_beam.required_tabulated_pressure(largest[0], 0.055) == 50e3
+    assert [state.wrinkled for state in found.equilibria] == [False] * 101
+
+
+def test_a_robot_without_inflated_links_has_no_moments(arm: sr.SoftModel) -> None:
+    plain = sr.load_model(arm.urdf, springs={"spring_1_up": 100.0}, motors=arm.motor_joints)
+    found = sr.follow_trajectory(plain, PATH.positions[:5], FORCE)
+    assert (found.link_moments, found.required_pressure, found.wrinkling_margin) == (None, None, None)
+
+
+def test_the_unloaded_trajectory_is_rigid_inverse_kinematics(arm: sr.SoftModel) -> None:
+    from tests.oracles import rigid_table
+
+    found = sr.follow_trajectory(arm, PATH.positions, elbow="up")
+    assert np.abs(found.q_springs).max() == 0.0
+    for motors, target in zip(found.q_motors, PATH.positions, strict=True):
+        assert np.allclose(rigid_table(motors)[:3, 3], target, atol=1e-9)
+
+
+def test_a_long_step_is_bridged(arm: sr.SoftModel) -> None:
+    found = sr.follow_trajectory(arm, PATH.positions[[0, -1]], FORCE, elbow="up")
+    near = sr.follow_trajectory(arm, PATH.positions, FORCE, elbow="up")
+    assert np.allclose(found.q_motors[-1], near.q_motors[-1], atol=1e-7)
+
+
+def test_an_unreachable_waypoint_is_named(arm: sr.SoftModel) -> None:
+    path = sr.straight_line((0.9, 0.0, 0.1), (1.6, 0.0, 0.1), 1.0, 10)
+    with pytest.raises(sr.TargetUnreachable, match=r"waypoint \d of 11: the tip cannot reach .* comes within"):
+        sr.follow_trajectory(arm, path.positions, FORCE)
+
+
+def test_fixed_point_that_fails_on_the_way_is_an_error_that_names_the_waypoint(arm: sr.SoftModel) -> None:
+    with pytest.raises(sr.NotConverged):
+        sr.follow_trajectory(arm, PATH.positions, (200.0, 0, 0), method="paper", times=PATH.times)
+
+
+def test_progress_goes_to_stderr(arm: sr.SoftModel, capsys: pytest.CaptureFixture) -> None:
+    sr.follow_trajectory(arm, PATH.positions[:6], FORCE, progress=True)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "waypoints (newton)" in err
+    assert "5/5" in err
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_bad_input_is_refused(arm: sr.SoftModel, method: str) -> None:
+    good = {"targets": PATH.positions[:4], "times": PATH.times[:4], "method": method}
+    for change, message in (
+        ({"targets": np.zeros((0, 3))}, "at least one target"),
+        ({"targets": PATH.positions[:4, :2]}, "targets"),
+        ({"targets": np.full((4, 3), np.nan)}, "targets"),
+        ({"times": PATH.times[:3]}, "times"),
+        ({"times": PATH.times[:4][::-1]}, "increasing"),
+        ({"gain": 0.0}, "gain"),
+        ({"force": (1,)}, "force"),
+        ({"q_motors0": (9, 9, 9)}, "q_motors0"),
+        ({"elbow": "sideways"}, "elbow"),
+        ({"method": "pink"}, "method"),
+    ):
+        with pytest.raises(sr.ParameterError, match=message):
+            sr.follow_trajectory(arm, **(good | change))
+    if method == "paper":
+        with pytest.raises(sr.ParameterError, match=r"times.*given for method='paper'"):
+            sr.follow_trajectory(arm, PATH.positions[:4], method="paper")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: sr.quintic(1.5), "share"),
+        (lambda: sr.quintic([0.1, float("nan")]), "share"),
+        (lambda: sr.straight_line((0, 0), (1, 1, 1), 1.0), "start"),
+        (lambda: sr.straight_line((0, 0, 0), (1, 1, float("inf")), 1.0), "end"),
+        (lambda: sr.straight_line((0, 0, 0), (1, 1, 1), 0.0), "duration"),
+        (lambda: sr.straight_line((0, 0, 0), (1, 1, 1), 1.0, 0), "steps"),
+        (lambda: sr.waypoints([(0, 0, 0)], [0.0]), "at least two"),
+        (lambda: sr.waypoints(np.zeros((3, 3)), [0, 2, 1]), "increasing"),
+        (lambda: sr.waypoints(np.zeros((3, 3)), [0, 1]), "times"),
+    ],
+)
+def test_bad_paths_are_refused(call, message: str) -> None:
+    with pytest.raises(sr.ParameterError, match=message):
+        call()
+
+
+def test_waypoints_are_read_from_csv(tmp_path: Path) -> None:
+    file = tmp_path / "path.csv"
+    file.write_text("\ufefft, x, y, z, note\n0,0.5,0.1,0.2,a\n0.5,0.6,0.1,0.2,b\n1.5,0.9,0.1,0.2,c\n", encoding="utf-8")
+    path = sr.read_waypoints(file)
+    assert path.times.tolist() == [0.0, 0.5, 1.5]
+    assert path.positions[:, 0].tolist() == [0.5, 0.6, 0.9]
+    file.write_text("x,y,z\n0,0,0\n1,1,1\n", encoding="utf-8")
+    assert sr.read_waypoints(file).times.tolist() == [0.0, 0.05]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"lacks the column x, y, z.*names nothing"),
+        ("a,b\n1,2\n", "lacks the column x, y, z.*names a, b"),
+        ("x,y,z\n1,2,3\n1,two,3\n", "line 3: y = 'two'"),
+        ("x,y,z\n1,2,3\n1,2\n", "line 3: z = None"),
+        ("x,y,z\n1,2,nan\n1,2,3\n", "line 2: z = 'nan'"),
+        ("x,y,z\n1,2,inf\n", "z = 'inf'"),
+    ],
+)
+def test_bad_csv_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "path.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(sr.FileFormatError, match=message):
+        sr.read_waypoints(file)
+
+
+def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(sr.FileFormatError, match="cannot read waypoints"):
+        sr.read_waypoints(tmp_path / "missing.csv")
+    (tmp_path / "binary.csv").write_bytes(bytes(range(128, 256)))
+    with pytest.raises(sr.FileFormatError, match="cannot read waypoints"):
+        sr.read_waypoints(tmp_path / "binary.csv")

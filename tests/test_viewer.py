@@ -1,0 +1,281 @@
+"""The browser view: loopback only, ends with its parent, and really draws the robot in a real Chromium."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.browser import find_chromium, open_browser, show_share, take_picture
+from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
+from softrobots.viewer import Viewer, view
+from tests.conftest import missing
+
+FORCE = (0.0, 10.0, -15.0)
+
+
+@pytest.fixture(scope="module")
+def trajectory(arm: sr.SoftModel) -> sr.Trajectory:
+    path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 1.0, 20)
+    return sr.follow_trajectory(arm, path.positions, FORCE, times=path.times, elbow="up")
+
+
+@pytest.fixture
+def browser(tool: Callable[[str], ModuleType]) -> Iterator[object]:
+    tool("playwright")
+    try:
+        find_chromium()
+    except sr.ViewerError as error:
+        missing(str(error))
+    with open_browser() as opened:
+        yield opened
+
+
+def listening(pid: int) -> set[str]:
+    """Local addresses on which a process listens, from /proc."""
+    inodes = set()
+    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+        try:
+            target = str(descriptor.readlink())
+        except OSError:
+            continue
+        if target.startswith("socket:["):
+            inodes.add(target[8:-1])
+    found = set()
+    for table, family in (("tcp", socket.AF_INET), ("tcp6", socket.AF_INET6)):
+        for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A" and fields[9] in inodes:
+                raw = bytes.fromhex(fields[1].split(":")[0])
+                words = b"".join(raw[i : i + 4][::-1] for i in range(0, len(raw), 4))
+                found.add(socket.inet_ntop(family, words))
+    return found
+
+
+def pixels(picture: bytes) -> np.ndarray:
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).astype(int)
+
+
+def coloured(picture: np.ndarray) -> int:
+    """How many pixels have the warm colours of inflated links: red well above blue."""
+    scene = picture[200:, :]  # below the legend
+    return int(np.count_nonzero(scene[..., 0] - scene[..., 2] > 60))
+
+
+def picture_of(browser: object, page_address: str, share: float) -> np.ndarray:
+    page = browser.new_page(viewport={"width": 800, "height": 600})
+    messages: list[str] = []
+    page.on("console", lambda message: messages.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: messages.append(str(error)))
+    page.goto(page_address)
+    show_share(page, share)
+    shot = pixels(page.screenshot())
+    page.close()
+    assert [m for m in messages if "favicon" not in m and "404" not in m] == []
+    return shot
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_server_listens_on_loopback_only_and_ends(arm: sr.SoftModel) -> None:
+    with Viewer(arm) as viewer:
+        process = viewer._server
+        assert listening(process.pid) == {"127.0.0.1"}
+        assert viewer.url == f"http://127.0.0.1:{viewer.port}/static/"
+        assert viewer.tunnel.startswith(f"ssh -L {viewer.port}:127.0.0.1:{viewer.port} ")
+    assert process.poll() is not None
+
+
+def test_two_viewers_take_two_ports(arm: sr.SoftModel) -> None:
+    with Viewer(arm) as one, Viewer(arm) as other:
+        assert one.port != other.port
+        one.show(sr.solve_equilibrium(arm, (0, 0.5, -0.5), FORCE))
+        other.show(sr.solve_equilibrium(arm, (0, 0.1, -0.5), FORCE))
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_server_ends_when_its_parent_is_killed(how: int) -> None:
+    code = (
+        "import softrobots as sr, time; from softrobots.viewer import Viewer\n"
+        "v = Viewer(sr.load_model(sr.InflatableArm())); print(v._server.pid, flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:
+        child = int(parent.stdout.readline())
+        parent.send_signal(how)
+        parent.wait(10)
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        try:
+            os.kill(child, 0)
+        except ProcessLookupError:
+            return
+        if Path(f"/proc/{child}/stat").read_text().split()[2] == "Z":
+            return
+        time.sleep(0.05)
+    pytest.fail("the server outlives its parent")
+
+
+def test_html_is_self_contained(arm: sr.SoftModel, trajectory: sr.Trajectory, tmp_path: Path) -> None:
+    with view(arm, trajectory) as viewer:
+        file = viewer.write_html(tmp_path / "a.html", title="An <arm>")
+        with pytest.raises(sr.OutputExists):
+            viewer.write_html(file)
+    text = file.read_text(encoding="utf-8")
+    assert "An &lt;arm&gt;" in text
+    assert "wrinkled" in text
+    assert 'src="http' not in text
+    assert 'href="http' not in text
+    assert "set_animation" in text
+
+
+def test_the_page_draws_the_robot_and_the_animation_moves_it(
+    browser: object, arm: sr.SoftModel, trajectory: sr.Trajectory, tmp_path: Path
+) -> None:
+    with view(arm, trajectory) as viewer:
+        address = viewer.write_html(tmp_path / "a.html").as_uri()
+    start, again, end = (picture_of(browser, address, share) for share in (0.0, 0.0, 1.0))
+    assert coloured(start) > 3000
+    assert coloured(end) > 3000
+    assert np.array_equal(start, again)  # the same pose gives the same picture
+    assert np.count_nonzero(np.abs(start - end).max(axis=2) > 30) > 5000
+    reddest = [int((shot[200:, :, 0] - shot[200:, :, 1]).max()) for shot in (start, end)]
+    assert reddest[1] > reddest[0] + 30  # link 1 comes nearer to wrinkling on the way and turns from orange to red
+
+
+def test_page_and_websocket_work_through_a_forwarded_port(browser: object, arm: sr.SoftModel) -> None:
+    """As an SSH tunnel does: another loopback port carries bytes to the server and back; live updates arrive."""
+    with Viewer(arm) as viewer, forwarded(viewer.port) as port:
+        page = browser.new_page(viewport={"width": 800, "height": 600})
+        sockets: list[object] = []
+        page.on("websocket", lambda opened: sockets.append(opened))
+        page.goto(f"http://127.0.0.1:{port}/static/")
+        viewer.show(sr.solve_equilibrium(arm, (0.0, 0.6, -0.8), FORCE))
+        show_share(page, 0.0)
+        first = pixels(page.screenshot())
+        viewer.show(sr.solve_equilibrium(arm, (0.0, 1.4, -1.8), FORCE))
+        page.wait_for_timeout(1000)
+        second = pixels(page.screenshot())
+        assert [opened.url for opened in sockets] == [f"ws://127.0.0.1:{port}/"]
+        assert coloured(first) > 3000
+        assert np.count_nonzero(np.abs(first - second).max(axis=2) > 30) > 5000
+
+
+def test_take_picture_writes_a_png(browser: object, arm: sr.SoftModel, tmp_path: Path) -> None:
+    with view(arm, sr.solve_equilibrium(arm, (0.0, 0.6, -0.8), FORCE)) as viewer:
+        page = viewer.write_html(tmp_path / "a.html")
+    with pytest.MonkeyPatch.context() as patch:  # Playwright's synchronous API runs once at a time
+        patch.setattr("softrobots.browser.open_browser", lambda: _keep(browser))
+        shot = take_picture(page, tmp_path / "a.png", width=400, height=300)
+    assert pixels(shot.read_bytes()).shape == (300, 400, 3)
+
+
+class _keep:
+    """A context manager that leaves the browser open."""
+
+    def __init__(self, browser: object) -> None:
+        self.browser = browser
+
+    def __enter__(self) -> object:
+        return self.browser
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+class forwarded:
+    """Carry bytes between a new loopback port and another one."""
+
+    def __init__(self, port: int) -> None:
+        self.target = port
+        self.listener = socket.create_server(("127.0.0.1", 0))
+
+    def __enter__(self) -> int:
+        threading.Thread(target=self._accept, daemon=True).start()
+        return self.listener.getsockname()[1]
+
+    def __exit__(self, *_: object) -> None:
+        self.listener.close()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                one, _ = self.listener.accept()
+            except OSError:
+                return
+            other = socket.create_connection(("127.0.0.1", self.target))
+            for a, b in ((one, other), (other, one)):
+                threading.Thread(target=self._carry, args=(a, b), daemon=True).start()
+
+    @staticmethod
+    def _carry(source: socket.socket, sink: socket.socket) -> None:
+        try:
+            while data := source.recv(65536):
+                sink.sendall(data)
+            sink.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass
+        finally:
+            source.close()
+
+
+def test_shapes_are_where_yourdfpy_places_them(arm: sr.SoftModel) -> None:
+    """The far end of the last cylinder is the tip; the first shape of link 1 starts at its motor."""
+    scene = Scene(arm)
+    q = arm.configuration((0.3, 0.6, -0.8), (0.05, -0.1, 0.03, -0.04))
+    poses = dict(zip((shape.name for shape in scene.shapes), scene.transforms(q), strict=True))
+    last = poses["link_2_0"]
+    tip = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8)).model.workspace(None)
+    del tip
+    from softrobots.equilibrium import frame_placement
+
+    end = last[:3, 3] + last[:3, 2] * 0.57 / 2
+    assert np.allclose(end, frame_placement(arm, q, "tip").translation, atol=1e-12)
+
+
+def test_links_are_coloured_by_what_is_left_of_the_wrinkling_moment(arm: sr.SoftModel) -> None:
+    limit = arm.spring_groups[0].wrinkling_moment
+    seen = []
+    for moment in np.linspace(0.01, 1.2 * limit, 40):
+        state = sr.solve_equilibrium(arm, (0, 0, 0), wrench=(0, 0, 0, 0, moment, 0))  # the moment of both links
+        left = 1 - state.link_moments[0] / limit
+        level = wrinkling_level(state, 0)
+        assert left >= WRINKLING_COLOURS[level][0]
+        assert level == 0 or left < WRINKLING_COLOURS[level - 1][0]
+        assert (level == len(WRINKLING_COLOURS) - 1) == state.wrinkled
+        seen.append(level)
+    assert sorted(set(seen)) == list(range(len(WRINKLING_COLOURS)))
+
+
+def test_bad_input_is_refused(arm: sr.SoftModel, odd_arm: sr.SoftModel, trajectory: sr.Trajectory) -> None:
+    foreign = sr.solve_equilibrium(odd_arm, (0, 0, 0, 0))
+    with Viewer(arm) as viewer:
+        for call, message in (
+            (lambda: viewer.show(foreign), "of the robot that the viewer shows"),
+            (lambda: viewer.show(None), "an Equilibrium"),
+            (lambda: viewer.animate(foreign), "a Trajectory"),
+            (lambda: viewer.animate(trajectory, duration=0.0), "duration"),
+            (lambda: viewer.trace([(0, 0)]), "points"),
+            (lambda: viewer.show_configuration(np.zeros(3)), "q = "),
+            (lambda: view(arm, "x"), "an Equilibrium"),
+        ):
+            with pytest.raises(sr.ParameterError, match=message):
+                call()
+
+
+def test_a_missing_browser_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(sr.ViewerError, match="apt-get install chromium"):
+        find_chromium()
