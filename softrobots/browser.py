@@ -79,6 +79,7 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
         page = browser.new_page(viewport={"width": width, "height": height})
         page.goto(Path(html).resolve().as_uri())
         show_share(page, share)
+        page.evaluate("() => { viewer.gui.domElement.style.display = 'none'; }")
         page.screenshot(path=str(target))
     return target
 

@@ -154,6 +154,7 @@ class Viewer:
         span = float(trajectory.times[-1] - trajectory.times[0])
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
         self.show(trajectory.equilibria[0])
+        self._centre(trajectory.tip_positions.mean(axis=0))
         self.trace(trajectory.tip_positions)
         animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
         for number, equilibrium in zip(_frames(trajectory, seconds), trajectory.equilibria, strict=True):
@@ -215,15 +216,19 @@ class Viewer:
         self._page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
         self._page["/Axes"].set_property("visible", False)
         self._page["/Grid"].set_property("visible", False)
-        shift = np.eye(4)
-        shift[:3, 3] = (-0.48 * reach, 0.0, -0.12 * reach)
-        self._root.set_transform(shift)
+        self._centre(np.array([0.9 * reach, 0.0, 0.2 * reach]))
         # meshcat's camera has y up: (x, z, -y) of the scene.
-        eye = reach * np.array([0.40, -0.92, 0.38])
+        eye = reach * np.array([0.34, -0.80, 0.34])
         self._page["/Cameras/default/rotated/<object>"].set_property("position", [eye[0], eye[2], -eye[1]])
         ends = np.concatenate([floor_lines(reach), floor_lines(reach)[:, [1, 0, 2]]])
         lines = geometry.PointsGeometry(ends.T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
+
+    def _centre(self, tip: FloatArray) -> None:
+        """Put the middle between base and tip where the camera looks."""
+        shift = np.eye(4)
+        shift[:3, 3] = -0.5 * tip
+        self._root.set_transform(shift)
 
     def _draw_shapes(self) -> None:
 

@@ -19,6 +19,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.browser import find_chromium, open_browser, show_share, take_picture
+from softrobots.equilibrium import frame_placement
 from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.viewer import Viewer, view
 from tests.conftest import missing
@@ -231,18 +232,17 @@ class forwarded:
             source.close()
 
 
-def test_shapes_are_where_yourdfpy_places_them(arm: sr.SoftModel) -> None:
+def test_cylinders_start_and_end_at_the_joints(arm: sr.SoftModel) -> None:
     """The far end of the last cylinder is the tip; the first shape of link 1 starts at its motor."""
     scene = Scene(arm)
     q = arm.configuration((0.3, 0.6, -0.8), (0.05, -0.1, 0.03, -0.04))
     poses = dict(zip((shape.name for shape in scene.shapes), scene.transforms(q), strict=True))
     last = poses["link_2_0"]
-    tip = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8)).model.workspace(None)
-    del tip
-    from softrobots.equilibrium import frame_placement
-
     end = last[:3, 3] + last[:3, 2] * 0.57 / 2
     assert np.allclose(end, frame_placement(arm, q, "tip").translation, atol=1e-12)
+    first = poses["link_1_root_1"]
+    start = first[:3, 3] - first[:3, 2] * 0.03 / 2
+    assert np.allclose(start, 0.0, atol=1e-12)
 
 
 def test_links_are_coloured_by_what_is_left_of_the_wrinkling_moment(arm: sr.SoftModel) -> None:

@@ -1,0 +1,100 @@
+"""What the package promises of itself: light imports, honest names, one direction of imports, folders without Python."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import softrobots as sr
+from softrobots import plots
+from tests.conftest import CHECKOUT
+
+PACKAGE = CHECKOUT / "softrobots"
+
+
+def test_importing_softrobots_imports_nothing_heavy() -> None:
+    code = "import softrobots, sys; print(*sys.modules)"
+    loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
+    assert "pinocchio" in loaded
+    assert not loaded & {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "mujoco", "tqdm"}
+
+
+def test_every_public_name_exists_and_is_documented() -> None:
+    assert sorted(sr.__all__) == sorted(set(sr.__all__))
+    for name in sr.__all__:
+        thing = getattr(sr, name)
+        assert callable(thing) is False or thing.__doc__, name
+
+
+def test_every_error_has_one_root() -> None:
+    from softrobots import errors
+
+    for thing in vars(errors).values():
+        if isinstance(thing, type) and issubclass(thing, Exception):
+            assert issubclass(thing, sr.SoftRobotsError)
+
+
+def imports_of(file: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("softrobots"):
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def test_imports_point_one_way() -> None:
+    """No cycle among the modules, not even through an import inside a function."""
+    files = {
+        ".".join(f.relative_to(CHECKOUT).with_suffix("").parts).removesuffix(".__init__"): f for f in PACKAGE.rglob("*.py")
+    }
+    graph = {
+        name: (imports_of(file) & files.keys()) - {name, "softrobots"} for name, file in files.items() if name != "softrobots"
+    }
+    while graph:
+        leaves = {name for name, needs in graph.items() if not needs & graph.keys()}
+        assert leaves, f"a cycle among {sorted(graph)}"
+        graph = {name: needs for name, needs in graph.items() if name not in leaves}
+
+
+def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
+    for name in ("errors", "checks", "paths", "description", "robots", "springs", "inflated_beam/beam", "time_law"):
+        assert "pinocchio" not in (PACKAGE / f"{name}.py").read_text(encoding="utf-8").replace("Pinocchio", "")
+
+
+def test_only_one_module_imports_xacro_and_one_builds_models() -> None:
+    users = [f.name for f in PACKAGE.rglob("*.py") if re.search(r"^\s*import xacro$", f.read_text(encoding="utf-8"), re.M)]
+    builders = [f.name for f in PACKAGE.rglob("*.py") if "buildModelFromXML" in f.read_text(encoding="utf-8")]
+    assert (users, builders) == (["description.py"], ["loader.py"])
+
+
+def test_xacro_and_urdf_hold_no_python() -> None:
+    """A Python file in xacro/ would shadow the package xacro in a checkout."""
+    for folder in ("xacro", "urdf"):
+        names = list((CHECKOUT / folder).rglob("*"))
+        assert names
+        assert not [name for name in names if name.suffix == ".py"]
+
+
+def test_no_assert_guards_input() -> None:
+    for file in PACKAGE.rglob("*.py"):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        assert not [node for node in ast.walk(tree) if isinstance(node, ast.Assert)], file
+
+
+def test_a_missing_extra_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> None:
+    original = builtins.__import__
+
+    def without(name: str, *rest: object, **options: object) -> object:
+        if name.startswith(("matplotlib", "playwright")):
+            raise ImportError(name)
+        return original(name, *rest, **options)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(sr.MissingDependency, match=r"matplotlib is not installed.*pip install 'softrobots\[plot\]'"):
+        plots.require_matplotlib()

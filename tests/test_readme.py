@@ -1,0 +1,73 @@
+"""The README keeps its promises: its code prints what it says, its commands and numbers are those of the project."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import re
+
+import pytest
+
+import softrobots as sr
+from tests.conftest import CHECKOUT
+
+README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_the_python_example_prints_what_the_readme_says() -> None:
+    (code,), (expected,) = blocks("python"), blocks("text")
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(code, "README.md", "exec"), {})
+    assert printed.getvalue() == expected
+    assert len(code.strip().splitlines()) <= 12
+
+
+def test_the_first_screen_holds_sentence_picture_commands_and_code() -> None:
+    marks = ("Soft robots as", "images/inflatable_arm.png", "scripts/ik_trajectory.py\n```", "-m pytest\n```", "```python")
+    order = [README.index(mark) for mark in marks]
+    assert order == sorted(order)
+    assert README[: order[-1]].count("\n") < 30
+    assert (CHECKOUT / "docs/images/inflatable_arm.png").stat().st_size > 10_000
+
+
+def test_there_are_two_commands_and_each_stands_alone() -> None:
+    commands = [block.strip() for block in blocks("sh")]
+    assert len(commands) == 2
+    for command in commands:
+        assert "\n" not in command
+        assert command.startswith("python3 -m venv .venv && .venv/bin/pip install -e ")
+
+
+@pytest.mark.parametrize("package", ["pin", "example-robot-data", "yourdfpy", "xacro", "numpy", "meshcat", "pytest"])
+def test_every_package_of_the_design_is_named(package: str) -> None:
+    assert f"| {package} |" in README
+
+
+def test_the_numbers_of_the_default_trajectory_are_current(tmp_path) -> None:
+    from tests.test_scripts import run_script
+
+    run_script("ik_trajectory", ["--output", str(tmp_path / "a"), "--no-plots"])
+    summary = json.loads((tmp_path / "a" / "summary.json").read_text())
+    text = " ".join(README.split())
+    assert f"({summary['largest_moment_N_m'][0]:.2f} N m) is within 10 %" in text
+    assert f"{summary['required_pressure_Pa'] / 1e3:.2f} kPa would then do" in text
+    assert f"off by up to {1e3 * summary['tip_error_uncompensated_m']:.0f} mm" in text
+    assert f"by up to {1e3 * summary['tip_error_paper_m']:.0f} mm" in text
+    assert summary["tip_error_compensated_m"] <= 1e-9
+    assert summary["required_tabulated_pressure_Pa"] == 50e3
+    assert abs(summary["largest_moment_N_m"][0] / 17.51 - 1) < 0.1
+
+
+def test_citation_names_the_papers_and_the_version() -> None:
+    text = (CHECKOUT / "CITATION.cff").read_text(encoding="utf-8")
+    assert "10.3390/app11062558" in text
+    assert "Helical Actuation on a Soft Inflated Robot Body" in text
+    assert "two-segment continuum robot" in text
+    assert f"version: {sr.__version__}\n" in text
+    assert f"## [{sr.__version__}]" in (CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8")

@@ -1,0 +1,165 @@
+"""Every script runs, writes what it says, and refuses bad input without leaving anything behind."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.trajectory import METHODS
+from tests.conftest import CHECKOUT
+
+
+def run_script(name: str, arguments: list[str]) -> int:
+    """Import a script as a module and call its main."""
+    spec = importlib.util.spec_from_file_location(name, CHECKOUT / "scripts" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.main(arguments)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_ik_trajectory_with_every_method(method: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder = tmp_path / "out"
+    assert run_script("ik_trajectory", ["--output", str(folder), "--method", method, "--steps", "60"]) == 0
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        "trajectory.npz", "uncompensated.npz", "trajectory.csv", "summary.json", "scene.html",
+        "poses.png", "motor_angles.png", "tip_errors.png", "link_moments.png",
+    }  # fmt: skip
+    saved = sr.load(folder / "trajectory.npz")
+    summary = json.loads((folder / "summary.json").read_text())
+    assert saved.method == method
+    assert summary["tip_error_compensated_m"] == saved.tip_error.max()
+    assert summary["tip_error_uncompensated_m"] > 0.1
+    assert (saved.tip_error.max() <= 1e-9) == (method != "paper")
+    out, err = capsys.readouterr()
+    assert "largest moment at link 1" in out
+    assert str(folder) in out
+    assert "60/60" in err  # a progress bar
+
+
+def test_ik_trajectory_reads_waypoints_gravity_and_parameters(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    waypoints = tmp_path / "path.csv"
+    waypoints.write_text("t,x,y,z\n0,0.8,0,0.2\n1,0.8,0.1,0.2\n2,0.8,0.2,0.3\n", encoding="utf-8")
+    folder = tmp_path / "out"
+    arguments = ["--csv", str(waypoints), "--gravity", "--force", "0", "0", "-5", "--stiffness", "200", "--pressure", "5000"]
+    assert run_script("ik_trajectory", [*arguments, "--elbow", "down", "--no-plots", "--output", str(folder)]) == 0
+    saved = sr.load(folder / "trajectory.npz")
+    assert saved.targets.tolist() == [[0.8, 0.0, 0.2], [0.8, 0.1, 0.2], [0.8, 0.2, 0.3]]
+    assert saved.equilibria[0].load.gravity == sr.EARTH_GRAVITY
+    assert saved.model.stiffness.tolist() == [200.0] * 4
+    assert saved.model.spring_groups[0].pressure == 5000.0
+    assert "WARNING: a link wrinkles" in capsys.readouterr().out
+
+
+def test_ik_trajectory_serves_until_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    from softrobots.viewer import Viewer
+
+    served: list[bool] = []
+    monkeypatch.setattr(Viewer, "wait", lambda self: served.append(self._server.poll() is None))
+    assert run_script("ik_trajectory", ["--output", str(tmp_path / "a"), "--no-plots", "--steps", "5", "--meshcat"]) == 0
+    assert served == [True]
+    out = capsys.readouterr().out
+    assert "serving http://127.0.0.1:" in out
+    assert "ssh -L" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["--end", "3", "0", "0"], 1, "waypoint .* cannot reach"),
+        (["--start", "3", "0", "0"], 1, "cannot reach"),
+        (["--duration", "-1"], 2, "duration"),
+        (["--steps", "0"], 2, "steps"),
+        (["--stiffness", "-5"], 2, "stiffness"),
+        (["--pressure", "-5"], 2, "pressure"),
+        (["--force", "nan", "0", "0"], 2, "force"),
+        (["--gravity", "1", "2"], 2, "gravity"),
+        (["--gain", "0"], 2, "gain"),
+        (["--csv", "missing.csv"], 2, "missing.csv"),
+    ],
+)
+def test_ik_trajectory_refuses_bad_input_and_leaves_nothing(
+    arguments: list[str], status: int, message: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    folder = tmp_path / "out"
+    assert run_script("ik_trajectory", [*arguments, "--output", str(folder), "--steps", "20", *arguments]) == status
+    out, err = capsys.readouterr()
+    assert re.search(f"error: .*{message}", err)
+    assert out == ""
+    assert not folder.exists()
+
+
+def test_ik_trajectory_refuses_a_folder_that_is_not_empty(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    (tmp_path / "mine.txt").write_text("keep", encoding="utf-8")
+    assert run_script("ik_trajectory", ["--output", str(tmp_path), "--no-plots"]) == 2
+    assert "is not empty (it holds mine.txt)" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+    assert run_script("ik_trajectory", ["--output", str(tmp_path / "mine.txt"), "--no-plots"]) == 2
+    assert "is a file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["ik_trajectory", "generate_urdf", "solver_rates", "make_pictures"])
+def test_every_script_explains_itself(name: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run_script(name, ["--help"])
+    assert ended.value.code == 0
+    assert "usage:" in capsys.readouterr().out
+
+
+def test_generate_urdf_checks_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert run_script("generate_urdf", ["--check"]) == 0
+    assert run_script("generate_urdf", ["--check", "--output", str(tmp_path)]) == 1
+    assert list(tmp_path.iterdir()) == []
+    assert run_script("generate_urdf", ["--output", str(tmp_path)]) == 0
+    assert run_script("generate_urdf", ["--check", "--output", str(tmp_path)]) == 0
+    file = tmp_path / "inflatable_arm.urdf"
+    file.write_text(file.read_text(encoding="utf-8").replace("172.71", "172.72"), encoding="utf-8")
+    assert run_script("generate_urdf", ["--check", "--output", str(tmp_path)]) == 1
+    assert "differs" in capsys.readouterr().out
+
+
+def test_solver_rates_prints_both_tables(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "rates.json"
+    arguments = ["--cases", "40", "--loads", "18", "200", "--estimation-loads", "18", "--json", str(file)]
+    assert run_script("solver_rates", arguments) == 0
+    out = capsys.readouterr().out
+    assert "| newton | 100.00 | 100.00 |" in out
+    assert "loads beyond wrinkling test the solvers, not the robot" in out
+    rates = json.loads(file.read_text(encoding="utf-8"))
+    assert rates["equilibrium"]["fixed_point"]["200.0"] < 70.0
+    assert run_script("solver_rates", arguments) == 2  # the file is there
+
+
+def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
+    """Lines, axis labels with units, legends: read back from the figures."""
+    from softrobots import plots
+
+    path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 12)
+    loaded = sr.follow_trajectory(arm, path.positions, (0, 10, -15), times=path.times, elbow="up")
+    rigid = sr.follow_trajectory(arm, path.positions, times=path.times, elbow="up")
+    angles = plots.motor_angles(loaded, rigid).axes[0]
+    assert len(angles.lines) == 6
+    assert np.array_equal(angles.lines[0].get_ydata(), loaded.q_motors[:, 0])
+    assert np.array_equal(angles.lines[1].get_ydata(), rigid.q_motors[:, 0])
+    assert angles.get_ylabel() == "motor angle [rad]"
+    moments = plots.link_moments(loaded).axes[0]
+    assert moments.get_ylim()[1] > arm.spring_groups[0].wrinkling_moment
+    scene = plots.poses(loaded).axes[0]
+    ends = np.array(scene.lines[1].get_data_3d())[:, -1]
+    assert np.allclose(ends, loaded.tip_positions[0], atol=1e-12)
+    errors = plots.tip_errors({"a": loaded.tip_error}, loaded.times).axes[0]
+    assert errors.get_yscale() == "log"
+    with pytest.raises(sr.ParameterError, match="a Trajectory"):
+        plots.poses(None)
+    with pytest.raises(sr.ParameterError, match="13 waypoints"):
+        plots.motor_angles(loaded, sr.follow_trajectory(arm, path.positions[:3]))
+    plain = sr.load_model(arm.urdf, springs={"spring_1_up": 100.0}, motors=arm.motor_joints)
+    with pytest.raises(sr.ParameterError, match="with inflated links"):
+        plots.link_moments(sr.follow_trajectory(plain, path.positions[:2]))
