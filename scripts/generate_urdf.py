@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import softrobots as sr
+from softrobots.files import write_atomically
 from softrobots.paths import urdf_folder
-from softrobots.results_io import write_atomically
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -18,6 +18,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, metavar="FOLDER", help="folder of the files (urdf/ of the project)")
     arguments = parser.parse_args(argv)
     folder = arguments.output or urdf_folder()
+    if folder.exists() and not folder.is_dir():
+        parser.error(f"--output {folder} is a file; a folder is required")
     stale = 0
     for name, robot in sr.ROBOTS.items():
         path, text = folder / f"{name}.urdf", robot().urdf().encode("utf-8")

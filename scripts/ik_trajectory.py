@@ -15,24 +15,23 @@ from datetime import datetime
 from pathlib import Path
 
 import softrobots as sr
-from softrobots import inflated_beam
-from softrobots.checks import free_folder
-from softrobots.plots import require_matplotlib
+from softrobots import inflated_beam, plots
+from softrobots.files import free_folder
+from softrobots.loads import Load
 from softrobots.trajectory import METHODS
+
+LINE = {"start": (0.4, -0.5, 0.6), "end": (1.0, 0.2, 0.2), "duration": 2.0, "steps": 200}
+"""The default path."""
 
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
     numbers = {"type": float, "nargs": 3}
     made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument(
-        "--start", **numbers, metavar=("X", "Y", "Z"), default=(0.4, -0.5, 0.6), help="first tip position [m] (0.4 -0.5 0.6)"
-    )
-    made.add_argument(
-        "--end", **numbers, metavar=("X", "Y", "Z"), default=(1.0, 0.2, 0.2), help="last tip position [m] (1.0 0.2 0.2)"
-    )
-    made.add_argument("--duration", type=float, default=2.0, help="time from start to end, quintic time law [s] (%(default)s)")
-    made.add_argument("--steps", type=int, default=200, help="intervals between start and end (%(default)s)")
+    made.add_argument("--start", **numbers, metavar=("X", "Y", "Z"), help="first tip position [m] (0.4 -0.5 0.6)")
+    made.add_argument("--end", **numbers, metavar=("X", "Y", "Z"), help="last tip position [m] (1.0 0.2 0.2)")
+    made.add_argument("--duration", type=float, help="time from start to end, quintic time law [s] (2.0)")
+    made.add_argument("--steps", type=int, help="intervals between start and end (200)")
     made.add_argument(
         "--csv", type=Path, metavar="FILE", help="waypoints with columns t,x,y,z [s, m], instead of start and end"
     )
@@ -64,39 +63,38 @@ def parser() -> argparse.ArgumentParser:
 def run(arguments: argparse.Namespace) -> Path:
     """Do the whole job and return the folder of the results."""
     gravity = arguments.gravity if arguments.gravity != [] else sr.EARTH_GRAVITY
-    if arguments.csv is not None:
-        path = sr.read_waypoints(arguments.csv)
-    else:
-        path = sr.straight_line(arguments.start, arguments.end, arguments.duration, arguments.steps)
+    path = _path(arguments)
     if not arguments.no_plots:
-        require_matplotlib()  # tells at once what is missing
+        plots.require_matplotlib()  # tells at once what is missing
     model = sr.load_model(sr.InflatableArm(stiffness=arguments.stiffness, pressure=arguments.pressure))
-    sr.Load.of(model, arguments.force, gravity=gravity)
+    Load.of(model, arguments.force, gravity=gravity)
     folder = free_folder(arguments.output or Path("output") / f"ik_trajectory_{datetime.now():%Y%m%d_%H%M%S}")
 
-    def follow(method: str, force: object, weight: object) -> sr.Trajectory:
+    def follow(label: str, method: str, force: object, weight: object) -> sr.Trajectory:
         return sr.follow_trajectory(
             model, path.positions, force, gravity=weight, elbow=arguments.elbow, method=method, times=path.times,
-            gain=arguments.gain, progress=True,
+            gain=arguments.gain, progress=label,
         )  # fmt: skip
 
-    trajectory = follow(arguments.method, arguments.force, gravity)
-    rigid = follow("newton", None, None)  # without load the flexible arm is the rigid one
+    trajectory = follow(f"compensated ({arguments.method})", arguments.method, arguments.force, gravity)
+    rigid = follow("rigid arm", "newton", None, None)  # without load the flexible arm is the rigid one
     sagging = [sr.solve_equilibrium(model, q, arguments.force, gravity=gravity) for q in rigid.q_motors]
     uncompensated = sr.Trajectory(path.times, path.positions, tuple(sagging), "rigid")
     paper = trajectory if arguments.method == "paper" else _paper(follow, arguments, gravity)
-
-    folder.mkdir(parents=True, exist_ok=True)
-    sr.save(trajectory, folder / "trajectory.npz")
-    sr.save(uncompensated, folder / "uncompensated.npz")
-    sr.save_csv(trajectory, folder / "trajectory.csv")
     summary = summarise(trajectory, uncompensated, paper, arguments.gain)
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    if not arguments.no_plots:
-        _plot(folder, trajectory, rigid, uncompensated, paper)
-    from softrobots.viewer import view
+    figures = {} if arguments.no_plots else _figures(trajectory, rigid, uncompensated, paper)
 
-    with view(model, trajectory) as viewer:
+    with sr.view(model, trajectory) as viewer:
+        folder.mkdir(parents=True, exist_ok=True)
+        results = {"trajectory": trajectory, "rigid": rigid, "uncompensated": uncompensated} | (
+            {} if paper is None else {"paper": paper}
+        )
+        for name, result in results.items():
+            sr.save_result(result, folder / f"{name}.npz")
+        sr.save_csv(trajectory, folder / "trajectory.csv")
+        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        for name, figure in figures.items():
+            figure.savefig(folder / f"{name}.png")
         viewer.write_html(folder / "scene.html", title="Inflatable arm, loaded, sag compensated")
         print(table(summary, trajectory.method))
         print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
@@ -106,10 +104,22 @@ def run(arguments: argparse.Namespace) -> Path:
     return folder
 
 
+def _path(arguments: argparse.Namespace) -> sr.Path3D:
+    """Waypoints from a file, or a straight line; not both."""
+    line = {name: getattr(arguments, name) for name in LINE if getattr(arguments, name) is not None}
+    if arguments.csv is None:
+        return sr.straight_line(**(LINE | line))
+    if line:
+        raise sr.ParameterError(
+            "--csv", str(arguments.csv), f"given without --{', --'.join(line)}, which describe a straight line"
+        )
+    return sr.read_waypoints(arguments.csv)
+
+
 def _paper(follow: object, arguments: argparse.Namespace, gravity: object) -> sr.Trajectory | None:
     """The paper's method on the same path; None where its fixed point does not converge."""
     try:
-        return follow("paper", arguments.force, gravity)  # type: ignore[operator,no-any-return]
+        return follow("the paper's method", "paper", arguments.force, gravity)  # type: ignore[operator,no-any-return]
     except sr.EquilibriumNotFound as error:
         print(f"the paper's method fails: {error}", file=sys.stderr)
         return None
@@ -165,21 +175,21 @@ def table(summary: dict[str, object], method: str) -> str:
     return "\n".join(["", *lines])
 
 
-def _plot(
-    folder: Path, trajectory: sr.Trajectory, rigid: sr.Trajectory, uncompensated: sr.Trajectory, paper: sr.Trajectory | None
-) -> None:
-    from softrobots import plots
-
+def _figures(
+    trajectory: sr.Trajectory, rigid: sr.Trajectory, uncompensated: sr.Trajectory, paper: sr.Trajectory | None
+) -> dict[str, object]:
     errors = {
         f"compensated ({trajectory.method})": trajectory.tip_error,
         "rigid IK on the flexible arm": uncompensated.tip_error,
     }
     if paper is not None and paper is not trajectory:
         errors["the paper's method"] = paper.tip_error
-    plots.poses(trajectory).savefig(folder / "poses.png")
-    plots.motor_angles(trajectory, rigid).savefig(folder / "motor_angles.png")
-    plots.tip_errors(errors, trajectory.times).savefig(folder / "tip_errors.png")
-    plots.link_moments(trajectory).savefig(folder / "link_moments.png")
+    return {
+        "poses": plots.poses(trajectory),
+        "motor_angles": plots.motor_angles(trajectory, rigid),
+        "tip_errors": plots.tip_errors(errors, trajectory.times),
+        "link_moments": plots.link_moments(trajectory),
+    }
 
 
 def main(argv: list[str] | None = None) -> int:

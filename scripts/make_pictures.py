@@ -9,7 +9,6 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots.browser import take_picture
-from softrobots.viewer import view
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -22,7 +21,7 @@ def main(argv: list[str] | None = None) -> int:
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
     trajectory = sr.follow_trajectory(model, path.positions, (0, 10, -15), times=path.times, elbow="up", progress=True)
     try:
-        with tempfile.TemporaryDirectory() as folder_name, view(model, trajectory) as viewer:
+        with tempfile.TemporaryDirectory() as folder_name, sr.view(model, trajectory) as viewer:
             page = viewer.write_html(Path(folder_name) / "scene.html", title="Inflatable arm, 18 N on the tip")
             print(take_picture(page, arguments.output / "inflatable_arm.png", width=1000, height=560, share=0.85))
     except sr.SoftRobotsError as error:

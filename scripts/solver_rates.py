@@ -16,8 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots.checks import new_file
-from softrobots.results_io import write_atomically
+from softrobots.files import new_file, write_atomically
 
 
 def random_cases(load: float, count: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -57,11 +56,11 @@ def estimation_rate(model: sr.SoftModel, load: float, method: str, count: int, s
 def main(argv: list[str] | None = None) -> int:
     """Measure the rates and print them as two tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=10_000, help="random cases a load (%(default)s)")
+    parser.add_argument("--cases", type=_count, default=10_000, help="random cases a load (%(default)s)")
     parser.add_argument(
-        "--loads", type=float, nargs="+", default=[18, 50, 100, 150, 200], help="force sizes [N] (18 50 100 150 200)"
+        "--loads", type=_size, nargs="+", default=[18, 50, 100, 150, 200], help="force sizes [N] (18 50 100 150 200)"
     )
-    parser.add_argument("--estimation-loads", type=float, nargs="+", default=[5, 18, 50], help="force sizes [N] (5 18 50)")
+    parser.add_argument("--estimation-loads", type=_size, nargs="+", default=[5, 18, 50], help="force sizes [N] (5 18 50)")
     parser.add_argument("--seed", type=int, default=0, help="of the random cases (%(default)s)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the rates to a new file")
     arguments = parser.parse_args(argv)
@@ -84,9 +83,27 @@ def main(argv: list[str] | None = None) -> int:
     print("Equilibria certified stable [%]\n\n" + _table(equilibria))
     print("\nTrue force recovered to 1e-6 from motor torques [%]\n\n" + _table(estimates))
     if target is not None:
-        text = json.dumps({"cases": count, "seed": seed, "equilibrium": equilibria, "load_estimation": estimates}, indent=2)
+        text = _json({"cases": count, "seed": seed, "equilibrium": equilibria, "load_estimation": estimates})
         write_atomically(target, lambda file: file.write(text.encode("utf-8")))
     return 0
+
+
+def _json(rates: dict[str, object]) -> str:
+    return json.dumps(rates, indent=2) + "\n"
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{text} is not a positive number of cases")
+    return value
+
+
+def _size(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a positive, finite force [N]")
+    return value
 
 
 def _table(rates: dict[str, dict[float, float]]) -> str:

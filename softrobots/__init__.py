@@ -9,8 +9,10 @@ from softrobots.errors import (
     LoadNotFound,
     MissingDependency,
     NameNotFound,
+    NeutralEquilibrium,
     NoCriticalLoad,
     NotConverged,
+    OutputError,
     OutputExists,
     ParameterError,
     SoftRobotsError,
@@ -20,14 +22,15 @@ from softrobots.errors import (
 from softrobots.inverse_kinematics import IkSolution, solve_ik
 from softrobots.load_estimation import LoadEstimate, estimate_load
 from softrobots.loader import load_model
-from softrobots.loads import EARTH_GRAVITY, Load
+from softrobots.loads import EARTH_GRAVITY
 from softrobots.model import SoftModel, SpringGroup
-from softrobots.results_io import load, save, save_csv
+from softrobots.results_io import load_result, save_csv, save_result
 from softrobots.robots import ROBOTS, InflatableArm
 from softrobots.sensitivity import compliance, elastostatic_jacobian
 from softrobots.stability import critical_load
 from softrobots.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
 from softrobots.trajectory import Trajectory, follow_trajectory
+from softrobots.viewer import Viewer, view
 
 __version__ = "0.1.0"
 
@@ -40,13 +43,14 @@ __all__ = [
     "FileFormatError",
     "IkSolution",
     "InflatableArm",
-    "Load",
     "LoadEstimate",
     "LoadNotFound",
     "MissingDependency",
     "NameNotFound",
+    "NeutralEquilibrium",
     "NoCriticalLoad",
     "NotConverged",
+    "OutputError",
     "OutputExists",
     "ParameterError",
     "Path3D",
@@ -55,6 +59,7 @@ __all__ = [
     "SpringGroup",
     "TargetUnreachable",
     "Trajectory",
+    "Viewer",
     "ViewerError",
     "__version__",
     "compliance",
@@ -63,14 +68,15 @@ __all__ = [
     "estimate_load",
     "follow_trajectory",
     "inflated_beam",
-    "load",
     "load_model",
+    "load_result",
     "quintic",
     "read_waypoints",
-    "save",
     "save_csv",
+    "save_result",
     "solve_equilibrium",
     "solve_ik",
     "straight_line",
+    "view",
     "waypoints",
 ]

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from softrobots.checks import new_file
 from softrobots.errors import MissingDependency, ViewerError
+from softrobots.files import as_path, new_file
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 _OPTIONS = (
@@ -71,13 +71,17 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
         The path of the picture.
 
     Raises:
-        ViewerError: If no Chromium is installed.
+        ViewerError: If the page is no file or no Chromium is installed.
+        OutputError: If the picture cannot be written.
         MissingDependency: If Playwright is not installed.
     """
+    page_file = as_path("html", html)
+    if not page_file.is_file():
+        raise ViewerError(f"{page_file} is no file; a page written by Viewer.write_html is required")
     target = new_file(png, overwrite=True)
     with open_browser() as browser:
         page = browser.new_page(viewport={"width": width, "height": height})
-        page.goto(Path(html).resolve().as_uri())
+        page.goto(page_file.resolve().as_uri())
         show_share(page, share)
         page.evaluate("() => { viewer.gui.domElement.style.display = 'none'; }")
         page.screenshot(path=str(target))
@@ -86,7 +90,22 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
 
 def show_share(page: Any, share: float) -> None:
     """Wait until a viewer page has drawn its scene, and stop its animation at a share of its time, from 0 to 1."""
-    page.wait_for_function("() => viewer.scene_tree.find(['meshcat', 'softrobots', 'deformed']).object.children.length > 0")
-    page.wait_for_timeout(1500)
+    page.wait_for_function(_SETTLED)
     page.evaluate("share => { viewer.animator.pause(); viewer.animator.seek(share * viewer.animator.duration); }", share)
-    page.wait_for_timeout(500)
+    page.evaluate(_TWO_FRAMES)
+
+
+# The commands of a page arrive one after the other: settled is when no object has been added for ten looks, 50 ms apart.
+_SETTLED = """async () => {
+  const count = () => { let n = 0; viewer.scene.traverse(() => n++); return n; };
+  const robot = () => viewer.scene_tree.find(['meshcat', 'softrobots', 'deformed']).object.children.length;
+  for (let last = -1, same = 0; same < 10; last = count()) {
+    await new Promise(done => setTimeout(done, 50));
+    same = count() === last && robot() > 0 ? same + 1 : 0;
+  }
+  return true;
+}"""
+_TWO_FRAMES = """() => new Promise(done => {
+  viewer.set_dirty();
+  requestAnimationFrame(() => { viewer.render(); requestAnimationFrame(() => done(true)); });
+})"""

@@ -1,4 +1,4 @@
-"""Checks of what callers pass in: numbers, vectors, choices and output paths.
+"""Checks of what callers pass in: numbers, vectors and choices.
 
 Each returns the checked value in its final type, or raises before any work is done.
 """
@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softrobots.errors import OutputExists, ParameterError
+from softrobots.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
 
@@ -36,8 +35,13 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str
     wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
     requirement = f"an array of shape {wanted} of finite numbers" + (f" [{unit}]" if unit else "")
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiu":  # not text, not truth values, not complex numbers, not objects
+            raise ParameterError(name, value, requirement)
+        array = given.astype(np.float64)  # always a copy
+    except (TypeError, ValueError, OverflowError) as error:
+        if isinstance(error, ParameterError):
+            raise
         raise ParameterError(name, value, requirement) from error
     if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
         raise ParameterError(name, value, f"{requirement} (it has shape {array.shape})")
@@ -54,11 +58,11 @@ def finite_number(name: str, value: Any, unit: str = "") -> float:
         ParameterError: If it is not one.
     """
     requirement = "a finite number" + (f" [{unit}]" if unit else "")
-    if isinstance(value, bool | str | bytes):
+    if isinstance(value, bool | np.bool_ | str | bytes):
         raise ParameterError(name, value, requirement)
     try:
         number = float(value)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ParameterError(name, value, requirement) from error
     if not math.isfinite(number):
         raise ParameterError(name, value, requirement)
@@ -117,35 +121,12 @@ def read_only(array: FloatArray) -> FloatArray:
     return array
 
 
-def new_file(path: str | Path, *, overwrite: bool) -> Path:
-    """Return `path` if a file may be written there, making its parent folders.
+def increasing(name: str, values: FloatArray, unit: str) -> FloatArray:
+    """Return `values`, shape (n,), if they increase.
 
     Raises:
-        OutputExists: If it exists and `overwrite` is false, or is a folder.
+        ParameterError: If they do not.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise OutputExists(f"{path} is a folder; a file name is required")
-    if path.exists() and not overwrite:
-        raise OutputExists(f"{path} exists; choose another name or allow overwriting")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path
-
-
-def free_folder(path: str | Path) -> Path:
-    """Return `path` if it can become a folder of results; nothing is made yet.
-
-    Args:
-        path: A folder that does not exist or is empty.
-
-    Raises:
-        OutputExists: If it is a file or holds anything.
-    """
-    path = Path(path)
-    if path.exists() and not path.is_dir():
-        raise OutputExists(f"{path} is a file; an output folder must be new or empty")
-    names = sorted(p.name for p in path.iterdir()) if path.exists() else []
-    if names:
-        held = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
-        raise OutputExists(f"{path} is not empty (it holds {held}); an output folder must be new or empty")
-    return path
+    if np.any(np.diff(values) <= 0.0):
+        raise ParameterError(name, values, f"increasing [{unit}]")
+    return values

@@ -57,6 +57,8 @@ class RobotTags:
     """Role by joint name, one of `ROLES`."""
     inflated_links: tuple[InflatedLinkTag, ...]
     """Inflated links, base to tip."""
+    mimics: tuple[str, ...]
+    """Names of the joints that mimic another joint."""
 
 
 def declared_arguments(xacro_file: str | Path) -> dict[str, str | None]:
@@ -111,7 +113,7 @@ def expand(xacro_file: str | Path, arguments: Mapping[str, str] | None = None) -
         except Exception as error:  # xacro raises whatever its expressions raise
             reason = str(error).split("\n")[0].strip()  # the rest is a trace of xacro's expressions
             raise DescriptionError(
-                f"{path.name} cannot be expanded with {dict(arguments or {})}: {reason}; declared: {', '.join(declared)}"
+                f"{path.name} refuses its arguments: {reason}; given: {dict(arguments or {})}; declared: {', '.join(declared)}"
             ) from error
     for comment in [node for node in document.childNodes if node.nodeType == node.COMMENT_NODE]:
         if any(mark in comment.data for mark in _BANNER):
@@ -164,8 +166,12 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         raise DescriptionError(f"{source} is an unexpanded xacro file; expand it first (softrobots.description.expand)")
     springs: dict[str, SpringTag] = {}
     roles: dict[str, str] = {}
+    mimics = tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None)
     for joint in root.findall("joint"):
         name = joint.get("name", "")
+        for tag_name in ("spring", "role"):
+            if len(joint.findall(f"{{{NAMESPACE}}}{tag_name}")) > 1:
+                raise DescriptionError(f"joint {name} in {source} has more than one {tag_name}; one is required")
         spring = joint.find(f"{{{NAMESPACE}}}spring")
         if spring is not None:
             where = f"the spring of joint {name} in {source}"
@@ -180,6 +186,10 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
                 raise DescriptionError(
                     f"joint {name} in {source} has the role {value!r}; one of {', '.join(ROLES)} is required"
                 )
+            if (value == "spring") != (name in springs):
+                raise DescriptionError(
+                    f"joint {name} in {source} has the role {value!r} and {'a' if name in springs else 'no'} spring"
+                )
             roles[name] = value
     inflated = []
     for link in root.findall(f"{{{NAMESPACE}}}inflated_link"):
@@ -191,8 +201,11 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
                 f"springs that exist are required: {', '.join(springs) or 'none'}"
             )
         where = f"the inflated_link of {' '.join(names)} in {source}"
-        inflated.append(InflatedLinkTag(names, _number(link, "radius", where), _number(link, "pressure", where)))
-    return RobotTags(springs, roles, tuple(inflated))
+        made = InflatedLinkTag(names, _number(link, "radius", where), _number(link, "pressure", where))
+        if made.radius <= 0.0 or made.pressure < 0.0:
+            raise DescriptionError(f"{where} has radius {made.radius} and pressure {made.pressure}; required > 0 and >= 0")
+        inflated.append(made)
+    return RobotTags(springs, roles, tuple(inflated), mimics)
 
 
 def _number(element: ElementTree.Element, attribute: str, where: str) -> float:

@@ -76,6 +76,21 @@ def settle(
     return (_descend if load.conservative else _grow_load)(case, start, max_iterations)
 
 
+def settled(
+    model: SoftModel,
+    q_motors: FloatArray,
+    load: Load,
+    start: FloatArray,
+    *,
+    method: str = "newton",
+    tolerance: float = TOLERANCE,
+) -> ElasticState | None:
+    """`settle`, or None where the springs do not settle to `TOLERANCE`."""
+    most = 200 if method == "newton" else 1000
+    state, _ = settle(model, q_motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
+    return state if state.error <= largest_residual(state.joints, max(tolerance, TOLERANCE)) else None
+
+
 def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
     """Evaluate residual, tangent stiffness and energy at given coordinates.
 
@@ -214,29 +229,42 @@ def _grow_load(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState,
     reached, step, spent, y = 0.0, 0.25, 0, start
     while spent < most and step > 1e-6:
         aim = min(1.0, reached + step)
-        part = case if aim == 1.0 else case._replace(load=case.load.scaled(aim))
-        state, used, arrived = _newton(part, y, min(20, most - spent))
+        part = case.load if aim == 1.0 else case.load.scaled(aim)
+        state, used = newton(case.model, case.q_motors, part, y, tolerance=case.tolerance, max_iterations=min(20, most - spent))
         spent += used
-        if arrived and aim == 1.0:
+        if state is not None and aim == 1.0:
             return state, spent
-        if arrived:
+        if state is not None:
             reached, y, step = aim, state.q_springs, 2.0 * step
         else:
             step *= 0.5
     return case.state(y), spent
 
 
-def _newton(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, int, bool]:
-    """Undamped Newton; gives up at a singular tangent or a step too long to trust."""
-    state = case.state(start)
-    for iteration in range(1, most + 1):
-        if case.settled(state):
-            return state, iteration, True
+def newton(
+    model: SoftModel,
+    q_motors: FloatArray,
+    load: Load,
+    start: FloatArray,
+    *,
+    tolerance: float = TOLERANCE,
+    max_iterations: int = 20,
+    largest_step: float = _LARGEST_STEP,
+) -> tuple[ElasticState | None, int]:
+    """Undamped Newton; gives up at a singular tangent or a step too long to trust. It goes to unstable equilibria too.
+
+    Returns:
+        The equilibrium, or None, and the evaluations spent.
+    """
+    state = elastic_state(model, q_motors, start, load)
+    for iteration in range(1, max_iterations + 1):
+        if state.error <= largest_residual(state.joints, tolerance):
+            return state, iteration
         try:
             step = np.linalg.solve(state.tangent, -state.residual)
         except np.linalg.LinAlgError:
-            return state, iteration, False
-        if float(step @ step) > _LARGEST_STEP**2:
-            return state, iteration, False
-        state = case.state(state.q_springs + step)
-    return state, most, case.settled(state)
+            return None, iteration
+        if float(step @ step) > largest_step**2:
+            return None, iteration
+        state = elastic_state(model, q_motors, state.q_springs + step, load)
+    return None, max_iterations

@@ -10,18 +10,18 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
 from softrobots.elastostatics import METHODS, TOLERANCE, ElasticState, is_stable, largest_residual, settle
-from softrobots.errors import EquilibriumNotFound
+from softrobots.errors import EquilibriumNotFound, ParameterError
+from softrobots.kinematics import frame_placement
 from softrobots.loads import Load
-from softrobots.model import SoftModel
+from softrobots.model import SoftModel, check_model
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A solved static equilibrium; knows its model, load and motors, and can be saved with `softrobots.save`.
+    """A solved static equilibrium; knows its model, load and motors, and can be saved with `softrobots.save_result`.
 
     Torques are loads carried, minus what spring or motor exerts.
     """
@@ -51,7 +51,7 @@ class Equilibrium:
     tolerance: float
     """What the residual had to stay below [N m]."""
     iterations: int
-    """Evaluations of the residual after the first."""
+    """Steps that led here: evaluations of the residual, or steps of the search or estimation that it is the end of."""
     stable: bool
     """Certified: every eigenvalue of the tangent stiffness has a positive real part."""
 
@@ -65,15 +65,15 @@ class Equilibrium:
         """Whether the residual meets the tolerance."""
         return self.residual <= self.tolerance
 
-    @cached_property
+    @property
     def transform_tip_to_world(self) -> Any:
-        """Pose of the tip, a `pinocchio.SE3` [m]."""
+        """Pose of the tip, a `pinocchio.SE3` of the caller's own [m]."""
         return frame_placement(self.model, self.q, self.model.tip)
 
-    @property
+    @cached_property
     def tip_position(self) -> FloatArray:
         """Position of the tip in the world, shape (3,) [m]."""
-        return np.array(self.transform_tip_to_world.translation)
+        return read_only(np.array(self.transform_tip_to_world.translation))
 
     @cached_property
     def link_moments(self) -> FloatArray:
@@ -117,7 +117,8 @@ def solve_equilibrium(
 ) -> Equilibrium:
     """Find the static equilibrium of the springs at given motor coordinates.
 
-    It is the one reached by energy descent from the relaxed springs, or from `q_springs0`.
+    It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
+    has no energy, the one reached by Newton while the load grows from zero.
 
     Args:
         model: The robot.
@@ -139,6 +140,7 @@ def solve_equilibrium(
         NameNotFound: If a frame does not exist.
         EquilibriumNotFound: If the residual stays above the tolerance; carries the best iterate.
     """
+    check_model(model)
     choice("method", method, METHODS)
     motors = finite_array("q_motors", q_motors, (model.n_motors,), "rad")
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
@@ -189,11 +191,17 @@ def equilibrium_from_state(
     )
 
 
-def frame_placement(model: SoftModel, q: FloatArray, frame: str) -> Any:
-    """Pose of a frame in the world, a `pinocchio.SE3` [m]."""
-    pin_model, data = model.workspace(None)
-    pin.forwardKinematics(pin_model, data, q)
-    return pin.SE3(pin.updateFramePlacement(pin_model, data, model.frame_id(frame)))
+def check_same_model(model: SoftModel, equilibrium: Any) -> None:
+    """Refuse anything but an equilibrium of a model equal to the one given.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    check_model(model)
+    if not isinstance(equilibrium, Equilibrium):
+        raise ParameterError("equilibrium", equilibrium, "an Equilibrium of the model")
+    if equilibrium.model != model:
+        raise ParameterError("equilibrium", equilibrium.model, f"an equilibrium of the model given, {model!r}")
 
 
 def _within(values: FloatArray, limits: FloatArray) -> bool:

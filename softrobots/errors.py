@@ -14,6 +14,10 @@ from typing import Any
 class SoftRobotsError(Exception):
     """Base of every error of this package."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle as message and attributes, so that an error crosses from a worker process whole."""
+        return _rebuild, (type(self), self.args, self.__dict__)
+
 
 class ParameterError(SoftRobotsError, ValueError):
     """A value that is not acceptable: wrong shape, not finite, out of range, unknown option.
@@ -91,6 +95,10 @@ class TargetUnreachable(NotConverged):
     """
 
 
+class NeutralEquilibrium(SoftRobotsError, ArithmeticError):
+    """An equilibrium that is neither stable nor unstable: its tangent stiffness is singular, so it has no derivative."""
+
+
 class NoCriticalLoad(SoftRobotsError, RuntimeError):
     """The equilibrium path stays stable up to the largest load that was tried.
 
@@ -104,7 +112,15 @@ class NoCriticalLoad(SoftRobotsError, RuntimeError):
         self.max_force = max_force
 
 
-class OutputExists(SoftRobotsError, FileExistsError):
+class OutputError(SoftRobotsError, OSError):
+    """A result cannot be written."""
+
+    def __str__(self) -> str:
+        """Return the message itself."""
+        return str(self.args[0])
+
+
+class OutputExists(OutputError, FileExistsError):
     """A file or a folder that is not empty stands where a result would be written."""
 
 
@@ -122,6 +138,13 @@ class MissingDependency(SoftRobotsError, ImportError):
     def __init__(self, package: str, extra: str) -> None:
         """Say what to type."""
         super().__init__(f"{package} is not installed; it is part of an extra: pip install 'softrobots[{extra}]'")
+
+
+def _rebuild(kind: type[SoftRobotsError], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> SoftRobotsError:
+    made = kind.__new__(kind, *arguments)
+    made.args = arguments
+    made.__dict__.update(attributes)
+    return made
 
 
 def _short(value: Any, limit: int = 120) -> str:

@@ -7,17 +7,18 @@ At every step the springs are in equilibrium; the step uses the exact derivative
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from softrobots.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
-from softrobots.elastostatics import METHODS, TOLERANCE, ElasticState, largest_residual, settle
-from softrobots.equilibrium import Equilibrium, equilibrium_from_state, frame_placement
-from softrobots.errors import ParameterError, TargetUnreachable
+from softrobots.elastostatics import METHODS, ElasticState, settle, settled
+from softrobots.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.errors import EquilibriumNotFound, NeutralEquilibrium, ParameterError, TargetUnreachable
+from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
-from softrobots.model import SoftModel
-from softrobots.sensitivity import frame_jacobian, tip_motion
+from softrobots.model import SoftModel, check_model
+from softrobots.sensitivity import tip_motion
 
 POSITION_TOLERANCE = 1e-9
 """Default distance of the tip from its target [m]."""
@@ -33,9 +34,9 @@ _SAME = 1e-6  # [rad], solutions closer than this are one
 _SEED = 20210312  # of the random starts: the day the paper appeared
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class IkSolution:
-    """Motor coordinates for a target; can be saved with `softrobots.save`."""
+    """Motor coordinates for a target; can be saved with `softrobots.save_result`."""
 
     target: FloatArray
     """The target, shape (3,) [m]."""
@@ -46,7 +47,8 @@ class IkSolution:
     iterations: int
     """Steps from the start that led here."""
     alternatives: tuple[FloatArray, ...]
-    """Motor coordinates of the other solutions found, each shape (n_motors,), by their distance from the start."""
+    """Motor coordinates of the other solutions found, each shape (n_motors,), by their distance from the start; whole turns
+    of a motor do not make another solution."""
 
     @property
     def q_motors(self) -> FloatArray:
@@ -65,6 +67,8 @@ class LocalSolution(NamedTuple):
     """Distance of the tip from the target [m]."""
     iterations: int
     """Steps."""
+    unsettled: int
+    """Motor coordinates tried at which the springs did not settle."""
 
 
 def solve_ik(
@@ -107,7 +111,9 @@ def solve_ik(
         ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has no motors.
         NameNotFound: If a frame does not exist.
         TargetUnreachable: If no search arrives; the error says how near the best one came and carries it.
+        EquilibriumNotFound: If the springs settle at none of the starts.
     """
+    check_model(model)
     goal = finite_array("target", target, (3,), "m")
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     choice("method", method, METHODS)
@@ -115,23 +121,21 @@ def solve_ik(
         choice("elbow", elbow, ELBOWS)
     positive_number("tolerance", tolerance, "m")
     first = start_motors(model, q_motors0)
-    found: list[LocalSolution] = []
-    nearest: LocalSolution | None = None
+    if elbow is not None and not _has_elbow(model):
+        raise ParameterError("elbow", elbow, "None for this robot: its last motor joint is where its first one is")
+    ended: list[LocalSolution] = []
     for start in _starts(model, first, positive_integer("starts", starts)):
         local = search(model, goal, load, start, model.rest, home=first, method=method, tolerance=tolerance)
-        if local is None or (elbow is not None and elbow_side(model, local.state.q) != elbow):
-            continue
-        if local.error <= tolerance and all(float(np.abs(local.q_motors - other.q_motors).max()) > _SAME for other in found):
+        if local is not None:
+            ended.append(local)
+    if not ended:
+        _raise_unsettled(model, first, load, method, starts)
+    allowed = [local for local in ended if elbow is None or elbow_side(model, local.state.q) == elbow]
+    found: list[LocalSolution] = []
+    for local in sorted(allowed, key=lambda local: float(np.linalg.norm(local.q_motors - first))):
+        if local.error <= tolerance and not any(_same_pose(model, local, other) for other in found):
             found.append(local)
-        if nearest is None or local.error < nearest.error:
-            nearest = local
-    if nearest is None:
-        side = f" with the elbow {elbow}" if elbow else ""
-        raise ParameterError(
-            "target", target, f"reached from one of {starts} starts{side}: none gave a loaded equilibrium there"
-        )
-    found.sort(key=lambda local: float(np.linalg.norm(local.q_motors - first)))
-    best = found[0] if found else nearest
+    best = found[0] if found else min(allowed or ended, key=lambda local: local.error)
     solution = IkSolution(
         target=read_only(goal),
         equilibrium=equilibrium_from_state(model, best.q_motors, load, best.state, method=method, iterations=best.iterations),
@@ -140,9 +144,13 @@ def solve_ik(
         alternatives=tuple(read_only(other.q_motors) for other in found[1:]),
     )
     if not found:
+        side = f" with the elbow {elbow}" if elbow else ""
+        unsettled = sum(local.unsettled for local in ended)
         raise TargetUnreachable(
-            f"the tip cannot reach {goal.tolist()} m" + (f" with the elbow {elbow}" if elbow else "") + f": the nearest of "
-            f"{starts} starts (seed {_SEED}) comes within {best.error:.6g} m, at motors {best.q_motors.round(6).tolist()}",
+            f"the tip cannot reach {goal.tolist()} m{side}: the nearest of {starts} starts (seed {_SEED}) comes within "
+            f"{best.error:.6g} m, at motors {best.q_motors.round(6).tolist()}"
+            + ("" if allowed else ", with the elbow on the other side")
+            + (f"; the springs did not settle by {method!r} at {unsettled} of the motor angles tried" if unsettled else ""),
             best=solution,
             residual=best.error,
             iterations=best.iterations,
@@ -197,35 +205,39 @@ def search(
     Returns:
         Where the search ended, at the target or not; None if the start itself has no equilibrium.
     """
-    start = _settled(model, q_motors, load, q_springs, method, target)
-    if start is None:
+    here = _settle_at(model, q_motors, load, q_springs, method, target)
+    if here is None:
         return None
-    here, mu, redundant = start, damping * model.reach, model.n_motors > 3
+    mu, redundant, unsettled = damping * model.reach, model.n_motors > 3, 0
     home = q_motors if home is None else home
     for iteration in range(1, max_iterations + 1):
         missing = target - frame_placement(model, here.state.q, model.tip).translation
         jacobian = frame_jacobian(model, here.state.q, model.tip)[:3]
-        slope, follow = tip_motion(model, jacobian, here.state.tangent, here.state.joints.derivative)
+        try:
+            slope, follow = tip_motion(model, jacobian, here.state.tangent, here.state.joints.derivative)
+        except NeutralEquilibrium:
+            break
         free = _free(model, here.q_motors, slope.T @ missing)
         slope = slope * free
         drift = _drift(slope, home - here.q_motors) * free if redundant else np.zeros(model.n_motors)
         arrived = here.error <= tolerance
         if arrived and float(np.abs(drift).max()) <= _SAME:
-            return here._replace(iterations=iteration - 1)
+            return here._replace(iterations=iteration - 1, unsettled=unsettled)
         if not arrived and float(np.linalg.norm(slope.T @ missing)) <= _STATIONARY * model.reach * here.error:
             break
         step = _damped_step(slope, missing, mu, 1e-12 * model.reach) + drift
         step *= min(1.0, _LARGEST_STEP / max(float(np.linalg.norm(step)), 1e-300))
         moved = np.clip(here.q_motors + step, *model.motor_limits.T)
         guess = here.state.q_springs + follow @ (moved - here.q_motors)
-        there = _settled(model, moved, load, guess, method, target)
+        there = _settle_at(model, moved, load, guess, method, target)
+        unsettled += there is None
         if there is not None and (there.error < here.error or (redundant and there.error <= max(10.0 * tolerance, here.error))):
             here, mu = there, 0.1 * mu if mu > _LAST_DAMPING * model.reach else 0.0
         else:
             mu = max(10.0 * mu, 10.0 * _LAST_DAMPING * model.reach)
             if mu > 1e6 * model.reach:
                 break
-    return here._replace(iterations=iteration)
+    return here._replace(iterations=iteration, unsettled=unsettled)
 
 
 def elbow_side(model: SoftModel, q: FloatArray) -> str:
@@ -246,16 +258,41 @@ def _ends(model: SoftModel) -> tuple[str, str]:
     return model.motor_joints[0], model.motor_joints[-1]
 
 
-def _settled(
+def _has_elbow(model: SoftModel) -> bool:
+    """Whether the last motor joint is away from the first one."""
+    q = model.assemble(np.zeros(model.n_motors), model.rest)
+    first, last = (frame_placement(model, q, name).translation for name in _ends(model))
+    return float(np.linalg.norm(last - first)) > _SAME * model.reach
+
+
+def _same_pose(model: SoftModel, one: LocalSolution, other: LocalSolution) -> bool:
+    """Whether two solutions are one, up to whole turns of a motor."""
+    apart = one.q_motors - other.q_motors
+    apart = np.where(model.turning_motors, apart - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)), apart)
+    return float(np.abs(apart).max()) <= _SAME
+
+
+def _raise_unsettled(model: SoftModel, motors: FloatArray, load: Load, method: str, starts: int) -> NoReturn:
+    state, spent = settle(model, motors, load, model.rest, method=method)
+    best = equilibrium_from_state(model, motors, load, state, method=method, iterations=spent)
+    hint = "; method='newton' settles larger loads" if method == "fixed_point" else ""
+    raise EquilibriumNotFound(
+        f"the springs do not settle under this load by {method!r} at any of {starts} starts{hint}",
+        best=best,
+        residual=best.residual,
+        iterations=spent,
+    )
+
+
+def _settle_at(
     model: SoftModel, q_motors: FloatArray, load: Load, start: FloatArray, method: str, target: FloatArray
 ) -> LocalSolution | None:
     """Springs in equilibrium and the distance of the tip; None if they do not settle."""
-    most = 200 if method == "newton" else 1000
-    state, _ = settle(model, q_motors, load, start, method=method, max_iterations=most)
-    if state.error > largest_residual(state.joints, TOLERANCE):
+    state = settled(model, q_motors, load, start, method=method)
+    if state is None:
         return None
     error = float(np.linalg.norm(target - frame_placement(model, state.q, model.tip).translation))
-    return LocalSolution(q_motors, state, error, 0)
+    return LocalSolution(q_motors, state, error, 0, 0)
 
 
 def _free(model: SoftModel, motors: FloatArray, pull: FloatArray) -> FloatArray:

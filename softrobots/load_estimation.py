@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
-from softrobots.elastostatics import ElasticState, elastic_state, largest_residual, settle
+from softrobots.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, settled
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import LoadNotFound, ParameterError
+from softrobots.kinematics import frame_jacobian
 from softrobots.loads import Load
-from softrobots.model import SoftModel
-from softrobots.sensitivity import frame_jacobian, motor_torque_slope
+from softrobots.model import SoftModel, check_model
+from softrobots.sensitivity import motor_torque_slope
 
 METHODS = ("newton", "alternation")
 """The solvers of `estimate_load`; "alternation" is the paper's."""
@@ -34,16 +35,20 @@ _LAST_DAMPING = 1e-7
 _INNER = 1e-12  # tolerance of the equilibria on the way
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoadEstimate:
-    """A force explained by motor torques, with what can be said about it; can be saved with `softrobots.save`."""
+    """A force explained by motor torques, with what can be said about it; can be saved with `softrobots.save_result`."""
 
     force: FloatArray
     """The force, shape (3,) [N], world axes. Its part along unobservable directions is the smallest possible."""
     equilibrium: Equilibrium
     """The robot under that force: its pose, its springs, its stability."""
+    frame: str
+    """Where the force acts."""
     measured_torques: FloatArray
     """The motor torques that came in, shape (n_motors,) [N m]."""
+    torque_std: FloatArray | None
+    """Their standard deviation, shape (n_motors,) [N m]; None if none was given."""
     method: str
     """The solver."""
     singular_values: FloatArray
@@ -108,6 +113,7 @@ def estimate_load(
         NameNotFound: If the frame does not exist.
         LoadNotFound: If no force explains the torques; carries the best estimate.
     """
+    check_model(model)
     choice("method", method, METHODS)
     if model.n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor")
@@ -121,10 +127,10 @@ def estimate_load(
     problem = _Problem(model, motors, torques, base, at)
     force, state, iterations = (_newton if method == "newton" else _alternation)(problem, most)
     result = _estimate(problem, force, state, method, iterations, noise)
-    allowed = problem.tolerance if method == "newton" else 1e2 * problem.tolerance
+    allowed = problem.tolerance
     if noise is not None:  # what the noise alone may leave unexplained
         allowed = max(allowed, 5.0 * float(np.linalg.norm(noise)))
-    if not (result.residual <= allowed and result.equilibrium.residual <= 1e2 * result.equilibrium.tolerance):
+    if not (result.residual <= allowed and result.equilibrium.converged):
         raise LoadNotFound(
             f"no force explains the motor torques {torques.tolist()} N m by {method!r} in {iterations} iterations: "
             f"{result.residual:.3g} N m remain, required {allowed:.3g} N m",
@@ -135,7 +141,7 @@ def estimate_load(
     return result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Problem:
     """The measurement and what is known of the load."""
 
@@ -154,8 +160,7 @@ class _Problem:
 
     def equilibrium(self, force: FloatArray, start: FloatArray) -> ElasticState | None:
         """Springs in equilibrium under a force; None if there is none to be found."""
-        state, _ = settle(self.model, self.motors, self.load(force), start, tolerance=_INNER)
-        return state if state.error <= largest_residual(state.joints, 1e-10) else None
+        return settled(self.model, self.motors, self.load(force), start, tolerance=_INNER)
 
     def unexplained(self, state: ElasticState) -> FloatArray:
         """Motor torques minus those of a state."""
@@ -194,7 +199,7 @@ def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int
 
 
 def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
-    """The paper's recursion, [Troise 2021] Figure 5, until force and springs stand still."""
+    """The paper's recursion, [Troise 2021] Figure 5, until springs and motors are in balance."""
     model = problem.model
     force, springs = np.zeros(3), np.array(model.rest)
     state = elastic_state(model, problem.motors, springs, problem.base)
@@ -206,9 +211,9 @@ def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState
         )[0]
         pull = unloaded + jacobian.T @ found
         springs = model.rest + pull[model.spring_indices] / model.stiffness
-        moved = float(np.linalg.norm(found - force))
         force, state = found, elastic_state(model, problem.motors, springs, problem.load(found))
-        if moved <= 1e-10 * float(np.linalg.norm(force)):
+        still = state.error <= largest_residual(state.joints, TOLERANCE)
+        if still and float(np.linalg.norm(problem.unexplained(state))) <= problem.tolerance:
             return force, state, iteration
     return force, state, most
 
@@ -226,17 +231,15 @@ def _estimate(
         inverse = felt.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
         covariance = read_only(inverse @ np.diag(noise**2) @ inverse.T)
     unfelt = np.concatenate([right[: len(values)][~keep], right[len(values) :]])
+    equilibrium = equilibrium_from_state(
+        problem.model, problem.motors, problem.load(force), state, method=method, iterations=iterations
+    )
     return LoadEstimate(
         force=read_only(force),
-        equilibrium=equilibrium_from_state(
-            problem.model,
-            problem.motors,
-            problem.load(force),
-            state,
-            method="newton" if method == "newton" else "fixed_point",
-            iterations=iterations,
-        ),
+        equilibrium=equilibrium,
+        frame=problem.frame,
         measured_torques=read_only(problem.torques),
+        torque_std=None if noise is None else read_only(noise),
         method=method,
         singular_values=read_only(singular_values),
         unobservable_directions=read_only(unfelt),
@@ -244,6 +247,40 @@ def _estimate(
         residual=float(np.linalg.norm(missing[keep])),
         iterations=iterations,
     )
+
+
+def estimate_at(
+    equilibrium: Equilibrium,
+    *,
+    frame: str,
+    motor_torques: FloatArray,
+    force: FloatArray,
+    torque_std: FloatArray | None,
+    method: str,
+) -> LoadEstimate:
+    """Make a load estimate anew from its equilibrium and what was measured; what a saved estimate is loaded with.
+
+    Args:
+        equilibrium: The robot under the estimated force.
+        frame: Where the force acts.
+        motor_torques: Measured torques, shape (n_motors,) [N m].
+        force: The estimated force, shape (3,) [N], part of the equilibrium's load.
+        torque_std: Standard deviation of the torques, shape (n_motors,) [N m], or None.
+        method: The solver that found it.
+
+    Returns:
+        The estimate.
+
+    Raises:
+        ParameterError: If the force is not the one in the equilibrium's load.
+    """
+    wrench = equilibrium.load.wrenches.get(frame, np.zeros(6))
+    if not np.allclose(wrench[:3], force, rtol=1e-12, atol=0.0):
+        raise ParameterError("force", force, f"that of the load, {wrench[:3].tolist()} N")
+    base = equilibrium.load.plus(frame, np.concatenate([-force, np.zeros(3)]))
+    problem = _Problem(equilibrium.model, equilibrium.q_motors, motor_torques, base, frame)
+    state = elastic_state(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, equilibrium.load)
+    return _estimate(problem, force, state, method, equilibrium.iterations, torque_std)
 
 
 def _noise(torque_std: Any, n_motors: int) -> FloatArray:

@@ -15,9 +15,6 @@ from softrobots.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.model import SoftModel
 from softrobots.robots import InflatableArm
 
-MAX_DOF = 300
-"""Largest number of coordinates: Pinocchio's workspace needs 8 s and 1.8 GB there, 57 s and 14 GB at twice as many."""
-
 
 def load_model(
     source: InflatableArm | Path | str,
@@ -41,7 +38,8 @@ def load_model(
 
     Raises:
         DescriptionError: If the file cannot be read or is no URDF, has no springs and none are given, has joints other than
-            revolute, continuous and prismatic, has no single end, or has more than `MAX_DOF` coordinates.
+            revolute, continuous and prismatic, has a spring on a fixed joint, would have a motor that mimics another joint,
+            or has no single end.
         NameNotFound: If a named joint or frame does not exist.
         ParameterError: If a stiffness is not positive, a rest coordinate is not finite, or a joint is named twice.
     """
@@ -58,7 +56,16 @@ def load_model(
             f"{label} has no joint springs; give springs={{joint: stiffness}} for its movable joints "
             f"({', '.join(movable) or 'none'}), or springs={{}} for a rigid robot"
         )
+    stray = [name for name in spring_tags if name not in movable]
+    if stray:
+        raise DescriptionError(f"{label} has a spring on {', '.join(stray)}, which cannot move; movable: {', '.join(movable)}")
     motor_names = _motors_said(motors, movable, spring_tags, tags)
+    coupled = [name for name in tags.mimics if name in motor_names or name in spring_tags]
+    if coupled:
+        raise DescriptionError(
+            f"{label} has joints that mimic others ({', '.join(coupled)}); they cannot be motors or springs: name the motors, "
+            "motors=[...], and the rest is locked"
+        )
     locked = [name for name in movable if name not in spring_tags and name not in motor_names]
     if locked:
         model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], pin.neutral(model))
@@ -124,14 +131,12 @@ def _check_joints(model: Any, label: str) -> None:
             raise DescriptionError(
                 f"joint {name} of {label} is a {joint.shortname()}; revolute, continuous and prismatic joints are supported"
             )
-    if model.nv > MAX_DOF:
-        raise DescriptionError(f"{label} has {model.nv} coordinates; at most {MAX_DOF} are supported")
 
 
 def _tip(model: Any, tip: str | None, label: str) -> str:
     bodies = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
     if tip is not None:
-        if not model.existFrame(tip):
+        if not isinstance(tip, str) or not model.existFrame(tip):
             raise NameNotFound("frame", str(tip), bodies)
         return tip
     if "tip" in bodies:

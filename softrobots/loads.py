@@ -6,13 +6,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from softrobots.checks import FloatArray, finite_array, read_only
-from softrobots.model import SoftModel
+from softrobots.model import SoftModel, check_model
 
 EARTH_GRAVITY = (0.0, 0.0, -9.81)
 """Gravity on the ground, world axes [m/s^2]."""
@@ -44,7 +45,7 @@ class LoadTerm(NamedTuple):
         return cls(frame, wrench, force, cross_matrix(force).T, cross_matrix(moment) if norms[1] > 0.0 else None, norms)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Load:
     """A load case: dead wrenches (fixed in the world, they do not follow the robot) and gravity.
 
@@ -52,9 +53,18 @@ class Load:
     """
 
     wrenches: Mapping[str, FloatArray]
-    """Wrench by frame name, shape (6,): force [N] then moment [N m], world axes, at the origin of the frame."""
+    """Wrench by frame name, shape (6,): force [N] then moment [N m], world axes, at the origin of the frame; read-only."""
     gravity: tuple[float, float, float] | None
     """Gravity, world axes [m/s^2]; None: weightless."""
+
+    def __post_init__(self) -> None:
+        """Keep a read-only copy of the wrenches."""
+        kept = {name: read_only(np.array(wrench)) for name, wrench in self.wrenches.items()}
+        object.__setattr__(self, "wrenches", MappingProxyType(kept))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle with a plain dictionary."""
+        return Load, (dict(self.wrenches), self.gravity)
 
     @classmethod
     def of(
@@ -76,6 +86,7 @@ class Load:
             ParameterError: If a shape differs or a number is not finite.
             NameNotFound: If a frame does not exist.
         """
+        check_model(model)
         at = model.tip if frame is None else frame
         model.frame_id(at)
         total: dict[str, FloatArray] = {}
@@ -88,9 +99,9 @@ class Load:
                 field = f"wrench[{name!r}]" if isinstance(wrench, Mapping) else "wrench"
                 total[name] = total.get(name, 0.0) + finite_array(field, value, (6,), "N, N m")
         if gravity is None:
-            return cls({name: read_only(value) for name, value in total.items()}, None)
+            return cls(total, None)
         x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
-        return cls({name: read_only(value) for name, value in total.items()}, (x, y, z))
+        return cls(total, (x, y, z))
 
     @property
     def conservative(self) -> bool:
@@ -105,11 +116,11 @@ class Load:
     def scaled(self, factor: float) -> Load:
         """Return the load with every wrench and gravity multiplied by `factor`."""
         gravity = None if self.gravity is None else tuple(factor * g for g in self.gravity)
-        return Load({name: read_only(factor * value) for name, value in self.wrenches.items()}, gravity)  # type: ignore[arg-type]
+        return Load({name: factor * value for name, value in self.wrenches.items()}, gravity)  # type: ignore[arg-type]
 
     def plus(self, frame: str, wrench: FloatArray) -> Load:
         """Return the load with one more wrench, shape (6,) [N, N m], at a frame."""
-        return Load({**self.wrenches, frame: read_only(self.wrenches.get(frame, 0.0) + wrench)}, self.gravity)
+        return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity)
 
 
 class GeneralisedLoad(NamedTuple):

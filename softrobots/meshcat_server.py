@@ -60,15 +60,20 @@ def start_server() -> tuple[subprocess.Popen[bytes], str, str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
+    watchdog = threading.Timer(_REPLY_TIME / 1000.0, server.kill)  # a server that says nothing ends, and so does the wait
+    watchdog.start()
     found: dict[str, str] = {}
     while server.stdout is not None and len(found) < 2:
         line = server.stdout.readline().decode("utf-8", "replace")
         if not line:
+            watchdog.cancel()
             told = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
             end_server(server)
             raise ViewerError(f"the meshcat server ended before it served: {told}")
         name, _, value = line.strip().partition("=")
-        found[name] = value
+        if name in ("zmq_url", "web_url"):
+            found[name] = value
+    watchdog.cancel()
     return server, found["zmq_url"], found["web_url"]
 
 

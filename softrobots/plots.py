@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.checks import FloatArray
+from softrobots.checks import FloatArray, finite_array, positive_integer
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import MissingDependency, ParameterError
 from softrobots.model import SoftModel
@@ -45,9 +45,10 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
         The figure.
 
     Raises:
-        ParameterError: If it is no trajectory.
+        ParameterError: If it is no trajectory, or `shown` is not positive.
         MissingDependency: If matplotlib is not installed.
     """
+    positive_integer("shown", shown)
     figure = _figure(trajectory, (8.0, 6.4))
     axes = figure.add_subplot(projection="3d")
     model = trajectory.model
@@ -98,7 +99,7 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
         MissingDependency: If matplotlib is not installed.
     """
     figure = _figure(trajectory, (8.0, 5.0))
-    _figure(rigid, (1.0, 1.0))
+    _check(rigid)
     if len(rigid.times) != len(trajectory.times):
         raise ParameterError("rigid", len(rigid.times), f"a trajectory with {len(trajectory.times)} waypoints")
     axes = figure.add_subplot()
@@ -125,14 +126,17 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
         The figure.
 
     Raises:
+        ParameterError: If shapes differ or a number is not finite.
         MissingDependency: If matplotlib is not installed.
     """
+    moments = finite_array("times", times, (None,), "s")
+    lines = {label: finite_array(f"errors[{label!r}]", error, moments.shape, "m") for label, error in errors.items()}
     figure = _new((8.0, 4.4))
     axes = figure.add_subplot()
-    every = max(len(times) // 10, 1)
-    for number, (label, error) in enumerate(errors.items()):
+    every = max(len(moments) // 10, 1)
+    for number, (label, error) in enumerate(lines.items()):
         axes.semilogy(
-            times,
+            moments,
             np.maximum(error, 1e-16) * 1e3,
             color=_COLOURS[number % 6],
             ls=("-", "--", "-.", ":")[number % 4],
@@ -222,9 +226,13 @@ def _force_arrow(axes: Any, equilibrium: Equilibrium) -> None:
 
 
 def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:
+    _check(trajectory)
+    return _new(size)
+
+
+def _check(trajectory: Trajectory) -> None:
     if not isinstance(trajectory, Trajectory):
         raise ParameterError("trajectory", trajectory, "a Trajectory")
-    return _new(size)
 
 
 def _new(size: tuple[float, float]) -> Any:

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
+import numpy as np
+
 from softrobots import inflated_beam
 from softrobots.checks import finite_array, finite_number
 from softrobots.description import expand
@@ -86,6 +88,9 @@ class InflatableArm:
         for offset, length in zip(self._each("hinge_offset"), lengths, strict=True):
             if offset >= length:
                 raise ParameterError("hinge_offset", self.hinge_offset, f"below the link lengths {lengths} m")
+        for radius, wall in zip(self._each("radius"), self._each("wall_thickness"), strict=True):
+            if wall > 0.1 * radius:
+                raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius {radius} m")
         for name in ("rest_side", "rest_up"):
             if max(map(abs, self._each(name))) > math.pi / 2:
                 raise ParameterError(name, getattr(self, name), "within the spring limits +-pi/2 rad")
@@ -113,10 +118,19 @@ class InflatableArm:
         Raises:
             ParameterError: If the links differ in pressure or a pressure is out of range.
         """
-        pressures = self._each("pressure")
-        if len(set(pressures)) != 1:
-            raise ParameterError("pressure", pressures, "the same in all links to be filled from one tank")
-        return inflated_beam.tank_volume(self.volume, pressures[0], tank_pressure, ambient_pressure=ambient_pressure)
+        return inflated_beam.tank_volume(self.volume, self._one_pressure(), tank_pressure, ambient_pressure=ambient_pressure)
+
+    def tank_pressure(self, tank_volume: float, *, ambient_pressure: float = 0.0) -> float:
+        """Gauge pressure of a full tank that inflates the whole arm once [Pa]; see `inflated_beam.tank_pressure`.
+
+        Args:
+            tank_volume: Volume of the tank [m^3].
+            ambient_pressure: Absolute pressure outside [Pa]; 0 in space (the default).
+
+        Raises:
+            ParameterError: If the links differ in pressure or a value is out of range.
+        """
+        return inflated_beam.tank_pressure(self.volume, self._one_pressure(), tank_volume, ambient_pressure=ambient_pressure)
 
     def xacro_arguments(self) -> dict[str, str]:
         """Return the parameters as arguments of the xacro file: text by name, full precision."""
@@ -131,6 +145,12 @@ class InflatableArm:
             DescriptionError: If xacro refuses the parameters, e.g. a link too light to cut its hinge from.
         """
         return _expanded(self.XACRO, tuple(self.xacro_arguments().items()))
+
+    def _one_pressure(self) -> float:
+        pressures = self._each("pressure")
+        if len(set(pressures)) != 1:
+            raise ParameterError("pressure", pressures, "the same in all links to be filled from one tank")
+        return float(pressures[0])
 
     def _each(self, name: str) -> tuple[Any, ...]:
         values: tuple[Any, ...] = getattr(self, name)
@@ -187,11 +207,10 @@ def _at_least(name: str, values: tuple[float, ...], low: float, strict: bool, un
 
 def _colours(value: Any, count: int) -> tuple[tuple[float, ...], ...]:
     requirement = f"red, green, blue, opacity in [0, 1]: one colour, or one for each of the {count} links"
-    single = len(value) == 4 and not any(isinstance(item, Sequence) for item in value) if isinstance(value, Sequence) else False
-    colours = [value] * count if single else value
     try:
-        checked = finite_array("rgba", colours, (count, 4))
-    except ParameterError as error:
+        single = np.ndim(value) == 1
+        checked = finite_array("rgba", np.tile(value, (count, 1)) if single else value, (count, 4))
+    except (ParameterError, ValueError) as error:
         raise ParameterError("rgba", value, requirement) from error
     if checked.min() < 0.0 or checked.max() > 1.0:
         raise ParameterError("rgba", value, requirement)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -71,14 +73,14 @@ class Scene:
         return [np.array(pose.homogeneous) for pose in self._data.oMg]
 
     def _inflated_links(self) -> list[int | None]:
-        """Inflated link of every shape: what hangs on its last spring, and what has the same colour just before its first."""
+        """Inflated link of every shape: what hangs on its last spring, and the tube of its radius just before its first."""
         pin_model, objects = self._model.pinocchio, self._geometry.geometryObjects
         links: list[int | None] = [None] * len(objects)
         for number, group in enumerate(self._model.spring_groups):
             first, last = (pin_model.getJointId(self._model.spring_joints[group.springs[place]]) for place in (0, -1))
-            colours = {tuple(shape.meshColor) for shape in objects if shape.parentJoint == last}
             for place, shape in enumerate(objects):
-                before = shape.parentJoint == pin_model.parents[first] and tuple(shape.meshColor) in colours
+                tube = isinstance(shape.geometry, coal.Cylinder) and math.isclose(shape.geometry.radius, group.radius)
+                before = tube and shape.parentJoint == pin_model.parents[first]
                 if shape.parentJoint == last or before:
                     links[place] = number
         return links

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.checks import FloatArray
-from softrobots.equilibrium import Equilibrium
-from softrobots.errors import ParameterError
+from softrobots.equilibrium import Equilibrium, check_same_model
+from softrobots.errors import NeutralEquilibrium
+from softrobots.kinematics import frame_jacobian
 from softrobots.loads import GeneralisedLoad
 from softrobots.model import SoftModel
-
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
@@ -27,9 +25,10 @@ def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatAr
         Shape (3, n_motors) [m/rad or m/m], world axes.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model or is neutral (singular tangent stiffness).
+        ParameterError: If the equilibrium belongs to another model.
+        NeutralEquilibrium: If its tangent stiffness is singular.
     """
-    _same_model(model, equilibrium)
+    check_same_model(model, equilibrium)
     jacobian = frame_jacobian(model, equilibrium.q, model.tip)[:3]
     return tip_motion(model, jacobian, equilibrium.tangent_stiffness, equilibrium.joint_derivative)[0]
 
@@ -48,27 +47,12 @@ def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
         Shape (6, 6) [m/N, m/(N m); rad/N, rad/(N m)].
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model or is neutral (singular tangent stiffness).
+        ParameterError: If the equilibrium belongs to another model.
+        NeutralEquilibrium: If its tangent stiffness is singular.
     """
-    _same_model(model, equilibrium)
+    check_same_model(model, equilibrium)
     springs = frame_jacobian(model, equilibrium.q, model.tip)[:, model.spring_indices]
     return np.asarray(springs @ _solve(equilibrium.tangent_stiffness, springs.T))
-
-
-def frame_jacobian(model: SoftModel, q: FloatArray, frame: str) -> FloatArray:
-    """Geometric Jacobian of a frame in world axes, [Troise 2021] (4), shape (6, nv), linear rows first [m/rad; rad/rad].
-
-    Args:
-        model: The robot.
-        q: Pinocchio's configuration, shape (nq,).
-        frame: Name of the frame.
-
-    Raises:
-        NameNotFound: If there is no such frame.
-    """
-    pin_model, data = model.workspace(None)
-    jacobian = pin.computeFrameJacobian(pin_model, data, q, model.frame_id(frame), _AXES)
-    return np.asarray(jacobian).reshape(6, pin_model.nv)
 
 
 def tip_motion(
@@ -86,7 +70,7 @@ def tip_motion(
         `dx/dq_m`, shape (m, n_motors), and `dy/dq_m`, shape (n_springs, n_motors).
 
     Raises:
-        ParameterError: If the tangent stiffness is singular.
+        NeutralEquilibrium: If the tangent stiffness is singular.
     """
     motors, springs = model.motor_indices, model.spring_indices
     follow = _solve(tangent, derivative[springs[:, None], motors])
@@ -110,7 +94,7 @@ def motor_torque_slope(model: SoftModel, jacobian: FloatArray, tangent: FloatArr
         Shape (n_motors, 3) [m].
 
     Raises:
-        ParameterError: If the tangent stiffness is singular.
+        NeutralEquilibrium: If the tangent stiffness is singular.
     """
     motors, springs = model.motor_indices, model.spring_indices
     follow = _solve(tangent, jacobian[:, springs].T)
@@ -121,13 +105,4 @@ def _solve(tangent: FloatArray, right: FloatArray) -> FloatArray:
     try:
         return np.asarray(np.linalg.solve(tangent, right))
     except np.linalg.LinAlgError as error:
-        raise ParameterError(
-            "equilibrium", tangent, "away from a neutral equilibrium: its tangent stiffness is singular"
-        ) from error
-
-
-def _same_model(model: SoftModel, equilibrium: Equilibrium) -> None:
-    if not isinstance(equilibrium, Equilibrium):
-        raise ParameterError("equilibrium", equilibrium, "an Equilibrium of the model")
-    if equilibrium.model is not model:
-        raise ParameterError("equilibrium", equilibrium.model, f"an equilibrium of the model given, {model!r}")
+        raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has no derivative") from error

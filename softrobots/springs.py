@@ -11,7 +11,8 @@ from softrobots.checks import FloatArray
 class LinearSprings:
     """Independent linear springs, `torque = stiffness (y - rest)`, [Troise 2021] (2).
 
-    A spring law is what has these three methods; the solvers know nothing else of a spring.
+    The residual, the tangent stiffness and the energy of `softrobots.elastostatics` use the three methods only; the paper's
+    recursions, and the scales and first steps of the solvers, use `stiffness` and `rest`.
     """
 
     stiffness: FloatArray

@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.checks import FloatArray, finite_array, positive_number
-from softrobots.elastostatics import ElasticState, elastic_state, largest_residual
+from softrobots.elastostatics import ElasticState, newton
 from softrobots.errors import NoCriticalLoad, ParameterError
+from softrobots.kinematics import frame_jacobian
 from softrobots.loads import Load
-from softrobots.model import SoftModel
-from softrobots.sensitivity import frame_jacobian
+from softrobots.model import SoftModel, check_model
 
 _NEWTON_STEPS = 12
+_TOLERANCE = 1e-12
 _SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
 _LARGEST_MOVE = 0.1  # [rad] of a spring between two points of the path
 _NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the one at zero force, may vanish in the next step
@@ -52,6 +53,7 @@ def critical_load(
         NameNotFound: If the frame does not exist.
         NoCriticalLoad: If the path is stable up to `max_force`: the direction pulls or bends rather than pushes.
     """
+    check_model(model)
     motors = finite_array("q_motors", q_motors, (model.n_motors,), "rad")
     unit = finite_array("direction", direction, (3,))
     length = float(np.linalg.norm(unit))
@@ -133,18 +135,13 @@ def _correct(
     *,
     largest_move: float = _LARGEST_MOVE,
 ) -> ElasticState | None:
-    """Plain Newton from a prediction; None if it does not converge, or not near the prediction and the last point."""
-    state = elastic_state(model, motors, guess, load)
-    predicted = float(np.abs(guess - last).max(initial=0.0))
-    for _ in range(_NEWTON_STEPS):
-        if state.error <= largest_residual(state.joints, 1e-12):
-            moved, missed = (float(np.abs(state.q_springs - other).max(initial=0.0)) for other in (last, guess))
-            return state if moved <= largest_move and missed <= max(0.5 * predicted, 0.1 * largest_move) else None
-        try:
-            step = np.linalg.solve(state.tangent, -state.residual)
-        except np.linalg.LinAlgError:
-            return None
-        if float(np.abs(step).max()) > max(largest_move, 0.5):
-            return None
-        state = elastic_state(model, motors, state.q_springs + step, load)
-    return None
+    """Newton from a prediction; None if it does not converge, or not near the prediction and the last point."""
+    longest = max(largest_move, 0.5)
+    state, _ = newton(model, motors, load, guess, tolerance=_TOLERANCE, max_iterations=_NEWTON_STEPS, largest_step=longest)
+    if state is None:
+        return None
+    moved, missed, predicted = (
+        float(np.abs(one - other).max(initial=0.0))
+        for one, other in ((state.q_springs, last), (state.q_springs, guess), (guess, last))
+    )
+    return state if moved <= largest_move and missed <= max(0.5 * predicted, 0.1 * largest_move) else None

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number, read_only
+from softrobots.checks import FloatArray, finite_array, increasing, positive_integer, positive_number, read_only
 from softrobots.errors import FileFormatError, ParameterError
+from softrobots.files import as_path
 
 _LARGEST_FILE = 100_000_000  # bytes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Path3D:
     """Target positions over time."""
 
@@ -23,8 +24,6 @@ class Path3D:
     """Time of each waypoint, increasing, shape (n,) [s]."""
     positions: FloatArray
     """Target positions, shape (n, 3) [m], world axes."""
-    velocities: FloatArray
-    """Target velocities, shape (n, 3) [m/s]."""
 
 
 def quintic(share: Any) -> FloatArray:
@@ -65,12 +64,11 @@ def straight_line(start: Any, end: Any, duration: float, steps: int = 200) -> Pa
     a, b = finite_array("start", start, (3,), "m"), finite_array("end", end, (3,), "m")
     duration, steps = positive_number("duration", duration, "s"), positive_integer("steps", steps)
     s = np.linspace(0.0, 1.0, steps + 1)
-    speed = 30.0 * s**2 * (1.0 - s) ** 2 / duration
-    return Path3D(read_only(s * duration), read_only(a + quintic(s)[:, None] * (b - a)), read_only(speed[:, None] * (b - a)))
+    return Path3D(read_only(s * duration), read_only(a + quintic(s)[:, None] * (b - a)))
 
 
 def waypoints(positions: Any, times: Any) -> Path3D:
-    """Path through given positions at given times; velocities by finite differences (second order inside).
+    """Path through given positions at given times.
 
     Args:
         positions: Target positions, shape (n, 3) [m], n >= 2.
@@ -86,10 +84,7 @@ def waypoints(positions: Any, times: Any) -> Path3D:
     moments = finite_array("times", times, (len(points),), "s")
     if len(points) < 2:
         raise ParameterError("positions", positions, "at least two waypoints")
-    if np.any(np.diff(moments) <= 0.0):
-        raise ParameterError("times", times, "increasing [s]")
-    velocities = np.gradient(points, moments, axis=0, edge_order=2 if len(points) > 2 else 1)
-    return Path3D(read_only(moments), read_only(points), read_only(np.asarray(velocities)))
+    return Path3D(read_only(increasing("times", moments, "s")), read_only(points))
 
 
 def read_waypoints(path: str | Path) -> Path3D:
@@ -104,10 +99,11 @@ def read_waypoints(path: str | Path) -> Path3D:
         The path.
 
     Raises:
-        FileFormatError: If the file cannot be read, lacks a column, or a cell is no finite number; names the line.
-        ParameterError: If there are fewer than two waypoints or times do not increase.
+        ParameterError: If the path is none.
+        FileFormatError: If the file cannot be read, lacks a column, has a cell that is no finite number (names the line), has
+            fewer than two waypoints, or times that do not increase.
     """
-    path = Path(path)
+    path = as_path("path", path)
     try:
         if path.stat().st_size > _LARGEST_FILE:
             raise FileFormatError(f"{path} has {path.stat().st_size} bytes; at most {_LARGEST_FILE} are read")
@@ -123,11 +119,16 @@ def read_waypoints(path: str | Path) -> Path3D:
                 )
             columns = [name for name in ("t", "x", "y", "z") if name in names]
             rows = [[_cell(row, name, path, reader.line_num) for name in columns] for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
+        if isinstance(error, FileFormatError):
+            raise
         raise FileFormatError(f"cannot read waypoints from {path}: {error}") from error
     table = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
     times = table[:, 0] if columns[0] == "t" else 0.05 * np.arange(len(table))
-    return waypoints(table[:, -3:], times)
+    try:
+        return waypoints(table[:, -3:], times)
+    except ParameterError as error:
+        raise FileFormatError(f"{path}: {error}") from error
 
 
 def _cell(row: dict[str, str | None], name: str, path: Path, line: int) -> float:

@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from softrobots import inflated_beam
-from softrobots.checks import FloatArray, choice, finite_array, positive_number, read_only
-from softrobots.elastostatics import elastic_state, settle
-from softrobots.equilibrium import Equilibrium, equilibrium_from_state, frame_placement
+from softrobots.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
+from softrobots.elastostatics import TOLERANCE, elastic_state, largest_residual, settle
+from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
-from softrobots.inverse_kinematics import POSITION_TOLERANCE, LocalSolution, search, solve_ik, start_motors
+from softrobots.inverse_kinematics import POSITION_TOLERANCE, IkSolution, LocalSolution, search, solve_ik, start_motors
+from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
-from softrobots.model import SoftModel
-from softrobots.sensitivity import frame_jacobian, tip_motion
+from softrobots.model import SoftModel, check_model
+from softrobots.sensitivity import tip_motion
 
 METHODS = ("newton", "fixed_point", "paper")
 """How `follow_trajectory` follows: exact steps with the springs settled by Newton or by the paper's recursion, or the paper's
@@ -28,9 +29,9 @@ _WARM_DAMPING = 1e-6  # of the first step of a warm-started search, relative to 
 _HALVINGS = 6  # of the way between two waypoints before the search starts anew
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Motor coordinates over a path, with the loaded robot at every waypoint; can be saved with `softrobots.save`."""
+    """Motor coordinates over a path, with the loaded robot at every waypoint; can be saved with `softrobots.save_result`."""
 
     times: FloatArray
     """Time of each waypoint, shape (n,) [s]; the number of the waypoint if no times were given."""
@@ -86,6 +87,9 @@ class Trajectory:
         """Share of the wrinkling moment that is left at the worst waypoint and link [-]; negative: a link wrinkles.
 
         None without inflated links.
+
+        Raises:
+            ParameterError: If a link has no pressure, and so no wrinkling moment.
         """
         if self.link_moments is None:
             return None
@@ -109,7 +113,8 @@ def follow_trajectory(
     tolerance: float = POSITION_TOLERANCE,
     times: Any = None,
     gain: float = 50.0,
-    progress: bool = False,
+    allow_jumps: bool = False,
+    progress: bool | str = False,
 ) -> Trajectory:
     """Find motor coordinates that move the loaded tip through target positions.
 
@@ -130,8 +135,10 @@ def follow_trajectory(
         method: "newton", "fixed_point" or "paper".
         tolerance: Largest distance of the tip from a target [m]; not for "paper".
         times: Increasing times of the waypoints, shape (n,) [s]; required by "paper".
-        gain: Gain `K` of "paper" [1/s].
-        progress: Show a progress bar on stderr.
+        gain: Gain `K` of "paper" [1/s]; intervals longer than half its inverse are integrated in several steps.
+        allow_jumps: Where a waypoint cannot be reached from the last one by a continuous motion (a motor limit, a turn of the
+            base under a tip that passes over it), go on from the nearest other solution instead of raising.
+        progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
         The trajectory.
@@ -139,9 +146,10 @@ def follow_trajectory(
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range.
         NameNotFound: If a frame does not exist.
-        TargetUnreachable: If a waypoint cannot be reached; names it and how near the tip came.
-        EquilibriumNotFound: If the springs do not settle on the way ("paper").
+        TargetUnreachable: If a waypoint cannot be reached, or not without a jump; names it and how near the tip came.
+        EquilibriumNotFound: If the springs do not settle on the way.
     """
+    check_model(model)
     choice("method", method, METHODS)
     points = finite_array("targets", targets, (None, 3), "m")
     if len(points) == 0:
@@ -154,46 +162,66 @@ def follow_trajectory(
             raise ParameterError("times", times, "given for method='paper', which integrates over time")
         moments: FloatArray = np.arange(len(points), dtype=np.float64)
     else:
-        moments = finite_array("times", times, (len(points),), "s")
-        if np.any(np.diff(moments) <= 0.0):
-            raise ParameterError("times", times, "increasing [s]")
+        moments = increasing("times", finite_array("times", times, (len(points),), "s"), "s")
     inner = "newton" if method == "newton" else "fixed_point"
-    first = solve_ik(
-        model,
-        points[0],
-        wrench=dict(load.wrenches),
-        gravity=gravity,
-        q_motors0=q_motors0,
-        elbow=elbow,
-        method=inner,
-        tolerance=tolerance,
-    ).equilibrium
+    try:
+        first = solve_ik(
+            model,
+            points[0],
+            wrench=dict(load.wrenches),
+            gravity=gravity,
+            q_motors0=q_motors0,
+            elbow=elbow,
+            method=inner,
+            tolerance=tolerance,
+        ).equilibrium
+    except TargetUnreachable as error:
+        raise _named(error, 1, len(points)) from error
     steps = (
         _paper_steps(model, points, moments, load, first, gain)
         if method == "paper"
-        else _exact_steps(model, points, load, first, inner, tolerance)
+        else _exact_steps(model, points, load, first, inner, tolerance, allow_jumps)
     )
     equilibria = [first, *_with_progress(steps, len(points) - 1, method, progress)]
     return Trajectory(read_only(moments), read_only(points), tuple(equilibria), method)
 
 
-def _with_progress(steps: Iterable[Equilibrium], total: int, label: str, progress: bool) -> Iterable[Equilibrium]:
+def _with_progress(steps: Iterable[Equilibrium], total: int, method: str, progress: bool | str) -> Iterable[Equilibrium]:
     if not progress:
         return steps
     from tqdm import tqdm
 
-    bar: Iterable[Equilibrium] = tqdm(steps, total=total, desc=f"waypoints ({label})", unit="wp")
+    label = progress if isinstance(progress, str) else f"waypoints ({method})"
+    bar: Iterable[Equilibrium] = tqdm(steps, total=total, desc=label, unit="wp")
     return bar
 
 
+def _named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachable:
+    """The error with the number of its waypoint, counted from 1."""
+    told = f"waypoint {number} of {total}: {error}"
+    return TargetUnreachable(told, best=error.best, residual=error.residual, iterations=error.iterations)
+
+
 def _exact_steps(
-    model: SoftModel, points: FloatArray, load: Load, first: Equilibrium, method: str, tolerance: float
+    model: SoftModel, points: FloatArray, load: Load, first: Equilibrium, method: str, tolerance: float, allow_jumps: bool
 ) -> Iterable[Equilibrium]:
     state = elastic_state(model, first.q_motors, first.q_springs, load)
-    here = LocalSolution(first.q_motors, state, 0.0, 0)
-    for number, (last, target) in enumerate(pairwise(points), start=1):
+    here = LocalSolution(first.q_motors, state, 0.0, 0, 0)
+    for number, (last, target) in enumerate(pairwise(points), start=2):
         reached = _advance(model, last, target, load, here, method, tolerance, _HALVINGS)
-        here = reached or _anew(model, target, load, here, method, tolerance, number, len(points))
+        if reached is None:
+            reached = _jump(model, target, load, here, method, tolerance, number, len(points))
+            if not allow_jumps:
+                apart = reached.q_motors - here.q_motors
+                solution = equilibrium_from_state(model, reached.q_motors, load, reached.state, method=method, iterations=0)
+                raise TargetUnreachable(
+                    f"waypoint {number} of {len(points)}: no continuous motion leads there from the last one; the nearest "
+                    f"solution is a jump of the motors by {apart.round(4).tolist()} rad (allow_jumps=True takes it)",
+                    best=IkSolution(target, solution, reached.error, reached.iterations, ()),
+                    residual=reached.error,
+                    iterations=reached.iterations,
+                )
+        here = reached
         yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
 
 
@@ -226,7 +254,7 @@ def _advance(
     return None if half is None else _advance(model, middle, target, load, half, method, tolerance, halvings - 1)
 
 
-def _anew(
+def _jump(
     model: SoftModel,
     target: FloatArray,
     load: Load,
@@ -236,25 +264,22 @@ def _anew(
     number: int,
     total: int,
 ) -> LocalSolution:
-    """Search a waypoint from everywhere when the way from the last one is blocked (a limit, a fold of the workspace)."""
-    gravity = load.gravity
+    """Search a waypoint from everywhere when the way from the last one is blocked."""
     try:
         found = solve_ik(
             model,
             target,
             wrench=dict(load.wrenches),
-            gravity=gravity,
+            gravity=load.gravity,
             q_motors0=here.q_motors,
             method=method,
             tolerance=tolerance,
         )
     except TargetUnreachable as error:
-        raise TargetUnreachable(
-            f"waypoint {number} of {total}: {error}", best=error.best, residual=error.residual, iterations=error.iterations
-        ) from error
+        raise _named(error, number, total) from error
     solution = found.equilibrium
     state = elastic_state(model, solution.q_motors, solution.q_springs, load)
-    return LocalSolution(solution.q_motors, state, found.error, found.iterations)
+    return LocalSolution(solution.q_motors, state, found.error, found.iterations, 0)
 
 
 def _paper_steps(
@@ -265,19 +290,24 @@ def _paper_steps(
     for number in range(1, len(points)):
         interval = times[number] - times[number - 1]
         velocity = (points[number] - points[number - 1]) / interval
-        error = points[number - 1] - frame_placement(model, q, model.tip).translation
-        inverse = np.linalg.pinv(frame_jacobian(model, q, model.tip)[:3])
-        motors = motors + interval * (inverse[model.motor_indices] @ (velocity + gain * error))
-        motors = np.clip(motors, *model.motor_limits.T)
-        state, spent = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
-        equilibrium = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
-        if not equilibrium.converged:
-            raise EquilibriumNotFound(
-                f"waypoint {number} of {len(points)}: the fixed point of method='paper' does not converge in {spent} steps "
-                f"(residual {equilibrium.residual:.3g} N m)",
-                best=equilibrium,
-                residual=equilibrium.residual,
-                iterations=spent,
-            )
-        springs, q = np.array(state.q_springs), state.q
-        yield equilibrium
+        parts = max(1, int(np.ceil(2.0 * gain * interval - 1e-9)))  # explicit Euler is unstable at gain times step > 2
+        spent = 0
+        for part in range(parts):
+            wanted = points[number - 1] + (part / parts) * (points[number] - points[number - 1])
+            error = wanted - frame_placement(model, q, model.tip).translation
+            inverse = np.linalg.pinv(frame_jacobian(model, q, model.tip)[:3])
+            motors = motors + interval / parts * (inverse[model.motor_indices] @ (velocity + gain * error))
+            motors = np.clip(motors, *model.motor_limits.T)
+            state, used = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
+            spent += used
+            if state.error > largest_residual(state.joints, TOLERANCE):
+                best = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
+                raise EquilibriumNotFound(
+                    f"waypoint {number + 1} of {len(points)}: the fixed point of method='paper' does not converge in {used} "
+                    f"steps (residual {best.residual:.3g} N m)",
+                    best=best,
+                    residual=best.residual,
+                    iterations=spent,
+                )
+            springs, q = np.array(state.q_springs), state.q
+        yield equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)

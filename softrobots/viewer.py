@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, finite_array, new_file, positive_number
-from softrobots.equilibrium import Equilibrium, frame_placement
-from softrobots.errors import ParameterError
+from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number
+from softrobots.equilibrium import Equilibrium, check_same_model
+from softrobots.errors import ParameterError, ViewerError
+from softrobots.files import new_file, write_atomically
+from softrobots.kinematics import frame_placement
 from softrobots.meshcat_server import connect, end_server, start_server
 from softrobots.meshcat_shapes import (
     FORCE_COLOUR,
@@ -24,13 +26,12 @@ from softrobots.meshcat_shapes import (
     meshcat_geometry,
     with_legend,
 )
-from softrobots.model import SoftModel
-from softrobots.results_io import write_atomically
+from softrobots.model import SoftModel, check_model
 from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.trajectory import Trajectory
 
-ARROW_SCALE = 0.012
-"""Length of a force arrow [m/N]."""
+ARROW_LENGTH = 0.2
+"""Length of the arrow of the largest force, relative to the reach; other arrows are shorter in proportion."""
 
 _FRAME_RATE = 30
 
@@ -51,7 +52,7 @@ class Viewer:
         Raises:
             ViewerError: If the server does not start or the robot has shapes that cannot be drawn.
         """
-        self._model = model
+        self._model = check_model(model)
         self._scene = Scene(model)
         self._server, zmq_url, self._url = start_server()
         try:
@@ -97,26 +98,28 @@ class Viewer:
 
         Raises:
             ParameterError: If it belongs to another robot.
+            ViewerError: If the viewer is closed.
         """
         self._check(equilibrium)
-        rigid = self._model.configuration(equilibrium.q_motors)
-        for group, q in (("deformed", equilibrium.q), ("rigid", rigid)):
-            for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
-                self._root[f"{group}/{shape.name}"].set_transform(transform)
+        self._place(equilibrium.q, self._model.configuration(equilibrium.q_motors))
         for link in range(len(self._model.spring_groups)):
             self._colour(link, wrinkling_level(equilibrium, link))
         self._draw_arrows(equilibrium)
 
     def show_configuration(self, q: FloatArray) -> None:
-        """Show the robot at a configuration of Pinocchio, shape (nq,), without load.
+        """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling.
 
         Raises:
             ParameterError: If the shape differs or a number is not finite.
         """
         q = finite_array("q", q, (self._model.pinocchio.nq,))
-        for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
-            self._root[f"deformed/{shape.name}"].set_transform(transform)
-            self._root[f"rigid/{shape.name}"].set_transform(transform)
+        self._check_open()
+        self._place(q, q)
+        for link in range(len(self._model.spring_groups)):
+            self._colour(link, 0)
+        for name in self._arrows:
+            self._root[f"load/{name}"].delete()
+        self._arrows.clear()
 
     def trace(self, points: Any) -> None:
         """Draw a path as dots.
@@ -126,9 +129,11 @@ class Viewer:
 
         Raises:
             ParameterError: If the shape differs or a number is not finite.
+            ViewerError: If the viewer is closed.
         """
         import meshcat.geometry as geometry
 
+        self._check_open()
         positions = finite_array("points", points, (None, 3), "m")
         rgb = np.array([PATH_COLOUR >> 16 & 255, PATH_COLOUR >> 8 & 255, PATH_COLOUR & 255]) / 255.0
         colours = np.tile(rgb[:, None], (1, len(positions)))
@@ -153,11 +158,12 @@ class Viewer:
         self._check(trajectory.equilibria[0])
         span = float(trajectory.times[-1] - trajectory.times[0])
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
+        positive_integer("repetitions", repetitions)
         self.show(trajectory.equilibria[0])
         self._centre(trajectory.tip_positions.mean(axis=0))
         self.trace(trajectory.tip_positions)
         animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
-        for number, equilibrium in zip(_frames(trajectory, seconds), trajectory.equilibria, strict=True):
+        for number, equilibrium in _frames(trajectory, seconds).items():
             self._add_frame(animation, number, equilibrium)
         self._page.set_animation(animation, play=True, repetitions=repetitions)
 
@@ -166,7 +172,11 @@ class Viewer:
 
         Args:
             title: Title of the page.
+
+        Raises:
+            ViewerError: If the viewer is closed.
         """
+        self._check_open()
         return with_legend(self._page.static_html(), title, colours=bool(self._model.spring_groups))
 
     def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
@@ -201,11 +211,18 @@ class Viewer:
             page.window.zmq_socket.close(linger=0)
         end_server(self._server)
 
-    def _check(self, equilibrium: Equilibrium) -> None:
-        if not isinstance(equilibrium, Equilibrium):
-            raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
-        if equilibrium.model is not self._model:
-            raise ParameterError("equilibrium", equilibrium.model, f"of the robot that the viewer shows, {self._model!r}")
+    def _check(self, equilibrium: Any) -> None:
+        check_same_model(self._model, equilibrium)
+        self._check_open()
+
+    def _check_open(self) -> None:
+        if self._server.poll() is not None:
+            raise ViewerError("the viewer is closed, or its server has ended; open a new one")
+
+    def _place(self, deformed: FloatArray, rigid: FloatArray) -> None:
+        for group, q in (("deformed", deformed), ("rigid", rigid)):
+            for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
+                self._root[f"{group}/{shape.name}"].set_transform(transform)
 
     def _prepare(self) -> None:
         """White background, a camera on the middle of the reach: meshcat's camera looks at the origin, so the scene moves."""
@@ -264,8 +281,9 @@ class Viewer:
         for name in self._arrows - wanted.keys():
             self._root[f"load/{name}"].delete()
         self._arrows = set(wanted)
+        largest = max((float(np.linalg.norm(force)) for force in wanted.values()), default=1.0)
         for name, force in wanted.items():
-            length = ARROW_SCALE * float(np.linalg.norm(force))
+            length = ARROW_LENGTH * self._model.reach * float(np.linalg.norm(force)) / largest
             width = 0.009 * self._model.reach
             green = geometry.MeshLambertMaterial(color=FORCE_COLOUR)
             node = self._root[f"load/{name}"]
@@ -334,9 +352,9 @@ def _arrow_pose(equilibrium: Equilibrium, frame: str, force: FloatArray) -> Floa
     return pose
 
 
-def _frames(trajectory: Trajectory, seconds: float) -> list[int]:
-    """Frame numbers of the waypoints, in proportion to their times."""
+def _frames(trajectory: Trajectory, seconds: float) -> dict[int, Equilibrium]:
+    """What each frame of the animation shows: the waypoint nearest to its time, in proportion."""
     span = float(trajectory.times[-1] - trajectory.times[0])
     share = (trajectory.times - trajectory.times[0]) / (span or 1.0)
-    numbers = np.rint(share * seconds * _FRAME_RATE).astype(int)
-    return [int(number) for number in numbers]
+    numbers = np.rint(share * seconds * _FRAME_RATE).astype(int).tolist()
+    return dict(zip(numbers, trajectory.equilibria, strict=True))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.equilibrium import frame_placement
+from softrobots.kinematics import frame_placement
 from softrobots.paths import urdf_folder
 from tests.conftest import missing
 

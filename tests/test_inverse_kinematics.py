@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 import softrobots as sr
 from softrobots.elastostatics import METHODS
-from softrobots.equilibrium import frame_placement
 from softrobots.inverse_kinematics import elbow_side
+from softrobots.kinematics import frame_placement
 from tests.oracles import flexible_table, rigid_table
 
 FORCE = (0.0, 10.0, -15.0)

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.equilibrium import frame_placement
+from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.paths import urdf_folder
-from softrobots.sensitivity import frame_jacobian
 from tests.oracles import flexible_jacobian, flexible_table, rigid_table
 
 # The last DH frame has its z axis along -y of the arm; the tip frame of the URDF has z up.

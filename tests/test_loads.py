@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.loads import generalised_load
+from softrobots.loads import Load, generalised_load
 from tests.foreign import BRANCHED, LIMIT, SPRINGS
 from tests.oracles import central_difference, flexible_jacobian
 
@@ -21,10 +21,10 @@ MODELS = {
 }
 
 
-def random_load(model: sr.SoftModel, rng: np.random.Generator, *, moments: bool) -> sr.Load:
+def random_load(model: sr.SoftModel, rng: np.random.Generator, *, moments: bool) -> Load:
     mask = np.r_[np.ones(3), np.full(3, float(moments))]
     wrench = {name: 20 * rng.normal(size=6) * mask for name in (model.tip, model.pinocchio.names[2])}
-    return sr.Load.of(model, wrench=wrench, gravity=10 * rng.normal(size=3))
+    return Load.of(model, wrench=wrench, gravity=10 * rng.normal(size=3))
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
@@ -51,7 +51,7 @@ def test_torque_is_the_papers_jacobian_transposed(arm: sr.SoftModel, rng: np.ran
     for _ in range(20):
         wrench, angles = rng.normal(size=6), rng.uniform(-1.5, 1.5, 7)
         q = arm.configuration(angles[[0, 1, 4]], angles[[2, 3, 5, 6]])
-        found = generalised_load(arm, q, sr.Load.of(arm, wrench=wrench)).torque
+        found = generalised_load(arm, q, Load.of(arm, wrench=wrench)).torque
         order = np.r_[arm.motor_indices, arm.spring_indices]
         assert np.allclose(found[order], (flexible_jacobian(angles).T @ wrench)[[0, 1, 4, 2, 3, 5, 6]], atol=1e-13)
 
@@ -64,16 +64,16 @@ def test_gravity_torque_is_that_of_inverse_dynamics_at_rest(odd_arm: sr.SoftMode
     for _ in range(10):
         q = rng.uniform(-1.5, 1.5, model.nq)
         expected = -pin.rnea(model, model.createData(), q, np.zeros(model.nv), np.zeros(model.nv))
-        found = generalised_load(odd_arm, q, sr.Load.of(odd_arm, gravity=gravity)).torque
+        found = generalised_load(odd_arm, q, Load.of(odd_arm, gravity=gravity)).torque
         assert np.allclose(found, expected, atol=1e-13)
 
 
 def test_force_and_wrench_at_one_frame_add_up(arm: sr.SoftModel) -> None:
-    load = sr.Load.of(arm, (1, 2, 3), wrench={"tip": (1, 1, 1, 4, 5, 6), "link_1": np.ones(6)})
+    load = Load.of(arm, (1, 2, 3), wrench={"tip": (1, 1, 1, 4, 5, 6), "link_1": np.ones(6)})
     assert load.wrenches["tip"].tolist() == [2, 3, 4, 4, 5, 6]
     assert load.wrenches["link_1"].tolist() == [1] * 6
     assert not load.conservative
-    assert sr.Load.of(arm, (1, 2, 3), gravity=sr.EARTH_GRAVITY).conservative
+    assert Load.of(arm, (1, 2, 3), gravity=sr.EARTH_GRAVITY).conservative
 
 
 @pytest.mark.parametrize(
@@ -96,6 +96,6 @@ def test_force_and_wrench_at_one_frame_add_up(arm: sr.SoftModel) -> None:
 )
 def test_bad_loads_are_refused(arm: sr.SoftModel, options: dict, error: type, message: str) -> None:
     with pytest.raises(error, match=message):
-        sr.Load.of(arm, **options)
+        Load.of(arm, **options)
     with pytest.raises(error, match=message):
         sr.solve_equilibrium(arm, (0, 0, 0), **options)

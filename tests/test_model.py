@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.equilibrium import frame_placement
-from softrobots.loader import MAX_DOF
+from softrobots.kinematics import frame_placement
+from softrobots.model import MAX_DOF
 from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 
 

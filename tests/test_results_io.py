@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.results_io import write_atomically
+from softrobots.files import write_atomically
 
 FORCE = (0.0, 10.0, -15.0)
 
@@ -54,9 +54,9 @@ def same(one: object, other: object, path: str = "") -> None:
 
 @pytest.mark.parametrize("kind", ["equilibrium", "ik_solution", "load_estimate", "trajectory"])
 def test_what_is_saved_comes_back_equal(results: dict, kind: str, tmp_path: Path) -> None:
-    file = sr.save(results[kind], tmp_path / kind)
+    file = sr.save_result(results[kind], tmp_path / kind)
     assert file.suffix == ".npz"
-    same(results[kind], sr.load(file))
+    same(results[kind], sr.load_result(file))
 
 
 def test_springs_said_by_the_caller_come_back(tmp_path: Path) -> None:
@@ -64,19 +64,19 @@ def test_springs_said_by_the_caller_come_back(tmp_path: Path) -> None:
 
     model = sr.load_model(BRANCHED, springs=SPRINGS, motors=["elbow"], tip="finger")
     state = sr.solve_equilibrium(model, (0.3,), (0, 0, -2))
-    same(state, sr.load(sr.save(state, tmp_path / "a.npz")))
+    same(state, sr.load_result(sr.save_result(state, tmp_path / "a.npz")))
 
 
 def test_nothing_is_overwritten_silently(results: dict, tmp_path: Path) -> None:
-    file = sr.save(results["equilibrium"], tmp_path / "a.npz")
+    file = sr.save_result(results["equilibrium"], tmp_path / "a.npz")
     before = file.read_bytes()
     with pytest.raises(sr.OutputExists, match=r"a\.npz exists"):
-        sr.save(results["trajectory"], file)
+        sr.save_result(results["trajectory"], file)
     assert file.read_bytes() == before
-    sr.save(results["trajectory"], file, overwrite=True)
-    assert isinstance(sr.load(file), sr.Trajectory)
+    sr.save_result(results["trajectory"], file, overwrite=True)
+    assert isinstance(sr.load_result(file), sr.Trajectory)
     with pytest.raises(sr.OutputExists, match="is a folder"):
-        sr.save(results["trajectory"], tmp_path)
+        sr.save_result(results["trajectory"], tmp_path)
     table = sr.save_csv(results["trajectory"], tmp_path / "a.csv")
     with pytest.raises(sr.OutputExists, match=r"a\.csv exists"):
         sr.save_csv(results["trajectory"], table)
@@ -115,7 +115,7 @@ def altered(file: Path, target: Path, **changes: np.ndarray) -> Path:
 
 
 def test_files_that_do_not_hold_what_they_claim_are_refused(results: dict, tmp_path: Path) -> None:
-    file = sr.save(results["equilibrium"], tmp_path / "a.npz")
+    file = sr.save_result(results["equilibrium"], tmp_path / "a.npz")
     with np.load(file) as data:
         springs = data["q_springs"]
     bad = tmp_path / "bad.npz"
@@ -131,28 +131,28 @@ def test_files_that_do_not_hold_what_they_claim_are_refused(results: dict, tmp_p
         ({"q_motors": np.array([{"a": 1}], dtype=object)}, "cannot read a result"),  # pickle inside
     ):
         with pytest.raises(sr.FileFormatError, match=message):
-            sr.load(altered(file, bad, **changes))
+            sr.load_result(altered(file, bad, **changes))
 
 
 def test_files_that_are_not_ours_are_refused(tmp_path: Path) -> None:
     for name, content in (("a.npz", b""), ("b.npz", b"not a zip"), ("c.npz", b"PK\x03\x04" + bytes(100))):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(sr.FileFormatError):
-            sr.load(tmp_path / name)
+            sr.load_result(tmp_path / name)
     with zipfile.ZipFile(tmp_path / "d.npz", "w") as archive:
         archive.writestr("readme.txt", "hello")
     with pytest.raises(sr.FileFormatError):
-        sr.load(tmp_path / "d.npz")
+        sr.load_result(tmp_path / "d.npz")
     np.save(tmp_path / "e.npy", np.zeros(3))
     with pytest.raises(sr.FileFormatError):
-        sr.load(tmp_path / "e.npy")
+        sr.load_result(tmp_path / "e.npy")
     with pytest.raises(sr.FileFormatError, match="cannot read"):
-        sr.load(tmp_path / "missing.npz")
+        sr.load_result(tmp_path / "missing.npz")
 
 
 def test_other_objects_are_refused(arm: sr.SoftModel, results: dict, tmp_path: Path) -> None:
     with pytest.raises(sr.ParameterError, match="Equilibrium, IkSolution, LoadEstimate or Trajectory"):
-        sr.save(arm, tmp_path / "a.npz")
+        sr.save_result(arm, tmp_path / "a.npz")
     with pytest.raises(sr.ParameterError, match="a Trajectory"):
         sr.save_csv(results["equilibrium"], tmp_path / "a.csv")
     assert list(tmp_path.iterdir()) == []

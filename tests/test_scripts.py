@@ -32,7 +32,7 @@ def test_ik_trajectory_with_every_method(method: str, tmp_path: Path, capsys: py
         "trajectory.npz", "uncompensated.npz", "trajectory.csv", "summary.json", "scene.html",
         "poses.png", "motor_angles.png", "tip_errors.png", "link_moments.png",
     }  # fmt: skip
-    saved = sr.load(folder / "trajectory.npz")
+    saved = sr.load_result(folder / "trajectory.npz")
     summary = json.loads((folder / "summary.json").read_text())
     assert saved.method == method
     assert summary["tip_error_compensated_m"] == saved.tip_error.max()
@@ -50,7 +50,7 @@ def test_ik_trajectory_reads_waypoints_gravity_and_parameters(tmp_path: Path, ca
     folder = tmp_path / "out"
     arguments = ["--csv", str(waypoints), "--gravity", "--force", "0", "0", "-5", "--stiffness", "200", "--pressure", "5000"]
     assert run_script("ik_trajectory", [*arguments, "--elbow", "down", "--no-plots", "--output", str(folder)]) == 0
-    saved = sr.load(folder / "trajectory.npz")
+    saved = sr.load_result(folder / "trajectory.npz")
     assert saved.targets.tolist() == [[0.8, 0.0, 0.2], [0.8, 0.1, 0.2], [0.8, 0.2, 0.3]]
     assert saved.equilibria[0].load.gravity == sr.EARTH_GRAVITY
     assert saved.model.stiffness.tolist() == [200.0] * 4

@@ -19,7 +19,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.browser import find_chromium, open_browser, show_share, take_picture
-from softrobots.equilibrium import frame_placement
+from softrobots.kinematics import frame_placement
 from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.viewer import Viewer, view
 from tests.conftest import missing

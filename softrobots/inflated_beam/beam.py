@@ -108,7 +108,7 @@ def deflection(
         force: Transverse tip force `F` [N].
         length: Distance `l` of the force from the clamp [m], positive.
         radius: Tube radius [m], positive.
-        wall_thickness: Wall thickness [m], positive and thin.
+        wall_thickness: Wall thickness [m], positive, at most a tenth of the radius.
         pressure: Gauge pressure [Pa], zero or positive.
         young_modulus: Modulus `E` of the wall [Pa], positive.
         poisson_ratio: Poisson ratio of the wall [-], in (-1, 0.5].
@@ -150,7 +150,7 @@ def stiffness_from_young_modulus(
         pressure: Gauge pressure [Pa], zero or positive.
         length: Link length `L` [m], positive.
         radius: Tube radius [m], positive.
-        wall_thickness: Wall thickness [m], positive and thin.
+        wall_thickness: Wall thickness [m], positive, at most a tenth of the radius.
         poisson_ratio: Poisson ratio of the wall [-], in (-1, 0.5].
 
     Returns:
@@ -190,7 +190,7 @@ def young_modulus_from_stiffness(
         pressure: Gauge pressure [Pa], zero or positive.
         length: Link length `L` [m], positive.
         radius: Tube radius [m], positive.
-        wall_thickness: Wall thickness [m], positive and thin.
+        wall_thickness: Wall thickness [m], positive, at most a tenth of the radius.
         poisson_ratio: Poisson ratio of the wall [-], in (-1, 0.5].
 
     Returns:

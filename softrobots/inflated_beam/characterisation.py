@@ -116,7 +116,8 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
         The fit and what it rests on.
 
     Raises:
-        ParameterError: If shapes differ, a number is not finite, or fewer than three points lie below wrinkling.
+        ParameterError: If shapes differ, a number is not finite, pressure or radius is not positive, fewer than three points
+            lie below wrinkling, or the fitted slope is not positive.
     """
     theta = finite_array("angle", angle, (None,), "rad")
     tau = finite_array("moment", moment, theta.shape, "N m")

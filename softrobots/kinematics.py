@@ -1,0 +1,48 @@
+"""Where the frames of a robot are, and how they move with its joints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.checks import FloatArray
+from softrobots.model import SoftModel
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+def frame_placement(model: SoftModel, q: FloatArray, frame: str) -> Any:
+    """Pose of a frame in the world.
+
+    Args:
+        model: The robot.
+        q: Pinocchio's configuration, shape (nq,).
+        frame: Name of the frame.
+
+    Returns:
+        A `pinocchio.SE3` of the caller's own [m].
+
+    Raises:
+        NameNotFound: If there is no such frame.
+    """
+    pin_model, data = model.workspace(None)
+    pin.forwardKinematics(pin_model, data, q)
+    return pin.SE3(pin.updateFramePlacement(pin_model, data, model.frame_id(frame)))
+
+
+def frame_jacobian(model: SoftModel, q: FloatArray, frame: str) -> FloatArray:
+    """Geometric Jacobian of a frame in world axes, [Troise 2021] (4), shape (6, nv), linear rows first [m/rad; rad/rad].
+
+    Args:
+        model: The robot.
+        q: Pinocchio's configuration, shape (nq,).
+        frame: Name of the frame.
+
+    Raises:
+        NameNotFound: If there is no such frame.
+    """
+    pin_model, data = model.workspace(None)
+    jacobian = pin.computeFrameJacobian(pin_model, data, q, model.frame_id(frame), _AXES)
+    return np.asarray(jacobian).reshape(6, pin_model.nv)
