@@ -81,6 +81,9 @@ def run(arguments: argparse.Namespace) -> Path:
     sagging = [sr.solve_equilibrium(model, q, arguments.force, gravity=gravity) for q in rigid.q_motors]
     uncompensated = sr.Trajectory(path.times, path.positions, tuple(sagging), "rigid")
     paper = trajectory if arguments.method == "paper" else _paper(follow, arguments, gravity)
+    results = {"trajectory": trajectory, "rigid": rigid, "uncompensated": uncompensated}
+    if paper is not None:
+        results["paper"] = paper
     summary = summarise(trajectory, uncompensated, paper, arguments.gain)
     figures = {} if arguments.no_plots else _figures(trajectory, rigid, uncompensated, paper)
 

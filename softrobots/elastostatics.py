@@ -88,7 +88,7 @@ def settled(
     """`settle`, or None where the springs do not settle to `TOLERANCE`."""
     most = 200 if method == "newton" else 1000
     state, _ = settle(model, q_motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
-    return state if state.error <= largest_residual(state.joints, max(tolerance, TOLERANCE)) else None
+    return state if state.error <= largest_residual(model, state.joints, max(tolerance, TOLERANCE)) else None
 
 
 def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
@@ -113,9 +113,12 @@ def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
     return ElasticState(q_springs, q, joints, residual, tangent, energy, math.sqrt(float(residual @ residual)))
 
 
-def largest_residual(joints: GeneralisedLoad, tolerance: float) -> float:
-    """Largest residual that counts as equilibrium: `tolerance * max(|f| reach + |moment| + |g|, 1e-3 N m)` [N m]."""
-    return tolerance * max(joints.scale, _MOMENT_FLOOR)
+def largest_residual(model: SoftModel, joints: GeneralisedLoad, tolerance: float) -> float:
+    """Largest residual that counts as equilibrium: `tolerance * max(|f| reach + |moment| + |g|, 1e-3 N m)` [N m].
+
+    Never below the rounding of the spring torques, which matters for stiff springs with rest angles only.
+    """
+    return max(tolerance * max(joints.scale, _MOMENT_FLOOR), model.rounding)
 
 
 class _Case(NamedTuple):
@@ -130,7 +133,7 @@ class _Case(NamedTuple):
         return elastic_state(self.model, self.q_motors, q_springs, self.load)
 
     def settled(self, state: ElasticState) -> bool:
-        return state.error <= largest_residual(state.joints, self.tolerance)
+        return state.error <= largest_residual(self.model, state.joints, self.tolerance)
 
     def stable(self, state: ElasticState) -> bool:
         return is_stable(self.model, state.tangent, symmetric=self.load.conservative)
@@ -178,7 +181,7 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
         settled = case.settled(state)
         if settled and case.stable(state):
             break
-        step = _escape(state, stiffness) if settled else _newton_step(state, stiffness)
+        step = _escape(state, stiffness) if settled else _newton_step(state, case.model.stiffness)
         if step is None:  # neutral equilibrium: balanced, neither stable nor unstable
             break
         slope = float(state.residual @ step)
@@ -198,15 +201,20 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
     return state, spent
 
 
-def _newton_step(state: ElasticState, stiffness: float) -> FloatArray:
-    """Newton step on the energy; where the tangent is not positive definite, with its eigenvalues made positive."""
+def _newton_step(state: ElasticState, stiffness: FloatArray) -> FloatArray:
+    """Newton step on the energy; where the tangent is not positive definite, with its eigenvalues made positive.
+
+    The eigenvalues are those in coordinates scaled by the springs' own stiffness, so that a soft spring beside a stiff one
+    keeps its share.
+    """
     try:
         np.linalg.cholesky(state.tangent)
         step = np.linalg.solve(state.tangent, -state.residual)
     except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(state.tangent)
-        values = np.maximum(np.abs(values), 1e-3 * stiffness)
-        step = -vectors @ ((vectors.T @ state.residual) / values)
+        softness = 1.0 / np.sqrt(stiffness)
+        values, vectors = np.linalg.eigh(softness[:, None] * state.tangent * softness)
+        values = np.maximum(np.abs(values), 1e-3)
+        step = -softness * (vectors @ ((vectors.T @ (softness * state.residual)) / values))
     length = math.sqrt(float(step @ step))
     return np.asarray(step if length <= _LARGEST_STEP else step * (_LARGEST_STEP / length))
 
@@ -225,17 +233,21 @@ def _escape(state: ElasticState, stiffness: float) -> FloatArray | None:
 
 
 def _grow_load(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, int]:
-    """Plain Newton under a load that grows from zero in steps: for loads without a potential."""
-    reached, step, spent, y = 0.0, 0.25, 0, start
+    """For loads without a potential: plain Newton from the start, else from the relaxed springs under a growing load."""
+    model, motors = case.model, case.q_motors
+    found, spent = newton(model, motors, case.load, start, tolerance=case.tolerance, max_iterations=min(20, most))
+    if found is not None:
+        return found, spent
+    reached, step, y = 0.0, 0.25, np.asarray(model.rest)
     while spent < most and step > 1e-6:
         aim = min(1.0, reached + step)
         part = case.load if aim == 1.0 else case.load.scaled(aim)
-        state, used = newton(case.model, case.q_motors, part, y, tolerance=case.tolerance, max_iterations=min(20, most - spent))
+        found, used = newton(model, motors, part, y, tolerance=case.tolerance, max_iterations=min(20, most - spent))
         spent += used
-        if state is not None and aim == 1.0:
-            return state, spent
-        if state is not None:
-            reached, y, step = aim, state.q_springs, 2.0 * step
+        if found is not None and aim == 1.0:
+            return found, spent
+        if found is not None:
+            reached, y, step = aim, found.q_springs, 2.0 * step
         else:
             step *= 0.5
     return case.state(y), spent
@@ -258,7 +270,7 @@ def newton(
     """
     state = elastic_state(model, q_motors, start, load)
     for iteration in range(1, max_iterations + 1):
-        if state.error <= largest_residual(state.joints, tolerance):
+        if state.error <= largest_residual(model, state.joints, tolerance):
             return state, iteration
         try:
             step = np.linalg.solve(state.tangent, -state.residual)

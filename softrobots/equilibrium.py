@@ -185,7 +185,7 @@ def equilibrium_from_state(
         tangent_stiffness=read_only(state.tangent),
         joint_derivative=read_only(state.joints.derivative),
         residual=state.error,
-        tolerance=largest_residual(state.joints, tolerance),
+        tolerance=largest_residual(model, state.joints, tolerance),
         iterations=iterations,
         stable=is_stable(model, state.tangent, symmetric=load.conservative),
     )

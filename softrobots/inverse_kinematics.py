@@ -124,7 +124,7 @@ def solve_ik(
     if elbow is not None and not _has_elbow(model):
         raise ParameterError("elbow", elbow, "None for this robot: its last motor joint is where its first one is")
     ended: list[LocalSolution] = []
-    for start in _starts(model, first, positive_integer("starts", starts)):
+    for start in _starts(model, first, positive_integer("starts", starts, 10_000)):
         local = search(model, goal, load, start, model.rest, home=first, method=method, tolerance=tolerance)
         if local is not None:
             ended.append(local)
@@ -314,6 +314,7 @@ def _drift(slope: FloatArray, homeward: FloatArray) -> FloatArray:
 
 
 def _starts(model: SoftModel, first: FloatArray, count: int) -> list[FloatArray]:
-    low, high = np.clip(model.motor_limits.T, -np.pi, np.pi)
+    low, high = model.motor_limits.T
+    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
     random = np.random.default_rng(_SEED)
     return [first, *(random.uniform(low, high) for _ in range(count - 1))]

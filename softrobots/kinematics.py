@@ -44,5 +44,8 @@ def frame_jacobian(model: SoftModel, q: FloatArray, frame: str) -> FloatArray:
         NameNotFound: If there is no such frame.
     """
     pin_model, data = model.workspace(None)
+    if pin_model.nv == 0:
+        model.frame_id(frame)
+        return np.zeros((6, 0))
     jacobian = pin.computeFrameJacobian(pin_model, data, q, model.frame_id(frame), _AXES)
     return np.asarray(jacobian).reshape(6, pin_model.nv)

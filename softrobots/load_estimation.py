@@ -40,7 +40,8 @@ class LoadEstimate:
     """A force explained by motor torques, with what can be said about it; can be saved with `softrobots.save_result`."""
 
     force: FloatArray
-    """The force, shape (3,) [N], world axes. Its part along unobservable directions is the smallest possible."""
+    """The force, shape (3,) [N], world axes. Its part along unobservable directions is what the damped search leaves there:
+    small, and not to be trusted."""
     equilibrium: Equilibrium
     """The robot under that force: its pose, its springs, its stability."""
     frame: str
@@ -59,7 +60,8 @@ class LoadEstimate:
     """Covariance of the force for the given torque noise, shape (3, 3) [N^2], over the observable directions; None if no
     noise was given."""
     residual: float
-    """Motor torque that the force does not explain, as far as it is observable [N m]."""
+    """Norm of the motor torques that the force does not explain [N m]; rounding, unless a direction is unobservable or more
+    than three motors disagree."""
     iterations: int
     """Steps of the solver."""
 
@@ -91,7 +93,8 @@ def estimate_load(
     "newton" solves `tau_m(f) = motor_torques` with the springs in equilibrium at every step, by damped Newton with the exact
     derivative :math:`d\tau_m/df = J_m^T + d(J_m^T f - g_m)/dy K_t^{-1} J_k^T`. "alternation" is [Troise 2021] Figure 5:
     `f = (J_m,lin^T)^-1 (tau_m + g_m)` and `y = rest + (J_k^T f - g_k)/k` in turn; it fails in a few per cent of cases at 18 N.
-    With more than three motors the fit is least squares; with fewer it has the smallest norm.
+    With more than three motors the fit is least squares; with fewer the force is the one that the damped search finds from
+    zero, close to the smallest.
 
     Args:
         model: The robot, with at least one motor.
@@ -127,13 +130,10 @@ def estimate_load(
     problem = _Problem(model, motors, torques, base, at)
     force, state, iterations = (_newton if method == "newton" else _alternation)(problem, most)
     result = _estimate(problem, force, state, method, iterations, noise)
-    allowed = problem.tolerance
-    if noise is not None:  # what the noise alone may leave unexplained
-        allowed = max(allowed, 5.0 * float(np.linalg.norm(noise)))
-    if not (result.residual <= allowed and result.equilibrium.converged):
+    if not (_explained(problem, state, noise) and result.equilibrium.converged):
         raise LoadNotFound(
             f"no force explains the motor torques {torques.tolist()} N m by {method!r} in {iterations} iterations: "
-            f"{result.residual:.3g} N m remain, required {allowed:.3g} N m",
+            f"{result.residual:.3g} N m remain",
             best=result,
             residual=result.residual,
             iterations=iterations,
@@ -171,6 +171,25 @@ class _Problem:
         jacobian = frame_jacobian(self.model, state.q, self.frame)[:3]
         left, values, right = np.linalg.svd(motor_torque_slope(self.model, jacobian, state.tangent, state.joints))
         return left, values, right, values > OBSERVABLE * self.model.reach
+
+
+def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None) -> bool:
+    """Whether what a force leaves of the torques is rounding, noise, or hidden.
+
+    Along an observable direction nothing but rounding or noise may be left. Along an unobservable one, what a force that the
+    motors hardly feel may give: a twentieth of the torques, or `OBSERVABLE` of the stiffest spring. What more than three
+    motors measure beyond three components may be anything as long as nothing is known of the noise: a least-squares fit.
+    """
+    left, values, _, keep = problem.slope(state)
+    missing = left.T @ problem.unexplained(state)
+    scatter = 0.0 if noise is None else 5.0 * float(np.linalg.norm(noise))
+    hidden = 0.05 * float(np.linalg.norm(problem.torques)) + OBSERVABLE * problem.model.stiffest
+    felt, unfelt, surplus = missing[: len(values)][keep], missing[: len(values)][~keep], missing[len(values) :]
+    return bool(
+        np.linalg.norm(felt) <= max(problem.tolerance, scatter)
+        and np.linalg.norm(unfelt) <= hidden + scatter
+        and (noise is None or np.linalg.norm(surplus) <= scatter)
+    )
 
 
 def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
@@ -212,7 +231,7 @@ def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState
         pull = unloaded + jacobian.T @ found
         springs = model.rest + pull[model.spring_indices] / model.stiffness
         force, state = found, elastic_state(model, problem.motors, springs, problem.load(found))
-        still = state.error <= largest_residual(state.joints, TOLERANCE)
+        still = state.error <= largest_residual(model, state.joints, TOLERANCE)
         if still and float(np.linalg.norm(problem.unexplained(state))) <= problem.tolerance:
             return force, state, iteration
     return force, state, most
@@ -225,7 +244,6 @@ def _estimate(
     felt = right[: len(values)][keep]
     singular_values = np.zeros(3)
     singular_values[: len(values)] = values
-    missing = left[:, : len(values)].T @ problem.unexplained(state)
     covariance = None
     if noise is not None:
         inverse = felt.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
@@ -244,7 +262,7 @@ def _estimate(
         singular_values=read_only(singular_values),
         unobservable_directions=read_only(unfelt),
         covariance=covariance,
-        residual=float(np.linalg.norm(missing[keep])),
+        residual=float(np.linalg.norm(problem.unexplained(state))),
         iterations=iterations,
     )
 
@@ -284,7 +302,7 @@ def estimate_at(
 
 
 def _noise(torque_std: Any, n_motors: int) -> FloatArray:
-    if np.ndim(torque_std) == 0:
+    if isinstance(torque_std, int | float | np.number):
         return np.full(n_motors, positive_number("torque_std", torque_std, "N m"))
     noise = finite_array("torque_std", torque_std, (n_motors,), "N m")
     if np.any(noise <= 0.0):

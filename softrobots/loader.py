@@ -83,7 +83,7 @@ def load_model(
 
 def _read_source(source: Any) -> tuple[str, str]:
     """Return URDF text and a label for errors."""
-    if hasattr(source, "urdf") and callable(source.urdf):
+    if not isinstance(source, type) and callable(getattr(source, "urdf", None)):
         return str(source.urdf()), type(source).__name__
     if isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
         return source.lstrip("\ufeff \t\r\n"), "the URDF text"
@@ -126,11 +126,15 @@ def _motors_said(motors: Any, movable: Sequence[str], springs: Mapping[str, Spri
 
 
 def _check_joints(model: Any, label: str) -> None:
-    for name, joint in zip(model.names, model.joints, strict=True):
-        if name != "universe" and (joint.nv != 1 or joint.nq not in (1, 2)):
+    for name in list(model.names)[1:]:  # the first is the universe
+        joint = model.joints[model.getJointId(name)]
+        if joint.nv != 1 or joint.nq not in (1, 2):
             raise DescriptionError(
                 f"joint {name} of {label} is a {joint.shortname()}; revolute, continuous and prismatic joints are supported"
             )
+        low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+        if joint.nq == 1 and low > high:
+            raise DescriptionError(f"joint {name} of {label} has the lower limit {low} above the upper one, {high}")
 
 
 def _tip(model: Any, tip: str | None, label: str) -> str:

@@ -155,6 +155,8 @@ def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> Generalised
     pin_model, data = model.workspace(load.gravity)
     nv = pin_model.nv
     upper, strictly_upper = _triangles(nv)
+    if nv == 0:  # nothing moves; Pinocchio's frame Jacobian crashes without columns
+        return GeneralisedLoad(np.zeros(0), np.zeros((0, 0)), 0.0, 0.0)
     pin.computeJointJacobians(pin_model, data, q)
     torque: FloatArray = np.zeros(nv)
     derivative: FloatArray = np.zeros((nv, nv))

@@ -89,6 +89,7 @@ class SoftModel:
         self._motor_limits = self._limits(self._motor_joints)
         self._spring_limits = self._limits(self._spring_joints)
         self._stiffest = float(self.stiffness.max(initial=0.0))
+        self._rounding = 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(self.stiffness * self.rest))
         self._reach = self._chain_length()
         self._identity = (urdf, tuple(self.spring_table.items()), self._motor_joints, tip)
         self._local = threading.local()
@@ -144,6 +145,11 @@ class SoftModel:
         return self._stiffest
 
     @property
+    def rounding(self) -> float:
+        """Rounding of the spring torques [N m]: `k (y - rest)` of a stiff spring with a rest coordinate is no more exact."""
+        return self._rounding
+
+    @property
     def rest(self) -> FloatArray:
         """Relaxed spring coordinates, shape (n_springs,) [rad or m], read-only."""
         return self._springs.rest
@@ -166,7 +172,7 @@ class SoftModel:
 
     @property
     def reach(self) -> float:
-        """Sum of the link lengths from base to tip [m], the scale of residuals."""
+        """Sum of the link lengths from base to tip, and of the travel of sliding joints [m], the scale of residuals."""
         return self._reach
 
     @property
@@ -302,8 +308,11 @@ class SoftModel:
         joint = frame.parentJoint
         while joint > 0:
             length += float(np.linalg.norm(self._pin.jointPlacements[joint].translation))
+            kind = self._pin.joints[joint]
+            if kind.shortname().startswith("JointModelP"):
+                length += float(self._pin.upperPositionLimit[kind.idx_q] - self._pin.lowerPositionLimit[kind.idx_q])
             joint = self._pin.parents[joint]
-        return length
+        return max(length, 1e-6)
 
 
 def check_model(model: Any) -> SoftModel:

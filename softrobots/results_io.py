@@ -94,7 +94,8 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
     """Save a trajectory as a CSV table, one line a waypoint, full precision.
 
     Columns: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z` [m],
-    `tip_error` [m], one for each motor and spring [rad], `moment_<i>` [N m] for each inflated link.
+    `tip_error` [m], one for each motor and spring [rad] (`joint_x` where a joint is
+    called `x`), `moment_<i>` [N m] for each inflated link.
 
     Args:
         trajectory: The trajectory.
@@ -113,7 +114,8 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
         raise ParameterError("trajectory", trajectory, "a Trajectory")
     target = new_file(path, overwrite=overwrite)
     model, moments = trajectory.model, trajectory.link_moments
-    names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error", *model.motor_joints, *model.spring_joints]
+    names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error"]
+    names += [f"joint_{name}" if name in names else name for name in (*model.motor_joints, *model.spring_joints)]
     columns = [trajectory.times[:, None], trajectory.targets, trajectory.tip_positions, trajectory.tip_error[:, None]]
     columns += [trajectory.q_motors, trajectory.q_springs]
     if moments is not None:
@@ -176,7 +178,7 @@ def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
             model, motors[row], load, state, method=str(fields["solver"][row]), iterations=int(fields["iterations"][row])
         )
         # Rounding differs between machines; a coordinate that was shifted by 1e-9 rad shows up above this.
-        if made.residual > 1.001 * residual[row] + largest_residual(state.joints, 1e-12):
+        if made.residual > 1.001 * residual[row] + largest_residual(model, state.joints, 1e-12):
             raise FileFormatError(
                 f"its row {row} claims a residual of {residual[row]:.3g} N m, but it is {made.residual:.3g} N m"
             )

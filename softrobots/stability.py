@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.checks import FloatArray, finite_array, positive_number
-from softrobots.elastostatics import ElasticState, newton
+from softrobots.elastostatics import ElasticState, newton, settled
 from softrobots.errors import NoCriticalLoad, ParameterError
 from softrobots.kinematics import frame_jacobian
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
 
+_MOST_POINTS = 20_000  # of the path
 _NEWTON_STEPS = 12
 _TOLERANCE = 1e-12
 _SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
@@ -51,7 +52,8 @@ def critical_load(
     Raises:
         ParameterError: If an argument is out of range, the model has no springs, or it is unstable under gravity alone.
         NameNotFound: If the frame does not exist.
-        NoCriticalLoad: If the path is stable up to `max_force`: the direction pulls or bends rather than pushes.
+        NoCriticalLoad: If the path is stable up to `max_force` (the direction pulls or bends rather than pushes), or as far
+            as it could be followed.
     """
     check_model(model)
     motors = finite_array("q_motors", q_motors, (model.n_motors,), "rad")
@@ -75,24 +77,31 @@ def critical_load(
         state = _correct(model, motors, constant.plus(at, magnitude * push), guess, last.state.q_springs)
         return None if state is None else _point(model, state, magnitude, push, at)
 
-    first_state = _correct(model, motors, constant, model.rest, model.rest, largest_move=np.inf)
+    first_state = settled(model, motors, constant, model.rest)
     here = None if first_state is None else _point(model, first_state, 0.0, push, at)
     if here is None or here.softest <= 0.0:
         raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
     first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
     nearly_zero = _NEARLY_ZERO * here.softest
-    while here.force < largest:
+    for _ in range(_MOST_POINTS):
+        if here.force >= largest:
+            break
         there = follow(min(here.force + step, largest), here)
         if there is None or (here.softest > nearly_zero and there.softest < 0.5 * here.softest):
             step *= 0.5  # too far to tell this path from a neighbour
             if step < _SHORTEST_STEP * max(here.force, first_step):
-                return here.force  # the path turns back here: a limit point
+                if here.softest <= 10.0 * nearly_zero:
+                    return here.force  # the path turns back here: a limit point
+                break
         elif there.softest <= 0.0:
             return _bisect(follow, here, there.force)
         else:
             here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
-    along = (unit / length).tolist()
-    raise NoCriticalLoad(f"the equilibrium stays stable up to {largest:.6g} N along {along}", max_force=largest)
+    reached = f"{here.force:.6g} N along {(unit / length).tolist()}"
+    told = f"the equilibrium stays stable up to {reached}"
+    if here.force < largest:
+        told += f"; its path could not be followed further (up to {largest:.6g} N was wanted)"
+    raise NoCriticalLoad(told, max_force=here.force)
 
 
 class _Point(NamedTuple):
@@ -126,22 +135,13 @@ def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high
             high = middle
 
 
-def _correct(
-    model: SoftModel,
-    motors: FloatArray,
-    load: Load,
-    guess: FloatArray,
-    last: FloatArray,
-    *,
-    largest_move: float = _LARGEST_MOVE,
-) -> ElasticState | None:
+def _correct(model: SoftModel, motors: FloatArray, load: Load, guess: FloatArray, last: FloatArray) -> ElasticState | None:
     """Newton from a prediction; None if it does not converge, or not near the prediction and the last point."""
-    longest = max(largest_move, 0.5)
-    state, _ = newton(model, motors, load, guess, tolerance=_TOLERANCE, max_iterations=_NEWTON_STEPS, largest_step=longest)
+    state, _ = newton(model, motors, load, guess, tolerance=_TOLERANCE, max_iterations=_NEWTON_STEPS, largest_step=0.5)
     if state is None:
         return None
     moved, missed, predicted = (
         float(np.abs(one - other).max(initial=0.0))
         for one, other in ((state.q_springs, last), (state.q_springs, guess), (guess, last))
     )
-    return state if moved <= largest_move and missed <= max(0.5 * predicted, 0.1 * largest_move) else None
+    return state if moved <= _LARGEST_MOVE and missed <= max(0.5 * predicted, 0.1 * _LARGEST_MOVE) else None

@@ -40,7 +40,7 @@ def quintic(share: Any) -> FloatArray:
     Raises:
         ParameterError: If a share is outside [0, 1].
     """
-    s = finite_array("share", share, (None,) * np.ndim(share))
+    s = finite_array("share", share, None)
     if np.any((s < 0.0) | (s > 1.0)):
         raise ParameterError("share", share, "within [0, 1]")
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
@@ -111,10 +111,11 @@ def read_waypoints(path: str | Path) -> Path3D:
             reader = csv.DictReader(file, skipinitialspace=True)
             names = [name.strip() for name in reader.fieldnames or []]
             reader.fieldnames = names
-            missing = [name for name in "xyz" if name not in names]
+            missing = [name for name in "xyz" if names.count(name) != 1]
             if missing:
                 raise FileFormatError(
-                    f"{path} lacks the column {', '.join(missing)}; its first line must name x, y, z and may name t "
+                    f"{path} lacks the column {', '.join(missing)}, or has it twice; its first line must name x, y, z and may "
+                    "name t "
                     f"(it names {', '.join(names) or 'nothing'})"
                 )
             columns = [name for name in ("t", "x", "y", "z") if name in names]

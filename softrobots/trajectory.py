@@ -300,7 +300,7 @@ def _paper_steps(
             motors = np.clip(motors, *model.motor_limits.T)
             state, used = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
             spent += used
-            if state.error > largest_residual(state.joints, TOLERANCE):
+            if state.error > largest_residual(model, state.joints, TOLERANCE):
                 best = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
                 raise EquilibriumNotFound(
                     f"waypoint {number + 1} of {len(points)}: the fixed point of method='paper' does not converge in {used} "

@@ -34,6 +34,7 @@ ARROW_LENGTH = 0.2
 """Length of the arrow of the largest force, relative to the reach; other arrows are shorter in proportion."""
 
 _FRAME_RATE = 30
+_NO_FORCE = 1e-12  # [N], forces below have no arrow
 
 
 class Viewer:
@@ -277,7 +278,9 @@ class Viewer:
     def _draw_arrows(self, equilibrium: Equilibrium) -> None:
         import meshcat.geometry as geometry
 
-        wanted = {name: wrench[:3] for name, wrench in equilibrium.load.wrenches.items() if wrench[:3].any()}
+        wanted = {
+            name: wrench[:3] for name, wrench in equilibrium.load.wrenches.items() if np.linalg.norm(wrench[:3]) > _NO_FORCE
+        }
         for name in self._arrows - wanted.keys():
             self._root[f"load/{name}"].delete()
         self._arrows = set(wanted)

@@ -10,8 +10,13 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 import softrobots as sr
+
+# The same examples in every run: a failure is a failure of the code, not of the day.
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 

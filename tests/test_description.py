@@ -189,6 +189,10 @@ def test_collision_shapes_across_a_hinge_do_not_touch(arm: sr.SoftModel) -> None
         ({"hinge_offset": "1e-5"}, "too light"),
         ({"rgba": "1 0 0 1, 0 1 0 1, 0 0 1 1"}, "rgba has 3 colours"),
         ({"motor_limit": "[1,2]"}, "motor_limit has 2 values"),
+        ({"rgba": "red"}, "could not convert"),
+        ({"rgba": "1 0 0"}, "red, green, blue and opacity"),
+        ({"rgba": "1 0 0 2"}, "red, green, blue and opacity"),
+        ({"wall_thickness": "0.006"}, "at most a tenth of radius"),
         ({"link_lengths": ""}, "could not convert"),
         ({"density": "__import__('os')"}, "could not convert"),
     ],
@@ -224,6 +228,19 @@ def robot_with(joint: str = "", inside: str = "") -> str:
         (robot_with('<softrobots:spring stiffness="0" rest="0"/>'), "positive one is required"),
         (robot_with('<softrobots:spring stiffness="inf" rest="0"/>'), "finite number is required"),
         (robot_with('<softrobots:spring stiffness="10"/>'), "rest = None; a finite number"),
+        (robot_with('<softrobots:role value="spring"/>'), "role 'spring' and no spring"),
+        (
+            robot_with('<softrobots:role value="motor"/><softrobots:spring stiffness="1" rest="0"/>'),
+            "role 'motor' and a spring",
+        ),
+        (robot_with('<softrobots:spring stiffness="1" rest="0"/>' * 2), "more than one spring"),
+        (
+            robot_with(
+                '<softrobots:spring stiffness="1" rest="0"/>',
+                '<softrobots:inflated_link springs="j" radius="-1" pressure="1"/>',
+            ),
+            "radius -1.0 and pressure 1.0",
+        ),
         (robot_with('<softrobots:role value="tendon"/>'), "role 'tendon'; one of motor, spring, section, locked"),
         (robot_with(inside='<softrobots:inflated_link springs="k" radius="1" pressure="1"/>'), "names the springs k"),
     ],
@@ -246,6 +263,7 @@ def test_malformed_tags_are_refused(text: str, message: str) -> None:
         ({"radius": 0.0}, "radius"),
         ({"radius": None}, "radius"),
         ({"wall_thickness": -1e-4}, "wall_thickness"),
+        ({"wall_thickness": 0.006}, "wall_thickness"),
         ({"stiffness": -172.0}, "stiffness"),
         ({"stiffness": (172.0, 0.0)}, "stiffness"),
         ({"stiffness": float("inf")}, "stiffness"),
@@ -276,8 +294,15 @@ def test_arm_computes_volume_and_tank() -> None:
     assert robot.volume == pytest.approx(2 * np.pi * 0.055**2 * 0.6, rel=1e-14)
     # The paper's tank of 30 MPa: p V / (p_t - p), in vacuum.
     assert robot.tank_volume(30e6) == pytest.approx(50e3 * robot.volume / (30e6 - 50e3), rel=1e-14)
+    assert robot.tank_pressure(robot.tank_volume(30e6)) == pytest.approx(30e6, rel=1e-12)
     with pytest.raises(sr.ParameterError, match="the same in all links"):
         sr.InflatableArm(pressure=(50e3, 40e3)).tank_volume(30e6)
+
+
+def test_colours_may_be_arrays() -> None:
+    assert sr.InflatableArm(rgba=np.array([1.0, 0.5, 0.25, 1.0])).rgba == ((1.0, 0.5, 0.25, 1.0),) * 2
+    four = sr.InflatableArm(link_lengths=(0.5,) * 4, rgba=list(np.linspace(0, 1, 16).reshape(4, 4)))
+    assert len(four.rgba) == 4
 
 
 def test_parameters_are_frozen_and_keyword_only() -> None:

@@ -199,6 +199,40 @@ def test_wrinkling_is_reported(arm: sr.SoftModel) -> None:
     assert beyond.within_limits is False
 
 
+def test_a_moment_is_solved_from_any_start(arm: sr.SoftModel) -> None:
+    wrench = (0, 10, -15, 0, 0, 1.0)
+    relaxed = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), wrench=wrench)
+    away = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), wrench=wrench, q_springs0=np.full(4, 0.3))
+    assert np.allclose(away.q_springs, relaxed.q_springs, atol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1e-5, 1e-3, 1e3, 1e5])
+def test_soft_and_stiff_springs_together(arm: sr.SoftModel, ratio: float) -> None:
+    """Buckling pushes on an arm whose first link is much stiffer or softer than its second: always certified, few steps."""
+    table = {name: (172.71 * (ratio if "_1_" in name else 1.0), 0.0) for name in arm.spring_joints}
+    model = sr.load_model(arm.urdf, springs=table)
+    for force in ((-400, 0, 1), (-50, 3, 1), (0, 10, -15)):
+        found = sr.solve_equilibrium(model, (0, 0, 0), force)
+        assert found.stable
+        assert found.iterations < 60
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 1.0])
+def test_stiff_springs_with_rest_angles_under_tiny_loads(size: float) -> None:
+    """k (y - rest) of 1e6 N m/rad is exact to 1e-10 N m only; the residual is measured against that too."""
+    model = sr.load_model(sr.InflatableArm(stiffness=1e6, rest_up=-0.3, rest_side=0.7))
+    found = sr.solve_equilibrium(model, (0.1, 0.2, 0.3), (0, 0, -size))
+    assert found.stable
+    assert found.residual < 1e-8
+
+
+def test_a_robot_without_joints_does_not_crash() -> None:
+    rigid = sr.load_model(sr.InflatableArm(), springs={}, motors=[])
+    found = sr.solve_equilibrium(rigid, [], (1, 2, 3), gravity=sr.EARTH_GRAVITY)
+    assert found.tip_position == pytest.approx([1.2, 0, 0])
+    assert sr.compliance(rigid, found).tolist() == np.zeros((6, 6)).tolist()
+
+
 def test_results_are_read_only_and_know_their_inputs(arm: sr.SoftModel) -> None:
     found = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), FORCE)
     assert found.model is arm
@@ -221,6 +255,13 @@ def test_results_are_read_only_and_know_their_inputs(arm: sr.SoftModel) -> None:
         ({"tolerance": float("nan")}, "tolerance"),
         ({"max_iterations": 0}, "max_iterations"),
         ({"max_iterations": 2.5}, "max_iterations"),
+        ({"force": (1e308, 0, 0)}, "force.*at most 1e.30 in size"),
+        ({"force": ("0", "10", "-15")}, "force"),
+        ({"force": (True, False, True)}, "force"),
+        ({"force": (1j, 0, 0)}, "force"),
+        ({"force": (10**400, 0, 0)}, "force"),
+        ({"q_motors": [[0], [0, 0]]}, "q_motors"),
+        ({"method": np.array(["newton"])}, "method"),
     ],
 )
 def test_bad_input_is_refused(arm: sr.SoftModel, options: dict, message: str) -> None:

@@ -97,6 +97,23 @@ def test_fit_recovers_known_parameters_within_three_standard_errors(seed: int, s
     assert fit.wrinkling_moment == pytest.approx(20.53, abs=0.005)
 
 
+@pytest.mark.parametrize("plateau", [21.76, 20.0, 12.0])
+@pytest.mark.parametrize("noise", [0.2, 0.5, 1.0])
+def test_noise_does_not_pull_the_slope(noise: float, plateau: float) -> None:
+    """Over 100 noisy repetitions the mean slope is the true one, and errors are as large as the standard error says.
+
+    The knee is chosen with the noise in it, which pulls by a fraction of a standard error: 0.5 is allowed.
+    """
+    angle, pulls = np.linspace(0.0, 0.25, 60), []
+    for seed in range(100):
+        moments = np.minimum(170.0 * angle, plateau) + noise * np.random.default_rng(seed).normal(size=60)
+        fit = inflated_beam.fit_characterisation(angle, moments, pressure=50e3, radius=0.055)
+        pulls.append((fit.stiffness - 170.0) / fit.stiffness_std)
+        assert fit.max_moment == pytest.approx(plateau, abs=5 * noise / np.sqrt(fit.n_saturated))
+    assert abs(np.mean(pulls)) < 0.6
+    assert np.std(pulls) < 1.5
+
+
 def test_fit_without_saturation_says_so() -> None:
     angle = np.linspace(0.0, 0.1, 50)
     fit = inflated_beam.fit_characterisation(angle, 166.66 * angle, pressure=60e3, radius=0.055)
@@ -144,7 +161,7 @@ GOOD = {"pressure": 30e3, "young_modulus": 138e6, **TUBE}
         (lambda: inflated_beam.moment(0.1, stiffness=0.0, max_moment=20.0), "stiffness"),
         (lambda: inflated_beam.moment(0.1, stiffness=170.0, max_moment=-1.0), "max_moment"),
         (lambda: inflated_beam.fit_characterisation([0.1, 0.2], [1.0], pressure=1e4, radius=0.05), "moment"),
-        (lambda: inflated_beam.fit_characterisation([0.1, 0.2], [1.0, 2.0], pressure=1e4, radius=0.05), "moment"),
+        (lambda: inflated_beam.fit_characterisation([0.1, 0.2], [1.0, 2.0], pressure=1e4, radius=0.05), "angle"),
         (lambda: inflated_beam.fit_characterisation([0.1, 0.2, 0.3], [-1.0, -2.0, -3.0], pressure=1e4, radius=0.05), "moment"),
         (lambda: inflated_beam.fit_characterisation([0.1], [1.0], pressure=0.0, radius=0.05), "pressure"),
         (lambda: inflated_beam.volume(-0.6, 0.05), "length"),

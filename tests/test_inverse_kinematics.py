@@ -90,6 +90,39 @@ def test_motor_limits_hold() -> None:
     assert np.abs(caught.value.best.q_motors).max() <= 1.0
 
 
+def test_springs_that_do_not_settle_are_not_an_unreachable_target(arm: sr.SoftModel) -> None:
+    """At 200 N the fixed point mostly fails; the error says that it is the springs, and what to use instead."""
+    force = (200.0, 0.0, 0.0)
+    target = sr.solve_equilibrium(arm, (0.5, 0.8, -1.0), force).tip_position
+    assert sr.solve_ik(arm, target, force).error <= TOLERANCE
+    with pytest.raises(sr.NotConverged, match=r"do not settle under this load|did not settle by 'fixed_point' at \d+"):
+        sr.solve_ik(arm, target, force, method="fixed_point", starts=3)
+
+
+def test_targets_under_moments_are_reached(arm: sr.SoftModel) -> None:
+    wrench = np.array([0, 0, 0, 0, 100.0, 0])
+    start = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), wrench=wrench)
+    target = start.tip_position + [-0.05, 0.02, 0.01]
+    found = sr.solve_ik(arm, target, wrench=wrench, q_motors0=(0.3, 0.6, -0.8))
+    again = sr.solve_equilibrium(arm, found.q_motors, wrench=wrench)
+    assert np.linalg.norm(again.tip_position - target) < 2 * TOLERANCE
+
+
+def test_whole_turns_are_not_other_solutions(arm: sr.SoftModel) -> None:
+    found = sr.solve_ik(arm, (-0.7, 0.0, 0.4))
+    motors = np.array([found.q_motors, *found.alternatives])
+    turns = np.exp(1j * motors)
+    for i in range(len(motors)):
+        for j in range(i):
+            assert np.abs(turns[i] - turns[j]).max() > 1e-3
+
+
+def test_a_robot_without_an_elbow_refuses_the_choice() -> None:
+    single = sr.load_model(sr.InflatableArm(link_lengths=(0.6,)))
+    with pytest.raises(sr.ParameterError, match=r"elbow.*None for this robot"):
+        sr.solve_ik(single, (0.6, 0, 0), elbow="down")
+
+
 def test_an_unreachable_target_says_how_near(arm: sr.SoftModel) -> None:
     """Unloaded: the nearest point to a far target is on the sphere of radius 1.2 m, exactly."""
     with pytest.raises(sr.TargetUnreachable, match=r"nearest of 24 starts \(seed \d+\) comes within 0.8 m") as caught:

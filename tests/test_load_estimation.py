@@ -27,6 +27,7 @@ def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel) -> N
         if not close:  # small lever, or another force that gives the same torques
             explained = estimate.equilibrium.motor_torques - truth.motor_torques
             assert len(estimate.unobservable_directions) or np.abs(explained).max() < 1e-8
+        assert estimate.equilibrium.converged
     assert found >= 9_900
 
 
@@ -122,6 +123,31 @@ def test_one_motor_gives_the_smallest_force(arm: sr.SoftModel) -> None:
     assert len(estimate.unobservable_directions) == 2
     assert np.linalg.norm(estimate.force) == pytest.approx(1.0, rel=1e-3)  # lever 1.2 m, a little less when bent
     assert estimate.condition_number == np.inf
+
+
+@pytest.mark.parametrize(
+    ("motors", "torques", "options"),
+    [
+        ((0, np.pi / 2, 0), (5, 0, 0), {}),  # the tip on the axis of motor 1: nothing can turn it
+        ((0.3, 0.6, -0.8), (1, 2, 0.3), {"frame": "base_link"}),  # nothing moves the base
+        ((0.3, 0.6, -0.8), (1000, -1000, 500), {}),  # far beyond what the arm can stand
+    ],
+)
+def test_torques_that_are_not_felt_are_not_explained_away(arm: sr.SoftModel, motors, torques, options) -> None:
+    with pytest.raises(sr.LoadNotFound) as caught:
+        sr.estimate_load(arm, motors, torques, **options)
+    assert caught.value.residual > 0.2
+
+
+def test_more_motors_than_components_are_fitted_and_judged_by_the_noise(odd_arm: sr.SoftModel) -> None:
+    motors = np.array([0.3, 0.8, -0.9, 0.7])
+    truth = sr.solve_equilibrium(odd_arm, motors, (2.0, -3.0, -4.0), tolerance=1e-13).motor_torques
+    wrong = truth + np.array([0.0, 1.0, -1.0, 1.0])
+    fitted = sr.estimate_load(odd_arm, motors, wrong)
+    assert fitted.residual > 0.1
+    assert fitted.residual == pytest.approx(np.linalg.norm(wrong - fitted.equilibrium.motor_torques))
+    with pytest.raises(sr.LoadNotFound):
+        sr.estimate_load(odd_arm, motors, wrong, torque_std=0.001)
 
 
 def test_torques_that_no_force_gives_are_an_error_with_the_best(arm: sr.SoftModel) -> None:

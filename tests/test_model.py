@@ -21,7 +21,7 @@ def test_springs_of_the_caller_on_a_foreign_file() -> None:
     assert set(model.motor_joints) == {"shoulder", "elbow", "gripper"}
     assert model.spring_table == {"wrist": (20.0, 0.1), "slider": (800.0, 0.0)}
     assert model.spring_groups == ()
-    assert model.reach == pytest.approx(4 * 0.3)
+    assert model.reach == pytest.approx(4 * 0.3 + 4.0)  # four offsets, and a slider that travels from -2 to 2 m
     unlimited = model.motor_limits[model.motor_joints.index("shoulder")]
     assert unlimited.tolist() == [-np.inf, np.inf]
 
@@ -74,6 +74,14 @@ def test_results_cannot_be_changed(arm: sr.SoftModel) -> None:
     for array in (arm.stiffness, arm.rest, arm.motor_limits, arm.spring_limits):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
+    for indices in (arm.motor_indices, arm.spring_indices):
+        with pytest.raises(ValueError, match="read-only"):
+            indices[0] = 0
+    result = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15))
+    with pytest.raises(TypeError):
+        result.load.wrenches["tip"] = np.zeros(6)
+    result.transform_tip_to_world.translation[:] = 0.0  # a copy
+    assert result.tip_position[0] > 1.0
 
 
 def test_a_model_survives_pickling(arm: sr.SoftModel) -> None:
@@ -115,12 +123,20 @@ def test_gravity_of_one_call_does_not_leak_into_the_next(arm: sr.SoftModel) -> N
         (BRANCHED, {"springs": SPRINGS, "motors": ["elbw"]}, sr.NameNotFound, "'elbw'.*did you mean 'elbow'"),
         (BRANCHED, {"springs": SPRINGS, "motors": ["wrist"]}, sr.ParameterError, "without a spring"),
         (BRANCHED, {"springs": SPRINGS, "motors": ["elbow", "elbow"]}, sr.ParameterError, "repetition"),
+        (BRANCHED, {"springs": SPRINGS, "tip": 3}, sr.NameNotFound, "frame is called '3'"),
         (BRANCHED, {"springs": SPRINGS, "motors": "elbow"}, sr.ParameterError, "list of joint names"),
         ("<robot name='r'><link name='a'/><link name='b'/></robot>", {"springs": {}}, sr.DescriptionError, "Pinocchio refuses"),
         ("<mujoco/>", {"springs": {}}, sr.DescriptionError, "root tag <mujoco>"),
         ("<robot", {}, sr.DescriptionError, "not well-formed"),
         ("no_such_file.urdf", {}, sr.DescriptionError, "cannot read 'no_such_file.urdf'"),
         (42, {}, sr.ParameterError, "a robot, a path, or URDF text"),
+        (sr.InflatableArm, {}, sr.ParameterError, "a robot, a path, or URDF text"),
+        (
+            BRANCHED.replace('lower="-2"', 'lower="3"'),
+            {"springs": {}, "tip": "finger"},
+            sr.DescriptionError,
+            "lower limit 3.0 above",
+        ),
         (
             f'<robot name="f"><link name="a">{INERTIAL}</link>' + joint("j", "a", "b", "0 0 1", "floating") + "</robot>",
             {"springs": {}},
@@ -135,9 +151,53 @@ def test_what_cannot_be_loaded_is_refused(source: object, options: dict, error: 
     assert isinstance(caught.value, sr.SoftRobotsError)
 
 
-def test_too_many_coordinates_are_refused() -> None:
-    with pytest.raises(sr.DescriptionError, match=f"at most {MAX_DOF} are supported"):
-        sr.load_model(sr.InflatableArm(link_lengths=(0.1,) * 101))
+def test_too_many_coordinates_are_refused_before_gigabytes_are_spent() -> None:
+    model = sr.load_model(sr.InflatableArm(link_lengths=(0.1,) * 101))
+    with pytest.raises(sr.DescriptionError, match=f"has 304 coordinates.*at most {MAX_DOF}.*compiled solver"):
+        sr.solve_equilibrium(model, np.zeros(102))
+
+
+def test_equal_models_are_equal(arm: sr.SoftModel) -> None:
+    twin = sr.load_model(sr.InflatableArm().urdf())
+    assert twin == arm
+    assert hash(twin) == hash(arm)
+    state = sr.solve_equilibrium(twin, (0.3, 0.6, -0.8), (0, 10, -15))
+    assert sr.compliance(arm, state).shape == (6, 6)
+    assert arm != sr.load_model(sr.InflatableArm(stiffness=170.0))
+    assert arm != sr.load_model(sr.InflatableArm(), tip="link_2")
+
+
+@pytest.mark.parametrize("given", [sr.InflatableArm(), "arm.urdf", None])
+def test_what_is_no_model_is_refused_by_every_solver(given: object, arm: sr.SoftModel) -> None:
+    state = sr.solve_equilibrium(arm, (0, 0, 0))
+    for call in (
+        lambda: sr.solve_equilibrium(given, (0, 0, 0)),
+        lambda: sr.critical_load(given, (0, 0, 0), (-1, 0, 0)),
+        lambda: sr.estimate_load(given, (0, 0, 0), (0, 0, 0)),
+        lambda: sr.solve_ik(given, (1, 0, 0)),
+        lambda: sr.follow_trajectory(given, [(1, 0, 0)]),
+        lambda: sr.compliance(given, state),
+        lambda: sr.elastostatic_jacobian(given, state),
+        lambda: sr.view(given),
+    ):
+        with pytest.raises(sr.ParameterError, match=r"a SoftModel \(made by softrobots.load_model\)"):
+            call()
+
+
+def test_mimic_joints_are_locked_or_refused() -> None:
+    text = BRANCHED.replace(
+        '<joint name="gripper" type="revolute">', '<joint name="gripper" type="revolute"><mimic joint="elbow"/>'
+    )
+    with pytest.raises(sr.DescriptionError, match=r"joints that mimic others \(gripper\).*name the motors"):
+        sr.load_model(text, springs=SPRINGS, tip="finger")
+    model = sr.load_model(text, springs=SPRINGS, motors=["shoulder", "elbow"], tip="finger")
+    assert model.motor_joints == ("shoulder", "elbow")
+
+
+def test_a_spring_on_a_fixed_joint_is_refused(arm: sr.SoftModel) -> None:
+    text = arm.urdf.replace('name="spring_2_up" type="revolute"', 'name="spring_2_up" type="fixed"')
+    with pytest.raises(sr.DescriptionError, match="spring on spring_2_up, which cannot move"):
+        sr.load_model(text)
 
 
 def test_a_folder_and_a_binary_file_are_refused(tmp_path: Path) -> None:

@@ -64,6 +64,15 @@ def test_the_numbers_of_the_default_trajectory_are_current(tmp_path) -> None:
     assert abs(summary["largest_moment_N_m"][0] / 17.51 - 1) < 0.1
 
 
+def test_the_rate_tables_are_those_of_the_recorded_run() -> None:
+    rates = json.loads((CHECKOUT / "docs" / "solver_rates.json").read_text(encoding="utf-8"))
+    assert rates["cases"] == 10_000
+    for table in ("equilibrium", "load_estimation"):
+        for method, row in rates[table].items():
+            cells = " | ".join(f"{rate:.2f}" for rate in row.values())
+            assert re.search(rf"\| {method}[^|]* \| {re.escape(cells)} \|", README), (method, cells)
+
+
 def test_citation_names_the_papers_and_the_version() -> None:
     text = (CHECKOUT / "CITATION.cff").read_text(encoding="utf-8")
     assert "10.3390/app11062558" in text

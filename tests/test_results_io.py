@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +42,7 @@ def same(one: object, other: object, path: str = "") -> None:
         assert len(one) == len(other)
         for number, (a, b) in enumerate(zip(one, other, strict=True)):
             same(a, b, f"{path}[{number}]")
-    elif isinstance(one, dict):
+    elif isinstance(one, Mapping):
         assert one.keys() == other.keys()
         for key in one:
             same(one[key], other[key], f"{path}[{key}]")
@@ -107,6 +108,17 @@ def test_csv_holds_the_trajectory_in_full_precision(results: dict, tmp_path: Pat
     assert np.array_equal(sr.read_waypoints(file).positions, trajectory.targets)  # readable as waypoints
 
 
+def test_joints_called_like_columns_do_not_hide_the_targets(tmp_path: Path) -> None:
+    from tests.foreign import BRANCHED
+
+    model = sr.load_model(BRANCHED.replace('"elbow"', '"x"'), springs={"wrist": 20.0}, motors=["shoulder", "x"], tip="finger")
+    target = sr.solve_equilibrium(model, (0.3, 0.4)).tip_position
+    found = sr.follow_trajectory(model, [target, target], tolerance=1e-6)
+    file = sr.save_csv(found, tmp_path / "a.csv")
+    assert np.array_equal(sr.read_waypoints(file).positions, found.targets)
+    assert "joint_x" in file.read_text(encoding="utf-8").splitlines()[0]
+
+
 def altered(file: Path, target: Path, **changes: np.ndarray) -> Path:
     with np.load(file) as data:
         fields = dict(data) | changes
@@ -132,6 +144,69 @@ def test_files_that_do_not_hold_what_they_claim_are_refused(results: dict, tmp_p
     ):
         with pytest.raises(sr.FileFormatError, match=message):
             sr.load_result(altered(file, bad, **changes))
+
+
+@pytest.mark.parametrize("kind", ["equilibrium", "load_estimate", "trajectory"])
+def test_damaged_files_are_refused_or_harmless(results: dict, kind: str, tmp_path: Path) -> None:
+    """Bytes flipped at random: an error of ours, or the right answer (the byte was padding)."""
+    good = sr.save_result(results[kind], tmp_path / "a.npz").read_bytes()
+    bad, rng = tmp_path / "bad.npz", np.random.default_rng(0)
+    refused = 0
+    for _ in range(150):
+        damaged = bytearray(good)
+        for place in rng.integers(0, len(good), rng.integers(1, 4)):
+            damaged[place] ^= int(rng.integers(1, 256))
+        bad.write_bytes(bytes(damaged))
+        try:
+            same(results[kind], sr.load_result(bad))
+        except sr.FileFormatError:
+            refused += 1
+    assert refused > 100
+    bad.write_bytes(good[: len(good) // 2])
+    with pytest.raises(sr.FileFormatError):
+        sr.load_result(bad)
+
+
+def test_an_estimate_whose_force_was_changed_is_refused(results: dict, tmp_path: Path) -> None:
+    file = sr.save_result(results["load_estimate"], tmp_path / "a.npz")
+    with pytest.raises(sr.FileFormatError, match="force"):
+        sr.load_result(altered(file, tmp_path / "b.npz", force=np.array([1.0, 2.0, 3.0])))
+
+
+def test_rows_and_times_must_fit(results: dict, tmp_path: Path) -> None:
+    file = sr.save_result(results["trajectory"], tmp_path / "a.npz")
+    with np.load(file) as data:
+        fields = dict(data)
+    for changes, message in (
+        ({name: fields[name][:0] for name in fields if fields[name].shape[:1] == (9,)}, "at least one configuration"),
+        ({"solver": fields["solver"][:2]}, "one row for each"),
+        ({"times": fields["times"][::-1]}, "increasing"),
+    ):
+        with pytest.raises(sr.FileFormatError, match=message):
+            sr.load_result(altered(file, tmp_path / "b.npz", **changes))
+
+
+def test_places_that_cannot_be_written_are_an_error_of_ours(results: dict, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x", encoding="utf-8")
+    for path in (tmp_path / "file" / "a.npz", "/proc/nowhere/a.npz"):
+        with pytest.raises(sr.OutputError, match="cannot write"):
+            sr.save_result(results["equilibrium"], path)
+    for function in (lambda p: sr.save_result(results["equilibrium"], p), sr.load_result, sr.read_waypoints):
+        with pytest.raises(sr.ParameterError, match="a path"):
+            function(None)
+
+
+def test_a_full_disk_is_an_error_that_loses_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    file.write_bytes(b"old")
+
+    def full(handle) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(sr.OutputError, match="No space left"):
+        write_atomically(file, full)
+    assert file.read_bytes() == b"old"
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_files_that_are_not_ours_are_refused(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def test_ik_trajectory_with_every_method(method: str, tmp_path: Path, capsys: py
     assert run_script("ik_trajectory", ["--output", str(folder), "--method", method, "--steps", "60"]) == 0
     names = {path.name for path in folder.iterdir()}
     assert names == {
-        "trajectory.npz", "uncompensated.npz", "trajectory.csv", "summary.json", "scene.html",
+        "trajectory.npz", "rigid.npz", "uncompensated.npz", "paper.npz", "trajectory.csv", "summary.json", "scene.html",
         "poses.png", "motor_angles.png", "tip_errors.png", "link_moments.png",
     }  # fmt: skip
     saved = sr.load_result(folder / "trajectory.npz")
@@ -79,6 +79,8 @@ def test_ik_trajectory_serves_until_interrupted(tmp_path: Path, monkeypatch: pyt
         (["--steps", "0"], 2, "steps"),
         (["--stiffness", "-5"], 2, "stiffness"),
         (["--pressure", "-5"], 2, "pressure"),
+        (["--pressure", "0"], 2, "pressure"),
+        (["--csv", "path.csv", "--start", "1", "0", "0"], 2, "given without --start"),
         (["--force", "nan", "0", "0"], 2, "force"),
         (["--gravity", "1", "2"], 2, "gravity"),
         (["--gain", "0"], 2, "gain"),
@@ -89,7 +91,13 @@ def test_ik_trajectory_refuses_bad_input_and_leaves_nothing(
     arguments: list[str], status: int, message: str, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     folder = tmp_path / "out"
-    assert run_script("ik_trajectory", [*arguments, "--output", str(folder), "--steps", "20", *arguments]) == status
+    assert (
+        run_script(
+            "ik_trajectory",
+            [*arguments, "--output", str(folder), *(() if "--csv" in arguments else ("--steps", "20")), *arguments],
+        )
+        == status
+    )
     out, err = capsys.readouterr()
     assert re.search(f"error: .*{message}", err)
     assert out == ""
@@ -101,8 +109,9 @@ def test_ik_trajectory_refuses_a_folder_that_is_not_empty(tmp_path: Path, capsys
     assert run_script("ik_trajectory", ["--output", str(tmp_path), "--no-plots"]) == 2
     assert "is not empty (it holds mine.txt)" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-    assert run_script("ik_trajectory", ["--output", str(tmp_path / "mine.txt"), "--no-plots"]) == 2
-    assert "is a file" in capsys.readouterr().err
+    for folder in (tmp_path / "mine.txt", tmp_path / "mine.txt" / "below"):
+        assert run_script("ik_trajectory", ["--output", str(folder), "--no-plots"]) == 2
+        assert "mine.txt is a file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["ik_trajectory", "generate_urdf", "solver_rates", "make_pictures"])
@@ -137,6 +146,37 @@ def test_solver_rates_prints_both_tables(tmp_path: Path, capsys: pytest.CaptureF
     assert run_script("solver_rates", arguments) == 2  # the file is there
 
 
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("solver_rates", ["--cases", "0"], "0 is not a positive number of cases"),
+        ("solver_rates", ["--loads", "nan"], "nan is not a positive, finite force"),
+        ("generate_urdf", ["--output", __file__], "is a file; a folder is required"),
+    ],
+)
+def test_scripts_refuse_bad_arguments(name: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run_script(name, arguments)
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    from PIL import Image
+
+    from softrobots.browser import find_chromium
+    from tests.conftest import missing
+
+    try:
+        find_chromium()
+    except sr.ViewerError as error:
+        missing(str(error))
+    assert run_script("make_pictures", ["--output", str(tmp_path)]) == 0
+    picture = np.asarray(Image.open(tmp_path / "inflatable_arm.png").convert("RGB")).astype(int)
+    assert picture.shape == (560, 1000, 3)
+    assert np.count_nonzero(picture[..., 0] - picture[..., 2] > 60) > 5000  # the warm colours of the links
+
+
 def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     """Lines, axis labels with units, legends: read back from the figures."""
     from softrobots import plots
@@ -158,6 +198,10 @@ def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     assert errors.get_yscale() == "log"
     with pytest.raises(sr.ParameterError, match="a Trajectory"):
         plots.poses(None)
+    with pytest.raises(sr.ParameterError, match="shown"):
+        plots.poses(loaded, shown=-2)
+    with pytest.raises(sr.ParameterError, match="errors"):
+        plots.tip_errors({"a": loaded.tip_error[:3]}, loaded.times)
     with pytest.raises(sr.ParameterError, match="13 waypoints"):
         plots.motor_angles(loaded, sr.follow_trajectory(arm, path.positions[:3]))
     plain = sr.load_model(arm.urdf, springs={"spring_1_up": 100.0}, motors=arm.motor_joints)

@@ -80,6 +80,36 @@ def test_sag_under_gravity_lowers_nothing_to_zero(arm: sr.SoftModel) -> None:
     assert limits[0] < limits[1] < limits[2]
 
 
+def test_stiff_springs_with_rest_angles_have_no_false_limit(arm: sr.SoftModel) -> None:
+    """Rounding of k (y - rest) must not be taken for the end of the path."""
+    for stiffness, rest in ((1e5, 1.0), (1e6, 0.5)):
+        table = {name: (stiffness, rest) if "_1_" in name else (172.71, 0.0) for name in arm.spring_joints}
+        model = sr.load_model(arm.urdf, springs=table)
+        with pytest.raises(sr.NoCriticalLoad, match="stays stable"):
+            sr.critical_load(model, (0.3, 0.2, 0.1), (0, 0, -1), max_force=100.0)
+
+
+def test_a_soft_arm_that_sags_is_followed_from_its_sag() -> None:
+    model = sr.load_model(sr.InflatableArm(stiffness=25.0, cap_mass=1.0))
+    state = sr.solve_equilibrium(model, (2.0, 1.1, -0.1), gravity=sr.EARTH_GRAVITY)
+    assert state.stable
+    try:
+        assert sr.critical_load(model, (2.0, 1.1, -0.1), (0, 0, -1), gravity=sr.EARTH_GRAVITY, max_force=50.0) > 0.0
+    except sr.NoCriticalLoad as error:
+        assert error.max_force > 1.0
+
+
+def test_a_slider_does_not_buckle() -> None:
+    stage = (
+        '<robot name="stage"><link name="a"/><joint name="x" type="prismatic"><parent link="a"/><child link="b"/>'
+        '<axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="b"/></robot>'
+    )
+    model = sr.load_model(stage, springs={"x": 1e5})
+    with pytest.raises(sr.NoCriticalLoad):
+        sr.critical_load(model, (), (-1, 0, 0), max_force=1e6)
+    assert sr.solve_equilibrium(model, (), (-200.0, 0, 0)).q_springs == pytest.approx([-2e-3], rel=1e-12)
+
+
 def test_tension_has_no_limit(arm: sr.SoftModel) -> None:
     with pytest.raises(sr.NoCriticalLoad, match="stays stable up to 500 N") as caught:
         sr.critical_load(arm, (0, 0, 0), (1, 0, 0), max_force=500.0)

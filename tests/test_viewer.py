@@ -81,12 +81,15 @@ def picture_of(browser: object, page_address: str, share: float) -> np.ndarray:
     page = browser.new_page(viewport={"width": 800, "height": 600})
     messages: list[str] = []
     page.on("console", lambda message: messages.append(message.text) if message.type == "error" else None)
+    requests: list[str] = []
+    page.on("request", lambda request: None if request.url.startswith("data:") else requests.append(request.url))
     page.on("pageerror", lambda error: messages.append(str(error)))
     page.goto(page_address)
     show_share(page, share)
     shot = pixels(page.screenshot())
     page.close()
-    assert [m for m in messages if "favicon" not in m and "404" not in m] == []
+    assert messages == []
+    assert set(requests) == {page_address}  # self-contained: no file but its own is asked for
     return shot
 
 
@@ -107,6 +110,7 @@ def test_two_viewers_take_two_ports(arm: sr.SoftModel) -> None:
         other.show(sr.solve_equilibrium(arm, (0, 0.1, -0.5), FORCE))
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_server_ends_when_its_parent_is_killed(how: int) -> None:
     code = (
@@ -167,7 +171,8 @@ def test_page_and_websocket_work_through_a_forwarded_port(browser: object, arm: 
         show_share(page, 0.0)
         first = pixels(page.screenshot())
         viewer.show(sr.solve_equilibrium(arm, (0.0, 1.4, -1.8), FORCE))
-        page.wait_for_timeout(1000)
+        page.wait_for_timeout(500)
+        show_share(page, 0.0)
         second = pixels(page.screenshot())
         assert [opened.url for opened in sockets] == [f"ws://127.0.0.1:{port}/"]
         assert coloured(first) > 3000
@@ -263,16 +268,26 @@ def test_bad_input_is_refused(arm: sr.SoftModel, odd_arm: sr.SoftModel, trajecto
     foreign = sr.solve_equilibrium(odd_arm, (0, 0, 0, 0))
     with Viewer(arm) as viewer:
         for call, message in (
-            (lambda: viewer.show(foreign), "of the robot that the viewer shows"),
+            (lambda: viewer.show(foreign), "an equilibrium of the model given"),
             (lambda: viewer.show(None), "an Equilibrium"),
             (lambda: viewer.animate(foreign), "a Trajectory"),
             (lambda: viewer.animate(trajectory, duration=0.0), "duration"),
+            (lambda: viewer.animate(trajectory, repetitions=-3), "repetitions"),
             (lambda: viewer.trace([(0, 0)]), "points"),
             (lambda: viewer.show_configuration(np.zeros(3)), "q = "),
             (lambda: view(arm, "x"), "an Equilibrium"),
         ):
             with pytest.raises(sr.ParameterError, match=message):
                 call()
+    for late in (lambda: viewer.show(trajectory.equilibria[0]), lambda: viewer.html(), lambda: viewer.trace([(0, 0, 0)])):
+        with pytest.raises(sr.ViewerError, match="closed"):
+            late()
+
+
+def test_pictures_of_missing_pages_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(sr.ViewerError, match="is no file"):
+        take_picture(tmp_path / "missing.html", tmp_path / "sub" / "a.png")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_missing_browser_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

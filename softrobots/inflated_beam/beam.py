@@ -120,7 +120,7 @@ def deflection(
         ParameterError: If an argument is out of range.
     """
     length = positive_number("length", length, "m")
-    x = finite_array("position", position, (None,) * np.ndim(position), "m")
+    x = finite_array("position", position, None, "m")
     if np.any((x < 0.0) | (x > length)):
         raise ParameterError("position", position, f"within [0, {length}] m, the length of the beam")
     force = finite_number("force", force, "N")

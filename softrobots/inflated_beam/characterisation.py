@@ -71,7 +71,7 @@ def moment(angle: Any, *, stiffness: float, max_moment: float) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range.
     """
-    theta = finite_array("angle", angle, (None,) * np.ndim(angle), "rad")
+    theta = finite_array("angle", angle, None, "rad")
     stiffness = positive_number("stiffness", stiffness, "N m/rad")
     max_moment = positive_number("max_moment", max_moment, "N m")
     return np.asarray(np.clip(stiffness * theta, -max_moment, max_moment))
@@ -86,7 +86,7 @@ class Characterisation:
     stiffness_std: float
     """Its standard error [N m/rad]."""
     max_moment: float | None
-    """Mean moment of the points past the knee `M_max / k` [N m]; None if no point is there."""
+    """Mean moment of the points past the knee `M_max / k` [N m]; None if fewer than three points are there."""
     mean_moment_above_wrinkling: float | None
     """Mean moment of all points above the wrinkling moment, the paper's `M_max` read literally [N m]; it includes the
     points still rising between `M_w` and `M_max`, so it lies below `max_moment`. None if no point is above."""
@@ -101,10 +101,11 @@ class Characterisation:
 def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: float) -> Characterisation:
     """Fit the moment-angle law to the raw data of a bending test, as [Troise 2021] section 4 did.
 
-    The stiffness is the least-squares slope, through the origin (law (2) has no offset), of the points whose moment is
-    below the theoretical wrinkling moment (3). The saturation moment is the mean of the points past the knee, found by
-    repeating "average the points with `k |theta|` above the last average" until it stands still. Negative angles count
-    by their absolute value (the law is odd).
+    First the knee between slope and plateau is found: the split of the points, ordered by angle, into a line through the
+    origin and a constant that leaves the least squares. The stiffness is then the slope (law (2) has no offset) of the points
+    before the knee and below the theoretical wrinkling moment (3), told by the angle, `k |theta| < M_w`: told by the noisy
+    moment, points of the plateau would be taken for the slope. The saturation moment is the mean past the knee. Negative
+    angles count by their absolute value (the law is odd).
 
     Args:
         angle: Hinge angles [rad], shape (n,).
@@ -124,28 +125,61 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
     limit = wrinkling_moment(positive_number("pressure", pressure, "Pa"), radius)
     tau = np.where(theta < 0.0, -tau, tau)
     theta = np.abs(theta)
-    linear = tau < limit
-    n_linear = int(np.count_nonzero(linear))
-    spread = float(theta[linear] @ theta[linear])
-    if n_linear < 3 or spread == 0.0:
-        raise ParameterError("moment", moment, f"data with at least three loaded points below wrinkling at {limit:.4g} N m")
-    stiffness = float(theta[linear] @ tau[linear]) / spread
-    if stiffness <= 0.0:
-        raise ParameterError("moment", moment, "of the same sign as the angle (the fitted slope is not positive)")
-    scatter = tau[linear] - stiffness * theta[linear]
-    above = tau[~linear]
-    saturated, plateau = ~linear, float(above.mean()) if above.size else limit
-    for _ in range(100):
-        following = (stiffness * theta > plateau) & (tau >= 0.5 * limit)
-        if not following.any() or np.array_equal(following, saturated):
+    order = np.argsort(theta, kind="stable")
+    theta, tau = theta[order], tau[order]
+    if np.count_nonzero(theta) < 3:
+        raise ParameterError("angle", angle, "at least three angles different from zero")
+    knee = _knee(theta, tau)
+    plateau = float(tau[knee:].mean()) if knee < len(theta) else None
+    linear = np.arange(len(theta)) < knee
+    for _ in range(100):  # the slope decides which points are below wrinkling, and they decide the slope
+        stiffness = _slope(theta, tau, linear, moment, limit)
+        below = (np.arange(len(theta)) < knee) & (stiffness * theta < limit)
+        if np.array_equal(below, linear):
             break
-        saturated, plateau = following, float(tau[following].mean())
+        linear = below
+    scatter = tau[linear] - stiffness * theta[linear]
+    spread, n_linear = float(theta[linear] @ theta[linear]), int(np.count_nonzero(linear))
+    above = tau[tau >= limit]
     return Characterisation(
         stiffness=stiffness,
         stiffness_std=math.sqrt(float(scatter @ scatter) / (n_linear - 1) / spread),
-        max_moment=plateau if above.size else None,
+        max_moment=plateau,
         mean_moment_above_wrinkling=float(above.mean()) if above.size else None,
         wrinkling_moment=limit,
         n_linear=n_linear,
-        n_saturated=int(np.count_nonzero(saturated)) if above.size else 0,
+        n_saturated=len(theta) - knee,
     )
+
+
+def _knee(theta: FloatArray, tau: FloatArray) -> int:
+    """Number of points before the plateau, of points ordered by angle; all of them if there is no plateau.
+
+    A plateau has at least three points, and must lower the sum of squares by more than chance does (F-test, ratio 12).
+    """
+    n = len(theta)
+    split = np.arange(3, n + 1)  # candidates: this many points before the knee
+
+    def before(values: FloatArray) -> FloatArray:
+        return np.asarray(np.cumsum(values)[split - 1])
+
+    products, squares, moments = before(theta * tau), before(theta**2), before(tau)
+    line = before(tau**2) - products**2 / np.maximum(squares, np.finfo(np.float64).tiny)
+    after = n - split
+    constant = np.sum(tau**2) - before(tau**2) - (np.sum(tau) - moments) ** 2 / np.maximum(after, 1)
+    left = np.where((after >= 3) | (after == 0), line + np.where(after > 0, constant, 0.0), np.inf)
+    best = int(np.argmin(left))
+    rounding = 1e-12 * float(tau @ tau)
+    gained = left[-1] - left[best]
+    return int(split[best]) if gained > 12.0 * max(left[best], rounding) / max(n - 3, 1) + rounding else n
+
+
+def _slope(theta: FloatArray, tau: FloatArray, linear: Any, moment: Any, limit: float) -> float:
+    """Least-squares slope through the origin of the chosen points."""
+    spread = float(theta[linear] @ theta[linear])
+    if np.count_nonzero(linear) < 3 or spread == 0.0:
+        raise ParameterError("moment", moment, f"data with at least three loaded points below wrinkling at {limit:.4g} N m")
+    slope = float(theta[linear] @ tau[linear]) / spread
+    if slope <= 0.0:
+        raise ParameterError("moment", moment, "of the same sign as the angle (the fitted slope is not positive)")
+    return slope
