@@ -161,7 +161,7 @@ class Viewer:
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
         positive_integer("repetitions", repetitions)
         self.show(trajectory.equilibria[0])
-        self._centre(trajectory.tip_positions.mean(axis=0))
+        self._look_at(trajectory.tip_positions.mean(axis=0))
         self.trace(trajectory.tip_positions)
         animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
         for number, equilibrium in _frames(trajectory, seconds).items():
@@ -226,7 +226,7 @@ class Viewer:
                 self._root[f"{group}/{shape.name}"].set_transform(transform)
 
     def _prepare(self) -> None:
-        """White background, a camera on the middle of the reach: meshcat's camera looks at the origin, so the scene moves."""
+        """White background, floor, and the camera; meshcat's camera looks at the origin, so the scene moves."""
         import meshcat.geometry as geometry
 
         reach = self._model.reach
@@ -234,19 +234,24 @@ class Viewer:
         self._page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
         self._page["/Axes"].set_property("visible", False)
         self._page["/Grid"].set_property("visible", False)
-        self._centre(np.array([0.9 * reach, 0.0, 0.2 * reach]))
-        # meshcat's camera has y up: (x, z, -y) of the scene.
-        eye = reach * np.array([0.34, -0.80, 0.34])
-        self._page["/Cameras/default/rotated/<object>"].set_property("position", [eye[0], eye[2], -eye[1]])
+        self._look_at(np.array([0.9 * reach, 0.0, 0.2 * reach]))
         ends = np.concatenate([floor_lines(reach), floor_lines(reach)[:, [1, 0, 2]]])
         lines = geometry.PointsGeometry(ends.T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
 
-    def _centre(self, tip: FloatArray) -> None:
-        """Put the middle between base and tip where the camera looks."""
+    def _look_at(self, tip: FloatArray) -> None:
+        """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
+
+        Args:
+            tip: Where the tip is, or is on average, shape (3,) [m].
+        """
         shift = np.eye(4)
         shift[:3, 3] = -0.5 * tip
         self._root.set_transform(shift)
+        azimuth = np.arctan2(tip[1], tip[0]) - np.deg2rad(78.0)
+        x, y, z = 0.94 * self._model.reach * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
+        # meshcat's camera has y up: (x, z, -y) of the scene.
+        self._page["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
 
     def _draw_shapes(self) -> None:
 
@@ -292,7 +297,7 @@ class Viewer:
             node = self._root[f"load/{name}"]
             for part, drawn, height in (
                 ("shaft", geometry.Cylinder(length, width), 0.5 * length),
-                ("head", geometry.Cylinder(4.0 * width, radiusTop=0.0, radiusBottom=2.5 * width), length + 2.0 * width),
+                ("head", geometry.Cylinder(7.0 * width, radiusTop=0.0, radiusBottom=2.5 * width), length + 3.5 * width),
             ):
                 node[part].set_object(drawn, green)
                 raised = np.eye(4)
