@@ -8,7 +8,7 @@ Two methods:
 
 - "newton": Newton on the potential energy with the exact tangent, made positive definite where it is not, and halving of
   steps that do not lower the energy. It ends in a stable equilibrium. With a world-fixed moment in the load there is no
-  energy; then the load grows in steps, with plain Newton at each.
+  energy; then plain Newton from the start, or from the relaxed springs under a load that grows in steps.
 - "fixed_point": the recursion of [Troise 2021] Figure 6, `y <- rest + (J_k^T w - g_k) / k`.
 """
 

@@ -118,7 +118,7 @@ def solve_equilibrium(
     """Find the static equilibrium of the springs at given motor coordinates.
 
     It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
-    has no energy, the one reached by Newton while the load grows from zero.
+    has no energy, the one reached by Newton from there, or while the load grows from zero.
 
     Args:
         model: The robot.

@@ -115,6 +115,7 @@ def estimate_load(
         ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has no motors.
         NameNotFound: If the frame does not exist.
         LoadNotFound: If no force explains the torques; carries the best estimate.
+        NeutralEquilibrium: If the search comes upon a load at which the robot is about to buckle.
     """
     check_model(model)
     choice("method", method, METHODS)

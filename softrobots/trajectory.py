@@ -14,7 +14,7 @@ from softrobots import inflated_beam
 from softrobots.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
 from softrobots.elastostatics import TOLERANCE, elastic_state, largest_residual, settle
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
-from softrobots.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
+from softrobots.errors import EquilibriumNotFound, NeutralEquilibrium, ParameterError, TargetUnreachable
 from softrobots.inverse_kinematics import POSITION_TOLERANCE, IkSolution, LocalSolution, search, solve_ik, start_motors
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
@@ -237,7 +237,10 @@ def _advance(
 ) -> LocalSolution | None:
     """Go from one waypoint to the next by its linear prediction and a search, over waypoints between if need be."""
     jacobian = frame_jacobian(model, here.state.q, model.tip)[:3]
-    slope, follow = tip_motion(model, jacobian, here.state.tangent, here.state.joints.derivative)
+    try:
+        slope, follow = tip_motion(model, jacobian, here.state.tangent, here.state.joints.derivative)
+    except NeutralEquilibrium:  # about to buckle: no linear prediction leads on
+        return None
     step = np.linalg.pinv(slope, rcond=1e-6) @ (target - frame_placement(model, here.state.q, model.tip).translation)
     if float(np.linalg.norm(step)) <= 0.5:
         motors = np.clip(here.q_motors + step, *model.motor_limits.T)
