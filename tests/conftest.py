@@ -21,11 +21,11 @@ settings.load_profile("repeatable")
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 
-def missing(what: str) -> None:
+def missing(reason: str) -> None:
     """Fail in CI, skip elsewhere, with the reason."""
     if os.environ.get("CI") == "true":
-        pytest.fail(f"{what} is missing, and CI must have it")
-    pytest.skip(f"{what} is not installed")
+        pytest.fail(f"{reason} (CI must have it)")
+    pytest.skip(reason)
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def tool() -> Callable[[str], ModuleType]:
         try:
             return importlib.import_module(name)
         except ImportError:
-            missing(name)
+            missing(f"{name} is not installed")
             raise
 
     return load

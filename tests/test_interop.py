@@ -121,7 +121,7 @@ def test_a_third_party_robot_with_springs_said_by_the_caller() -> None:
     try:
         distribution = metadata.distribution("example-robot-data")
     except metadata.PackageNotFoundError:
-        missing("example-robot-data")
+        missing("example-robot-data is not installed")
     place = "cmeel.prefix/share/example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
     file = Path(distribution.locate_file(place)).resolve()
     model = sr.load_model(file, springs={"wrist_1_joint": 40.0, "wrist_3_joint": (25.0, 0.1)}, tip="tool0")
