@@ -74,3 +74,29 @@ def central_difference(function: Callable[[np.ndarray], np.ndarray], at: np.ndar
         shift[place] = step
         columns.append((np.asarray(function(at + shift)) - np.asarray(function(at - shift))) / (2.0 * step))
     return np.array(columns).T
+
+
+def paper_closed_loop(
+    motors: np.ndarray, positions: np.ndarray, times: np.ndarray, force: np.ndarray, gain: float, rows: int
+) -> np.ndarray:
+    """[Troise 2021] Figure 6 on the DH table: tip positions, shape (n, 3), with the first `rows` rows of the Jacobian."""
+
+    def angles(q: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.array([q[0], q[1], y[0], y[1], q[2], y[2], y[3]])
+
+    def settle(q: np.ndarray, y: np.ndarray) -> np.ndarray:
+        for _ in range(100):
+            y = flexible_jacobian(angles(q, y))[:3, [2, 3, 5, 6]].T @ force / 172.71
+        return y
+
+    springs = settle(motors, np.zeros(4))
+    tips = [flexible_table(angles(motors, springs))[-1][:3, 3]]
+    for place in range(1, len(times)):
+        interval = times[place] - times[place - 1]
+        command = np.zeros(rows)
+        command[:3] = (positions[place] - positions[place - 1]) / interval + gain * (positions[place - 1] - tips[-1])
+        jacobian = flexible_jacobian(angles(motors, springs))[:rows]
+        motors = motors + interval * (np.linalg.pinv(jacobian)[[0, 1, 4]] @ command)
+        springs = settle(motors, springs)
+        tips.append(flexible_table(angles(motors, springs))[-1][:3, 3])
+    return np.array(tips)

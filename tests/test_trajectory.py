@@ -9,6 +9,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.trajectory import METHODS
+from tests.oracles import paper_closed_loop
 
 FORCE = (0.0, 10.0, -15.0)
 PATH = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
@@ -67,6 +68,18 @@ def test_the_papers_method_lags_as_measured(arm: sr.SoftModel) -> None:
     assert largest == sorted(largest, reverse=True)
     assert 50 < largest[0] < 200
     assert 2 < largest[-1] < 15
+
+
+def test_the_papers_method_is_the_one_written_on_the_dh_table(arm: sr.SoftModel) -> None:
+    """Position rows: the same tips, step by step. All six rows, as the paper prints it: it loses the path by half a metre."""
+    path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 200)
+    found = sr.follow_trajectory(arm, path.positions, FORCE, method="paper", times=path.times, gain=50.0, elbow="up")
+    start, force = np.array(found.q_motors[0]), np.array(FORCE)
+    three = paper_closed_loop(start, path.positions, path.times, force, 50.0, rows=3)
+    assert np.abs(found.tip_positions - three).max() < 1e-8  # springs settle to 1e-10 of 22 N m at each of 200 steps
+    for gain in (5.0, 50.0):
+        six = paper_closed_loop(start, path.positions, path.times, force, gain, rows=6)
+        assert np.linalg.norm(six - path.positions, axis=1).max() > 0.5
 
 
 def test_moments_pressure_and_margin(arm: sr.SoftModel) -> None:
