@@ -177,7 +177,7 @@ class _Problem:
 def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None) -> bool:
     """Whether what a force leaves of the torques is rounding, noise, or hidden.
 
-    Along an observable direction nothing but rounding or noise may be left. Along an unobservable one, what a force that the
+    In a pose that shows every direction nothing but rounding or noise may be left. In a singular pose, what a force that the
     motors hardly feel may give: a twentieth of the torques, or `OBSERVABLE` of the stiffest spring. What more than three
     motors measure beyond three components may be anything as long as nothing is known of the noise: a least-squares fit.
     """
@@ -185,12 +185,9 @@ def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None)
     missing = left.T @ problem.unexplained(state)
     scatter = 0.0 if noise is None else 5.0 * float(np.linalg.norm(noise))
     hidden = 0.05 * float(np.linalg.norm(problem.torques)) + OBSERVABLE * problem.model.stiffest
-    felt, unfelt, surplus = missing[: len(values)][keep], missing[: len(values)][~keep], missing[len(values) :]
-    return bool(
-        np.linalg.norm(felt) <= max(problem.tolerance, scatter)
-        and np.linalg.norm(unfelt) <= hidden + scatter
-        and (noise is None or np.linalg.norm(surplus) <= scatter)
-    )
+    felt, surplus = missing[: len(values)], missing[len(values) :]
+    allowed = max(problem.tolerance, scatter) if keep.all() else hidden + scatter
+    return bool(np.linalg.norm(felt) <= allowed and (noise is None or np.linalg.norm(surplus) <= max(allowed, scatter)))
 
 
 def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
