@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -130,7 +131,8 @@ def follow_trajectory(
         wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
         frame: Frame of `force` and `wrench`; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-        q_motors0: Motor coordinates near the first waypoint, shape (n_motors,) [rad or m]; zero by default.
+        q_motors0: Motor coordinates near the first waypoint, shape (n_motors,) [rad or m]. By default the solution nearest to
+            zero, or, where a motor limit then blocks the path, the next one from which the whole path can be followed.
         elbow: "up" or "down" at the first waypoint; None: whatever changes `q_motors0` least.
         method: "newton", "fixed_point" or "paper".
         tolerance: Largest distance of the tip from a target [m]; not for "paper".
@@ -164,26 +166,30 @@ def follow_trajectory(
     else:
         moments = increasing("times", finite_array("times", times, (len(points),), "s"), "s")
     inner = "newton" if method == "newton" else "fixed_point"
+    options = {"wrench": dict(load.wrenches), "gravity": gravity, "method": inner, "tolerance": tolerance}
     try:
-        first = solve_ik(
-            model,
-            points[0],
-            wrench=dict(load.wrenches),
-            gravity=gravity,
-            q_motors0=q_motors0,
-            elbow=elbow,
-            method=inner,
-            tolerance=tolerance,
-        ).equilibrium
+        begin = solve_ik(model, points[0], q_motors0=q_motors0, elbow=elbow, **options)
     except TargetUnreachable as error:
         raise _named(error, 1, len(points)) from error
-    steps = (
-        _paper_steps(model, points, moments, load, first, gain)
-        if method == "paper"
-        else _exact_steps(model, points, load, first, inner, tolerance, allow_jumps)
-    )
-    equilibria = [first, *_with_progress(steps, len(points) - 1, method, progress)]
-    return Trajectory(read_only(moments), read_only(points), tuple(equilibria), method)
+
+    def follow_from(first: Equilibrium) -> Trajectory:
+        steps = (
+            _paper_steps(model, points, moments, load, first, gain)
+            if method == "paper"
+            else _exact_steps(model, points, load, first, inner, tolerance, allow_jumps)
+        )
+        equilibria = (first, *_with_progress(steps, len(points) - 1, method, progress))
+        return Trajectory(read_only(moments), read_only(points), equilibria, method)
+
+    try:
+        return follow_from(begin.equilibrium)
+    except TargetUnreachable as error:
+        if q_motors0 is not None or error.residual > tolerance:  # the start was chosen, or the waypoint is out of reach
+            raise
+        for motors in begin.alternatives:  # the same tip, another shoulder or elbow: perhaps no limit is in the way
+            with contextlib.suppress(TargetUnreachable):
+                return follow_from(solve_ik(model, points[0], q_motors0=motors, starts=1, **options).equilibrium)
+        raise
 
 
 def _with_progress(steps: Iterable[Equilibrium], total: int, method: str, progress: bool | str) -> Iterable[Equilibrium]:

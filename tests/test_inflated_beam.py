@@ -121,6 +121,14 @@ def test_fit_without_saturation_says_so() -> None:
     assert fit.stiffness == pytest.approx(166.66, rel=1e-13)
 
 
+def test_softening_is_not_a_plateau() -> None:
+    """A slope that falls by a fifth while the moment still rises: no saturation, with and without noise."""
+    angle = np.linspace(0.0, 0.08, 40)
+    for noise in (0.0, 0.02, 0.1):
+        moments = 170.0 * angle * (1 - 0.2 * angle / 0.08) + noise * np.random.default_rng(0).normal(size=40)
+        assert inflated_beam.fit_characterisation(angle, moments, pressure=50e3, radius=0.055).max_moment is None
+
+
 def test_plain_average_lies_below_the_plateau() -> None:
     angle = np.linspace(0.0, 0.3, 300)
     moments = inflated_beam.moment(angle, stiffness=150.0, max_moment=9.45)

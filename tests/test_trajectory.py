@@ -122,6 +122,17 @@ def test_an_unreachable_waypoint_is_named(arm: sr.SoftModel) -> None:
         sr.follow_trajectory(arm, path.positions[::-1], FORCE)
 
 
+@pytest.mark.parametrize("elbow", [None, "up", "down"])
+def test_a_wide_circle_starts_from_the_shoulder_that_can_go_round(arm: sr.SoftModel, elbow: str | None) -> None:
+    """From -2.9 to 2.9 rad about the base: the solution nearest to zero, over the shoulder, would meet the limit of motor 1."""
+    turn = np.linspace(-2.9, 2.9, 120)
+    circle = np.c_[0.72 * np.cos(turn), 0.72 * np.sin(turn), np.full(120, 0.24)]
+    found = sr.follow_trajectory(arm, circle, elbow=elbow)
+    assert found.tip_error.max() <= 1e-9
+    assert np.abs(np.diff(found.q_motors, axis=0)).max() < 0.1
+    assert found.q_motors[:, 0] == pytest.approx(turn, abs=1e-7)
+
+
 def test_a_jump_is_refused_unless_allowed() -> None:
     """Motors within +-1 rad: the way on from the last reachable waypoint is blocked by motor 1; no other branch helps."""
     arm = sr.load_model(sr.InflatableArm(motor_limit=2.0))

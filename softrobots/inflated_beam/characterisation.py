@@ -155,7 +155,8 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
 def _knee(theta: FloatArray, tau: FloatArray) -> int:
     """Number of points before the plateau, of points ordered by angle; all of them if there is no plateau.
 
-    A plateau has at least three points, and must lower the sum of squares by more than chance does (F-test, ratio 12).
+    A plateau has at least three points, rises by less than half the slope before it, and must lower the sum of squares by
+    more than chance does (F-test, ratio 12).
     """
     n = len(theta)
     split = np.arange(3, n + 1)  # candidates: this many points before the knee
@@ -171,6 +172,10 @@ def _knee(theta: FloatArray, tau: FloatArray) -> int:
     best = int(np.argmin(left))
     rounding = 1e-12 * float(tau @ tau)
     gained = left[-1] - left[best]
+    past = theta[split[best] :] - theta[split[best] :].mean() if after[best] else np.zeros(0)
+    rise, slope = float(past @ tau[split[best] :]), float(products[best] / max(squares[best], np.finfo(np.float64).tiny))
+    if rise > 0.5 * slope * float(past @ past):  # still rising at half the slope: softer, but no plateau
+        return n
     return int(split[best]) if gained > 12.0 * max(left[best], rounding) / max(n - 3, 1) + rounding else n
 
 
