@@ -1,6 +1,6 @@
 """Soft robots as rigid-body robot descriptions, with certified statics and inverse kinematics on Pinocchio."""
 
-from softrobots import inflated_beam
+from softrobots import constant_curvature, inflated_beam
 from softrobots.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.errors import (
     DescriptionError,
@@ -25,7 +25,7 @@ from softrobots.loader import load_model
 from softrobots.loads import EARTH_GRAVITY
 from softrobots.model import SoftModel, SpringGroup
 from softrobots.results_io import load_result, save_csv, save_result
-from softrobots.robots import ROBOTS, InflatableArm
+from softrobots.robots import ROBOTS, InflatableArm, PccArm
 from softrobots.sensitivity import compliance, elastostatic_jacobian
 from softrobots.stability import critical_load
 from softrobots.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
@@ -54,6 +54,7 @@ __all__ = [
     "OutputExists",
     "ParameterError",
     "Path3D",
+    "PccArm",
     "SoftModel",
     "SoftRobotsError",
     "SpringGroup",
@@ -63,6 +64,7 @@ __all__ = [
     "ViewerError",
     "__version__",
     "compliance",
+    "constant_curvature",
     "critical_load",
     "elastostatic_jacobian",
     "estimate_load",

@@ -1,8 +1,9 @@
-r"""Elastostatics: settling the springs under a load, and telling whether they are stable.
+r"""Elastostatics: settling the elastic coordinates under a load, and telling whether they are stable.
 
-The springs `y` are in equilibrium when the residual `r(y) = tau_spring(y) - J_k^T w + g_k` vanishes; motors are held exactly.
-The tangent stiffness `K_t = dr/dy` tells stability: positive definite means stable ([Troise 2021] (5-7) give the
-weightless, first-order form of this).
+The elastic coordinates `y` (springs, sections) are in equilibrium when the residual `r(y) = tau_spring(y) - J_k^T w + g_k`
+vanishes; actuators are held exactly. Where joints follow sections, `J_k` is Pinocchio's Jacobian times `dm/dz`
+(`softrobots.coordinates`). The tangent stiffness `K_t = dr/dy` tells stability: positive definite means stable
+([Troise 2021] (5-7) give the weightless, first-order form of this).
 
 Two methods:
 
@@ -20,7 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.checks import FloatArray
-from softrobots.loads import GeneralisedLoad, Load, generalised_load
+from softrobots.coordinates import Point, ReducedLoad
+from softrobots.loads import Load, generalised_load
 from softrobots.model import SoftModel
 
 METHODS = ("newton", "fixed_point")
@@ -37,22 +39,26 @@ _ROUNDING = 1e-14  # energies this close, relative to their terms, cannot be tol
 
 
 class ElasticState(NamedTuple):
-    """A configuration of the springs, in equilibrium or not, and everything statics needs there."""
+    """Elastic coordinates, in equilibrium or not, and everything statics needs there."""
 
     q_springs: FloatArray
-    """Spring coordinates, shape (n_springs,) [rad or m]."""
+    """Elastic coordinates, shape (n_springs,) [rad or m]."""
     q: FloatArray
     """Pinocchio's configuration, shape (nq,)."""
-    joints: GeneralisedLoad
-    """The load in all joint coordinates."""
+    point: Point
+    """The same robot as joint positions and their derivatives."""
+    load: ReducedLoad
+    """The load in actuator and elastic coordinates."""
+    scale: float
+    """Size of the load [N m]."""
     residual: FloatArray
-    """Out-of-balance torque of the springs, shape (n_springs,) [N m or N]."""
+    """Out-of-balance torque of the elastic coordinates, shape (n_springs,) [N m or N]."""
     tangent: FloatArray
     """Tangent stiffness, shape (n_springs, n_springs)."""
     energy: float
-    """Elastic energy plus potential of the load [J]."""
+    """Elastic energy plus potential of the load [J]; infinite where the robot cannot be."""
     error: float
-    """Norm of the residual."""
+    """Norm of the residual; infinite where the robot cannot be."""
 
 
 def settle(
@@ -88,7 +94,7 @@ def settled(
     """`settle`, or None where the springs do not settle to `TOLERANCE`."""
     most = 200 if method == "newton" else 1000
     state, _ = settle(model, q_motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
-    return state if state.error <= largest_residual(model, state.joints, max(tolerance, TOLERANCE)) else None
+    return state if state.error <= largest_residual(model, state.scale, max(tolerance, TOLERANCE)) else None
 
 
 def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
@@ -103,22 +109,39 @@ def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
     Returns:
         The state.
     """
-    q = model.assemble(q_motors, q_springs)
+    point = model.coordinates.at(q_motors, q_springs)
+    q = model.embed(point.joints)
+    if not point.valid:
+        return _nowhere(model, q_springs, q, point)
     joints = generalised_load(model, q, load)
-    springs, law = model.spring_indices, model.springs
-    residual = law.torque(q_springs) - joints.torque[springs]
-    tangent = -joints.derivative[springs[:, None], springs]
+    reduced = point.reduce(joints.torque, joints.derivative)
+    law = model.springs
+    residual = law.torque(q_springs) - reduced.elastic
+    tangent = -reduced.derivative
     tangent.flat[:: tangent.shape[0] + 1] += law.tangent(q_springs)
-    energy = law.energy(q_springs) + joints.potential
-    return ElasticState(q_springs, q, joints, residual, tangent, energy, math.sqrt(float(residual @ residual)))
+    energy = law.energy(q_springs) + joints.potential + reduced.potential
+    scale = joints.scale + reduced.scale * model.reach
+    return ElasticState(q_springs, q, point, reduced, scale, residual, tangent, energy, math.sqrt(float(residual @ residual)))
 
 
-def largest_residual(model: SoftModel, joints: GeneralisedLoad, tolerance: float) -> float:
+def _nowhere(model: SoftModel, q_springs: FloatArray, q: FloatArray, point: Point) -> ElasticState:
+    """A state that no solver accepts: a section beyond its range."""
+    n, m = model.n_springs, model.n_motors
+    load = ReducedLoad(np.zeros(m), np.zeros(n), np.zeros((n, n)), np.zeros((n, m)), 0.0, 0.0)
+    return ElasticState(q_springs, q, point, load, 0.0, np.zeros(n), np.zeros((n, n)), math.inf, math.inf)
+
+
+def largest_residual(model: SoftModel, scale: float, tolerance: float) -> float:
     """Largest residual that counts as equilibrium: `tolerance * max(|f| reach + |moment| + |g|, 1e-3 N m)` [N m].
 
     Never below the rounding of the spring torques, which matters for stiff springs with rest angles only.
+
+    Args:
+        model: The robot.
+        scale: Size of the load, `ElasticState.scale` [N m].
+        tolerance: Relative tolerance.
     """
-    return max(tolerance * max(joints.scale, _MOMENT_FLOOR), model.rounding)
+    return max(tolerance * max(scale, _MOMENT_FLOOR), model.rounding)
 
 
 class _Case(NamedTuple):
@@ -133,32 +156,38 @@ class _Case(NamedTuple):
         return elastic_state(self.model, self.q_motors, q_springs, self.load)
 
     def settled(self, state: ElasticState) -> bool:
-        return state.error <= largest_residual(self.model, state.joints, self.tolerance)
+        return state.error <= largest_residual(self.model, state.scale, self.tolerance)
 
     def stable(self, state: ElasticState) -> bool:
         return is_stable(self.model, state.tangent, symmetric=self.load.conservative)
 
 
 def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool) -> bool:
-    """Whether every eigenvalue of a tangent stiffness has a real part above rounding, 1e-9 of the stiffest spring.
+    """Whether every eigenvalue of a tangent stiffness has a real part above rounding.
 
-    For a symmetric tangent a Cholesky factorisation is the certificate.
+    Taken in coordinates scaled by the springs' own stiffness, in which no unit and no stiff spring beside a soft one matters;
+    rounding is 1e-9 there. For a symmetric tangent a Cholesky factorisation is the certificate.
 
     Args:
         model: The robot.
         tangent: Tangent stiffness, shape (n_springs, n_springs).
         symmetric: Whether it is symmetric.
     """
-    margin = _STABLE * model.stiffest
     if not symmetric:
-        return bool(np.all(np.linalg.eigvals(tangent).real > margin))
+        return bool(np.all(np.linalg.eigvals(scaled(tangent, model.stiffness)).real > _STABLE))
     shifted = tangent.copy()
-    shifted.flat[:: len(tangent) + 1] -= margin
+    shifted.flat[:: len(tangent) + 1] -= _STABLE * model.stiffness
     try:
         np.linalg.cholesky(shifted)
     except np.linalg.LinAlgError:
         return False
     return True
+
+
+def scaled(tangent: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Tangent stiffness in coordinates scaled by the springs' own stiffness: 1 on the diagonal without load."""
+    softness = 1.0 / np.sqrt(stiffness)
+    return np.asarray(softness[:, None] * tangent * softness)
 
 
 def _fixed_point(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, int]:
@@ -168,25 +197,25 @@ def _fixed_point(case: _Case, start: FloatArray, most: int) -> tuple[ElasticStat
     for iteration in range(most):
         if case.settled(state):
             return state, iteration
-        state = case.state(model.rest + state.joints.torque[model.spring_indices] / model.stiffness)
+        state = case.state(model.rest + state.load.elastic / model.stiffness)
         best = state if state.error < best.error else best
     return best, most
 
 
 def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, int]:
     """Newton descent on the energy, out of unstable equilibria too."""
-    stiffness = case.model.stiffest
+    stiffness = case.model.stiffness
     state, spent = case.state(start), 0
     while spent < most:
         settled = case.settled(state)
         if settled and case.stable(state):
             break
-        step = _escape(state, stiffness) if settled else _newton_step(state, case.model.stiffness)
+        step = _escape(state, stiffness) if settled else _newton_step(state, stiffness)
         if step is None:  # neutral equilibrium: balanced, neither stable nor unstable
             break
         slope = float(state.residual @ step)
         # The terms of the energy are as large as this even where they cancel (a tip that is folded back to the base).
-        rounding = _ROUNDING * (state.joints.scale + stiffness * float(state.q_springs @ state.q_springs))
+        rounding = _ROUNDING * (state.scale + float(stiffness @ (state.q_springs * state.q_springs)))
         scale = 1.0
         trial = case.state(state.q_springs + step)
         spent += 1
@@ -212,22 +241,23 @@ def _newton_step(state: ElasticState, stiffness: FloatArray) -> FloatArray:
         step = np.linalg.solve(state.tangent, -state.residual)
     except np.linalg.LinAlgError:
         softness = 1.0 / np.sqrt(stiffness)
-        values, vectors = np.linalg.eigh(softness[:, None] * state.tangent * softness)
+        values, vectors = np.linalg.eigh(scaled(state.tangent, stiffness))
         values = np.maximum(np.abs(values), 1e-3)
         step = -softness * (vectors @ ((vectors.T @ (softness * state.residual)) / values))
     length = math.sqrt(float(step @ step))
     return np.asarray(step if length <= _LARGEST_STEP else step * (_LARGEST_STEP / length))
 
 
-def _escape(state: ElasticState, stiffness: float) -> FloatArray | None:
+def _escape(state: ElasticState, stiffness: FloatArray) -> FloatArray | None:
     """Step out of an unstable equilibrium along its softest direction; None at a neutral one.
 
     Both signs lower the energy; the one with the positive largest component is taken, so that answers repeat.
     """
-    values, vectors = np.linalg.eigh(state.tangent)
-    if values[0] > -_STABLE * stiffness:
+    values, vectors = np.linalg.eigh(scaled(state.tangent, stiffness))
+    if values[0] > -_STABLE:
         return None
-    direction = vectors[:, 0]
+    direction = vectors[:, 0] / np.sqrt(stiffness)
+    direction = direction / math.sqrt(float(direction @ direction))
     sign = 1.0 if direction[np.argmax(np.abs(direction))] > 0.0 else -1.0
     return np.asarray(sign * 0.1 * direction)
 
@@ -270,7 +300,7 @@ def newton(
     """
     state = elastic_state(model, q_motors, start, load)
     for iteration in range(1, max_iterations + 1):
-        if state.error <= largest_residual(model, state.joints, tolerance):
+        if state.error <= largest_residual(model, state.scale, tolerance):
             return state, iteration
         try:
             step = np.linalg.solve(state.tangent, -state.residual)

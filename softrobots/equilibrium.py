@@ -44,8 +44,8 @@ class Equilibrium:
     """Load on each motor, `J_m^T w - g_m`, shape (n_motors,) [N m or N]."""
     tangent_stiffness: FloatArray
     """Derivative of the residual, shape (n_springs, n_springs)."""
-    joint_derivative: FloatArray
-    """Derivative of the load in all joint coordinates, shape (nv, nv)."""
+    coupling: FloatArray
+    """Derivative of the load on the elastic coordinates with respect to the actuators, shape (n_springs, n_motors)."""
     residual: float
     """Norm of the out-of-balance torque [N m]."""
     tolerance: float
@@ -92,8 +92,9 @@ class Equilibrium:
 
     @property
     def within_limits(self) -> bool:
-        """Whether every motor and spring is within its joint limits; statics does not clip."""
-        return _within(self.q_motors, self.model.motor_limits) and _within(self.q_springs, self.model.spring_limits)
+        """Whether every actuator and every elastic joint is within its limits; statics does not clip."""
+        joints = self.model.coordinates.at(self.q_motors, self.q_springs).joints
+        return _within(self.q_motors, self.model.motor_limits) and _within(joints, self.model.structure.elastic_limits)
 
     @cached_property
     def eigenvalues(self) -> FloatArray:
@@ -142,7 +143,7 @@ def solve_equilibrium(
     """
     check_model(model)
     choice("method", method, METHODS)
-    motors = finite_array("q_motors", q_motors, (model.n_motors,), "rad")
+    motors = model.checked_motors(q_motors)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     start = model.rest if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
     positive_number("tolerance", tolerance)
@@ -181,11 +182,11 @@ def equilibrium_from_state(
         q_springs=read_only(state.q_springs),
         q=read_only(state.q),
         spring_torques=read_only(model.springs.torque(state.q_springs)),
-        motor_torques=read_only(state.joints.torque[model.motor_indices]),
+        motor_torques=read_only(state.load.motors),
         tangent_stiffness=read_only(state.tangent),
-        joint_derivative=read_only(state.joints.derivative),
+        coupling=read_only(state.load.coupling),
         residual=state.error,
-        tolerance=largest_residual(model, state.joints, tolerance),
+        tolerance=largest_residual(model, state.scale, tolerance),
         iterations=iterations,
         stable=is_stable(model, state.tangent, symmetric=load.conservative),
     )

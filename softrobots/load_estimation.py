@@ -121,7 +121,9 @@ def estimate_load(
     choice("method", method, METHODS)
     if model.n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor")
-    motors = finite_array("q_motors", q_motors, (model.n_motors,), "rad")
+    if model.muscles and model.muscle_input == "forces":
+        raise ParameterError("model", model, "a robot whose muscle lengths are given: given forces feel no load")
+    motors = model.checked_motors(q_motors)
     torques = finite_array("motor_torques", motor_torques, (model.n_motors,), "N m")
     noise = None if torque_std is None else _noise(torque_std, model.n_motors)
     at = model.tip if frame is None else frame
@@ -165,12 +167,12 @@ class _Problem:
 
     def unexplained(self, state: ElasticState) -> FloatArray:
         """Motor torques minus those of a state."""
-        return np.asarray(self.torques - state.joints.torque[self.model.motor_indices])
+        return np.asarray(self.torques - state.load.motors)
 
     def slope(self, state: ElasticState) -> tuple[FloatArray, FloatArray, FloatArray, Any]:
         """Singular value decomposition of the torque slope, and which of its directions are observable."""
-        jacobian = frame_jacobian(self.model, state.q, self.frame)[:3]
-        left, values, right = np.linalg.svd(motor_torque_slope(self.model, jacobian, state.tangent, state.joints))
+        motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
+        left, values, right = np.linalg.svd(motor_torque_slope(motors, springs, state.tangent, state.load.coupling))
         return left, values, right, values > OBSERVABLE * self.model.reach
 
 
@@ -221,15 +223,12 @@ def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState
     force, springs = np.zeros(3), np.array(model.rest)
     state = elastic_state(model, problem.motors, springs, problem.base)
     for iteration in range(1, most + 1):
-        jacobian = frame_jacobian(model, state.q, problem.frame)[:3]
-        unloaded = elastic_state(model, problem.motors, springs, problem.base).joints.torque
-        found = np.linalg.lstsq(
-            jacobian[:, model.motor_indices].T, problem.torques - unloaded[model.motor_indices], rcond=None
-        )[0]
-        pull = unloaded + jacobian.T @ found
-        springs = model.rest + pull[model.spring_indices] / model.stiffness
+        by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, problem.frame)[:3])
+        unloaded = elastic_state(model, problem.motors, springs, problem.base).load
+        found = np.asarray(np.linalg.lstsq(by_motors.T, problem.torques - unloaded.motors, rcond=None)[0], dtype=np.float64)
+        springs = model.rest + (unloaded.elastic + by_springs.T @ found) / model.stiffness
         force, state = found, elastic_state(model, problem.motors, springs, problem.load(found))
-        still = state.error <= largest_residual(model, state.joints, TOLERANCE)
+        still = state.error <= largest_residual(model, state.scale, TOLERANCE)
         if still and float(np.linalg.norm(problem.unexplained(state))) <= problem.tolerance:
             return force, state, iteration
     return force, state, most

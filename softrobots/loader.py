@@ -7,21 +7,27 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
-from softrobots.checks import finite_number, positive_number
-from softrobots.description import RobotTags, SpringTag, read_tags
+from softrobots.checks import choice, finite_number, positive_number
+from softrobots.coordinates import rest_coordinates
 from softrobots.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.model import SoftModel
-from softrobots.robots import InflatableArm
+from softrobots.muscles import MUSCLE_INPUTS
+from softrobots.robots import Robot
+from softrobots.strain_chain import joint_positions
+from softrobots.structure import Parts
+from softrobots.urdf_tags import RobotTags, SectionTag, SpringTag, read_tags
 
 
 def load_model(
-    source: InflatableArm | Path | str,
+    source: Robot | Path | str,
     *,
     springs: Mapping[str, float | tuple[float, float]] | None = None,
     motors: Sequence[str] | None = None,
     tip: str | None = None,
+    muscles: str = "lengths",
 ) -> SoftModel:
     """Load a robot: ours, or anybody's URDF with springs said by the caller.
 
@@ -29,9 +35,10 @@ def load_model(
         source: A robot of this package, a path (`Path` or text), or URDF text (starting with `<`).
         springs: For files without springs of their own: `{joint: stiffness}` or `{joint: (stiffness, rest)}`
             [N m/rad or N/m; rad or m]. Given, it replaces the springs in the file. `{}` says that the robot is rigid.
-        motors: Names of the motor joints; movable joints that are neither motor nor spring are then locked at zero.
-            By default every movable joint without a spring is a motor.
+        motors: Names of the motor joints; movable joints that are neither motor, spring nor part of a section are then locked
+            at zero. By default every movable joint without a spring is a motor.
         tip: Name of the tip frame; by default `tip`, or the only link at the end of the tree.
+        muscles: What is given of the muscles, if the robot has any: their "lengths" [m] or the "forces" they pull with [N].
 
     Returns:
         The model.
@@ -39,10 +46,13 @@ def load_model(
     Raises:
         DescriptionError: If the file cannot be read or is no URDF, has no springs and none are given, has joints other than
             revolute, continuous and prismatic, has a spring on a fixed joint, would have a motor that mimics another joint,
-            or has no single end.
+            has a section whose joints are not the chain that its tag describes, has muscles that do not fix the shape of their
+            segment, or has no single end.
         NameNotFound: If a named joint or frame does not exist.
-        ParameterError: If a stiffness is not positive, a rest coordinate is not finite, or a joint is named twice.
+        ParameterError: If a stiffness is not positive, a rest coordinate is not finite, a joint is named twice or belongs to a
+            section, or `muscles` is none of the choices.
     """
+    choice("muscles", muscles, MUSCLE_INPUTS)
     urdf, label = _read_source(source)
     tags = read_tags(urdf, label)
     try:
@@ -50,33 +60,40 @@ def load_model(
     except (ValueError, RuntimeError) as error:
         raise DescriptionError(f"Pinocchio refuses {label}: {error} (its parser prints the reason on stderr)") from error
     movable = [name for name in model.names if name != "universe"]
-    spring_tags = _springs_said(springs, movable) if springs is not None else dict(tags.springs)
-    if springs is None and not spring_tags:
+    in_sections = {name for section in tags.sections for name in section.joints}
+    free = [name for name in movable if name not in in_sections]
+    spring_tags = _springs_said(springs, free) if springs is not None else dict(tags.springs)
+    if springs is None and not spring_tags and not tags.sections:
         raise DescriptionError(
             f"{label} has no joint springs; give springs={{joint: stiffness}} for its movable joints "
             f"({', '.join(movable) or 'none'}), or springs={{}} for a rigid robot"
         )
-    stray = [name for name in spring_tags if name not in movable]
+    stray = [name for name in (*spring_tags, *in_sections) if name not in movable]
     if stray:
-        raise DescriptionError(f"{label} has a spring on {', '.join(stray)}, which cannot move; movable: {', '.join(movable)}")
-    motor_names = _motors_said(motors, movable, spring_tags, tags)
-    coupled = [name for name in tags.mimics if name in motor_names or name in spring_tags]
+        raise DescriptionError(
+            f"{label} has a spring or a section on {', '.join(stray)}, which cannot move; movable: {', '.join(movable)}"
+        )
+    motor_names = _motors_said(motors, free, spring_tags, tags)
+    coupled = [name for name in tags.mimics if name in motor_names or name in spring_tags or name in in_sections]
     if coupled:
         raise DescriptionError(
             f"{label} has joints that mimic others ({', '.join(coupled)}); they cannot be motors or springs: name the motors, "
             "motors=[...], and the rest is locked"
         )
-    locked = [name for name in movable if name not in spring_tags and name not in motor_names]
+    locked = [name for name in free if name not in spring_tags and name not in motor_names]
     if locked:
         model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], pin.neutral(model))
     _check_joints(model, label)
-    groups = [link for link in tags.inflated_links if all(name in spring_tags for name in link.springs)]
+    for section in tags.sections:
+        _check_section(model, section, label)
+    lumped = [section for section in tags.lumped_sections if all(name in spring_tags for name in section.joints.values())]
+    if tags.muscles and len(lumped) < len(tags.lumped_sections):
+        raise DescriptionError(f"{label} has muscles along lumped sections; each joint of those needs a spring")
     return SoftModel(
         pinocchio_model=model,
         urdf=urdf,
-        springs=spring_tags,
-        motors=motor_names,
-        inflated_links=groups,
+        parts=Parts(spring_tags, motor_names, tags.sections, lumped, tags.muscles, muscles),
+        inflated_links=[link for link in tags.inflated_links if all(name in spring_tags for name in link.springs)],
         tip=_tip(model, tip, label),
     )
 
@@ -137,6 +154,26 @@ def _check_joints(model: Any, label: str) -> None:
             raise DescriptionError(f"joint {name} of {label} has the lower limit {low} above the upper one, {high}")
 
 
+def _check_section(model: Any, section: SectionTag, label: str) -> None:
+    """Refuse six joints that are not the chain of `strain_chain` with the rest shape of the section in its origins."""
+    numbers = [model.getJointId(name) for name in section.joints]
+    _, u2, chord, r1, r2, r3 = joint_positions(rest_coordinates([section]), np.array([section.length]))[0]
+    origins = [None, pin.SE3(pin.rpy.rpyToMatrix(0.0, u2, 0.0), np.zeros(3)), pin.SE3(np.eye(3), np.array([0.0, 0.0, chord]))]
+    origins += [pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.zeros(3)) for rpy in ((r1, 0.0, 0.0), (0.0, r2, 0.0), (0.0, 0.0, r3))]
+    kinds = ("RX", "RY", "PZ", "RX", "RY", "RZ")
+    for place, (number, kind, origin) in enumerate(zip(numbers, kinds, origins, strict=True)):
+        name = section.joints[place]
+        if model.joints[number].shortname() != f"JointModel{kind}":
+            told = f"a {model.joints[number].shortname()}, required: JointModel{kind}"
+        elif place > 0 and model.parents[number] != numbers[place - 1]:
+            told = f"not a child of joint {section.joints[place - 1]}"
+        elif origin is not None and not model.jointPlacements[number].isApprox(origin, 1e-9):
+            told = "not where the rest shape of the section puts it"
+        else:
+            continue
+        raise DescriptionError(f"joint {name} of section {section.name} of {label} is {told}")
+
+
 def _tip(model: Any, tip: str | None, label: str) -> str:
     bodies = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
     if tip is not None:
@@ -152,12 +189,12 @@ def _tip(model: Any, tip: str | None, label: str) -> str:
     return str(leaves[0])
 
 
-def _rebuild(urdf: str, springs: dict[str, tuple[float, float]], motors: tuple[str, ...], tip: str) -> SoftModel:
-    return load_model(urdf, springs=springs, motors=motors, tip=tip)
+def _rebuild(urdf: str, springs: dict[str, tuple[float, float]], motors: tuple[str, ...], tip: str, muscles: str) -> SoftModel:
+    return load_model(urdf, springs=springs, motors=motors, tip=tip, muscles=muscles)
 
 
 def _reduce(model: SoftModel) -> tuple[Any, ...]:
-    return _rebuild, (model.urdf, model.spring_table, model.motor_joints, model.tip)
+    return _rebuild, (model.urdf, model.spring_table, model.structure.motor_joints, model.tip, model.muscle_input)
 
 
 copyreg.pickle(SoftModel, _reduce)  # as the URDF and what was said about it; Pinocchio workspaces are not carried along

@@ -1,4 +1,4 @@
-"""The model that all statics works on: a Pinocchio model with its motors, springs and tip.
+"""The model that all statics works on: a Pinocchio model with its actuators, elastic coordinates and tip.
 
 `softrobots.loader` is the only place that builds one.
 """
@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +15,11 @@ import pinocchio as pin
 
 from softrobots import inflated_beam
 from softrobots.checks import FloatArray, finite_array, read_only
-from softrobots.description import InflatedLinkTag, SpringTag
+from softrobots.coordinates import Coordinates
 from softrobots.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.springs import LinearSprings
+from softrobots.structure import Parts, Structure
+from softrobots.urdf_tags import InflatedLinkTag, MuscleTag
 
 MAX_DOF = 300
 """Largest number of coordinates: Pinocchio's workspace needs 8 s and 1.8 GB there, 57 s and 14 GB at twice as many."""
@@ -43,61 +45,49 @@ class SpringGroup:
 
 
 class SoftModel:
-    """A robot with motors (prescribed) and springs (elastic), ready for statics.
+    """A robot with actuators (prescribed) and elastic coordinates (free), ready for statics.
+
+    Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then muscle lengths (or tensions).
+    Elastic coordinates, `q_springs`, are joint springs and what the actuators leave free of the sections of constant strain.
 
     Made by `softrobots.load_model`. Arrays are ordered base to tip. Safe to share between threads: each thread gets
     its own Pinocchio workspace. Nothing of it can be changed; do not change `pinocchio` either.
     """
 
     def __init__(
-        self,
-        *,
-        pinocchio_model: Any,
-        urdf: str,
-        springs: Mapping[str, SpringTag],
-        motors: Sequence[str],
-        inflated_links: Sequence[InflatedLinkTag],
-        tip: str,
+        self, *, pinocchio_model: Any, urdf: str, parts: Parts, inflated_links: Sequence[InflatedLinkTag], tip: str
     ) -> None:
         """Order the joints and prepare index arrays; call `load_model` instead."""
         self._pin = pinocchio_model
         self._urdf = urdf
-        by_place = sorted(springs, key=pinocchio_model.getJointId)
-        self._spring_joints = tuple(by_place)
-        self._motor_joints = tuple(sorted(motors, key=pinocchio_model.getJointId))
-        self._springs = LinearSprings(
-            read_only(np.array([springs[name].stiffness for name in by_place], dtype=np.float64)),
-            read_only(np.array([springs[name].rest for name in by_place], dtype=np.float64)),
-        )
+        self._structure = Structure(pinocchio_model, parts)
+        names, stiffness, rest, turning = self._structure.law
+        self._springs = LinearSprings(read_only(stiffness), read_only(rest))
         frames = [(frame.name, number) for number, frame in enumerate(pinocchio_model.frames)]
         bodies = [(name, number) for name, number in frames if pinocchio_model.frames[number].type == pin.FrameType.BODY]
         self._frame_ids = dict(frames) | dict(bodies)  # a link goes before a joint of the same name
         self._tip = tip
         self._groups = tuple(
-            SpringGroup(tuple(by_place.index(name) for name in link.springs), link.radius, link.pressure)
+            SpringGroup(tuple(names.index(name) for name in link.springs), link.radius, link.pressure)
             for link in inflated_links
         )
-        self._motor_v = self._indices(self._motor_joints, "idx_v")
-        self._spring_v = self._indices(self._spring_joints, "idx_v")
-        self._motor_q = self._indices(self._motor_joints, "idx_q")
-        self._spring_q = self._indices(self._spring_joints, "idx_q")
         self._circles = {
             self._pin.joints[i].idx_v: self._pin.joints[i].idx_q
             for i in range(1, self._pin.njoints)
             if self._pin.joints[i].nq == 2
         }
-        self._motor_limits = self._limits(self._motor_joints)
-        self._spring_limits = self._limits(self._spring_joints)
-        self._stiffest = float(self.stiffness.max(initial=0.0))
+        self._plain = not self._circles
+        self._q_indices = np.array([self._pin.joints[i].idx_q for i in range(1, self._pin.njoints)], dtype=np.intp)
+        self._stiffest = float((stiffness[turning] if turning.any() else stiffness).max(initial=0.0))
         self._rounding = 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(self.stiffness * self.rest))
         self._reach = self._chain_length()
-        self._identity = (urdf, tuple(self.spring_table.items()), self._motor_joints, tip)
+        self._identity = (urdf, tuple(self.spring_table.items()), self.motor_joints, tip, parts.muscle_input)
         self._local = threading.local()
 
     def __repr__(self) -> str:
         """Name, motors, springs and tip in one line."""
         return (
-            f"SoftModel({self._pin.name!r}, motors={list(self._motor_joints)}, springs={list(self._spring_joints)}, "
+            f"SoftModel({self._pin.name!r}, motors={list(self.motor_joints)}, springs={list(self.spring_joints)}, "
             f"tip={self._tip!r})"
         )
 
@@ -120,14 +110,38 @@ class SoftModel:
         return self._urdf
 
     @property
+    def structure(self) -> Structure:
+        """The parts that the robot is put together from."""
+        return self._structure
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The map from actuators and elastic coordinates to joint positions."""
+        return self._structure.coordinates
+
+    @property
     def motor_joints(self) -> tuple[str, ...]:
-        """Names of the motor joints."""
-        return self._motor_joints
+        """Names of the actuators: motor joints, then muscles."""
+        return (*self._structure.motor_joints, *(muscle.name for muscle in self._structure.muscles))
+
+    @property
+    def muscles(self) -> tuple[MuscleTag, ...]:
+        """The muscles; the last actuators."""
+        return self._structure.muscles
+
+    @property
+    def muscle_input(self) -> str:
+        """What `q_motors` holds of the muscles: "lengths" or "forces"."""
+        return self._structure.parts.muscle_input
 
     @property
     def spring_joints(self) -> tuple[str, ...]:
-        """Names of the spring joints."""
-        return self._spring_joints
+        """Names of the elastic coordinates: spring joints by their names, then what is free of sections.
+
+        `section_<segment>_<i>_bend_x` is a section coordinate; `segment_<i>_bend_x_mode_<j>` a difference between the sections
+        of a segment whose muscle lengths are given.
+        """
+        return self._structure.law.names
 
     @property
     def springs(self) -> LinearSprings:
@@ -136,12 +150,12 @@ class SoftModel:
 
     @property
     def stiffness(self) -> FloatArray:
-        """Stiffness of the springs, shape (n_springs,) [N m/rad or N/m], read-only."""
+        """Stiffness of the elastic coordinates, shape (n_springs,) [N m/rad or N/m], read-only."""
         return self._springs.stiffness
 
     @property
     def stiffest(self) -> float:
-        """Largest spring stiffness [N m/rad or N/m], the scale of the tangent stiffness; 0 without springs."""
+        """Largest stiffness of an elastic angle [N m/rad] (of a distance [N/m] if there are only those); 0 without springs."""
         return self._stiffest
 
     @property
@@ -151,14 +165,14 @@ class SoftModel:
 
     @property
     def rest(self) -> FloatArray:
-        """Relaxed spring coordinates, shape (n_springs,) [rad or m], read-only."""
+        """Relaxed elastic coordinates, shape (n_springs,) [rad or m], read-only."""
         return self._springs.rest
 
     @property
     def spring_table(self) -> dict[str, tuple[float, float]]:
-        """Stiffness and rest coordinate by joint name, in the form that `load_model(springs=...)` takes."""
-        rows = zip(self._spring_joints, self.stiffness.tolist(), self.rest.tolist(), strict=True)
-        return {name: (stiffness, rest) for name, stiffness, rest in rows}
+        """Stiffness and rest coordinate by name of spring joint, in the form that `load_model(springs=...)` takes."""
+        tags = self._structure.parts.springs
+        return {name: (tags[name].stiffness, tags[name].rest) for name in self._structure.spring_joints}
 
     @property
     def spring_groups(self) -> tuple[SpringGroup, ...]:
@@ -177,65 +191,117 @@ class SoftModel:
 
     @property
     def n_motors(self) -> int:
-        """Number of motors."""
-        return len(self._motor_joints)
+        """Number of actuators: motor joints and muscles."""
+        return len(self._structure.motor_joints) + len(self._structure.muscles)
 
     @property
     def n_springs(self) -> int:
-        """Number of springs."""
-        return len(self._spring_joints)
+        """Number of elastic coordinates."""
+        return len(self._structure.law.names)
 
     @property
     def motor_limits(self) -> FloatArray:
-        """Lower and upper limit of each motor, shape (n_motors, 2) [rad or m], read-only; infinite for continuous joints."""
-        return self._motor_limits
+        """Lower and upper limit of each actuator, shape (n_motors, 2) [rad, m or N], read-only; infinite if continuous."""
+        return self._structure.motor_limits
+
+    @property
+    def motor_scale(self) -> FloatArray:
+        """Change of each actuator that moves the robot about as much as a radian, shape (n_motors,), read-only."""
+        return self._structure.motor_scale
+
+    @property
+    def relaxed_motors(self) -> FloatArray:
+        """Motor joints at zero, muscles at their rest lengths or without tension, shape (n_motors,) [rad, m or N].
+
+        Or as near to that as the limits allow.
+        """
+        muscles = self._structure.muscle_rest if self.muscle_input == "lengths" else np.zeros(len(self.muscles))
+        relaxed = np.concatenate([np.zeros(len(self._structure.motor_joints)), muscles])
+        return np.asarray(np.clip(relaxed, *self.motor_limits.T))
 
     @property
     def spring_limits(self) -> FloatArray:
-        """Lower and upper limit of each spring, shape (n_springs, 2) [rad or m], read-only."""
-        return self._spring_limits
+        """Lower and upper limit of each spring joint, shape (n, 2) [rad or m], read-only; sections have none of their own."""
+        return self._structure.joint_limits(self._structure.spring_joints)
 
     @property
     def motor_indices(self) -> Any:
-        """Places of the motors in Pinocchio's velocity vector, shape (n_motors,)."""
-        return self._motor_v
+        """Places of the motor joints in Pinocchio's velocity vector."""
+        return self._structure.motor_indices
 
     @property
     def spring_indices(self) -> Any:
-        """Places of the springs in Pinocchio's velocity vector, shape (n_springs,)."""
-        return self._spring_v
+        """Places of the spring joints in Pinocchio's velocity vector."""
+        return self._structure.spring_indices
 
     @property
     def turning_motors(self) -> Any:
-        """Which motors turn rather than slide, shape (n_motors,), truth values."""
-        joints = [self._pin.joints[self._pin.getJointId(name)] for name in self._motor_joints]
-        return np.array([joint.shortname().startswith("JointModelR") for joint in joints], dtype=bool)
+        """Which actuators turn rather than slide or pull, shape (n_motors,), truth values."""
+        joints = [self._pin.joints[self._pin.getJointId(name)] for name in self._structure.motor_joints]
+        turning = [joint.shortname().startswith("JointModelR") for joint in joints]
+        return np.array(turning + [False] * len(self.muscles), dtype=bool)
 
-    def configuration(self, q_motors: Any, q_springs: Any | None = None) -> FloatArray:
-        """Pinocchio's configuration vector from motor and spring coordinates.
+    def checked_motors(self, q_motors: Any, field: str = "q_motors") -> FloatArray:
+        """Return actuator coordinates that the robot can take, as a new array.
 
         Args:
-            q_motors: Motor coordinates, shape (n_motors,) [rad or m].
-            q_springs: Spring coordinates, shape (n_springs,) [rad or m]; relaxed by default.
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+            field: Name of the parameter, for the error.
+
+        Raises:
+            ParameterError: If the shape differs, a number is not finite, or no shape of the robot has such muscle lengths.
+        """
+        motors = finite_array(field, q_motors, (self.n_motors,), self._motor_unit())
+        if self._structure.held is not None:
+            self._structure.held.check(field, motors)
+        return motors
+
+    @property
+    def independent_motors(self) -> bool:
+        """Whether each actuator can be set by itself; more than three muscles along a segment must fit together."""
+        return bool(self.motor_basis.shape[0] == self.motor_basis.shape[1])
+
+    @property
+    def motor_basis(self) -> FloatArray:
+        """Independent changes of the actuators, shape (n_motors, n), each about a radian's worth of motion, read-only."""
+        return self._structure.motor_basis
+
+    def admits(self, motors: FloatArray) -> bool:
+        """Whether some shape of the robot has these actuator coordinates, shape (n_motors,), as in `checked_motors`."""
+        return self._structure.held is None or self._structure.held.refusal(motors) is None
+
+    def consistent_motors(self, motors: FloatArray) -> FloatArray:
+        """Nearest actuator coordinates whose muscle lengths fit together, shape (n_motors,)."""
+        return motors if self._structure.held is None else self._structure.held.consistent(motors)
+
+    def configuration(self, q_motors: Any, q_springs: Any | None = None) -> FloatArray:
+        """Pinocchio's configuration vector from actuator and elastic coordinates.
+
+        Args:
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+            q_springs: Elastic coordinates, shape (n_springs,) [rad or m]; relaxed by default.
 
         Returns:
             Configuration, shape (nq,); a continuous joint takes its cosine and sine.
 
         Raises:
-            ParameterError: If a shape differs or a number is not finite.
+            ParameterError: If a shape differs, a number is not finite, or a section is bent or twisted beyond its range.
         """
-        motors = finite_array("q_motors", q_motors, (self.n_motors,), "rad")
+        motors = self.checked_motors(q_motors)
         springs = self.rest if q_springs is None else finite_array("q_springs", q_springs, (self.n_springs,), "rad")
-        return self.assemble(motors, springs)
+        point = self.coordinates.at(motors, springs)
+        if not point.valid:
+            raise ParameterError("q_springs", springs, "within the range of every section (see strain_chain.in_range)")
+        return self.embed(point.joints)
 
-    def assemble(self, q_motors: FloatArray, q_springs: FloatArray) -> FloatArray:
-        """`configuration` without checks, for arrays that are known to be right."""
-        q = np.zeros(self._pin.nq)
-        q[self._motor_q] = q_motors
-        q[self._spring_q] = q_springs
-        for index_q in self._circles.values():
-            angle = q[index_q]
-            q[index_q], q[index_q + 1] = np.cos(angle), np.sin(angle)
+    def embed(self, joints: FloatArray) -> FloatArray:
+        """Pinocchio's configuration, shape (nq,), of joint positions in the order of its velocities, shape (nv,)."""
+        if self._plain:
+            return joints
+        q: FloatArray = np.zeros(self._pin.nq)
+        q[self._q_indices] = joints
+        for index_v, index_q in self._circles.items():
+            q[index_q], q[index_q + 1] = np.cos(joints[index_v]), np.sin(joints[index_v])
         return q
 
     def frame_id(self, name: str) -> int:
@@ -285,31 +351,21 @@ class SoftModel:
             pair = pairs[gravity] = (model, model.createData())
         return pair
 
-    def _indices(self, names: Sequence[str], attribute: str) -> Any:
-        joints = [self._pin.joints[self._pin.getJointId(name)] for name in names]
-        indices = np.array([getattr(joint, attribute) for joint in joints], dtype=np.intp)
-        indices.setflags(write=False)
-        return indices
-
-    def _limits(self, names: Sequence[str]) -> FloatArray:
-        limits = np.zeros((len(names), 2))
-        for row, name in enumerate(names):
-            joint = self._pin.joints[self._pin.getJointId(name)]
-            limits[row] = (
-                (-np.inf, np.inf)
-                if joint.nq == 2
-                else (self._pin.lowerPositionLimit[joint.idx_q], self._pin.upperPositionLimit[joint.idx_q])
-            )
-        return read_only(limits)
+    def _motor_unit(self) -> str:
+        if not self.muscles:
+            return "rad"
+        return "m" if self.muscle_input == "lengths" else "N"
 
     def _chain_length(self) -> float:
+        sections = self._structure.sections
+        strained = set() if sections is None else set(sections.joint_indices.ravel().tolist())
         frame = self._pin.frames[self.frame_id(self._tip)]
         length = float(np.linalg.norm(frame.placement.translation))
         joint = frame.parentJoint
         while joint > 0:
             length += float(np.linalg.norm(self._pin.jointPlacements[joint].translation))
             kind = self._pin.joints[joint]
-            if kind.shortname().startswith("JointModelP"):
+            if kind.shortname().startswith("JointModelP") and kind.idx_v not in strained:
                 length += float(self._pin.upperPositionLimit[kind.idx_q] - self._pin.lowerPositionLimit[kind.idx_q])
             joint = self._pin.parents[joint]
         return max(length, 1e-6)

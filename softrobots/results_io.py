@@ -26,6 +26,7 @@ from softrobots.load_estimation import LoadEstimate, estimate_at
 from softrobots.loader import load_model
 from softrobots.loads import Load
 from softrobots.model import SoftModel
+from softrobots.tip_search import Goal
 from softrobots.trajectory import Trajectory
 
 Result = Equilibrium | IkSolution | LoadEstimate | Trajectory
@@ -136,7 +137,12 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
 
 def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
     wrenches = {name: wrench.tolist() for name, wrench in load.wrenches.items()}
-    said = {"springs": model.spring_table, "motors": model.motor_joints, "tip": model.tip}
+    said = {
+        "springs": model.spring_table,
+        "motors": model.structure.motor_joints,
+        "tip": model.tip,
+        "muscles": model.muscle_input,
+    }
     return {
         "urdf": np.array(model.urdf),
         "model": np.array(json.dumps(said)),
@@ -147,7 +153,9 @@ def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
 def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
     said, loaded = json.loads(str(fields["model"])), json.loads(str(fields["load"]))
     springs = {str(name): (float(k), float(rest)) for name, (k, rest) in said["springs"].items()}
-    model = load_model(str(fields["urdf"]), springs=springs, motors=said["motors"], tip=said["tip"])
+    model = load_model(
+        str(fields["urdf"]), springs=springs, motors=said["motors"], tip=said["tip"], muscles=said.get("muscles", "lengths")
+    )
     return model, Load.of(model, wrench=loaded["wrenches"], gravity=loaded["gravity"])
 
 
@@ -168,17 +176,18 @@ def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
     count = len(fields["q_motors"])
     if count == 0 or any(len(fields[name]) != count for name in ("q_springs", "residual", "tolerance", "iterations", "solver")):
         raise FileFormatError("its arrays must have one row for each of at least one configuration")
-    motors = finite_array("q_motors", fields["q_motors"], (count, model.n_motors), "rad")
+    motors = finite_array("q_motors", fields["q_motors"], (count, model.n_motors))
     springs = finite_array("q_springs", fields["q_springs"], (count, model.n_springs), "rad")
     residual, tolerance = (finite_array(name, fields[name], (count,), "N m") for name in ("residual", "tolerance"))
     equilibria = []
     for row in range(count):
+        model.checked_motors(motors[row])
         state = elastic_state(model, motors[row], springs[row], load)
         made = equilibrium_from_state(
             model, motors[row], load, state, method=str(fields["solver"][row]), iterations=int(fields["iterations"][row])
         )
         # Rounding differs between machines; a coordinate that was shifted by 1e-9 rad shows up above this.
-        if made.residual > 1.001 * residual[row] + largest_residual(model, state.joints, 1e-12):
+        if made.residual > 1.001 * residual[row] + largest_residual(model, state.scale, 1e-12):
             raise FileFormatError(
                 f"its row {row} claims a residual of {residual[row]:.3g} N m, but it is {made.residual:.3g} N m"
             )
@@ -189,6 +198,7 @@ def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
 def _pack_solution(solution: IkSolution) -> dict[str, Any]:
     return _pack_rows((solution.equilibrium,)) | {
         "target": solution.target,
+        **({} if solution.orientation is None else {"orientation": solution.orientation}),
         "steps": np.array(solution.iterations),
         "alternatives": np.array(solution.alternatives).reshape(-1, len(solution.q_motors)),
     }
@@ -198,10 +208,14 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
     (equilibrium,) = _unpack_rows(fields)
     target = finite_array("target", fields["target"], (3,), "m")
     others = finite_array("alternatives", fields["alternatives"], (None, equilibrium.model.n_motors), "rad")
+    orientation = read_only(finite_array("orientation", fields["orientation"], None)) if "orientation" in fields else None
+    translation, turn = Goal(target, orientation).missing(equilibrium.model, equilibrium.q)
     return IkSolution(
         target=read_only(target),
+        orientation=orientation,
         equilibrium=equilibrium,
-        error=float(np.linalg.norm(equilibrium.tip_position - target)),
+        error=float(np.linalg.norm(translation)),
+        orientation_error=float(np.linalg.norm(turn)),
         iterations=int(fields["steps"]),
         alternatives=tuple(map(read_only, others)),
     )

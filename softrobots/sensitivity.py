@@ -8,7 +8,6 @@ from softrobots.checks import FloatArray
 from softrobots.equilibrium import Equilibrium, check_same_model
 from softrobots.errors import NeutralEquilibrium
 from softrobots.kinematics import frame_jacobian
-from softrobots.loads import GeneralisedLoad
 from softrobots.model import SoftModel
 
 
@@ -29,8 +28,8 @@ def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatAr
         NeutralEquilibrium: If its tangent stiffness is singular.
     """
     check_same_model(model, equilibrium)
-    jacobian = frame_jacobian(model, equilibrium.q, model.tip)[:3]
-    return tip_motion(model, jacobian, equilibrium.tangent_stiffness, equilibrium.joint_derivative)[0]
+    motors, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
+    return tip_motion(motors[:3], springs[:3], equilibrium.tangent_stiffness, equilibrium.coupling)[0]
 
 
 def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
@@ -51,20 +50,35 @@ def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
         NeutralEquilibrium: If its tangent stiffness is singular.
     """
     check_same_model(model, equilibrium)
-    springs = frame_jacobian(model, equilibrium.q, model.tip)[:, model.spring_indices]
+    _, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
     return np.asarray(springs @ _solve(equilibrium.tangent_stiffness, springs.T))
 
 
+def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Geometric Jacobian of the tip per actuator and per elastic coordinate, the other held, linear rows first.
+
+    Args:
+        model: The robot.
+        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+        q_springs: Elastic coordinates, shape (n_springs,) [rad or m].
+
+    Returns:
+        Shapes (6, n_motors) and (6, n_springs), world axes.
+    """
+    point = model.coordinates.at(q_motors, q_springs)
+    return point.columns(frame_jacobian(model, model.embed(point.joints), model.tip))
+
+
 def tip_motion(
-    model: SoftModel, jacobian: FloatArray, tangent: FloatArray, derivative: FloatArray
+    motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """How tip and springs follow the motors at constant load, from matrices at an equilibrium.
 
     Args:
-        model: The robot.
-        jacobian: Rows of the tip Jacobian, shape (m, nv).
+        motors: Rows of the tip Jacobian, columns per actuator, shape (m, n_motors).
+        springs: The same rows, columns per elastic coordinate, shape (m, n_springs).
         tangent: Tangent stiffness, shape (n_springs, n_springs).
-        derivative: Derivative of the generalised load, shape (nv, nv).
+        coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
 
     Returns:
         `dx/dq_m`, shape (m, n_motors), and `dy/dq_m`, shape (n_springs, n_motors).
@@ -72,23 +86,22 @@ def tip_motion(
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.
     """
-    motors, springs = model.motor_indices, model.spring_indices
-    follow = _solve(tangent, derivative[springs[:, None], motors])
-    return jacobian[:, motors] + jacobian[:, springs] @ follow, follow
+    follow = _solve(tangent, coupling)
+    return motors + springs @ follow, follow
 
 
-def motor_torque_slope(model: SoftModel, jacobian: FloatArray, tangent: FloatArray, joints: GeneralisedLoad) -> FloatArray:
-    r"""Derivative of the motor torques with respect to a tip force, springs following.
+def motor_torque_slope(motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray) -> FloatArray:
+    r"""Derivative of the actuator loads with respect to a tip force, springs following.
 
     .. math:: d\tau_m/df = J_m^T + d(J_m^T w - g_m)/dy \, K_t^{-1} J_k^T
 
-    The transpose of the elastostatic Jacobian when the load has a potential.
+    The transpose of the elastostatic Jacobian: the load must have a potential.
 
     Args:
-        model: The robot.
-        jacobian: Linear rows of the tip Jacobian, shape (3, nv).
+        motors: Linear rows of the tip Jacobian, columns per actuator, shape (3, n_motors).
+        springs: The same rows, columns per elastic coordinate, shape (3, n_springs).
         tangent: Tangent stiffness, shape (n_springs, n_springs).
-        joints: The load in joint coordinates.
+        coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
 
     Returns:
         Shape (n_motors, 3) [m].
@@ -96,9 +109,7 @@ def motor_torque_slope(model: SoftModel, jacobian: FloatArray, tangent: FloatArr
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.
     """
-    motors, springs = model.motor_indices, model.spring_indices
-    follow = _solve(tangent, jacobian[:, springs].T)
-    return np.asarray(jacobian[:, motors].T + joints.derivative[motors[:, None], springs] @ follow)
+    return np.asarray(motors.T + coupling.T @ _solve(tangent, springs.T))
 
 
 def _solve(tangent: FloatArray, right: FloatArray) -> FloatArray:

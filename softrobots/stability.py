@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.checks import FloatArray, finite_array, positive_number
-from softrobots.elastostatics import ElasticState, newton, settled
+from softrobots.elastostatics import ElasticState, newton, scaled, settled
 from softrobots.errors import NoCriticalLoad, ParameterError
 from softrobots.kinematics import frame_jacobian
 from softrobots.loads import Load
@@ -20,7 +20,7 @@ _TOLERANCE = 1e-12
 _SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
 _LARGEST_MOVE = 0.1  # [rad] of a spring between two points of the path
 _NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the one at zero force, may vanish in the next step
-_STIFF = 1e-9  # eigenvalues above this, relative to the stiffest spring, count for the prediction
+_STIFF = 1e-9  # eigenvalues above this, relative to the springs' own stiffness, count for the prediction
 
 
 def critical_load(
@@ -56,7 +56,7 @@ def critical_load(
             as it could be followed.
     """
     check_model(model)
-    motors = finite_array("q_motors", q_motors, (model.n_motors,), "rad")
+    motors = model.checked_motors(q_motors)
     unit = finite_array("direction", direction, (3,))
     length = float(np.linalg.norm(unit))
     if length == 0.0:
@@ -110,15 +110,17 @@ class _Point(NamedTuple):
     force: float
     state: ElasticState
     softest: float
-    """Smallest eigenvalue of the tangent stiffness."""
+    """Smallest eigenvalue of the tangent stiffness, relative to the springs' own stiffness."""
     slope: FloatArray
     """Derivative of the springs with respect to the force."""
 
 
 def _point(model: SoftModel, state: ElasticState, force: float, push: FloatArray, frame: str) -> _Point:
-    pull = push @ frame_jacobian(model, state.q, frame)[:, model.spring_indices]
-    values, vectors = np.linalg.eigh(state.tangent)
-    slope = vectors @ ((vectors.T @ pull) / np.where(np.abs(values) > _STIFF * model.stiffest, values, np.inf))
+    _, springs = state.point.columns(frame_jacobian(model, state.q, frame))
+    softness = 1.0 / np.sqrt(model.stiffness)
+    values, vectors = np.linalg.eigh(scaled(state.tangent, model.stiffness))
+    pull = vectors.T @ (softness * (push @ springs))
+    slope = softness * (vectors @ (pull / np.where(np.abs(values) > _STIFF, values, np.inf)))
     return _Point(force, state, float(values[0]), slope)
 
 

@@ -16,11 +16,12 @@ from softrobots.checks import FloatArray, choice, finite_array, increasing, posi
 from softrobots.elastostatics import TOLERANCE, elastic_state, largest_residual, settle
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import EquilibriumNotFound, NeutralEquilibrium, ParameterError, TargetUnreachable
-from softrobots.inverse_kinematics import POSITION_TOLERANCE, IkSolution, LocalSolution, search, solve_ik, start_motors
+from softrobots.inverse_kinematics import IkSolution, solve_ik, start_motors
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
 from softrobots.sensitivity import tip_motion
+from softrobots.tip_search import POSITION_TOLERANCE, Goal, LocalSolution, search, within_limits
 
 METHODS = ("newton", "fixed_point", "paper")
 """How `follow_trajectory` follows: exact steps with the springs settled by Newton or by the paper's recursion, or the paper's
@@ -212,7 +213,7 @@ def _exact_steps(
     model: SoftModel, points: FloatArray, load: Load, first: Equilibrium, method: str, tolerance: float, allow_jumps: bool
 ) -> Iterable[Equilibrium]:
     state = elastic_state(model, first.q_motors, first.q_springs, load)
-    here = LocalSolution(first.q_motors, state, 0.0, 0, 0)
+    here = LocalSolution(first.q_motors, state, 0.0, 0.0, 0, 0)
     for number, (last, target) in enumerate(pairwise(points), start=2):
         reached = _advance(model, last, target, load, here, method, tolerance, _HALVINGS)
         if reached is None:
@@ -223,7 +224,7 @@ def _exact_steps(
                 raise TargetUnreachable(
                     f"waypoint {number} of {len(points)}: no continuous motion leads there from the last one; the nearest "
                     f"solution is a jump of the motors by {apart.round(4).tolist()} rad (allow_jumps=True takes it)",
-                    best=IkSolution(target, solution, reached.error, reached.iterations, ()),
+                    best=IkSolution(target, None, solution, reached.error, 0.0, reached.iterations, ()),
                     residual=reached.error,
                     iterations=reached.iterations,
                 )
@@ -242,25 +243,39 @@ def _advance(
     halvings: int,
 ) -> LocalSolution | None:
     """Go from one waypoint to the next by its linear prediction and a search, over waypoints between if need be."""
-    jacobian = frame_jacobian(model, here.state.q, model.tip)[:3]
+    by_motors, by_springs = here.state.point.columns(frame_jacobian(model, here.state.q, model.tip)[:3])
     try:
-        slope, follow = tip_motion(model, jacobian, here.state.tangent, here.state.joints.derivative)
+        slope, follow = tip_motion(by_motors, by_springs, here.state.tangent, here.state.load.coupling)
     except NeutralEquilibrium:  # about to buckle: no linear prediction leads on
         return None
-    step = np.linalg.pinv(slope, rcond=1e-6) @ (target - frame_placement(model, here.state.q, model.tip).translation)
+    basis, missing = model.motor_basis, target - frame_placement(model, here.state.q, model.tip).translation
+    step = np.linalg.pinv(slope @ basis, rcond=1e-6) @ missing
     if float(np.linalg.norm(step)) <= 0.5:
-        motors = np.clip(here.q_motors + step, *model.motor_limits.T)
+        motors = within_limits(model, here.q_motors, basis @ step)
         springs = here.state.q_springs + follow @ (motors - here.q_motors)
         found = search(
-            model, target, load, motors, springs, home=here.q_motors, method=method, tolerance=tolerance, damping=_WARM_DAMPING
+            model,
+            Goal(target),
+            load,
+            motors,
+            springs,
+            home=here.q_motors,
+            method=method,
+            tolerance=tolerance,
+            damping=_WARM_DAMPING,
         )
-        if found is not None and found.error <= tolerance and float(np.abs(found.q_motors - here.q_motors).max()) <= 1.0:
+        if found is not None and found.error <= tolerance and _apart(model, found.q_motors, here.q_motors) <= 1.0:
             return found
     if halvings == 0:
         return None
     middle = 0.5 * (last + target)
     half = _advance(model, last, middle, load, here, method, tolerance, halvings - 1)
     return None if half is None else _advance(model, middle, target, load, half, method, tolerance, halvings - 1)
+
+
+def _apart(model: SoftModel, one: FloatArray, other: FloatArray) -> float:
+    """Largest change of an actuator over its scale [rad]."""
+    return float(np.abs((one - other) / model.motor_scale).max())
 
 
 def _jump(
@@ -288,7 +303,7 @@ def _jump(
         raise _named(error, number, total) from error
     solution = found.equilibrium
     state = elastic_state(model, solution.q_motors, solution.q_springs, load)
-    return LocalSolution(solution.q_motors, state, found.error, found.iterations, 0)
+    return LocalSolution(solution.q_motors, state, found.error, 0.0, found.iterations, 0)
 
 
 def _paper_steps(
@@ -304,12 +319,14 @@ def _paper_steps(
         for part in range(parts):
             wanted = points[number - 1] + (part / parts) * (points[number] - points[number - 1])
             error = wanted - frame_placement(model, q, model.tip).translation
-            inverse = np.linalg.pinv(frame_jacobian(model, q, model.tip)[:3])
-            motors = motors + interval / parts * (inverse[model.motor_indices] @ (velocity + gain * error))
+            point = model.coordinates.at(motors, springs)
+            by_motors, by_springs = point.columns(frame_jacobian(model, q, model.tip)[:3])
+            inverse = np.linalg.pinv(np.concatenate([by_motors, by_springs], axis=1))
+            motors = motors + interval / parts * (inverse[: model.n_motors] @ (velocity + gain * error))
             motors = np.clip(motors, *model.motor_limits.T)
             state, used = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
             spent += used
-            if state.error > largest_residual(model, state.joints, TOLERANCE):
+            if state.error > largest_residual(model, state.scale, TOLERANCE):
                 best = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
                 raise EquilibriumNotFound(
                     f"waypoint {number + 1} of {len(points)}: the fixed point of method='paper' does not converge in {used} "

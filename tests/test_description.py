@@ -16,8 +16,9 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.description import NAMESPACE, declared_arguments, expand, parse_xml, read_tags
+from softrobots.description import declared_arguments, expand, parse_xml
 from softrobots.paths import urdf_folder, xacro_folder
+from softrobots.urdf_tags import NAMESPACE, read_tags
 from tests.oracles import tube_points
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO

@@ -196,7 +196,7 @@ def test_mimic_joints_are_locked_or_refused() -> None:
 
 def test_a_spring_on_a_fixed_joint_is_refused(arm: sr.SoftModel) -> None:
     text = arm.urdf.replace('name="spring_2_up" type="revolute"', 'name="spring_2_up" type="fixed"')
-    with pytest.raises(sr.DescriptionError, match="spring on spring_2_up, which cannot move"):
+    with pytest.raises(sr.DescriptionError, match="spring or a section on spring_2_up, which cannot move"):
         sr.load_model(text)
 
 

@@ -1,7 +1,4 @@
-"""The robots: frozen, checked parameters that become xacro arguments and URDF text.
-
-A robot is a dataclass here, a xacro file, and a line in `ROBOTS`.
-"""
+"""The inflatable arm of [Troise 2021]: its parameters, checked, as xacro arguments and URDF text."""
 
 from __future__ import annotations
 
@@ -9,19 +6,12 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, ClassVar
 
-import numpy as np
-
 from softrobots import inflated_beam
-from softrobots.checks import finite_array, finite_number
-from softrobots.description import expand
+from softrobots.checks import finite_number
 from softrobots.errors import ParameterError
-from softrobots.paths import xacro_folder
-
-PerLink = float | Sequence[float]
-"""One number for all links, or one for each, base to tip."""
+from softrobots.robots.parameters import PerPart, argument_text, at_least, colours, expanded, numbers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,27 +26,27 @@ class InflatableArm:
 
     link_lengths: Sequence[float] = (0.6, 0.6)
     """Lengths of the links, base to tip; their number is the number of links [m]. Troise 2021, section 3."""
-    hinge_offset: PerLink = 0.03
+    hinge_offset: PerPart = 0.03
     """Distance of the two springs of a link from its motor, `l1` [m], below the length. Troise 2021, section 4."""
-    radius: PerLink = 0.055
+    radius: PerPart = 0.055
     """Radius of a link [m]. Troise 2021, section 3."""
-    wall_thickness: PerLink = 0.0005
+    wall_thickness: PerPart = 0.0005
     """Wall thickness of a link [m]. Troise 2021, section 3."""
-    stiffness: PerLink = inflated_beam.MEAN_STIFFNESS
+    stiffness: PerPart = inflated_beam.MEAN_STIFFNESS
     """Stiffness of each of the two springs of a link [N m/rad]. Troise 2021, section 4."""
-    rest_side: PerLink = 0.0
+    rest_side: PerPart = 0.0
     """Angle at which the sideways spring is relaxed [rad], within +-pi/2."""
-    rest_up: PerLink = 0.0
+    rest_up: PerPart = 0.0
     """Angle at which the upward spring is relaxed [rad], within +-pi/2."""
-    pressure: PerLink = 50e3
+    pressure: PerPart = 50e3
     """Gauge pressure in a link; sets the wrinkling moment [Pa]. Troise 2021, section 4."""
-    density: PerLink = 1300.0
+    density: PerPart = 1300.0
     """Density of the wall [kg/m^3]. Assumed (PVC-coated fabric)."""
-    cap_mass: PerLink = 0.1
+    cap_mass: PerPart = 0.1
     """Mass of one end cap; a link has two [kg]. Assumed."""
     rgba: Sequence[float] | Sequence[Sequence[float]] = (0.95, 0.62, 0.22, 1.0)
     """Colour: red, green, blue, opacity in [0, 1]; one for all links or one for each."""
-    spring_damping: PerLink = 1.0
+    spring_damping: PerPart = 1.0
     """Damping of each spring joint, for simulators only [N m s/rad]. Assumed."""
     motor_limit: float = math.pi
     """Motors turn between minus and plus this angle [rad]. Assumed."""
@@ -72,18 +62,18 @@ class InflatableArm:
 
     def __post_init__(self) -> None:
         """Check every field and spread single numbers over the links."""
-        lengths = _numbers("link_lengths", self.link_lengths, None, "m")
+        lengths = numbers("link_lengths", self.link_lengths, None, "m")
         if not lengths:
             raise ParameterError("link_lengths", self.link_lengths, "at least one link length [m]")
         object.__setattr__(self, "link_lengths", lengths)
         for name, (unit, low, strict) in _PER_LINK.items():
-            values = _numbers(name, getattr(self, name), len(lengths), unit)
-            _at_least(name, values, low, strict, unit)
+            values = numbers(name, getattr(self, name), len(lengths), unit)
+            at_least(name, values, low, strict, unit)
             object.__setattr__(self, name, values)
-        _at_least("link_lengths", lengths, 0.0, True, "m")
+        at_least("link_lengths", lengths, 0.0, True, "m")
         for name, (unit, low) in _SINGLE.items():
             value = finite_number(name, getattr(self, name), unit)
-            _at_least(name, (value,), low, True, unit)
+            at_least(name, (value,), low, True, unit)
             object.__setattr__(self, name, value)
         for offset, length in zip(self._each("hinge_offset"), lengths, strict=True):
             if offset >= length:
@@ -94,7 +84,7 @@ class InflatableArm:
         for name in ("rest_side", "rest_up"):
             if max(map(abs, self._each(name))) > math.pi / 2:
                 raise ParameterError(name, getattr(self, name), "within the spring limits +-pi/2 rad")
-        object.__setattr__(self, "rgba", _colours(self.rgba, len(lengths)))
+        object.__setattr__(self, "rgba", colours(self.rgba, len(lengths)))
 
     @property
     def n_links(self) -> int:
@@ -134,9 +124,9 @@ class InflatableArm:
 
     def xacro_arguments(self) -> dict[str, str]:
         """Return the parameters as arguments of the xacro file: text by name, full precision."""
-        arguments = {field.name: _text(getattr(self, field.name)) for field in dataclasses.fields(self)}
-        colours = [" ".join(map(repr, colour)) for colour in self._each("rgba")]
-        return arguments | {"rgba": ",".join(colours)}
+        arguments = {field.name: argument_text(getattr(self, field.name)) for field in dataclasses.fields(self)}
+        shades = [" ".join(map(repr, colour)) for colour in self._each("rgba")]
+        return arguments | {"rgba": ",".join(shades)}
 
     def urdf(self) -> str:
         """Return the robot as URDF text, with its springs inside.
@@ -144,7 +134,7 @@ class InflatableArm:
         Raises:
             DescriptionError: If xacro refuses the parameters, e.g. a link too light to cut its hinge from.
         """
-        return _expanded(self.XACRO, tuple(self.xacro_arguments().items()))
+        return expanded(self.XACRO, tuple(self.xacro_arguments().items()))
 
     def _one_pressure(self) -> float:
         pressures = self._each("pressure")
@@ -156,9 +146,6 @@ class InflatableArm:
         values: tuple[Any, ...] = getattr(self, name)
         return values
 
-
-ROBOTS = {"inflatable_arm": InflatableArm}
-"""Every robot by the name of its description."""
 
 _PER_LINK: dict[str, tuple[str, float, bool]] = {
     # name: (unit, lowest value, is the lowest value itself refused)
@@ -181,41 +168,3 @@ _SINGLE: dict[str, tuple[str, float]] = {
     "motor_velocity": ("rad/s", 0.0),
     "base_mass": ("kg", 1e-6),
 }
-
-
-@lru_cache(maxsize=64)
-def _expanded(xacro_name: str, arguments: tuple[tuple[str, str], ...]) -> str:
-    return expand(xacro_folder() / xacro_name, dict(arguments))
-
-
-def _numbers(name: str, value: Any, count: int | None, unit: str) -> tuple[float, ...]:
-    """Return `value` as a tuple of `count` floats, a single number repeated."""
-    if isinstance(value, str | bytes):
-        raise ParameterError(name, value, f"a number or a list of numbers [{unit}]")
-    if count is not None and not isinstance(value, Sequence) and getattr(value, "ndim", 0) == 0:
-        return (finite_number(name, value, unit),) * count
-    values = tuple(finite_array(name, value, (None,), unit).tolist())
-    if count is not None and len(values) != count:
-        raise ParameterError(name, value, f"one number, or one for each of the {count} links [{unit}]")
-    return values
-
-
-def _at_least(name: str, values: tuple[float, ...], low: float, strict: bool, unit: str) -> None:
-    if min(values) < low or (strict and min(values) == low):
-        raise ParameterError(name, values, f"{'above' if strict else 'at least'} {low} [{unit}]")
-
-
-def _colours(value: Any, count: int) -> tuple[tuple[float, ...], ...]:
-    requirement = f"red, green, blue, opacity in [0, 1]: one colour, or one for each of the {count} links"
-    try:
-        single = np.ndim(value) == 1
-        checked = finite_array("rgba", np.tile(value, (count, 1)) if single else value, (count, 4))
-    except (ParameterError, ValueError) as error:
-        raise ParameterError("rgba", value, requirement) from error
-    if checked.min() < 0.0 or checked.max() > 1.0:
-        raise ParameterError("rgba", value, requirement)
-    return tuple(tuple(colour) for colour in checked.tolist())
-
-
-def _text(value: Any) -> str:
-    return "[" + ",".join(map(repr, value)) + "]" if isinstance(value, tuple) else repr(value)

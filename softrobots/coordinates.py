@@ -1,0 +1,195 @@
+r"""Actuator and elastic coordinates of a robot, and the joint positions that follow from them.
+
+Statics works on elastic coordinates `y` (free) at given actuator coordinates `u`. Joint positions are a map `q(u, y)`:
+
+- a joint with a motor or a spring *is* a coordinate (`DirectCoordinates`);
+- the six joints of a section of constant strain follow its four section coordinates, `q = m(z) - m(z_rest)`
+  (`SectionCoordinates`), so that all joints are at zero at rest.
+
+Muscles are laid over either in `softrobots.muscles`. With `M = dq/d(u, y)`, a load of torque `t(q)` and derivative `D = dt/dq`
+becomes `M^T t` in these coordinates, and its derivative :math:`M^T D M + \sum_j t_j\, d^2 q_j`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from softrobots.checks import FloatArray
+from softrobots.strain_chain import STRAINS, in_range, joint_map, joint_positions
+from softrobots.urdf_tags import SectionTag
+
+
+class ReducedLoad(NamedTuple):
+    """A load in actuator and elastic coordinates."""
+
+    motors: FloatArray
+    """Load on each actuator, shape (n_motors,) [N m or N]."""
+    elastic: FloatArray
+    """Load on each elastic coordinate, shape (n_elastic,) [N m or N]."""
+    derivative: FloatArray
+    """Derivative of `elastic` with respect to the elastic coordinates, shape (n_elastic, n_elastic)."""
+    coupling: FloatArray
+    """Derivative of `elastic` with respect to the actuators, shape (n_elastic, n_motors)."""
+    potential: float
+    """Potential energy of actuators that exert given forces [J]; 0 for those that hold a position."""
+    scale: float
+    """Size of those forces [N]."""
+
+
+class Point(Protocol):
+    """A robot at given actuator and elastic coordinates."""
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions in the order of Pinocchio's velocities, shape (nv,) [rad or m]."""
+
+    @property
+    def valid(self) -> bool:
+        """Whether the chain can be there; joint positions mean nothing where it cannot."""
+
+    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+        """Carry a joint load, shape (nv,), with its derivative, shape (nv, nv), to these coordinates."""
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Split a matrix of columns per joint, shape (m, nv), into columns per actuator and per elastic coordinate."""
+
+
+class Coordinates(Protocol):
+    """A map from actuator and elastic coordinates to joint positions."""
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> Point:
+        """Go to given coordinates, shapes (n_motors,) and (n_elastic,) [rad, m or N]."""
+
+
+class DirectCoordinates:
+    """Every joint is an actuator or elastic by itself."""
+
+    def __init__(self, motor_indices: Any, elastic_indices: Any, count: int) -> None:
+        """Keep the places of both in Pinocchio's velocity vector of length `count`."""
+        self._motors, self._elastic, self._count = motor_indices, elastic_indices, count
+        self._rows = elastic_indices[:, None]
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> DirectPoint:
+        """Go to given coordinates."""
+        joints: FloatArray = np.zeros(self._count)
+        joints[self._motors] = motors
+        joints[self._elastic] = elastic
+        return DirectPoint(joints, self._motors, self._elastic, self._rows)
+
+
+class DirectPoint(NamedTuple):
+    """A robot whose joints are its coordinates."""
+
+    joints: FloatArray
+    """Joint positions."""
+    motor_indices: Any
+    """Places of the actuators."""
+    elastic_indices: Any
+    """Places of the elastic coordinates."""
+    elastic_rows: Any
+    """The same as a column."""
+
+    @property
+    def valid(self) -> bool:
+        """Always."""
+        return True
+
+    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+        """Pick rows and columns."""
+        motors, elastic, rows = self.motor_indices, self.elastic_indices, self.elastic_rows
+        return ReducedLoad(torque[motors], torque[elastic], derivative[rows, elastic], derivative[rows, motors], 0.0, 0.0)
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Pick columns."""
+        return jacobian[:, self.motor_indices], jacobian[:, self.elastic_indices]
+
+
+class Sections:
+    """The sections of constant strain of a robot, base to tip, as arrays."""
+
+    def __init__(self, tags: Sequence[SectionTag], joint_indices: Any) -> None:
+        """Collect the tags; `joint_indices` are the places of their joints in the velocity vector, shape (n, 6)."""
+        self.names = tuple(tag.name for tag in tags)
+        """Name of each section."""
+        self.segments = np.array([tag.segment for tag in tags])
+        """Number of the segment of each, shape (n,)."""
+        self.joint_indices = joint_indices
+        """Places of the joints, shape (n, 6)."""
+        self.lengths = np.array([tag.length for tag in tags])
+        """Rest lengths, shape (n,) [m]."""
+        self.rest = rest_coordinates(tags)
+        """Section coordinates at rest, shape (n, 4) [rad, rad, rad, m]."""
+        stiffness = [(t.bending_stiffness, t.bending_stiffness, t.torsional_stiffness, t.axial_stiffness) for t in tags]
+        self.stiffness = np.array(stiffness) / self.lengths[:, None]
+        """Stiffness of the section coordinates, shape (n, 4) [N m/rad, N m/rad, N m/rad, N/m]."""
+        self.rest_joints = joint_positions(self.rest, self.lengths)
+        """Joint positions that the joint origins of the description carry, shape (n, 6)."""
+        self.coordinate_names = tuple(f"{name}_{strain}" for name in self.names for strain in STRAINS)
+        """Names of the section coordinates, (4 n)."""
+
+
+def rest_coordinates(tags: Sequence[SectionTag]) -> FloatArray:
+    """Section coordinates at rest, shape (n, 4) [rad, rad, rad, m]: strains times rest length."""
+    strains = np.array([tag.rest for tag in tags], dtype=np.float64)
+    strains[:, 3] -= 1.0
+    return np.asarray(strains * np.array([[tag.length] for tag in tags]))
+
+
+class SectionCoordinates:
+    """Motors and springs are coordinates by themselves; sections have four coordinates for six joints."""
+
+    def __init__(self, motor_indices: Any, spring_indices: Any, sections: Sections, count: int) -> None:
+        """Order the elastic coordinates: springs, then four a section."""
+        self.motor_indices, self.spring_indices, self.sections, self.count = motor_indices, spring_indices, sections, count
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> SectionPoint:
+        """Go to given coordinates."""
+        return SectionPoint(self, motors, elastic)
+
+
+class SectionPoint:
+    """A robot with sections at given coordinates."""
+
+    def __init__(self, coordinates: SectionCoordinates, motors: FloatArray, elastic: FloatArray) -> None:
+        """Evaluate the map of the sections, unless they are out of range."""
+        self._c = coordinates
+        sections, n = coordinates.sections, len(coordinates.spring_indices)
+        z = elastic[n:].reshape(-1, 4)
+        self._joints: FloatArray = np.zeros(coordinates.count)
+        self._joints[coordinates.motor_indices] = motors
+        self._joints[coordinates.spring_indices] = elastic[:n]
+        self._valid = in_range(z, sections.lengths)
+        if self._valid:
+            self._map = joint_map(z, sections.lengths)
+            self._joints[sections.joint_indices] = self._map.positions - sections.rest_joints
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions."""
+        return self._joints
+
+    @property
+    def valid(self) -> bool:
+        """Whether every section is in range."""
+        return self._valid
+
+    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+        """Carry a joint load over by the chain rule, block by block."""
+        c, n = self._c, len(self._c.spring_indices)
+        at_sections = torque[c.sections.joint_indices][:, None, :]
+        elastic = np.concatenate([torque[c.spring_indices], (at_sections @ self._map.first).ravel()])
+        coupling, reduced = self.columns(self.columns(derivative.T)[1].T)
+        places = n + np.arange(len(elastic) - n).reshape(-1, 4)
+        curvature = (at_sections @ self._map.second.reshape(-1, 6, 16)).reshape(-1, 4, 4)
+        reduced[places[:, :, None], places[:, None, :]] += curvature
+        return ReducedLoad(torque[c.motor_indices], elastic, reduced, coupling, 0.0, 0.0)
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Combine the columns of the joints of each section."""
+        c = self._c
+        blocks = jacobian[:, c.sections.joint_indices].transpose(1, 0, 2) @ self._map.first  # (n, m, 4)
+        flat = blocks.transpose(1, 0, 2).reshape(len(jacobian), -1)
+        return jacobian[:, c.motor_indices], np.concatenate([jacobian[:, c.spring_indices], flat], axis=1)

@@ -1,0 +1,305 @@
+r"""Muscles: actuators along a segment whose length or tension is given.
+
+A muscle at distance `d` and azimuth `phi` of a segment has the length ([PCC paper] (20-22), summed over the sections)
+
+.. math:: l = l_0 + \sum_i (e_i + d \sin\phi\,a_i - d \cos\phi\,b_i) = l_0 + A z
+
+with the bending `a` about x and `b` about y [rad] and the elongation `e` [m] of each section `i`: linear in the section
+coordinates. (Twist lengthens a muscle in second order only; that is neglected.)
+
+- *Lengths given*: they fix the sums of bending and elongation over a segment. Free are the differences between its sections,
+  and twist: `z = z_u + N y` with `A N = 0`. The part `z_u` spreads the sums as the stiffness wants it, so that
+  `N^T K z_u = 0` and the stiffness of `y` is diagonal.
+- *Forces given*: all section coordinates are free, and a tension `t` adds the energy `t A z`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.checks import FloatArray
+from softrobots.coordinates import Coordinates, Point, ReducedLoad
+from softrobots.errors import DescriptionError, ParameterError
+from softrobots.strain_chain import LARGEST_BENDING
+from softrobots.urdf_tags import MuscleTag
+
+MUSCLE_INPUTS = ("lengths", "forces")
+"""What can be given of the muscles."""
+
+CONSISTENT = 1e-6
+"""Muscle lengths of a segment that miss those of the nearest arc by more than this are refused [m]."""
+
+_HELD = ("bend_x", "bend_y", "stretch")  # the section coordinates whose sums over a segment the muscles hold
+
+
+class ElasticLaw(NamedTuple):
+    """Diagonal stiffness of elastic coordinates."""
+
+    names: tuple[str, ...]
+    """Name of each coordinate."""
+    stiffness: FloatArray
+    """Shape (n,) [N m/rad or N/m]."""
+    rest: FloatArray
+    """Relaxed coordinates, shape (n,) [rad or m]."""
+    turning: Any
+    """Which coordinates are angles rather than distances, shape (n,), truth values."""
+
+
+Segments = Mapping[int, Mapping[str, Sequence[int]]]
+"""By segment and section coordinate (`strain_chain.STRAINS`), the places of that coordinate among the elastic coordinates."""
+
+
+def muscle_matrix(tags: Sequence[MuscleTag], segments: Segments, count: int) -> FloatArray:
+    """Derivative `A` of the muscle lengths with respect to `count` elastic coordinates, shape (n_muscles, count)."""
+    matrix = np.zeros((len(tags), count))
+    for row, tag in enumerate(tags):
+        arms = _arms([tag])[0]
+        for coordinate, arm in zip(_HELD, arms, strict=True):
+            matrix[row, list(segments[tag.segment].get(coordinate, ()))] = arm
+    return matrix
+
+
+def _arms(tags: Sequence[MuscleTag]) -> FloatArray:
+    """Derivative of the lengths with respect to the sums of bending and elongation, shape (n, 3) [m/rad, m/rad, -]."""
+    return np.array([(tag.distance * np.sin(tag.azimuth), -tag.distance * np.cos(tag.azimuth), 1.0) for tag in tags])
+
+
+class MuscleForces:
+    """Coordinates of a robot whose muscles exert given tensions: motors, then tensions, are given; all strains are free."""
+
+    def __init__(self, inner: Coordinates, matrix: FloatArray) -> None:
+        """Lay muscles of the length derivative `matrix`, shape (n_muscles, n_elastic), over a robot."""
+        self._inner, self._matrix = inner, matrix
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleForcePoint:
+        """Go to given coordinates."""
+        count = len(motors) - len(self._matrix)
+        return MuscleForcePoint(self._inner.at(motors[:count], elastic), self._matrix, motors[count:], elastic)
+
+
+class MuscleForcePoint(NamedTuple):
+    """A robot under given muscle tensions."""
+
+    inner: Point
+    """The robot without muscles."""
+    matrix: FloatArray
+    """Length derivative of the muscles."""
+    tensions: FloatArray
+    """Tension of each muscle [N]."""
+    elastic: FloatArray
+    """Elastic coordinates."""
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions."""
+        return self.inner.joints
+
+    @property
+    def valid(self) -> bool:
+        """Whether the chain can be there."""
+        return self.inner.valid
+
+    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+        """Add what the muscles pull; the load on a muscle is its tension."""
+        load = self.inner.reduce(torque, derivative)
+        return ReducedLoad(
+            np.concatenate([load.motors, self.tensions]),
+            load.elastic - self.tensions @ self.matrix,
+            load.derivative,
+            np.concatenate([load.coupling, -self.matrix.T], axis=1),
+            load.potential + float(self.tensions @ (self.matrix @ self.elastic)),
+            load.scale + float(np.abs(self.tensions).sum()),
+        )
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Tensions alone move nothing."""
+        motors, elastic = self.inner.columns(jacobian)
+        return np.concatenate([motors, np.zeros((len(jacobian), len(self.tensions)))], axis=1), elastic
+
+
+class MuscleLengths:
+    """Coordinates of a robot whose muscles hold given lengths: motors, then lengths, are given; what lengths leave is free."""
+
+    def __init__(
+        self,
+        inner: Coordinates,
+        tags: Sequence[MuscleTag],
+        segments: Segments,
+        law: ElasticLaw,
+        largest_bending: float | None = None,
+    ) -> None:
+        """Find the free coordinates.
+
+        Args:
+            inner: The robot without muscles.
+            tags: The muscles.
+            segments: Which of its elastic coordinates belong to which segment.
+            law: Stiffness of its elastic coordinates.
+            largest_bending: Bending of one section that lengths may ask for [rad]; `LARGEST_BENDING` by default.
+
+        Raises:
+            DescriptionError: If the muscles of a segment do not fix its bending and elongation.
+        """
+        self._inner, self._law, self._segments = inner, law, segments
+        self._largest_bending = LARGEST_BENDING if largest_bending is None else largest_bending
+        self._tags = tuple(tags)
+        self._rest_lengths = np.array([tag.rest_length for tag in tags])
+        count = len(law.names)
+        self._spread = np.zeros((count, len(tags)))
+        self._misfit = np.zeros((len(tags), len(tags)))
+        held: dict[int, FloatArray] = {}
+        modes, names, turning = [], [], []
+        for segment in sorted({tag.segment for tag in tags}):
+            rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
+            places = {key: list(segments[segment][key]) for key in _HELD if key in segments[segment]}
+            arms = _arms([tags[row] for row in rows])[:, [_HELD.index(key) for key in places]]
+            if np.linalg.matrix_rank(arms, tol=1e-9 * float(np.abs(arms).max())) < len(places):
+                raise DescriptionError(
+                    f"the {len(rows)} muscles of segment {segment} do not fix its bending and elongation; "
+                    f"three or more at different azimuths are required"
+                )
+            inverse = np.linalg.pinv(arms)
+            self._misfit[np.ix_(rows, rows)] = np.eye(len(rows)) - arms @ inverse
+            for key, row_of_inverse in zip(places, inverse, strict=True):
+                softness = 1.0 / law.stiffness[places[key]]
+                self._spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
+                held |= dict.fromkeys(places[key], softness)
+                basis = _differences(law.stiffness[places[key]])
+                for number, mode in enumerate(basis.T, start=1):
+                    column = np.zeros(count)
+                    column[places[key]] = mode
+                    modes.append(column)
+                    names.append(f"segment_{segment}_{key}_mode_{number}")
+                    turning.append(key != "stretch")
+        free = [place for place in range(count) if place not in held]
+        columns = [np.eye(count)[place] for place in free] + modes
+        self._free = np.array(columns).reshape(-1, count).T
+        stiffness = np.einsum("ik,i,ik->k", self._free, law.stiffness, self._free)
+        rest = (law.stiffness * law.rest) @ self._free / stiffness
+        angles = np.array([*(law.turning[place] for place in free), *turning], dtype=bool)
+        self.law = ElasticLaw((*(law.names[place] for place in free), *names), stiffness, np.asarray(rest), angles)
+        """Stiffness of the free coordinates."""
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleLengthPoint:
+        """Go to given coordinates."""
+        count = len(motors) - len(self._tags)
+        strains = self.strains(motors, elastic)
+        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self._spread, self._free, self._law, strains)
+
+    def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
+        change = motors[len(motors) - len(self._tags) :] - self._rest_lengths
+        return np.asarray(self._spread @ change + self._free @ elastic)
+
+    def consistent(self, motors: FloatArray) -> FloatArray:
+        """Nearest motors and lengths that arcs explain, shape (n_motors,)."""
+        made = np.array(motors)
+        lengths = made[len(motors) - len(self._tags) :]
+        lengths -= self._misfit @ (lengths - self._rest_lengths)
+        return made
+
+    def basis(self, scale: FloatArray) -> FloatArray:
+        """Independent changes of motors and lengths, of size `scale`, shape (n_motors, n)."""
+        count = len(scale) - len(self._tags)
+        consistent = np.eye(len(self._tags)) - self._misfit
+        if not np.any(np.abs(self._misfit) > 1e-12):
+            return np.diag(scale)
+        values, vectors = np.linalg.eigh(consistent)
+        directions = np.asarray(vectors[:, values > 0.5])
+        made = np.zeros((len(scale), count + directions.shape[1]))
+        made[:count, :count] = np.diag(scale[:count])
+        made[count:, count:] = scale[count:, None] * directions
+        return made
+
+    def check(self, field: str, motors: FloatArray) -> None:
+        """Refuse lengths that no shape of the robot has.
+
+        Raises:
+            ParameterError: If a length is not positive, if no arc explains the lengths of a segment, or if they would bend a
+                section beyond the range of the chain or leave it without length.
+        """
+        requirement = self.refusal(motors)
+        if requirement is not None:
+            raise ParameterError(field, motors, requirement)
+
+    def refusal(self, motors: FloatArray) -> str | None:
+        """What lengths would have to be, if no shape of the robot has the given ones; None if one has."""
+        lengths = motors[len(motors) - len(self._tags) :]
+        if np.any(lengths <= 0.0):
+            return "positive muscle lengths [m]"
+        change = lengths - self._rest_lengths
+        misfit = np.abs(self._misfit @ change)
+        if misfit.max() > CONSISTENT:
+            segment = self._tags[int(np.argmax(misfit))].segment
+            stretch = "" if "stretch" in self._segments[segment] else ", without elongation (this chain has no stretch joints)"
+            return (
+                f"muscle lengths that one arc a segment explains{stretch}; those of segment {segment} miss the nearest arc by "
+                f"{misfit.max():.3g} m, allowed {CONSISTENT:g} m"
+            )
+        spread = self._spread @ change
+        for segment, places in self._segments.items():
+            bending = float(np.hypot(spread[list(places["bend_x"])], spread[list(places["bend_y"])]).max())
+            if bending > self._largest_bending:
+                return (
+                    f"within the chain's range: segment {segment} would bend by {bending:.4g} rad a section, allowed "
+                    f"{self._largest_bending:.4g} rad (more sections a segment allow more)"
+                )
+        return None
+
+
+class MuscleLengthPoint(NamedTuple):
+    """A robot with held muscle lengths."""
+
+    inner: Point
+    """The robot without muscles."""
+    spread: FloatArray
+    """Derivative of its elastic coordinates with respect to the lengths."""
+    free: FloatArray
+    """The same with respect to the free coordinates."""
+    law: ElasticLaw
+    """Its stiffness."""
+    strains: FloatArray
+    """Its elastic coordinates."""
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions."""
+        return self.inner.joints
+
+    @property
+    def valid(self) -> bool:
+        """Whether the chain can be there."""
+        return self.inner.valid
+
+    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+        """Carry over to lengths and free coordinates; the load on a muscle is its tension, spring-back included."""
+        load = self.inner.reduce(torque, derivative)
+        unbalanced = load.elastic - self.law.stiffness * (self.strains - self.law.rest)
+        half = self.free.T @ load.derivative
+        return ReducedLoad(
+            np.concatenate([load.motors, unbalanced @ self.spread]),
+            load.elastic @ self.free,
+            half @ self.free,
+            np.concatenate([self.free.T @ load.coupling, half @ self.spread], axis=1),
+            load.potential,
+            load.scale,
+        )
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Combine the columns of the strains."""
+        motors, elastic = self.inner.columns(jacobian)
+        return np.concatenate([motors, elastic @ self.spread], axis=1), elastic @ self.free
+
+
+def _differences(stiffness: FloatArray) -> FloatArray:
+    """Orthonormal columns without sum, shape (n, n - 1), that make the stiffness diagonal; cosines where it is uniform."""
+    n = len(stiffness)
+    places = (np.arange(n) + 0.5)[:, None]
+    cosines = np.sqrt(2.0 / n) * np.cos(np.pi * places * np.arange(1, n) / n)
+    if np.ptp(stiffness) <= 1e-12 * float(stiffness.max()):
+        return np.asarray(cosines)
+    vectors: Any = np.linalg.eigh(cosines.T @ (stiffness[:, None] * cosines))[1]
+    return np.asarray(cosines @ vectors)

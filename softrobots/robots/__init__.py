@@ -1,0 +1,28 @@
+"""The robots: frozen, checked parameters that become xacro arguments and URDF text.
+
+A robot is a dataclass here, a xacro file, and a line in `ROBOTS`.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Protocol
+
+from softrobots.robots.inflatable_arm import InflatableArm
+from softrobots.robots.pcc_arm import PccArm
+
+
+class Robot(Protocol):
+    """Anything that describes itself as URDF."""
+
+    def urdf(self) -> str:
+        """Return the robot as URDF text."""
+
+
+ROBOTS: Mapping[str, Callable[[], Robot]] = {
+    "inflatable_arm": InflatableArm,
+    "pcc_arm": PccArm,
+    "pcc_arm_lumped": partial(PccArm, chain="lumped"),
+}
+"""What makes each robot with its default parameters, by the name of its URDF file."""
+
+__all__ = ["ROBOTS", "InflatableArm", "PccArm", "Robot"]

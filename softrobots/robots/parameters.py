@@ -1,0 +1,75 @@
+"""Checks of robot parameters: one number for all parts of a robot or one for each; and their way into xacro."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import finite_array, finite_number
+from softrobots.description import expand
+from softrobots.errors import ParameterError
+from softrobots.paths import xacro_folder
+
+PerPart = float | Sequence[float]
+"""One number for all links or segments, or one for each, base to tip."""
+
+
+@lru_cache(maxsize=64)
+def expanded(xacro_name: str, arguments: tuple[tuple[str, str], ...]) -> str:
+    """URDF text of a file in xacro/ with arguments, text by name; kept for the next call."""
+    return expand(xacro_folder() / xacro_name, dict(arguments))
+
+
+def numbers(name: str, value: Any, count: int | None, unit: str, part: str = "links") -> tuple[float, ...]:
+    """Return `value` as a tuple of `count` floats, a single number repeated.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    if isinstance(value, str | bytes):
+        raise ParameterError(name, value, f"a number or a list of numbers [{unit}]")
+    if count is not None and not isinstance(value, Sequence) and getattr(value, "ndim", 0) == 0:
+        return (finite_number(name, value, unit),) * count
+    values = tuple(finite_array(name, value, (None,), unit).tolist())
+    if count is not None and len(values) != count:
+        raise ParameterError(name, value, f"one number, or one for each of the {count} {part} [{unit}]")
+    return values
+
+
+def at_least(name: str, values: tuple[float, ...], low: float, strict: bool, unit: str) -> None:
+    """Refuse values below `low`, or at it if `strict`.
+
+    Raises:
+        ParameterError: If there is one.
+    """
+    if min(values) < low or (strict and min(values) == low):
+        raise ParameterError(name, values, f"{'above' if strict else 'at least'} {low} [{unit}]")
+
+
+def colours(value: Any, count: int, part: str = "links") -> tuple[tuple[float, ...], ...]:
+    """Return `value` as `count` colours, a single one repeated.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    requirement = f"red, green, blue, opacity in [0, 1]: one colour, or one for each of the {count} {part}"
+    try:
+        single = np.ndim(value) == 1
+        checked = finite_array("rgba", np.tile(value, (count, 1)) if single else value, (count, 4))
+    except (ParameterError, ValueError) as error:
+        raise ParameterError("rgba", value, requirement) from error
+    if checked.min() < 0.0 or checked.max() > 1.0:
+        raise ParameterError("rgba", value, requirement)
+    return tuple(tuple(colour) for colour in checked.tolist())
+
+
+def argument_text(value: Any) -> str:
+    """A value as the text of a xacro argument, full precision."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "[" + ",".join(map(repr, value)) + "]" if isinstance(value, tuple) else repr(value)

@@ -1,0 +1,170 @@
+r"""A section of constant strain as a chain of rigid joints: universal, prismatic, spherical.
+
+The chain `Rx(u1) Ry(u2) Tz(c) Rx(r1) Ry(r2) Rz(r3)` carries the end of a section (see `softrobots.screws`) exactly, position
+and orientation, twisted or not, and smoothly through straight: the prismatic joint spans the chord. Its joint positions are a
+map `m(z)` of the four section coordinates `z = h (kx, ky, tau, stretch - 1)`. With `(R, p)` the end of the section
+
+    c = |p|,  u1 = atan2(-p_y, p_z),  u2 = atan2(p_x, hypot(p_y, p_z)),  Q = (Rx(u1) Ry(u2))^T R,
+    r1 = atan2(-Q_12, Q_22),  r2 = atan2(Q_02, hypot(Q_12, Q_22)),  r3 = atan2(-Q_01, Q_00)
+
+and with the body Jacobian `J_b` of the chain and the twists `S` of the section, `dm/dz = J_b^-1 S`.
+
+(Chains that turn into the bending plane first, `Rz(alpha) Ry(theta/2) Tz Ry(theta/2) Rz(-alpha)`, are exact too, but
+undetermined when straight.) `|det J_b| = c^2 |cos u2 cos r2|` vanishes only where the chord lies along x of its base;
+`in_range` keeps away.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.checks import FloatArray
+from softrobots.screws import screw, screw_derivatives
+
+JOINTS = ("u1", "u2", "c", "r1", "r2", "r3")
+"""The joints of a section, base to tip: two of the universal joint, the chord, three of the spherical joint."""
+
+STRAINS = ("bend_x", "bend_y", "twist", "stretch")
+"""The section coordinates: rotation over the section about x, y and z [rad], elongation [m]."""
+
+LARGEST_BENDING = np.deg2rad(120.0)
+"""Bending of one section up to which the chain is meant to be used [rad]; use more sections beyond."""
+
+_FIRST, _SECOND = np.triu_indices(6, 1)  # pairs of joints, the first nearer to the base
+
+
+class JointMap(NamedTuple):
+    """Joint positions of a section with their derivatives with respect to the section coordinates."""
+
+    positions: FloatArray
+    """Joint positions `m`, shape (..., 6) [rad, rad, m, rad, rad, rad]."""
+    first: FloatArray
+    """First derivative, shape (..., 6, 4)."""
+    second: FloatArray
+    """Second derivative, symmetric in the last two, shape (..., 6, 4, 4)."""
+
+
+def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArray:
+    """Joint positions of sections.
+
+    Args:
+        z: Section coordinates, shape (..., 4) [rad, rad, rad, m], in range (see `in_range`).
+        rest_length: Rest length of a section, shape (...) [m].
+
+    Returns:
+        Shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad].
+    """
+    return _positions(*screw(z, rest_length))
+
+
+def joint_map(z: FloatArray, rest_length: FloatArray | float) -> JointMap:
+    r"""Joint positions of sections with first and second derivative.
+
+    With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise, so
+    `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`.
+
+    Args:
+        z: Section coordinates, shape (..., 4) [rad, rad, rad, m], in range (see `in_range`).
+        rest_length: Rest length of a section, shape (...) [m].
+
+    Returns:
+        Joint positions and derivatives.
+    """
+    end = screw_derivatives(z, rest_length)
+    positions = _positions(*end.screw)
+    jacobian = _body_jacobian(positions)
+    inverse = np.linalg.inv(jacobian)
+    first = inverse @ end.twists
+    brackets = _brackets(jacobian)
+    products = first[..., _FIRST, :, None] * first[..., _SECOND, None, :]  # (..., 15, 4, 4)
+    known = end.twist_derivatives - np.einsum("...ip,...pab->...iab", brackets, products)
+    second = np.einsum("...ij,...jab->...iab", inverse, known)
+    return JointMap(positions, first, second)
+
+
+def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
+    """Whether the chain carries every section.
+
+    Required of each: a positive length, a chord that points forwards (without twist: bending below 180 degrees), and less than
+    half a turn of twist.
+
+    Args:
+        z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
+        rest_length: Rest length of a section, shape (...) [m].
+    """
+    if not np.all(np.abs(z[..., 2]) < np.pi) or not np.all(rest_length + z[..., 3] > 1e-3 * np.asarray(rest_length)):
+        return False
+    if not np.all(np.einsum("...i,...i->...", z[..., :3], z[..., :3]) < 16.0 * np.pi**2):
+        return False
+    rotation, position = screw(z, rest_length)
+    chord = np.linalg.norm(position, axis=-1)
+    # The spherical joint turns by as much as the universal one where there is no twist.
+    back = np.einsum("...i,...i->...", rotation[..., :, 2], position)
+    return bool(np.all(position[..., 2] > 1e-3 * chord) and np.all(back > 1e-3 * chord))
+
+
+def _positions(rotation: FloatArray, position: FloatArray) -> FloatArray:
+    x, y, z = np.moveaxis(position, -1, 0)
+    across = np.hypot(y, z)
+    joints = np.zeros((*position.shape[:-1], 6))
+    joints[..., 0] = np.arctan2(-y, z)
+    joints[..., 1] = np.arctan2(x, across)
+    joints[..., 2] = np.hypot(x, across)
+    turn = np.swapaxes(_universal(joints[..., 0], joints[..., 1]), -1, -2) @ rotation
+    joints[..., 3] = np.arctan2(-turn[..., 1, 2], turn[..., 2, 2])
+    joints[..., 4] = np.arctan2(turn[..., 0, 2], np.hypot(turn[..., 1, 2], turn[..., 2, 2]))
+    joints[..., 5] = np.arctan2(-turn[..., 0, 1], turn[..., 0, 0])
+    return joints
+
+
+def _universal(about_x: FloatArray, about_y: FloatArray) -> FloatArray:
+    """`Rx Ry`, shape (..., 3, 3)."""
+    sx, cx, sy, cy = np.sin(about_x), np.cos(about_x), np.sin(about_y), np.cos(about_y)
+    made = np.zeros((*np.shape(about_x), 3, 3))
+    made[..., 0, 0], made[..., 0, 2] = cy, sy
+    made[..., 1, 0], made[..., 1, 1], made[..., 1, 2] = sx * sy, cx, -sx * cy
+    made[..., 2, 0], made[..., 2, 1], made[..., 2, 2] = -cx * sy, sx, cx * cy
+    return made
+
+
+def _body_jacobian(joints: FloatArray) -> FloatArray:
+    """Twist of the end of the chain per joint, in the axes of the end, linear part first, shape (..., 6, 6)."""
+    _, u2, c, r1, r2, r3 = np.moveaxis(joints, -1, 0)
+    s3, c3 = np.sin(r3), np.cos(r3)
+    about_z = np.zeros((*c.shape, 3, 3))
+    about_z[..., 0, 0], about_z[..., 0, 1], about_z[..., 1, 0], about_z[..., 1, 1] = c3, -s3, s3, c3
+    about_z[..., 2, 2] = 1.0
+    spherical = _universal(r1, r2) @ about_z
+    made = np.zeros((*c.shape, 6, 6))
+    # Rows of `spherical` are the axes before the spherical joint, in the axes of the end.
+    x, y, z = (spherical[..., axis, :] for axis in range(3))
+    su, cu = np.sin(u2)[..., None], np.cos(u2)[..., None]
+    made[..., 3:, 0] = cu * x + su * z
+    made[..., :3, 0] = -c[..., None] * cu * y
+    made[..., 3:, 1] = y
+    made[..., :3, 1] = c[..., None] * x
+    made[..., :3, 2] = z
+    made[..., 3:, 3] = x
+    made[..., 3:, 4] = about_z[..., 1, :]
+    made[..., 5, 5] = 1.0
+    # r1 turns about x before r2 and r3, i.e. about the x axis of the chord frame.
+    return made
+
+
+def _brackets(jacobian: FloatArray) -> FloatArray:
+    """Lie brackets `[J_i, J_j]` of the 15 pairs i < j, shape (..., 6, 15)."""
+    linear, angular = jacobian[..., :3, :], jacobian[..., 3:, :]
+    first, second = (linear[..., _FIRST], angular[..., _FIRST]), (linear[..., _SECOND], angular[..., _SECOND])
+    made = np.zeros((*jacobian.shape[:-1], len(_FIRST)))
+    made[..., :3, :] = _cross(first[1], second[0]) - _cross(second[1], first[0])
+    made[..., 3:, :] = _cross(first[1], second[1])
+    return made
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Cross products of the columns, shape (..., 3, n)."""
+    a, b, c = (first[..., row, :] for row in range(3))
+    x, y, z = (second[..., row, :] for row in range(3))
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-2)

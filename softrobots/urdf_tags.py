@@ -1,0 +1,297 @@
+"""Our own tags in a URDF: springs, sections, muscles and roles, read back out of the text."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from softrobots.description import XACRO_NAMESPACE, parse_xml
+from softrobots.errors import DescriptionError
+
+NAMESPACE = "urn:softrobots:urdf"
+"""XML namespace of the tags."""
+
+ROLES = ("motor", "spring", "section", "locked")
+"""What a movable joint can be."""
+
+
+@dataclass(frozen=True)
+class SpringTag:
+    """A linear joint spring, `torque = stiffness (q - rest)`."""
+
+    stiffness: float
+    """Stiffness [N m/rad], or [N/m] at a prismatic joint; positive."""
+    rest: float
+    """Coordinate at which the spring is relaxed [rad or m]."""
+
+
+@dataclass(frozen=True)
+class InflatedLinkTag:
+    """The springs that stand for one inflated link, and what sets its wrinkling moment."""
+
+    springs: tuple[str, ...]
+    """Names of the spring joints."""
+    radius: float
+    """Tube radius [m]."""
+    pressure: float
+    """Gauge pressure [Pa]."""
+
+
+@dataclass(frozen=True)
+class SectionTag:
+    """A section of constant strain: six joints that follow four section coordinates."""
+
+    name: str
+    """Name of the section, and of the link at its end."""
+    segment: int
+    """Number of the segment that it is part of, from 1."""
+    joints: tuple[str, ...]
+    """Its six joints, base to tip; `softrobots.strain_chain.JOINTS` in that order."""
+    length: float
+    """Rest length [m]."""
+    bending_stiffness: float
+    """EI [N m^2]."""
+    torsional_stiffness: float
+    """GJ [N m^2]."""
+    axial_stiffness: float
+    """EA [N]."""
+    rest: tuple[float, ...]
+    """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
+    radius: float
+    """Radius of the body, for pictures [m]."""
+
+
+@dataclass(frozen=True)
+class LumpedSectionTag:
+    """A section lumped into spring joints at its middle."""
+
+    name: str
+    """Name of the section."""
+    segment: int
+    """Number of the segment that it is part of, from 1."""
+    joints: Mapping[str, str]
+    """Spring joint by section coordinate, `softrobots.strain_chain.STRAINS`; `twist` and `stretch` may be missing."""
+    length: float
+    """Rest length [m]."""
+    radius: float
+    """Radius of the body, for pictures [m]."""
+
+
+@dataclass(frozen=True)
+class MuscleTag:
+    """A muscle along a segment, parallel to its backbone."""
+
+    name: str
+    """Name of the muscle."""
+    segment: int
+    """Number of the segment, from 1."""
+    azimuth: float
+    """Where it runs, from the x axis of the segment towards y [rad]."""
+    distance: float
+    """Distance from the backbone [m]."""
+    rest_length: float
+    """Length while the segment is straight and as long as at rest [m]."""
+    shortest: float
+    """Lower limit of its length [m]."""
+    longest: float
+    """Upper limit of its length [m]."""
+    strongest: float
+    """Largest tension, and push, that it can exert [N]."""
+
+
+@dataclass(frozen=True)
+class RobotTags:
+    """Everything softrobots reads from a URDF beyond what Pinocchio reads."""
+
+    springs: Mapping[str, SpringTag]
+    """Springs by joint name."""
+    roles: Mapping[str, str]
+    """Role by joint name, one of `ROLES`."""
+    inflated_links: tuple[InflatedLinkTag, ...]
+    """Inflated links, base to tip."""
+    sections: tuple[SectionTag, ...]
+    """Sections of constant strain, in the order of the file."""
+    lumped_sections: tuple[LumpedSectionTag, ...]
+    """Lumped sections, in the order of the file."""
+    muscles: tuple[MuscleTag, ...]
+    """Muscles, in the order of the file."""
+    mimics: tuple[str, ...]
+    """Names of the joints that mimic another joint."""
+
+
+def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
+    """Read springs, roles, sections, muscles and inflated links out of URDF text.
+
+    Args:
+        urdf_text: The whole document.
+        source: Where it comes from, for the errors.
+
+    Returns:
+        The tags; all empty for a file that has none.
+
+    Raises:
+        DescriptionError: If the text is no URDF, or a tag of ours is malformed.
+    """
+    root = parse_xml(urdf_text, source)
+    if root.tag != "robot":
+        raise DescriptionError(f"{source} has the root tag <{root.tag}>; <robot> is required")
+    if any(str(element.tag).startswith(f"{{{XACRO_NAMESPACE}}}") for element in root.iter()):
+        raise DescriptionError(f"{source} is an unexpanded xacro file; expand it first (softrobots.description.expand)")
+    springs: dict[str, SpringTag] = {}
+    roles: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        _read_joint(joint, source, springs, roles)
+    tags = RobotTags(
+        springs=springs,
+        roles=roles,
+        inflated_links=tuple(_inflated_link(element, source, springs) for element in _ours(root, "inflated_link")),
+        sections=tuple(_section(element, source, roles) for element in _ours(root, "section")),
+        lumped_sections=tuple(_lumped_section(element, source, springs) for element in _ours(root, "lumped_section")),
+        muscles=tuple(_muscle(element, source) for element in _ours(root, "muscle")),
+        mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
+    )
+    _check_together(tags, source)
+    return tags
+
+
+def _ours(element: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    return element.findall(f"{{{NAMESPACE}}}{name}")
+
+
+def _read_joint(joint: ElementTree.Element, source: str, springs: dict[str, SpringTag], roles: dict[str, str]) -> None:
+    name = joint.get("name", "")
+    for tag_name in ("spring", "role"):
+        if len(_ours(joint, tag_name)) > 1:
+            raise DescriptionError(f"joint {name} in {source} has more than one {tag_name}; one is required")
+    for spring in _ours(joint, "spring"):
+        where = f"the spring of joint {name} in {source}"
+        springs[name] = SpringTag(_positive(spring, "stiffness", where), _number(spring, "rest", where))
+    for role in _ours(joint, "role"):
+        value = role.get("value", "")
+        if value not in ROLES:
+            raise DescriptionError(f"joint {name} in {source} has the role {value!r}; one of {', '.join(ROLES)} is required")
+        if (value == "spring") != (name in springs):
+            raise DescriptionError(
+                f"joint {name} in {source} has the role {value!r} and {'a' if name in springs else 'no'} spring"
+            )
+        roles[name] = value
+
+
+def _inflated_link(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> InflatedLinkTag:
+    names = tuple(element.get("springs", "").split())
+    missing = [name for name in names if name not in springs]
+    if not names or missing:
+        raise DescriptionError(
+            f"an inflated_link of {source} names the springs {' '.join(names) or '(none)'}; "
+            f"springs that exist are required: {', '.join(springs) or 'none'}"
+        )
+    where = f"the inflated_link of {' '.join(names)} in {source}"
+    made = InflatedLinkTag(names, _number(element, "radius", where), _number(element, "pressure", where))
+    if made.radius <= 0.0 or made.pressure < 0.0:
+        raise DescriptionError(f"{where} has radius {made.radius} and pressure {made.pressure}; required > 0 and >= 0")
+    return made
+
+
+def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]) -> SectionTag:
+    name = element.get("name", "")
+    where = f"the section {name!r} of {source}"
+    joints = tuple(element.get("joints", "").split())
+    if len(joints) != 6 or any(roles.get(joint) != "section" for joint in joints):
+        raise DescriptionError(
+            f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
+        )
+    rest = element.get("rest", "").split()
+    try:
+        numbers = tuple(float(text) for text in rest)
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 4 or not all(map(math.isfinite, numbers)) or numbers[3] <= 0.0:
+        raise DescriptionError(f"{where} has rest = {' '.join(rest)!r}; kx, ky, twist and a positive stretch are required")
+    return SectionTag(
+        name,
+        _segment(element, where),
+        joints,
+        _positive(element, "length", where),
+        _positive(element, "EI", where),
+        _positive(element, "GJ", where),
+        _positive(element, "EA", where),
+        numbers,
+        _positive(element, "radius", where),
+    )
+
+
+def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> LumpedSectionTag:
+    name = element.get("name", "")
+    where = f"the lumped section {name!r} of {source}"
+    coordinates = ("bend_x", "bend_y", "twist", "stretch")
+    joints = {key: element.get(key, "") for key in coordinates if element.get(key)}
+    missing = [key for key in ("bend_x", "bend_y") if key not in joints]
+    strangers = [joint for joint in joints.values() if joint not in springs]
+    if missing or strangers or len(set(joints.values())) != len(joints):
+        raise DescriptionError(
+            f"{where} names the joints {joints}; bend_x and bend_y, each a spring joint of its own, are required "
+            f"(twist and stretch may follow)"
+        )
+    length, radius = _positive(element, "length", where), _positive(element, "radius", where)
+    return LumpedSectionTag(name, _segment(element, where), joints, length, radius)
+
+
+def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
+    name = element.get("name", "")
+    where = f"the muscle {name!r} of {source}"
+    positive = {key: _positive(element, key, where) for key in ("distance", "rest_length", "shortest", "longest", "strongest")}
+    if not positive["shortest"] < positive["longest"]:
+        raise DescriptionError(f"{where} is shortest at {positive['shortest']} and longest at {positive['longest']} m")
+    return MuscleTag(name, _segment(element, where), _number(element, "azimuth", where), **positive)
+
+
+def _check_together(tags: RobotTags, source: str) -> None:
+    """Names are unique, no joint serves twice, and muscles run along segments that exist."""
+    _unique("section", [*(tag.name for tag in tags.sections), *(tag.name for tag in tags.lumped_sections)], source)
+    _unique("muscle", [tag.name for tag in tags.muscles], source)
+    used = [joint for tag in tags.sections for joint in tag.joints]
+    used += [joint for lumped in tags.lumped_sections for joint in lumped.joints.values()]
+    _unique("joint of a section", used, source)
+    orphans = [name for name, role in tags.roles.items() if role == "section" and name not in used]
+    if orphans:
+        raise DescriptionError(f"{source} has joints with the role 'section' that no section names: {', '.join(orphans)}")
+    segments = {tag.segment for tag in tags.sections} | {tag.segment for tag in tags.lumped_sections}
+    for muscle in tags.muscles:
+        if muscle.segment not in segments:
+            raise DescriptionError(
+                f"the muscle {muscle.name!r} of {source} runs along segment {muscle.segment}; "
+                f"available: {', '.join(map(str, sorted(segments))) or 'none'}"
+            )
+
+
+def _unique(what: str, names: Sequence[str], source: str) -> None:
+    twice = {name for name in names if names.count(name) > 1}
+    if twice or "" in names:
+        raise DescriptionError(f"{source} uses a {what} name twice or leaves it empty: {', '.join(sorted(twice)) or '(empty)'}")
+
+
+def _segment(element: ElementTree.Element, where: str) -> int:
+    text = element.get("segment", "")
+    if not text.isascii() or not text.isdigit() or not 0 < int(text) < 10_000:
+        raise DescriptionError(f"{where} has segment = {text!r}; a number from 1 is required")
+    return int(text)
+
+
+def _positive(element: ElementTree.Element, attribute: str, where: str) -> float:
+    value = _number(element, attribute, where)
+    if value <= 0.0:
+        raise DescriptionError(f"{where} has {attribute} {value}; a positive one is required")
+    return value
+
+
+def _number(element: ElementTree.Element, attribute: str, where: str) -> float:
+    text = element.get(attribute)
+    try:
+        value = float(text if text is not None else "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise DescriptionError(f"{where} has {attribute} = {text!r}; a finite number is required")
+    return value
