@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from softrobots.checks import FloatArray
-from softrobots.strain_chain import STRAINS, in_range, joint_map, joint_positions
+from softrobots.strain_chain import STRAINS, SectionChain, joint_positions
 from softrobots.urdf_tags import SectionTag
 
 
@@ -161,10 +161,8 @@ class SectionPoint:
         self._joints: FloatArray = np.zeros(coordinates.count)
         self._joints[coordinates.motor_indices] = motors
         self._joints[coordinates.spring_indices] = elastic[:n]
-        self._valid = in_range(z, sections.lengths)
-        if self._valid:
-            self._map = joint_map(z, sections.lengths)
-            self._joints[sections.joint_indices] = self._map.positions - sections.rest_joints
+        self._chain = SectionChain(z, sections.lengths)
+        self._joints[sections.joint_indices] = self._chain.positions - sections.rest_joints
 
     @property
     def joints(self) -> FloatArray:
@@ -174,22 +172,21 @@ class SectionPoint:
     @property
     def valid(self) -> bool:
         """Whether every section is in range."""
-        return self._valid
+        return self._chain.valid
 
     def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
         """Carry a joint load over by the chain rule, block by block."""
         c, n = self._c, len(self._c.spring_indices)
-        at_sections = torque[c.sections.joint_indices][:, None, :]
-        elastic = np.concatenate([torque[c.spring_indices], (at_sections @ self._map.first).ravel()])
+        at_sections = torque[c.sections.joint_indices]
+        elastic = np.concatenate([torque[c.spring_indices], (at_sections[:, None, :] @ self._chain.first).ravel()])
         coupling, reduced = self.columns(self.columns(derivative.T)[1].T)
         places = n + np.arange(len(elastic) - n).reshape(-1, 4)
-        curvature = (at_sections @ self._map.second.reshape(-1, 6, 16)).reshape(-1, 4, 4)
-        reduced[places[:, :, None], places[:, None, :]] += curvature
+        reduced[places[:, :, None], places[:, None, :]] += self._chain.curvature(at_sections)
         return ReducedLoad(torque[c.motor_indices], elastic, reduced, coupling, 0.0, 0.0)
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Combine the columns of the joints of each section."""
         c = self._c
-        blocks = jacobian[:, c.sections.joint_indices].transpose(1, 0, 2) @ self._map.first  # (n, m, 4)
+        blocks = jacobian[:, c.sections.joint_indices].transpose(1, 0, 2) @ self._chain.first  # (n, m, 4)
         flat = blocks.transpose(1, 0, 2).reshape(len(jacobian), -1)
         return jacobian[:, c.motor_indices], np.concatenate([jacobian[:, c.spring_indices], flat], axis=1)

@@ -166,21 +166,20 @@ def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool) -> bool
     """Whether every eigenvalue of a tangent stiffness has a real part above rounding.
 
     Taken in coordinates scaled by the springs' own stiffness, in which no unit and no stiff spring beside a soft one matters;
-    rounding is 1e-9 there. For a symmetric tangent a Cholesky factorisation is the certificate.
+    rounding is 1e-9 there. A Cholesky factorisation of the symmetric part is the certificate (real parts of eigenvalues are at
+    least its smallest one); where a tangent that is not symmetric lacks it, its eigenvalues decide.
 
     Args:
         model: The robot.
         tangent: Tangent stiffness, shape (n_springs, n_springs).
         symmetric: Whether it is symmetric.
     """
-    if not symmetric:
-        return bool(np.all(np.linalg.eigvals(scaled(tangent, model.stiffness)).real > _STABLE))
-    shifted = tangent.copy()
+    shifted = tangent.copy() if symmetric else 0.5 * (tangent + tangent.T)
     shifted.flat[:: len(tangent) + 1] -= _STABLE * model.stiffness
     try:
         np.linalg.cholesky(shifted)
     except np.linalg.LinAlgError:
-        return False
+        return not symmetric and bool(np.all(np.linalg.eigvals(scaled(tangent, model.stiffness)).real > _STABLE))
     return True
 
 

@@ -159,20 +159,25 @@ def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> Generalised
         return GeneralisedLoad(np.zeros(0), np.zeros((0, 0)), 0.0, 0.0)
     pin.computeJointJacobians(pin_model, data, q)
     torque: FloatArray = np.zeros(nv)
-    derivative: FloatArray = np.zeros((nv, nv))
     potential = scale = 0.0
+    angular, by_force, turning, by_moment = [], [], [], []
     for term in load.terms:
         frame = model.frame_id(term.frame)
         jacobian = pin.getFrameJacobian(pin_model, data, frame, _AXES).reshape(6, nv)
         torque += term.wrench @ jacobian
         scale += term.norms[0] * model.reach + term.norms[1]
         potential -= float(term.force @ pin.updateFramePlacement(pin_model, data, frame).translation)
-        angular = jacobian[3:]
-        products = angular.T @ (term.force_cross_transposed @ jacobian[:3])
-        derivative += products * upper
-        derivative += (products * strictly_upper).T
+        angular.append(jacobian[3:])
+        by_force.append(term.force_cross_transposed @ jacobian[:3])
         if term.moment_cross is not None:
-            derivative += (angular.T @ (term.moment_cross @ angular)) * strictly_upper.T
+            turning.append(jacobian[3:])
+            by_moment.append(term.moment_cross @ jacobian[3:])
+    derivative: FloatArray = np.zeros((nv, nv))
+    if angular:  # one product for all wrenches: for long chains these matrices are what the time goes into
+        derivative = (np.concatenate(angular).T @ np.concatenate(by_force)) * upper
+        derivative += (derivative * strictly_upper).T
+    if turning:
+        derivative += (np.concatenate(turning).T @ np.concatenate(by_moment)) * strictly_upper.T
     if load.gravity is not None:
         derivative -= pin.computeGeneralizedGravityDerivatives(pin_model, data, q)
         gravity_torque: FloatArray = data.g

@@ -16,12 +16,13 @@ undetermined when straight.) `|det J_b| = c^2 |cos u2 cos r2|` vanishes only whe
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from softrobots.checks import FloatArray
-from softrobots.screws import screw, screw_derivatives
+from softrobots.screws import Screw, skew
 
 JOINTS = ("u1", "u2", "c", "r1", "r2", "r3")
 """The joints of a section, base to tip: two of the universal joint, the chord, three of the spherical joint."""
@@ -32,7 +33,62 @@ STRAINS = ("bend_x", "bend_y", "twist", "stretch")
 LARGEST_BENDING = np.deg2rad(120.0)
 """Bending of one section up to which the chain is meant to be used [rad]; use more sections beyond."""
 
-_FIRST, _SECOND = np.triu_indices(6, 1)  # pairs of joints, the first nearer to the base
+_UPPER = np.triu(np.ones((6, 6)), 1)  # pairs of joints, the first nearer to the base
+
+
+class SectionChain:
+    """Sections at given coordinates as joint positions, with derivatives."""
+
+    def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
+        """Evaluate the map.
+
+        Args:
+            z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
+            rest_length: Rest length of a section, shape (...) [m].
+        """
+        self._screw = Screw(z, rest_length)
+        self.valid = _in_range(z, np.asarray(rest_length), self._screw)
+        """Whether the chain carries every section, see `in_range`; if not, the rest means nothing."""
+        self.positions = _positions(self._screw.rotation, self._screw.position)
+        """Joint positions `m`, shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad]."""
+
+    @cached_property
+    def first(self) -> FloatArray:
+        """First derivative `J_b^-1 S`, shape (..., 6, 4)."""
+        return np.asarray(self._inverse @ self._twists)
+
+    def curvature(self, torque: FloatArray) -> FloatArray:
+        r"""Second derivative of the joint positions, summed with weights: `sum_j torque_j d^2 m_j`.
+
+        With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise, so
+        `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`; everything is contracted with `J_b^-T torque` first.
+
+        Args:
+            torque: Weight of each joint, shape (..., 6).
+
+        Returns:
+            Shape (..., 4, 4), symmetric.
+        """
+        covector = (torque[..., None, :] @ self._inverse)[..., 0, :]
+        linear, angular = self._jacobian[..., :3, :], self._jacobian[..., 3:, :]
+        half = np.swapaxes(angular, -1, -2) @ (skew(covector[..., :3]) @ linear)
+        brackets = np.swapaxes(half, -1, -2) - half
+        brackets -= np.swapaxes(angular, -1, -2) @ (skew(covector[..., 3:]) @ angular)
+        first = self.first
+        known = self._screw.curvature(self._twists, covector)
+        return np.asarray(known - np.swapaxes(first, -1, -2) @ ((brackets * _UPPER) @ first))
+
+    @cached_property
+    def _twists(self) -> FloatArray:
+        return self._screw.twists()
+
+    @cached_property
+    def _jacobian(self) -> FloatArray:
+        return _body_jacobian(self.positions)
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        return np.asarray(np.linalg.inv(self._jacobian))
 
 
 class JointMap(NamedTuple):
@@ -56,14 +112,11 @@ def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArra
     Returns:
         Shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad].
     """
-    return _positions(*screw(z, rest_length))
+    return SectionChain(z, rest_length).positions
 
 
 def joint_map(z: FloatArray, rest_length: FloatArray | float) -> JointMap:
-    r"""Joint positions of sections with first and second derivative.
-
-    With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise, so
-    `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`.
+    """Joint positions of sections with first and second derivative.
 
     Args:
         z: Section coordinates, shape (..., 4) [rad, rad, rad, m], in range (see `in_range`).
@@ -72,37 +125,30 @@ def joint_map(z: FloatArray, rest_length: FloatArray | float) -> JointMap:
     Returns:
         Joint positions and derivatives.
     """
-    end = screw_derivatives(z, rest_length)
-    positions = _positions(*end.screw)
-    jacobian = _body_jacobian(positions)
-    inverse = np.linalg.inv(jacobian)
-    first = inverse @ end.twists
-    brackets = _brackets(jacobian)
-    products = first[..., _FIRST, :, None] * first[..., _SECOND, None, :]  # (..., 15, 4, 4)
-    known = end.twist_derivatives - np.einsum("...ip,...pab->...iab", brackets, products)
-    second = np.einsum("...ij,...jab->...iab", inverse, known)
-    return JointMap(positions, first, second)
+    chain = SectionChain(z, rest_length)
+    weights = (np.broadcast_to(unit, chain.positions.shape) for unit in np.eye(6))
+    return JointMap(chain.positions, chain.first, np.stack([chain.curvature(unit) for unit in weights], axis=-3))
 
 
 def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
     """Whether the chain carries every section.
 
-    Required of each: a positive length, a chord that points forwards (without twist: bending below 180 degrees), and less than
-    half a turn of twist.
+    Required of each: a positive length, a chord that points forwards at both ends (without twist: bending below 180 degrees),
+    and less than half a turn of twist.
 
     Args:
         z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
         rest_length: Rest length of a section, shape (...) [m].
     """
-    if not np.all(np.abs(z[..., 2]) < np.pi) or not np.all(rest_length + z[..., 3] > 1e-3 * np.asarray(rest_length)):
+    return SectionChain(z, rest_length).valid
+
+
+def _in_range(z: FloatArray, rest_length: FloatArray, end: Screw) -> bool:
+    if np.abs(z[..., 2]).max(initial=0.0) >= np.pi or not np.all(rest_length + z[..., 3] > 1e-3 * rest_length):
         return False
-    if not np.all(np.einsum("...i,...i->...", z[..., :3], z[..., :3]) < 16.0 * np.pi**2):
-        return False
-    rotation, position = screw(z, rest_length)
-    chord = np.linalg.norm(position, axis=-1)
-    # The spherical joint turns by as much as the universal one where there is no twist.
-    back = np.einsum("...i,...i->...", rotation[..., :, 2], position)
-    return bool(np.all(position[..., 2] > 1e-3 * chord) and np.all(back > 1e-3 * chord))
+    forwards = 1e-3 * np.sqrt((end.position * end.position).sum(axis=-1))
+    at_end = (end.rotation[..., :, 2] * end.position).sum(axis=-1)
+    return bool(np.all(end.position[..., 2] > forwards) and np.all(at_end > forwards))
 
 
 def _positions(rotation: FloatArray, position: FloatArray) -> FloatArray:
@@ -149,22 +195,4 @@ def _body_jacobian(joints: FloatArray) -> FloatArray:
     made[..., 3:, 3] = x
     made[..., 3:, 4] = about_z[..., 1, :]
     made[..., 5, 5] = 1.0
-    # r1 turns about x before r2 and r3, i.e. about the x axis of the chord frame.
     return made
-
-
-def _brackets(jacobian: FloatArray) -> FloatArray:
-    """Lie brackets `[J_i, J_j]` of the 15 pairs i < j, shape (..., 6, 15)."""
-    linear, angular = jacobian[..., :3, :], jacobian[..., 3:, :]
-    first, second = (linear[..., _FIRST], angular[..., _FIRST]), (linear[..., _SECOND], angular[..., _SECOND])
-    made = np.zeros((*jacobian.shape[:-1], len(_FIRST)))
-    made[..., :3, :] = _cross(first[1], second[0]) - _cross(second[1], first[0])
-    made[..., 3:, :] = _cross(first[1], second[1])
-    return made
-
-
-def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Cross products of the columns, shape (..., 3, n)."""
-    a, b, c = (first[..., row, :] for row in range(3))
-    x, y, z = (second[..., row, :] for row in range(3))
-    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-2)

@@ -10,8 +10,10 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import partial, reduce
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
@@ -137,11 +139,11 @@ class RodSolution:
     length: float
     moment_unit: float
     ends: np.ndarray
-    states: object
+    states: Any
     nodes: int
     residual: float
 
-    def at(self, s: np.ndarray) -> np.ndarray:
+    def at(self, s: ArrayLike) -> np.ndarray:
         """The state at arc lengths s (n,) [m], shape (10, n); at the middle wrench, just after it."""
         s = np.asarray(s, dtype=float).reshape(-1) / self.length
         if np.any((s < -1e-12) | (s > 1.0 + 1e-12)):
@@ -151,15 +153,15 @@ class RodSolution:
         stacked = self.states(x).reshape(-1, 10, len(s))
         return stacked[piece, :, np.arange(len(s))].T
 
-    def positions(self, s: np.ndarray) -> np.ndarray:
+    def positions(self, s: ArrayLike) -> np.ndarray:
         """Points of the centre line at arc lengths s (n,) [m], shape (n, 3) [m]."""
         return self.length * self.at(s)[:3].T
 
-    def rotations(self, s: np.ndarray) -> np.ndarray:
+    def rotations(self, s: ArrayLike) -> np.ndarray:
         """Frames of the sections, columns in world axes, third column the tangent; shape (n, 3, 3)."""
         return quaternion_rotation(self.at(s)[3:7].T)
 
-    def moments(self, s: np.ndarray) -> np.ndarray:
+    def moments(self, s: ArrayLike) -> np.ndarray:
         """Internal moment in world axes, of the part after s on the part before it, shape (n, 3) [N m]."""
         return self.moment_unit * self.at(s)[7:].T
 
@@ -187,7 +189,7 @@ class _Problem:
     """
 
     def __init__(
-        self, rod: Rod, tip_wrench: np.ndarray, mid_wrench: np.ndarray | None, mid: float, gravity_load: np.ndarray | None
+        self, rod: Rod, tip_wrench: ArrayLike, mid_wrench: ArrayLike | None, mid: float, gravity_load: ArrayLike | None
     ) -> None:
         if mid_wrench is not None and not 0.0 < mid < 1.0:
             raise ValueError("the middle wrench must act between the ends of the rod: 0 < mid < 1")
@@ -253,13 +255,13 @@ class _Problem:
             parts += [a[1, :7] - b[0, :7], a[1, 7:] + factor * self.middle[3:] - b[0, 7:]]
         return np.concatenate(parts)
 
-    def solve(self, factor: float, x: np.ndarray, guess: np.ndarray, tol: float, max_nodes: int = MAX_NODES) -> object:
+    def solve(self, factor: float, x: np.ndarray, guess: np.ndarray, tol: float, max_nodes: int = MAX_NODES) -> Any:
         """`solve_bvp` at a load factor, from values `guess` (10 pieces, n) at nodes x (n,)."""
         functions = (partial(f, factor) for f in (self.rates, self.conditions))
         jacobian = partial(self.jacobian, factor)
         return solve_bvp(*functions, x, guess, fun_jac=jacobian, tol=tol, bc_tol=1e-12, max_nodes=max_nodes)
 
-    def moment_map(self, factor: float, spline: object, x: np.ndarray) -> np.ndarray:
+    def moment_map(self, factor: float, spline: Any, x: np.ndarray) -> np.ndarray:
         """How the tip moment of the equations started at the base follows the moment there, (3, 3); Runge-Kutta over x (n,)."""
         points = np.sort(np.concatenate([x, 0.5 * (x[1:] + x[:-1])]))
         a = np.moveaxis(self.jacobian(factor, points, spline(points)), 2, 0)
@@ -278,7 +280,7 @@ class _Problem:
         y[:, 3] = 1.0
         return y.reshape(10 * self.pieces, -1)
 
-    def packed(self, solution: object) -> RodSolution:
+    def packed(self, solution: Any) -> RodSolution:
         """For the user."""
         residual = float(np.max(solution.rms_residuals))
         return RodSolution(self.rod.length, self.moment_unit, self.ends, solution.sol, len(solution.x), residual)
@@ -330,14 +332,14 @@ class _Branch:
         self.largest = 1.0 / max(problem.rotation, 1e-3)  # first step: 1 rad if the rod stayed straight
         self.message = ""
 
-    def turn(self, spline: object) -> float:
+    def turn(self, spline: Any) -> float:
         """Largest angle by which a section turns between the state now and another [rad]."""
         p, q = (y.reshape(self.problem.pieces, 10, -1)[:, 3:7] for y in (self.y, spline(self.nodes)))
         p, q = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (p, q))
         gap = np.minimum(np.linalg.norm(p - q, axis=1), np.linalg.norm(p + q, axis=1))
         return float(np.max(4.0 * np.arcsin(np.minimum(0.5 * gap, 1.0))))
 
-    def check(self, to: float, found: object) -> tuple[str, np.ndarray]:
+    def check(self, to: float, found: Any) -> tuple[str, np.ndarray]:
         """Why what `solve_bvp` found at a load factor is not the next equilibrium, empty if it is; and its moment map."""
         if not found.success:
             return found.message, self.map
@@ -377,10 +379,10 @@ class _Branch:
 
 def solve_rod(
     rod: Rod,
-    tip_wrench: np.ndarray,
-    mid_wrench: np.ndarray | None = None,
+    tip_wrench: ArrayLike,
+    mid_wrench: ArrayLike | None = None,
     mid: float = 0.5,
-    gravity_load: np.ndarray | None = None,
+    gravity_load: ArrayLike | None = None,
     tol: float = 1e-9,
 ) -> RodSolution:
     """Equilibrium of a rod under dead wrenches, on the branch that starts at the unloaded rod.
@@ -425,10 +427,10 @@ def solve_rod(
 
 def rod_tip(
     rod: Rod,
-    tip_wrench: np.ndarray,
-    mid_wrench: np.ndarray | None = None,
+    tip_wrench: ArrayLike,
+    mid_wrench: ArrayLike | None = None,
     mid: float = 0.5,
-    gravity_load: np.ndarray | None = None,
+    gravity_load: ArrayLike | None = None,
     tol: float = 1e-9,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tip of a rod under dead wrenches; arguments and errors of `solve_rod`.
@@ -443,13 +445,13 @@ def rod_tip(
 
 def rod_shape(
     rod: Rod,
-    tip_wrench: np.ndarray,
-    mid_wrench: np.ndarray | None = None,
+    tip_wrench: ArrayLike,
+    mid_wrench: ArrayLike | None = None,
     mid: float = 0.5,
-    gravity_load: np.ndarray | None = None,
+    gravity_load: ArrayLike | None = None,
     tol: float = 1e-9,
     *,
-    s: np.ndarray,
+    s: ArrayLike,
 ) -> np.ndarray:
     """Points of a rod under dead wrenches; other arguments and errors of `solve_rod`.
 
@@ -509,7 +511,7 @@ def _factor_for_tilt(problem: _Problem, target: float, largest: float = 5.0) -> 
     high = branch
     for trial in range(40):
         if high.tilt() - target < CLOSE_ANGLE:
-            break
+            return high.factor if np.linalg.norm(high.map, -2) > SMALLEST_MAP else None
         share = 0.5 if trial % 3 == 2 else (target - low.tilt()) / (high.tilt() - low.tilt())
         between = copy(low)
         between.slope = (high.y - low.y) / (high.factor - low.factor)
@@ -519,4 +521,4 @@ def _factor_for_tilt(problem: _Problem, target: float, largest: float = 5.0) -> 
             low = between
         else:
             high = between
-    return high.factor if np.linalg.norm(high.map, -2) > SMALLEST_MAP else None
+    return None

@@ -18,6 +18,9 @@ from softrobots.robots.parameters import PerPart, argument_text, at_least, colou
 CHAINS = ("sections", "lumped")
 """Forms of the equivalent rigid chain."""
 
+HINGE_RULES = ("corrected", "midpoint")
+"""Where the hinges of the lumped chain stand."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PccArm:
@@ -66,6 +69,9 @@ class PccArm:
     """Sections of constant strain a segment, for chain="sections"; 1 is pure constant curvature."""
     hinges: int = 12
     """Pairs of orthogonal springs a segment, for chain="lumped"."""
+    hinge_rule: str = "corrected"
+    """Where the hinges stand: in the middle of their sections ("midpoint"), or the first and the last of a segment 1/24 section
+    nearer to its ends, which removes the leading error of the midpoint rule ("corrected")."""
     torsion: bool = True
     """Whether a lumped segment can twist: a torsional spring a hinge."""
     extension: bool = True
@@ -100,6 +106,7 @@ class PccArm:
             at_least(name, (value,), low, strict, unit)
             object.__setattr__(self, name, value)
         choice("chain", self.chain, CHAINS)
+        choice("hinge_rule", self.hinge_rule, HINGE_RULES)
         for name in ("elastic_sections", "hinges"):
             object.__setattr__(self, name, positive_integer(name, getattr(self, name), 1000))
         for name in ("torsion", "extension"):
