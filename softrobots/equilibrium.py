@@ -85,6 +85,25 @@ class Equilibrium:
             np.array([np.linalg.norm(self.spring_torques[list(group.springs)]) for group in self.model.spring_groups])
         )
 
+    @cached_property
+    def muscle_lengths(self) -> FloatArray:
+        """Length of each muscle, shape (n_muscles,) [m]."""
+        structure = self.model.structure
+        strains = structure.strains(self.q_motors, self.q_springs)
+        return read_only(np.asarray(structure.muscle_rest + structure.muscle_matrix @ strains))
+
+    @property
+    def muscle_forces(self) -> FloatArray:
+        """Tension that each muscle must exert, negative where it pushes, shape (n_muscles,) [N]."""
+        return self.motor_torques[len(self.motor_torques) - len(self.model.muscles) :]
+
+    @cached_property
+    def strains(self) -> FloatArray:
+        """Strains of each section, base to tip, shape (n_sections, 4): kx, ky, twist [rad/m], stretch [-]."""
+        structure = self.model.structure
+        lengths = np.array([section.length for section in structure.section_table]).reshape(-1, 1)
+        return read_only(structure.section_coordinates(self.q_motors, self.q_springs) / lengths + (0.0, 0.0, 0.0, 1.0))
+
     @property
     def wrinkled(self) -> bool:
         """Whether a link carries its wrinkling moment or more, so that linear springs no longer hold."""

@@ -357,8 +357,8 @@ class SoftModel:
         return "m" if self.muscle_input == "lengths" else "N"
 
     def _chain_length(self) -> float:
-        sections = self._structure.sections
-        strained = set() if sections is None else set(sections.joint_indices.ravel().tolist())
+        names = [name for section in self._structure.section_table for name in section.joint_names]
+        strained = set(self._structure.indices(names).tolist())  # their travel is strain
         frame = self._pin.frames[self.frame_id(self._tip)]
         length = float(np.linalg.norm(frame.placement.translation))
         joint = frame.parentJoint

@@ -5,7 +5,8 @@ A muscle at distance `d` and azimuth `phi` of a segment has the length ([PCC pap
 .. math:: l = l_0 + \sum_i (e_i + d \sin\phi\,a_i - d \cos\phi\,b_i) = l_0 + A z
 
 with the bending `a` about x and `b` about y [rad] and the elongation `e` [m] of each section `i`: linear in the section
-coordinates. (Twist lengthens a muscle in second order only; that is neglected.)
+coordinates. (Twist lengthens a muscle too, in second order: by `(d t)^2 / (2 l)` for a segment twisted by `t`. That is neglected:
+1 mm in 0.524 m for 0.8 rad at 0.04 m.)
 
 - *Lengths given*: they fix the sums of bending and elongation over a segment. Free are the differences between its sections,
   and twist: `z = z_u + N y` with `A N = 0`. The part `z_u` spreads the sums as the stiffness wants it, so that

@@ -64,7 +64,9 @@ class Screw:
         along = d[1] * _AXIS + d[2] * self._across + d[3] * omega[..., 2:] * omega
         slope = along[..., :, None] * omega[..., None, :] + c[2, ..., None] * _CROSS_AXIS
         slope += c[3, ..., None] * (omega[..., :, None] * _AXIS + omega[..., 2, None, None] * _UNITS)
-        moved = np.concatenate([self._length[..., None] * slope, self._direction[..., None]], axis=-1)  # dp/dz, axes of the start
+        moved = np.concatenate(
+            [self._length[..., None] * slope, self._direction[..., None]], axis=-1
+        )  # dp/dz, axes of the start
         made = np.zeros((*omega.shape[:-1], 6, 4))
         made[..., :3, :] = np.swapaxes(self.rotation, -1, -2) @ moved
         made[..., 3:, :3] = _UNITS - c[2, ..., None] * self._turn + c[3, ..., None] * self._turn_twice
@@ -73,8 +75,8 @@ class Screw:
     def curvature(self, twists: FloatArray, covector: FloatArray) -> FloatArray:
         r"""Derivative of `covector . twists` with respect to the section coordinates at constant covector.
 
-        Element `[a, b]` is :math:`\lambda \cdot \partial S_a / \partial z_b`. (Contracting before differentiating leaves matrices
-        where the second derivative itself is a field of tensors; unit covectors give that.)
+        Element `[a, b]` is :math:`\lambda \cdot \partial S_a / \partial z_b`. (Contracting before differentiating leaves
+        matrices where the second derivative itself is a field of tensors; unit covectors give that.)
 
         Args:
             twists: What `twists` returned, shape (..., 6, 4).

@@ -60,8 +60,8 @@ class SectionChain:
     def curvature(self, torque: FloatArray) -> FloatArray:
         r"""Second derivative of the joint positions, summed with weights: `sum_j torque_j d^2 m_j`.
 
-        With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise, so
-        `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`; everything is contracted with `J_b^-T torque` first.
+        With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise,
+        so `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`; everything is contracted with `J_b^-T torque` first.
 
         Args:
             torque: Weight of each joint, shape (..., 6).

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.checks import FloatArray, read_only
-from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections
+from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections, rest_coordinates
 from softrobots.muscles import ElasticLaw, MuscleForces, MuscleLengths, Segments, muscle_matrix
-from softrobots.strain_chain import STRAINS
+from softrobots.strain_chain import STRAINS, joint_positions
 from softrobots.urdf_tags import LumpedSectionTag, MuscleTag, SectionTag, SpringTag
 
 
@@ -31,6 +31,25 @@ class Parts:
     """Muscles."""
     muscle_input: str = "lengths"
     """What is given of the muscles, "lengths" or "forces"."""
+
+
+class SectionRow(NamedTuple):
+    """A section, of constant strain or lumped."""
+
+    name: str
+    """Name of the section."""
+    segment: int
+    """Number of its segment, from 1."""
+    length: float
+    """Rest length [m]."""
+    radius: float
+    """Radius of the body, for pictures [m]."""
+    lumped: bool
+    """Whether it is lumped into springs."""
+    joint_names: tuple[str, ...]
+    """Its joints."""
+    rest_joints: FloatArray
+    """Joint positions that the joint origins carry, shape (6,); zeros if lumped."""
 
 
 class Structure:
@@ -59,6 +78,8 @@ class Structure:
         """Sections lumped into springs."""
         self.muscles = tuple(parts.muscles)
         """Muscles."""
+        self.section_table = self._section_table(tags)
+        """Every section, base to tip."""
         self.motor_indices, self.spring_indices = self.indices(self.motor_joints), self.indices(self.spring_joints)
         """Places of motors and springs in Pinocchio's velocity vector."""
         self.sections = Sections(tags, np.array([self.indices(tag.joints) for tag in tags])) if tags else None
@@ -125,6 +146,18 @@ class Structure:
             for name, joint in section.joints.items():
                 made[row, STRAINS.index(name)] = strains[self.spring_joints.index(joint)]
         return made
+
+    def _section_table(self, tags: Sequence[SectionTag]) -> tuple[SectionRow, ...]:
+        if tags:
+            rest = joint_positions(rest_coordinates(tags), np.array([tag.length for tag in tags]))
+            return tuple(
+                SectionRow(tag.name, tag.segment, tag.length, tag.radius, False, tag.joints, joints)
+                for tag, joints in zip(tags, rest, strict=True)
+            )
+        return tuple(
+            SectionRow(tag.name, tag.segment, tag.length, tag.radius, True, tuple(tag.joints.values()), np.zeros(6))
+            for tag in self.lumped_sections
+        )
 
     def _elastic_limits(self) -> FloatArray:
         limits = np.tile([-np.inf, np.inf], (self._pin.nv, 1))

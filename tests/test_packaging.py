@@ -86,7 +86,18 @@ def test_imports_point_one_way() -> None:
 
 
 def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
-    names = ["errors", "checks", "paths", "description", "urdf_tags", "springs", "time_law", "stumpff", "screws", "strain_chain"]
+    names = [
+        "errors",
+        "checks",
+        "paths",
+        "description",
+        "urdf_tags",
+        "springs",
+        "time_law",
+        "stumpff",
+        "screws",
+        "strain_chain",
+    ]
     files = [PACKAGE / f"{name}.py" for name in (*names, "coordinates", "muscles")]
     for folder in ("inflated_beam", "constant_curvature", "robots"):
         files += (PACKAGE / folder).glob("*.py")

@@ -55,8 +55,8 @@ class PccArm:
     """Largest pull or push of a muscle [N]. Assumed."""
     bending_stiffness: PerPart = 1.92
     """Bending stiffness EI [N m^2]. Assumed, as of three muscles of 800 N a unit strain: 3/2 800 d^2."""
-    torsional_stiffness: PerPart = 1.0
-    """Torsional stiffness GJ [N m^2]. Assumed."""
+    torsional_stiffness: PerPart = 1.28
+    """Torsional stiffness GJ [N m^2]. Assumed, as of an incompressible round rod: EI / 1.5."""
     axial_stiffness: PerPart = 2400.0
     """Axial stiffness EA [N]. Assumed, as of three muscles of 800 N a unit strain."""
     linear_density: PerPart = 0.6

@@ -1,0 +1,142 @@
+"""The continuous body of a robot with sections: its backbone, its surface and its muscles, for pictures and measurements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.checks import FloatArray, positive_integer
+from softrobots.equilibrium import Equilibrium
+from softrobots.errors import ParameterError
+from softrobots.model import SoftModel
+from softrobots.screws import Screw
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentBody:
+    """One segment of a body."""
+
+    number: int
+    """Number of the segment, from 1."""
+    poses: FloatArray
+    """Frames along the backbone, z along it, from the start to the end of the segment, shape (n, 4, 4) [m], world axes."""
+    radius: float
+    """Radius of the body [m]."""
+    muscles: dict[str, FloatArray]
+    """Points along each muscle, by name, shape (n, 3) [m]."""
+
+    @property
+    def backbone(self) -> FloatArray:
+        """Points along the backbone, shape (n, 3) [m]."""
+        return np.asarray(self.poses[:, :3, 3])
+
+    def surface(self, sides: int = 24) -> tuple[FloatArray, FloatArray]:
+        """Triangles of the tube around the backbone, closed at both ends.
+
+        Args:
+            sides: Corners of its cross-section.
+
+        Returns:
+            Corners, shape (n sides + 2, 3) [m], and the corners of each triangle, shape (m, 3), integers, seen from outside
+            anticlockwise.
+        """
+        rings, angle = len(self.poses), 2.0 * np.pi * np.arange(sides) / sides
+        ring = self.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+        corners = np.einsum("nij,sj->nsi", self.poses[:, :3, :3], ring) + self.backbone[:, None, :]
+        start = sides * np.repeat(np.arange(rings - 1), sides)
+        here, there = np.tile(np.arange(sides), rings - 1), np.tile((np.arange(sides) + 1) % sides, rings - 1)
+        low = np.column_stack([start + here, start + there, start + sides + there])
+        high = np.column_stack([start + here, start + sides + there, start + sides + here])
+        around, after = np.arange(sides), (np.arange(sides) + 1) % sides
+        first, last, top = rings * sides, rings * sides + 1, (rings - 1) * sides
+        caps = [np.column_stack([after, around, np.full(sides, first)])]
+        caps.append(np.column_stack([top + around, top + after, np.full(sides, last)]))
+        points = np.concatenate([corners.reshape(-1, 3), self.backbone[[0, -1]]])
+        return points, np.concatenate([low, high, *caps])
+
+
+def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:
+    """Shape of the body of a loaded robot; see `body_at`.
+
+    Args:
+        equilibrium: The loaded robot.
+        points: Points a section, the start of the segment apart.
+
+    Returns:
+        The segments, base to tip; empty for a robot without sections.
+
+    Raises:
+        ParameterError: If it is no equilibrium, or `points` is not positive.
+    """
+    if not isinstance(equilibrium, Equilibrium):
+        raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
+    return body_at(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, points)
+
+
+def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, points: int = 12) -> tuple[SegmentBody, ...]:
+    """Shape of the body at given coordinates: screw motions from the start of each segment along its sections.
+
+    For sections of constant strain this is exact. A lumped chain is drawn as the smooth body that it stands for, which its
+    rigid links follow to the order of the discretisation.
+
+    Args:
+        model: The robot.
+        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+        q_springs: Elastic coordinates, shape (n_springs,) [rad or m].
+        points: Points a section, the start of the segment apart.
+
+    Returns:
+        The segments, base to tip; empty for a robot without sections.
+
+    Raises:
+        ParameterError: If `points` is not positive.
+    """
+    positive_integer("points", points, 10_000)
+    structure = model.structure
+    sections = structure.section_table
+    if not sections:
+        return ()
+    pin_model, data = model.workspace(None)
+    pin.forwardKinematics(pin_model, data, model.embed(model.coordinates.at(q_motors, q_springs).joints))
+    coordinates = structure.section_coordinates(q_motors, q_springs)
+    shares = np.arange(1, points + 1) / points
+    made = []
+    for number in dict.fromkeys(section.segment for section in sections):
+        rows = [row for row, section in enumerate(sections) if section.segment == number]
+        pose = _start(model, data, rows[0])
+        poses = [pose[None]]
+        for row in rows:
+            along = Screw(shares[:, None] * coordinates[row], shares * sections[row].length)
+            steps = np.tile(np.eye(4), (points, 1, 1))
+            steps[:, :3, :3], steps[:, :3, 3] = along.rotation, along.position
+            poses.append(pose @ steps)
+            pose = poses[-1][-1]
+        frames = np.concatenate(poses)
+        muscles = {
+            tag.name: frames[:, :3, 3]
+            + tag.distance * (np.cos(tag.azimuth) * frames[:, :3, 0] + np.sin(tag.azimuth) * frames[:, :3, 1])
+            for tag in structure.muscles
+            if tag.segment == number
+        }
+        made.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles))
+    return tuple(made)
+
+
+def _start(model: SoftModel, data: object, row: int) -> FloatArray:
+    """Frame at the start of a section, (4, 4), after forward kinematics."""
+    pin_model, section = model.pinocchio, model.structure.section_table[row]
+    joints = [pin_model.getJointId(name) for name in section.joint_names]
+    first = min(joints)
+    before = data.oMi[pin_model.parents[first]] * pin_model.jointPlacements[first]  # type: ignore[attr-defined]
+    if section.lumped:  # the hinge stands in the middle
+        return np.asarray(before.homogeneous @ _transform(np.eye(3), (0.0, 0.0, -0.5 * section.length)))
+    back = pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0)
+    return np.asarray(before.homogeneous @ _transform(back, (0.0, 0.0, 0.0)))
+
+
+def _transform(rotation: FloatArray, translation: tuple[float, float, float]) -> FloatArray:
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation, translation
+    return made
