@@ -31,6 +31,7 @@ from softrobots.stability import critical_load
 from softrobots.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
 from softrobots.trajectory import Trajectory, follow_trajectory
 from softrobots.viewer import Viewer, view
+from softrobots.workspace import Workspace, sample_workspace
 
 __version__ = "0.1.0"
 
@@ -62,6 +63,7 @@ __all__ = [
     "Trajectory",
     "Viewer",
     "ViewerError",
+    "Workspace",
     "__version__",
     "compliance",
     "constant_curvature",
@@ -74,6 +76,7 @@ __all__ = [
     "load_result",
     "quintic",
     "read_waypoints",
+    "sample_workspace",
     "save_csv",
     "save_result",
     "solve_equilibrium",

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from softrobots.checks import FloatArray, positive_integer
 from softrobots.equilibrium import Equilibrium
-from softrobots.errors import ParameterError
+from softrobots.errors import NameNotFound, ParameterError
 from softrobots.model import SoftModel
 from softrobots.screws import Screw
 
@@ -42,19 +42,52 @@ class SegmentBody:
             Corners, shape (n sides + 2, 3) [m], and the corners of each triangle, shape (m, 3), integers, seen from outside
             anticlockwise.
         """
-        rings, angle = len(self.poses), 2.0 * np.pi * np.arange(sides) / sides
-        ring = self.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
-        corners = np.einsum("nij,sj->nsi", self.poses[:, :3, :3], ring) + self.backbone[:, None, :]
-        start = sides * np.repeat(np.arange(rings - 1), sides)
-        here, there = np.tile(np.arange(sides), rings - 1), np.tile((np.arange(sides) + 1) % sides, rings - 1)
-        low = np.column_stack([start + here, start + there, start + sides + there])
-        high = np.column_stack([start + here, start + sides + there, start + sides + here])
-        around, after = np.arange(sides), (np.arange(sides) + 1) % sides
-        first, last, top = rings * sides, rings * sides + 1, (rings - 1) * sides
-        caps = [np.column_stack([after, around, np.full(sides, first)])]
-        caps.append(np.column_stack([top + around, top + after, np.full(sides, last)]))
-        points = np.concatenate([corners.reshape(-1, 3), self.backbone[[0, -1]]])
-        return points, np.concatenate([low, high, *caps])
+        return tube(self.poses[:, :3, :3], self.backbone, self.radius, sides)
+
+    def muscle_surface(self, name: str, radius: float, sides: int = 8) -> tuple[FloatArray, FloatArray]:
+        """Triangles of a tube around a muscle, as in `surface`.
+
+        Args:
+            name: The muscle.
+            radius: Radius of the tube [m].
+            sides: Corners of its cross-section.
+
+        Returns:
+            Corners and triangles.
+
+        Raises:
+            NameNotFound: If no muscle of the segment is called that.
+        """
+        if name not in self.muscles:
+            raise NameNotFound("muscle", name, self.muscles)
+        return tube(self.poses[:, :3, :3], self.muscles[name], radius, sides)
+
+
+def tube(rotations: FloatArray, centres: FloatArray, radius: float, sides: int) -> tuple[FloatArray, FloatArray]:
+    """Triangles of a closed tube.
+
+    Args:
+        rotations: Axes of each cross-section, which lies in x and y, shape (n, 3, 3).
+        centres: Centre of each, shape (n, 3) [m].
+        radius: Radius [m].
+        sides: Corners of a cross-section.
+
+    Returns:
+        Corners, shape (n sides + 2, 3) [m], and the corners of each triangle, shape (m, 3), integers, seen from outside
+        anticlockwise.
+    """
+    rings, angle = len(centres), 2.0 * np.pi * np.arange(sides) / sides
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    corners = np.einsum("nij,sj->nsi", rotations, ring) + centres[:, None, :]
+    start = sides * np.repeat(np.arange(rings - 1), sides)
+    here, there = np.tile(np.arange(sides), rings - 1), np.tile((np.arange(sides) + 1) % sides, rings - 1)
+    low = np.column_stack([start + here, start + there, start + sides + there])
+    high = np.column_stack([start + here, start + sides + there, start + sides + here])
+    around, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    first, last, top = rings * sides, rings * sides + 1, (rings - 1) * sides
+    caps = [np.column_stack([after, around, np.full(sides, first)])]
+    caps.append(np.column_stack([top + around, top + after, np.full(sides, last)]))
+    return np.concatenate([corners.reshape(-1, 3), centres[[0, -1]]]), np.concatenate([low, high, *caps])
 
 
 def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:

@@ -17,7 +17,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from softrobots.checks import FloatArray
+from softrobots.checks import FloatArray, read_only
+from softrobots.joint_loads import JointLoad
 from softrobots.strain_chain import STRAINS, SectionChain, joint_positions
 from softrobots.urdf_tags import SectionTag
 
@@ -50,8 +51,8 @@ class Point(Protocol):
     def valid(self) -> bool:
         """Whether the chain can be there; joint positions mean nothing where it cannot."""
 
-    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
-        """Carry a joint load, shape (nv,), with its derivative, shape (nv, nv), to these coordinates."""
+    def reduce(self, load: JointLoad) -> ReducedLoad:
+        """Carry a joint load to these coordinates."""
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Split a matrix of columns per joint, shape (m, nv), into columns per actuator and per elastic coordinate."""
@@ -97,9 +98,10 @@ class DirectPoint(NamedTuple):
         """Always."""
         return True
 
-    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+    def reduce(self, load: JointLoad) -> ReducedLoad:
         """Pick rows and columns."""
         motors, elastic, rows = self.motor_indices, self.elastic_indices, self.elastic_rows
+        torque, derivative = load.torque, load.derivative
         return ReducedLoad(torque[motors], torque[elastic], derivative[rows, elastic], derivative[rows, motors], 0.0, 0.0)
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -144,6 +146,14 @@ class SectionCoordinates:
     def __init__(self, motor_indices: Any, spring_indices: Any, sections: Sections, count: int) -> None:
         """Order the elastic coordinates: springs, then four a section."""
         self.motor_indices, self.spring_indices, self.sections, self.count = motor_indices, spring_indices, sections, count
+        self.singles = np.concatenate([motor_indices, spring_indices])
+        """Joints that are coordinates by themselves."""
+        order = np.concatenate([self.singles, np.repeat(sections.joint_indices[:, 0], 4)])
+        self.before = read_only((order[:, None] < order).astype(np.float64))
+        """Which coordinate moves joints nearer to the base than which other, shape (n, n): 1 or 0."""
+        first = len(self.singles) + 4 * np.arange(len(sections.names))
+        self.places = first[:, None] + np.arange(4)
+        """Places of the coordinates of each section, motors before all, shape (n_sections, 4)."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> SectionPoint:
         """Go to given coordinates."""
@@ -174,19 +184,36 @@ class SectionPoint:
         """Whether every section is in range."""
         return self._chain.valid
 
-    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
-        """Carry a joint load over by the chain rule, block by block."""
-        c, n = self._c, len(self._c.spring_indices)
-        at_sections = torque[c.sections.joint_indices]
-        elastic = np.concatenate([torque[c.spring_indices], (at_sections[:, None, :] @ self._chain.first).ravel()])
-        coupling, reduced = self.columns(self.columns(derivative.T)[1].T)
-        places = n + np.arange(len(elastic) - n).reshape(-1, 4)
-        reduced[places[:, :, None], places[:, None, :]] += self._chain.curvature(at_sections)
-        return ReducedLoad(torque[c.motor_indices], elastic, reduced, coupling, 0.0, 0.0)
+    def reduce(self, load: JointLoad) -> ReducedLoad:
+        """Carry a joint load over by the chain rule.
+
+        Between two sections the derivative is a product of combined columns, within one it goes joint by joint.
+        """
+        c, chain = self._c, self._chain
+        at_sections = load.torque[c.sections.joint_indices]
+        elastic = np.concatenate([load.torque[c.spring_indices], (at_sections[:, None, :] @ chain.first).ravel()])
+        angular, by_force = self._combine(load.angular), self._combine(load.by_force)
+        made = (angular.T @ by_force) * c.before
+        made += made.T
+        if load.by_moment is not None:
+            made += (angular.T @ self._combine(load.by_moment)) * c.before.T
+        singles = np.arange(len(c.singles))
+        made[singles, singles] += np.einsum("ij,ij->j", angular[:, singles], by_force[:, singles])
+        within = np.swapaxes(chain.first, -1, -2) @ (load.within(c.sections.joint_indices) @ chain.first)
+        made[c.places[:, :, None], c.places[:, None, :]] += within + chain.curvature(at_sections)
+        if load.gravity_derivative is not None:
+            made += self._combine(self._combine(load.gravity_derivative).T).T
+        n = len(c.motor_indices)
+        return ReducedLoad(load.torque[c.motor_indices], elastic, made[n:, n:], made[n:, :n], 0.0, 0.0)
+
+    def _combine(self, matrix: FloatArray) -> FloatArray:
+        """Columns per motor, spring and section coordinate of a matrix with columns per joint."""
+        c = self._c
+        blocks = matrix[:, c.sections.joint_indices].transpose(1, 0, 2) @ self._chain.first  # (n, m, 4)
+        flat = blocks.transpose(1, 0, 2).reshape(len(matrix), c.places.size)
+        return np.concatenate([matrix[:, c.singles], flat], axis=1)
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Combine the columns of the joints of each section."""
-        c = self._c
-        blocks = jacobian[:, c.sections.joint_indices].transpose(1, 0, 2) @ self._chain.first  # (n, m, 4)
-        flat = blocks.transpose(1, 0, 2).reshape(len(jacobian), -1)
-        return jacobian[:, c.motor_indices], np.concatenate([jacobian[:, c.spring_indices], flat], axis=1)
+        combined, n = self._combine(jacobian), len(self._c.motor_indices)
+        return combined[:, :n], combined[:, n:]

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from softrobots.blas_threads import one_blas_thread
 from softrobots.checks import FloatArray
 from softrobots.coordinates import Point, ReducedLoad
 from softrobots.loads import Load, generalised_load
@@ -77,9 +78,9 @@ def settle(
         The last state, whether or not it meets the tolerance (see `largest_residual`), and the evaluations spent.
     """
     case = _Case(model, q_motors, load, tolerance)
-    if method == "fixed_point":
-        return _fixed_point(case, start, max_iterations)
-    return (_descend if load.conservative else _grow_load)(case, start, max_iterations)
+    solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
+    with one_blas_thread(model.n_springs):
+        return solve(case, start, max_iterations)
 
 
 def settled(
@@ -114,7 +115,7 @@ def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
     if not point.valid:
         return _nowhere(model, q_springs, q, point)
     joints = generalised_load(model, q, load)
-    reduced = point.reduce(joints.torque, joints.derivative)
+    reduced = point.reduce(joints)
     law = model.springs
     residual = law.torque(q_springs) - reduced.elastic
     tangent = -reduced.derivative
@@ -177,7 +178,8 @@ def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool) -> bool
     shifted = tangent.copy() if symmetric else 0.5 * (tangent + tangent.T)
     shifted.flat[:: len(tangent) + 1] -= _STABLE * model.stiffness
     try:
-        np.linalg.cholesky(shifted)
+        with one_blas_thread(len(tangent)):
+            np.linalg.cholesky(shifted)
     except np.linalg.LinAlgError:
         return not symmetric and bool(np.all(np.linalg.eigvals(scaled(tangent, model.stiffness)).real > _STABLE))
     return True

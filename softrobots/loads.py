@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.checks import FloatArray, finite_array, read_only
+from softrobots.joint_loads import JointLoad
 from softrobots.model import SoftModel, check_model
 
 EARTH_GRAVITY = (0.0, 0.0, -9.81)
@@ -123,25 +124,9 @@ class Load:
         return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity)
 
 
-class GeneralisedLoad(NamedTuple):
-    """A load in joint coordinates."""
+def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> JointLoad:
+    """Torque of a load in joint coordinates, with its exact derivative (see `softrobots.joint_loads`).
 
-    torque: FloatArray
-    """Torque that the joints must carry, `sum J^T w - g(q)`, shape (nv,) [N m or N]."""
-    derivative: FloatArray
-    """Its derivative with respect to the joint coordinates, shape (nv, nv)."""
-    potential: float
-    """Potential energy of forces and gravity, `-sum f . p + U_g` [J]; moments have none and do not count."""
-    scale: float
-    """Size of the load, `sum |f| reach + |moment|` plus the norm of the gravity torque [N m]."""
-
-
-def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> GeneralisedLoad:
-    r"""Torque of a load in joint coordinates, with its exact derivative.
-
-    For a world-fixed force `f` at a point of a chain, with linear and angular Jacobian columns `v_i`, `w_i`,
-    the derivative of :math:`J_v^T f` is :math:`(f \times w_i) \cdot v_j` for `i <= j`, and symmetric.
-    For a world-fixed moment `mu` it is :math:`w_i \cdot (\mu \times w_j)` for `j < i`, else 0: not symmetric.
     (Closed form of the kinematic Hessian; Pinocchio's own static derivatives take the load as a follower.)
 
     Args:
@@ -154,43 +139,33 @@ def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> Generalised
     """
     pin_model, data = model.workspace(load.gravity)
     nv = pin_model.nv
-    upper, strictly_upper = _triangles(nv)
     if nv == 0:  # nothing moves; Pinocchio's frame Jacobian crashes without columns
-        return GeneralisedLoad(np.zeros(0), np.zeros((0, 0)), 0.0, 0.0)
+        return JointLoad(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), None, None, 0.0, 0.0)
     pin.computeJointJacobians(pin_model, data, q)
     torque: FloatArray = np.zeros(nv)
     potential = scale = 0.0
-    angular, by_force, turning, by_moment = [], [], [], []
-    for term in load.terms:
+    count = len(load.terms)
+    angular, by_force = np.zeros((3 * count, nv)), np.zeros((3 * count, nv))
+    by_moment = None if load.conservative else np.zeros((3 * count, nv))
+    for number, term in enumerate(load.terms):
+        rows = slice(3 * number, 3 * number + 3)
         frame = model.frame_id(term.frame)
         jacobian = pin.getFrameJacobian(pin_model, data, frame, _AXES).reshape(6, nv)
         torque += term.wrench @ jacobian
         scale += term.norms[0] * model.reach + term.norms[1]
         potential -= float(term.force @ pin.updateFramePlacement(pin_model, data, frame).translation)
-        angular.append(jacobian[3:])
-        by_force.append(term.force_cross_transposed @ jacobian[:3])
-        if term.moment_cross is not None:
-            turning.append(jacobian[3:])
-            by_moment.append(term.moment_cross @ jacobian[3:])
-    derivative: FloatArray = np.zeros((nv, nv))
-    if angular:  # one product for all wrenches: for long chains these matrices are what the time goes into
-        derivative = (np.concatenate(angular).T @ np.concatenate(by_force)) * upper
-        derivative += (derivative * strictly_upper).T
-    if turning:
-        derivative += (np.concatenate(turning).T @ np.concatenate(by_moment)) * strictly_upper.T
+        angular[rows] = jacobian[3:]
+        by_force[rows] = term.force_cross_transposed @ jacobian[:3]
+        if by_moment is not None and term.moment_cross is not None:
+            by_moment[rows] = term.moment_cross @ jacobian[3:]
+    gravity_derivative: FloatArray | None = None
     if load.gravity is not None:
-        derivative -= pin.computeGeneralizedGravityDerivatives(pin_model, data, q)
+        gravity_derivative = -pin.computeGeneralizedGravityDerivatives(pin_model, data, q)
         gravity_torque: FloatArray = data.g
         torque -= gravity_torque
         scale += math.sqrt(float(gravity_torque @ gravity_torque))
         potential += pin.computePotentialEnergy(pin_model, data)
-    return GeneralisedLoad(torque, derivative, potential, scale)
-
-
-@lru_cache(maxsize=16)
-def _triangles(n: int) -> tuple[FloatArray, FloatArray]:
-    """Masks of the upper triangle with and without the diagonal, shape (n, n)."""
-    return read_only(np.triu(np.ones((n, n)))), read_only(np.triu(np.ones((n, n)), 1))
+    return JointLoad(torque, angular, by_force, by_moment, gravity_derivative, potential, scale)
 
 
 def cross_matrix(vector: FloatArray) -> FloatArray:

@@ -55,13 +55,26 @@ def floor_lines(reach: float) -> FloatArray:
     return np.array(ends)
 
 
-def with_legend(page: str, title: str, *, colours: bool) -> str:
-    """Give a meshcat page a title and an explanation of what is drawn."""
-    rows = [
-        ("rgba(115,140,165,0.45)", "rigid arm, same motor angles"),
-        (f"#{PATH_COLOUR:06x}", "path of the tip"),
-        (f"#{FORCE_COLOUR:06x}", "force"),
-    ]
+def with_legend(page: str, title: str, *, path: bool, force: bool, colours: bool, muscles: str | None = None) -> str:
+    """Give a meshcat page a title and an explanation of what is drawn.
+
+    Args:
+        page: The page.
+        title: Its title.
+        path: Whether a path is drawn.
+        force: Whether forces are drawn.
+        colours: Whether inflated links are coloured by wrinkling.
+        muscles: What is given of the muscles, "lengths" or "forces"; None without muscles.
+
+    Returns:
+        The page.
+    """
+    ghost = {"lengths": "without load, same muscle lengths", "forces": "straight, at rest"}
+    rows = [("rgba(115,140,165,0.45)", ghost.get(muscles or "", "rigid arm, same motor angles"))]
+    rows += [(f"#{PATH_COLOUR:06x}", "path of the tip")] * path
+    rows += [(f"#{FORCE_COLOUR:06x}", "force")] * force
+    if muscles is not None:
+        rows += [("#0073b3", "muscle that pulls"), ("#e67300", "muscle that pushes")]
     if colours:
         above = 1.0
         for least, rgb in WRINKLING_COLOURS:

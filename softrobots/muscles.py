@@ -5,8 +5,8 @@ A muscle at distance `d` and azimuth `phi` of a segment has the length ([PCC pap
 .. math:: l = l_0 + \sum_i (e_i + d \sin\phi\,a_i - d \cos\phi\,b_i) = l_0 + A z
 
 with the bending `a` about x and `b` about y [rad] and the elongation `e` [m] of each section `i`: linear in the section
-coordinates. (Twist lengthens a muscle too, in second order: by `(d t)^2 / (2 l)` for a segment twisted by `t`. That is neglected:
-1 mm in 0.524 m for 0.8 rad at 0.04 m.)
+coordinates. (Twist lengthens a muscle too, in second order: by `(d t)^2 / (2 l)` for a segment twisted by `t`. That is
+neglected: 1 mm in 0.524 m for 0.8 rad at 0.04 m.)
 
 - *Lengths given*: they fix the sums of bending and elongation over a segment. Free are the differences between its sections,
   and twist: `z = z_u + N y` with `A N = 0`. The part `z_u` spreads the sums as the stiffness wants it, so that
@@ -24,6 +24,7 @@ import numpy as np
 from softrobots.checks import FloatArray
 from softrobots.coordinates import Coordinates, Point, ReducedLoad
 from softrobots.errors import DescriptionError, ParameterError
+from softrobots.joint_loads import JointLoad
 from softrobots.strain_chain import LARGEST_BENDING
 from softrobots.urdf_tags import MuscleTag
 
@@ -103,9 +104,9 @@ class MuscleForcePoint(NamedTuple):
         """Whether the chain can be there."""
         return self.inner.valid
 
-    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+    def reduce(self, joints: JointLoad) -> ReducedLoad:
         """Add what the muscles pull; the load on a muscle is its tension."""
-        load = self.inner.reduce(torque, derivative)
+        load = self.inner.reduce(joints)
         return ReducedLoad(
             np.concatenate([load.motors, self.tensions]),
             load.elastic - self.tensions @ self.matrix,
@@ -275,9 +276,9 @@ class MuscleLengthPoint(NamedTuple):
         """Whether the chain can be there."""
         return self.inner.valid
 
-    def reduce(self, torque: FloatArray, derivative: FloatArray) -> ReducedLoad:
+    def reduce(self, joints: JointLoad) -> ReducedLoad:
         """Carry over to lengths and free coordinates; the load on a muscle is its tension, spring-back included."""
-        load = self.inner.reduce(torque, derivative)
+        load = self.inner.reduce(joints)
         unbalanced = load.elastic - self.law.stiffness * (self.strains - self.law.rest)
         half = self.free.T @ load.derivative
         return ReducedLoad(

@@ -17,7 +17,8 @@ from softrobots.errors import MissingDependency, ParameterError
 from softrobots.model import SoftModel
 from softrobots.trajectory import Trajectory
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito, safe for colour-blind people
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito
+"""Line colours that colour-blind people can tell apart."""
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
@@ -70,16 +71,11 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
             label="loaded arm, later is darker" if first else None,
         )
         everything.append(loaded)
-    axes.plot(*trajectory.tip_positions.T, color=_COLOURS[1], lw=2.0, label="path of the tip")
+    axes.plot(*trajectory.tip_positions.T, color=COLOURS[1], lw=2.0, label="path of the tip")
     end = trajectory.equilibria[-1]
-    _force_arrow(axes, end)
+    force_arrow(axes, end)
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Loaded arm along the path")
-    points = np.vstack(everything)
-    centre, half = (points.max(0) + points.min(0)) / 2.0, max(float(np.ptp(points, axis=0).max()) / 2.0, 1e-3)
-    for name, middle in zip("xyz", centre, strict=True):
-        getattr(axes, f"set_{name}lim")(middle - half, middle + half)
-    axes.set_box_aspect((1, 1, 1))
-    axes.view_init(elev=22, azim=-62)
+    equal_box(axes, np.vstack(everything))
     axes.legend(loc="upper left", fontsize=9)
     return figure
 
@@ -105,7 +101,7 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
     axes = figure.add_subplot()
     every = max(len(trajectory.times) // 10, 1)
     for number, name in enumerate(trajectory.model.motor_joints):
-        colour, marker = _COLOURS[number % 6], _MARKERS[number % 6]
+        colour, marker = COLOURS[number % 6], _MARKERS[number % 6]
         style = {"color": colour, "marker": marker, "markevery": every, "ms": 5}
         axes.plot(trajectory.times, trajectory.q_motors[:, number], label=f"{name}, elastic", **style)
         axes.plot(rigid.times, rigid.q_motors[:, number], ls="--", mfc="white", label=f"{name}, rigid", **style)
@@ -131,14 +127,14 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
     """
     moments = finite_array("times", times, (None,), "s")
     lines = {label: finite_array(f"errors[{label!r}]", error, moments.shape, "m") for label, error in errors.items()}
-    figure = _new((8.0, 4.4))
+    figure = new_figure((8.0, 4.4))
     axes = figure.add_subplot()
     every = max(len(moments) // 10, 1)
     for number, (label, error) in enumerate(lines.items()):
         axes.semilogy(
             moments,
             np.maximum(error, 1e-16) * 1e3,
-            color=_COLOURS[number % 6],
+            color=COLOURS[number % 6],
             ls=("-", "--", "-.", ":")[number % 4],
             marker=_MARKERS[number % 6],
             markevery=every,
@@ -173,7 +169,7 @@ def link_moments(trajectory: Trajectory) -> Any:
         axes.plot(
             trajectory.times,
             moment,
-            color=_COLOURS[number % 6],
+            color=COLOURS[number % 6],
             ls=("-", "--", "-.", ":")[number % 4],
             label=f"link {number + 1}",
         )
@@ -214,20 +210,30 @@ def backbone(model: SoftModel, q: FloatArray) -> FloatArray:
     return np.array(points[::-1])
 
 
-def _force_arrow(axes: Any, equilibrium: Equilibrium) -> None:
+def equal_box(axes: Any, points: FloatArray) -> None:
+    """Give 3D axes equal scales around points, shape (n, 3) [m]."""
+    centre, half = (points.max(0) + points.min(0)) / 2.0, max(float(np.ptp(points, axis=0).max()) / 2.0, 1e-3)
+    for name, middle in zip("xyz", centre, strict=True):
+        getattr(axes, f"set_{name}lim")(middle - half, middle + half)
+    axes.set_box_aspect((1, 1, 1))
+    axes.view_init(elev=22, azim=-62)
+
+
+def force_arrow(axes: Any, equilibrium: Equilibrium) -> None:
+    """Draw the force at the tip, if there is one, as an arrow a fifth of the reach long."""
     tip = equilibrium.tip_position
     wrench = equilibrium.load.wrenches.get(equilibrium.model.tip)
     if wrench is None or not wrench[:3].any():
         return
     size = float(np.linalg.norm(wrench[:3]))
     axes.quiver(
-        *tip, *(0.2 * equilibrium.model.reach * wrench[:3] / size), color=_COLOURS[2], lw=2.0, label=f"force, {size:.1f} N"
+        *tip, *(0.2 * equilibrium.model.reach * wrench[:3] / size), color=COLOURS[2], lw=2.0, label=f"force, {size:.1f} N"
     )
 
 
 def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:
     _check(trajectory)
-    return _new(size)
+    return new_figure(size)
 
 
 def _check(trajectory: Trajectory) -> None:
@@ -235,5 +241,10 @@ def _check(trajectory: Trajectory) -> None:
         raise ParameterError("trajectory", trajectory, "a Trajectory")
 
 
-def _new(size: tuple[float, float]) -> Any:
+def new_figure(size: tuple[float, float]) -> Any:
+    """Make an empty figure of a size in inches.
+
+    Raises:
+        MissingDependency: If matplotlib is not installed.
+    """
     return require_matplotlib()(figsize=size, layout="constrained", dpi=120)

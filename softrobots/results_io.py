@@ -28,8 +28,9 @@ from softrobots.loads import Load
 from softrobots.model import SoftModel
 from softrobots.tip_search import Goal
 from softrobots.trajectory import Trajectory
+from softrobots.workspace import Workspace, workspace_at
 
-Result = Equilibrium | IkSolution | LoadEstimate | Trajectory
+Result = Equilibrium | IkSolution | LoadEstimate | Trajectory | Workspace
 """What can be saved."""
 
 _FORMAT = 1
@@ -41,7 +42,7 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
     The file appears whole or not at all: it is written beside its place and moved there.
 
     Args:
-        result: An equilibrium, load estimate, IK solution or trajectory.
+        result: An equilibrium, load estimate, IK solution, trajectory or workspace.
         path: File to write; `.npz` is added if it has no ending.
         overwrite: Replace an existing file.
 
@@ -55,7 +56,7 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
     """
     kind = next((name for name, (cls, _, _) in _KINDS.items() if isinstance(result, cls)), None)
     if kind is None:
-        raise ParameterError("result", result, "an Equilibrium, IkSolution, LoadEstimate or Trajectory")
+        raise ParameterError("result", result, "an Equilibrium, IkSolution, LoadEstimate, Trajectory or Workspace")
     path = as_path("path", path)
     named = path if path.suffix or path.is_dir() else path.with_suffix(".npz")
     target = new_file(named, overwrite=overwrite)
@@ -259,9 +260,22 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
     )
 
 
+def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
+    names = ("q_motors", "q_springs", "tip_positions", "manipulability")
+    arrays = {name: getattr(workspace, name) for name in names}
+    return _pack_model(workspace.model, workspace.load) | arrays | {"refused": np.array(workspace.refused)}
+
+
+def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
+    model, load = _unpack_model(fields)
+    arrays = {name: fields[name] for name in ("q_motors", "q_springs", "tip_positions", "manipulability")}
+    return workspace_at(model, load, **arrays, refused=int(fields["refused"]))
+
+
 _KINDS: dict[str, tuple[type, Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Result]]] = {
     "equilibrium": (Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
     "ik_solution": (IkSolution, _pack_solution, _unpack_solution),
     "load_estimate": (LoadEstimate, _pack_estimate, _unpack_estimate),
     "trajectory": (Trajectory, _pack_trajectory, _unpack_trajectory),
+    "workspace": (Workspace, _pack_workspace, _unpack_workspace),
 }

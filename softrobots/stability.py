@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softrobots.blas_threads import one_blas_thread
 from softrobots.checks import FloatArray, finite_array, positive_number
 from softrobots.elastostatics import ElasticState, newton, scaled, settled
 from softrobots.errors import NoCriticalLoad, ParameterError
@@ -77,26 +78,27 @@ def critical_load(
         state = _correct(model, motors, constant.plus(at, magnitude * push), guess, last.state.q_springs)
         return None if state is None else _point(model, state, magnitude, push, at)
 
-    first_state = settled(model, motors, constant, model.rest)
-    here = None if first_state is None else _point(model, first_state, 0.0, push, at)
-    if here is None or here.softest <= 0.0:
-        raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
-    first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
-    nearly_zero = _NEARLY_ZERO * here.softest
-    for _ in range(_MOST_POINTS):
-        if here.force >= largest:
-            break
-        there = follow(min(here.force + step, largest), here)
-        if there is None or (here.softest > nearly_zero and there.softest < 0.5 * here.softest):
-            step *= 0.5  # too far to tell this path from a neighbour
-            if step < _SHORTEST_STEP * max(here.force, first_step):
-                if here.softest <= 10.0 * nearly_zero:
-                    return here.force  # the path turns back here: a limit point
+    with one_blas_thread(model.n_springs):
+        first_state = settled(model, motors, constant, model.rest)
+        here = None if first_state is None else _point(model, first_state, 0.0, push, at)
+        if here is None or here.softest <= 0.0:
+            raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
+        first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
+        nearly_zero = _NEARLY_ZERO * here.softest
+        for _ in range(_MOST_POINTS):
+            if here.force >= largest:
                 break
-        elif there.softest <= 0.0:
-            return _bisect(follow, here, there.force)
-        else:
-            here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
+            there = follow(min(here.force + step, largest), here)
+            if there is None or (here.softest > nearly_zero and there.softest < 0.5 * here.softest):
+                step *= 0.5  # too far to tell this path from a neighbour
+                if step < _SHORTEST_STEP * max(here.force, first_step):
+                    if here.softest <= 10.0 * nearly_zero:
+                        return here.force  # the path turns back here: a limit point
+                    break
+            elif there.softest <= 0.0:
+                return _bisect(follow, here, there.force)
+            else:
+                here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
     reached = f"{here.force:.6g} N along {(unit / length).tolist()}"
     told = f"the equilibrium stays stable up to {reached}"
     if here.force < largest:

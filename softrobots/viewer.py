@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.body import body, body_at
 from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number
 from softrobots.equilibrium import Equilibrium, check_same_model
 from softrobots.errors import ParameterError, ViewerError
 from softrobots.files import new_file, write_atomically
 from softrobots.kinematics import frame_placement
+from softrobots.meshcat_body import BodyDrawing
 from softrobots.meshcat_server import connect, end_server, start_server
 from softrobots.meshcat_shapes import (
     FORCE_COLOUR,
@@ -34,6 +36,7 @@ ARROW_LENGTH = 0.2
 """Length of the arrow of the largest force, relative to the reach; other arrows are shorter in proportion."""
 
 _FRAME_RATE = 30
+_MOST_BODIES = 60  # shapes of a continuous body that an animation goes through
 _NO_FORCE = 1e-12  # [N], forces below have no arrow
 
 
@@ -41,7 +44,8 @@ class Viewer:
     """A meshcat page that shows one robot; a context manager that ends its server.
 
     The deformed robot is opaque; the rigid one, with the same motors and relaxed springs, is translucent. Inflated links are
-    coloured by the share of the wrinkling moment that is left.
+    coloured by the share of the wrinkling moment that is left. Segments with sections are drawn as smooth translucent tubes,
+    with their muscles (blue pulls, orange pushes) and the equivalent chain inside.
     """
 
     def __init__(self, model: SoftModel) -> None:
@@ -60,10 +64,13 @@ class Viewer:
             self._page = connect(zmq_url, self._url)
             self._root = self._page["softrobots"]
             self._arrows: set[str] = set()
+            self._traced = False
             self._levels: dict[int, int] = {}
+            self._body = BodyDrawing(self._root["body"])
             self._prepare()
             self._draw_shapes()
-            self.show_configuration(model.configuration(np.zeros(model.n_motors)))
+            self.show_configuration(model.configuration(model.relaxed_motors))
+            self._body.draw(body_at(model, model.relaxed_motors, model.rest), {})
         except BaseException:
             self.close()
             raise
@@ -103,12 +110,13 @@ class Viewer:
         """
         self._check(equilibrium)
         self._place(equilibrium.q, self._model.configuration(equilibrium.q_motors))
+        self._body.draw(body(equilibrium), _tensions(equilibrium))
         for link in range(len(self._model.spring_groups)):
             self._colour(link, wrinkling_level(equilibrium, link))
         self._draw_arrows(equilibrium)
 
     def show_configuration(self, q: FloatArray) -> None:
-        """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling.
+        """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling, the chain alone.
 
         Raises:
             ParameterError: If the shape differs or a number is not finite.
@@ -116,6 +124,7 @@ class Viewer:
         q = finite_array("q", q, (self._model.pinocchio.nq,))
         self._check_open()
         self._place(q, q)
+        self._body.clear()
         for link in range(len(self._model.spring_groups)):
             self._colour(link, 0)
         for name in self._arrows:
@@ -140,6 +149,7 @@ class Viewer:
         colours = np.tile(rgb[:, None], (1, len(positions)))
         cloud = geometry.PointCloud(positions.T.astype(np.float32), colours.astype(np.float32), size=0.012)
         self._root["path"].set_object(cloud)
+        self._traced = True
 
     def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1) -> None:
         """Play a trajectory as a meshcat animation, path and forces included; it starts by itself and can be scrubbed.
@@ -161,12 +171,32 @@ class Viewer:
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
         positive_integer("repetitions", repetitions)
         self.show(trajectory.equilibria[0])
-        self._look_at(trajectory.tip_positions.mean(axis=0))
+        self.look_at(trajectory.tip_positions.mean(axis=0))
         self.trace(trajectory.tip_positions)
         animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
-        for number, equilibrium in _frames(trajectory, seconds).items():
+        frames = _frames(trajectory, seconds)
+        for number, equilibrium in frames.items():
             self._add_frame(animation, number, equilibrium)
+        if self._model.structure.section_table:
+            numbers = sorted(frames)
+            chosen = numbers[:: -(-len(numbers) // _MOST_BODIES)]
+            bodies = {number: (body(frames[number], 6), _tensions(frames[number])) for number in chosen}
+            self._body.animate(animation, bodies)
         self._page.set_animation(animation, play=True, repetitions=repetitions)
+
+    def look_at(self, tip: FloatArray) -> None:
+        """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
+
+        Args:
+            tip: Where the tip is, or is on average, shape (3,) [m].
+        """
+        shift = np.eye(4)
+        shift[:3, 3] = -0.5 * tip
+        self._root.set_transform(shift)
+        azimuth = np.arctan2(tip[1], tip[0]) - np.deg2rad(78.0)
+        x, y, z = 0.94 * self._model.reach * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
+        # meshcat's camera has y up: (x, z, -y) of the scene.
+        self._page["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
 
     def html(self, title: str = "softrobots") -> str:
         """Return the page as one self-contained HTML text that works offline, with its animation.
@@ -178,7 +208,15 @@ class Viewer:
             ViewerError: If the viewer is closed.
         """
         self._check_open()
-        return with_legend(self._page.static_html(), title, colours=bool(self._model.spring_groups))
+        muscles = self._model.muscle_input if self._model.muscles else None
+        return with_legend(
+            self._page.static_html(),
+            title,
+            path=self._traced,
+            force=bool(self._arrows),
+            colours=bool(self._model.spring_groups),
+            muscles=muscles,
+        )
 
     def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
         """Write `html` to a file.
@@ -234,24 +272,13 @@ class Viewer:
         self._page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
         self._page["/Axes"].set_property("visible", False)
         self._page["/Grid"].set_property("visible", False)
-        self._look_at(np.array([0.9 * reach, 0.0, 0.2 * reach]))
+        q = self._model.configuration(self._model.relaxed_motors)
+        tip = np.array(frame_placement(self._model, q, self._model.tip).translation)
+        upright = np.hypot(tip[0], tip[1]) < 0.1 * reach
+        self.look_at(tip + [0.3 * reach if upright else -0.1 * reach, 0.0, 0.0 if upright else 0.2 * reach])
         ends = np.concatenate([floor_lines(reach), floor_lines(reach)[:, [1, 0, 2]]])
         lines = geometry.PointsGeometry(ends.T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
-
-    def _look_at(self, tip: FloatArray) -> None:
-        """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
-
-        Args:
-            tip: Where the tip is, or is on average, shape (3,) [m].
-        """
-        shift = np.eye(4)
-        shift[:3, 3] = -0.5 * tip
-        self._root.set_transform(shift)
-        azimuth = np.arctan2(tip[1], tip[0]) - np.deg2rad(78.0)
-        x, y, z = 0.94 * self._model.reach * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
-        # meshcat's camera has y up: (x, z, -y) of the scene.
-        self._page["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
 
     def _draw_shapes(self) -> None:
 
@@ -342,6 +369,7 @@ def view(model: SoftModel, result: Equilibrium | Trajectory | None = None) -> Vi
             viewer.animate(result)
         elif result is not None:
             viewer.show(result)
+            viewer.look_at(result.tip_position)
     except BaseException:
         viewer.close()
         raise
@@ -358,6 +386,11 @@ def _arrow_pose(equilibrium: Equilibrium, frame: str, force: FloatArray) -> Floa
     pose[:3, :3] = np.column_stack([first, along, np.cross(first, along)])
     pose[:3, 3] = frame_placement(equilibrium.model, equilibrium.q, frame).translation
     return pose
+
+
+def _tensions(equilibrium: Equilibrium) -> dict[str, float]:
+    names = (muscle.name for muscle in equilibrium.model.muscles)
+    return dict(zip(names, equilibrium.muscle_forces.tolist(), strict=True))
 
 
 def _frames(trajectory: Trajectory, seconds: float) -> dict[int, Equilibrium]:

@@ -76,7 +76,7 @@ class PccArm:
     """Whether a lumped segment can twist: a torsional spring a hinge."""
     extension: bool = True
     """Whether a lumped segment can stretch: a sliding spring a hinge."""
-    rgba: Sequence[float] | Sequence[Sequence[float]] = (0.25, 0.55, 0.70, 1.0)
+    rgba: Sequence[float] | Sequence[Sequence[float]] = (0.55, 0.60, 0.65, 1.0)
     """Colour: red, green, blue, opacity in [0, 1]; one for all segments or one for each."""
     damping_time: float = 0.05
     """Damping of each spring joint over its stiffness, for simulators only [s]. Assumed."""

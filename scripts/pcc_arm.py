@@ -1,0 +1,182 @@
+"""Bend the arm of pneumatic muscles: muscle lengths or tip targets in; pose, table and pictures out.
+
+Given muscle lengths, solves for the shape under load. Given a target (or a CSV file of waypoints), solves for the muscle
+lengths that put the loaded tip there. Prints a table, and writes results (NPZ, CSV for waypoints), a picture of the shape and a
+self-contained HTML scene with the smooth tube, the muscles and the equivalent chain into a new folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+import softrobots as sr
+from softrobots import body_plots, plots
+from softrobots.files import free_folder
+from softrobots.loads import Load
+from softrobots.robots.pcc_arm import CHAINS
+
+LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
+"""The default muscle lengths [m]."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    what = made.add_mutually_exclusive_group()
+    what.add_argument(
+        "--lengths", type=float, nargs="+", metavar="L", help="muscle lengths, base to tip [m] (0.50 0.53 0.55 0.54 0.51 0.52)"
+    )
+    what.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help="position of the loaded tip [m]")
+    what.add_argument("--csv", type=Path, metavar="FILE", help="waypoints of the loaded tip, columns t,x,y,z [s, m]")
+    made.add_argument(
+        "--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), help="direction in which the tip points at --target"
+    )
+    made.add_argument(
+        "--force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), default=(0.0, 0.0, 0.0), help="force on the tip [N] (0 0 0)"
+    )
+    made.add_argument(
+        "--gravity", type=float, nargs="*", metavar="G",
+        help="gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)",
+    )  # fmt: skip
+    made.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
+    made.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
+    made.add_argument(
+        "--distance", type=float, default=0.04, help="distance of the muscles from the backbone [m] (%(default)s)"
+    )
+    made.add_argument("--chain", choices=CHAINS, default="sections", help="form of the equivalent rigid chain (%(default)s)")
+    made.add_argument("--elastic-sections", type=int, default=4, help="sections a segment, for --chain sections (%(default)s)")
+    made.add_argument("--hinges", type=int, default=12, help="hinges a segment, for --chain lumped (%(default)s)")
+    made.add_argument(
+        "--output", type=Path, metavar="FOLDER", help="new or empty folder of the results (output/pcc_arm_<time>)"
+    )
+    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
+    made.add_argument("--meshcat", action="store_true", help="serve the scene on loopback until Ctrl-C")
+    return made
+
+
+def run(arguments: argparse.Namespace) -> Path:
+    """Do the whole job and return the folder of the results."""
+    gravity = arguments.gravity if arguments.gravity != [] else sr.EARTH_GRAVITY
+    if arguments.direction is not None and arguments.target is None:
+        raise sr.ParameterError("--direction", arguments.direction, "given with --target")
+    waypoints = None if arguments.csv is None else sr.read_waypoints(arguments.csv)
+    if not arguments.no_plots:
+        plots.require_matplotlib()  # tells at once what is missing
+    model = sr.load_model(
+        sr.PccArm(
+            segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance, chain=arguments.chain,
+            elastic_sections=arguments.elastic_sections, hinges=arguments.hinges,
+        )
+    )  # fmt: skip
+    Load.of(model, arguments.force, gravity=gravity)
+    folder = free_folder(arguments.output or Path("output") / f"pcc_arm_{datetime.now():%Y%m%d_%H%M%S}")
+    results: dict[str, object] = {}
+    if waypoints is not None:
+        shown = results["trajectory"] = sr.follow_trajectory(
+            model, waypoints.positions, arguments.force, gravity=gravity, times=waypoints.times, progress="waypoints"
+        )
+        last = shown.equilibria[-1]
+    elif arguments.target is not None:
+        solution = results["ik_solution"] = sr.solve_ik(
+            model, arguments.target, arguments.force, gravity=gravity, orientation=arguments.direction
+        )
+        shown = last = solution.equilibrium
+    else:
+        lengths = arguments.lengths or (LENGTHS if arguments.segments == 2 else model.relaxed_motors)
+        shown = last = sr.solve_equilibrium(model, lengths, arguments.force, gravity=gravity)
+    results["equilibrium"] = last
+    summary = summarise(last)
+    figure = None if arguments.no_plots else body_plots.shape(last)
+    with sr.view(model, shown) as viewer:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, result in results.items():
+            sr.save_result(result, folder / f"{name}.npz")
+        if waypoints is not None:
+            sr.save_csv(shown, folder / "trajectory.csv")
+        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        if figure is not None:
+            figure.savefig(folder / "shape.png")
+        viewer.write_html(folder / "scene.html", title="PCC arm")
+        print(table(summary))
+        if waypoints is not None:
+            print(f"largest tip error on the way: {shown.tip_error.max():.3g} m at {len(shown.times)} waypoints")
+        print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+        if arguments.meshcat:
+            print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
+            viewer.wait()
+    return folder
+
+
+def summarise(equilibrium: sr.Equilibrium) -> dict[str, object]:
+    """Collect the numbers of the table: muscles, the arcs that their lengths stand for, and the tip with and without load."""
+    model = equilibrium.model
+    lengths = equilibrium.muscle_lengths.reshape(model.structure.section_table[-1].segment, -1)
+    azimuths = [muscle.azimuth for muscle in model.muscles[: lengths.shape[1]]]
+    arcs = sr.constant_curvature.arc_from_muscles(lengths, model.muscles[0].distance, azimuths)
+    unloaded = sr.constant_curvature.chain_transform(arcs)[:3, 3]
+    return {
+        "muscles": [muscle.name for muscle in model.muscles],
+        "muscle_lengths_m": equilibrium.muscle_lengths.tolist(),
+        "muscle_forces_N": equilibrium.muscle_forces.tolist(),
+        "arc_length_m": arcs.length.tolist(),
+        "arc_bending_deg": np.degrees(arcs.bending).tolist(),
+        "arc_azimuth_deg": np.degrees(arcs.azimuth).tolist(),
+        "tip_m": equilibrium.tip_position.tolist(),
+        "tip_direction": np.array(equilibrium.transform_tip_to_world.rotation)[:, 2].tolist(),
+        "tip_without_load_m": unloaded.tolist(),
+        "residual_N_m": equilibrium.residual,
+        "stable": equilibrium.stable,
+        "within_limits": equilibrium.within_limits,
+    }
+
+
+def table(summary: dict[str, object]) -> str:
+    """Format the numbers for a person."""
+
+    def vector(name: str, digits: int) -> str:
+        return "  ".join(f"{value:.{digits}f}" for value in summary[name])  # type: ignore[attr-defined]
+
+    lines = ["", f"{'muscle':<14}{'length [m]':>12}{'tension [N]':>13}"]
+    rows = zip(summary["muscles"], summary["muscle_lengths_m"], summary["muscle_forces_N"], strict=True)  # type: ignore[call-overload]
+    lines += [f"{name:<14}{length:>12.6f}{force:>13.3f}" for name, length, force in rows]
+    lines += [
+        "",
+        f"{'segment':<10}{'length [m]':>12}{'bending [deg]':>15}{'azimuth [deg]':>15}   (arcs of these muscle lengths)",
+    ]
+    arcs = zip(summary["arc_length_m"], summary["arc_bending_deg"], summary["arc_azimuth_deg"], strict=True)  # type: ignore[call-overload]
+    lines += [f"{i:<10}{length:>12.6f}{bend:>15.3f}{azimuth:>15.3f}" for i, (length, bend, azimuth) in enumerate(arcs, start=1)]
+    lines += [
+        "",
+        f"tip [m]                 {vector('tip_m', 6)}",
+        f"tip without load [m]    {vector('tip_without_load_m', 6)}   (closed form)",
+        f"tip points along        {vector('tip_direction', 4)}",
+        f"certified stable        {'yes' if summary['stable'] else 'NO'}   (residual {summary['residual_N_m']:.1e} N m)",
+        f"within limits           {'yes' if summary['within_limits'] else 'NO'}",
+    ]
+    return "\n".join(lines)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run from the command line; bad input ends with status 2, a target that cannot be reached with 1."""
+    arguments = parser().parse_args(argv)
+    try:
+        if arguments.segments < 1:
+            raise sr.ParameterError("--segments", arguments.segments, "at least 1")
+        run(arguments)
+    except sr.NotConverged as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except sr.SoftRobotsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

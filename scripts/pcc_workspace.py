@@ -1,0 +1,94 @@
+"""Sample what the tip of the arm of pneumatic muscles can reach within the limits of its muscles.
+
+Draws random muscle lengths, brings the arm to equilibrium under the load at each, and writes the reached tip positions with
+their manipulability as a picture and an NPZ file (load it again with softrobots.load_result) into a new folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+import softrobots as sr
+from softrobots import body_plots, plots
+from softrobots.files import free_folder
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    made.add_argument("--samples", type=int, default=5000, help="muscle lengths to draw (%(default)s)")
+    made.add_argument("--seed", type=int, default=0, help="seed of the samples (%(default)s)")
+    made.add_argument(
+        "--force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), default=(0.0, 0.0, 0.0), help="force on the tip [N] (0 0 0)"
+    )
+    made.add_argument(
+        "--gravity", type=float, nargs="*", metavar="G",
+        help="gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)",
+    )  # fmt: skip
+    made.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
+    made.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
+    made.add_argument(
+        "--distance", type=float, default=0.04, help="distance of the muscles from the backbone [m] (%(default)s)"
+    )
+    made.add_argument("--contraction", type=float, default=0.15, help="largest contraction of a muscle [-] (%(default)s)")
+    made.add_argument("--extension", type=float, default=0.15, help="largest extension of a muscle [-] (%(default)s)")
+    made.add_argument(
+        "--output", type=Path, metavar="FOLDER", help="new or empty folder for the results (output/pcc_workspace_<time>)"
+    )
+    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
+    return made
+
+
+def run(arguments: argparse.Namespace) -> Path:
+    """Do the whole job and return the folder of the results."""
+    gravity = arguments.gravity if arguments.gravity != [] else sr.EARTH_GRAVITY
+    if arguments.segments < 1:
+        raise sr.ParameterError("--segments", arguments.segments, "at least 1")
+    if not arguments.no_plots:
+        plots.require_matplotlib()  # tells at once what is missing
+    model = sr.load_model(
+        sr.PccArm(
+            segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance,
+            muscle_contraction=arguments.contraction, muscle_extension=arguments.extension,
+        )
+    )  # fmt: skip
+    folder = free_folder(arguments.output or Path("output") / f"pcc_workspace_{datetime.now():%Y%m%d_%H%M%S}")
+    reach = sr.sample_workspace(
+        model, arguments.samples, force=arguments.force, gravity=gravity, seed=arguments.seed, progress="muscle lengths"
+    )
+    folder.mkdir(parents=True, exist_ok=True)
+    sr.save_result(reach, folder / "workspace.npz")
+    if not arguments.no_plots:
+        body_plots.workspace(reach).savefig(folder / "workspace.png")
+    tips, radius = reach.tip_positions, np.linalg.norm(reach.tip_positions[:, :2], axis=1)
+    rows = [
+        ("samples reached", f"{len(tips)}"),
+        ("samples left out (no such shape, or not stable)", f"{reach.refused}"),
+        ("height of the tip [m]", f"{tips[:, 2].min():.4f} ... {tips[:, 2].max():.4f}"),
+        ("distance of the tip from the z axis, at most [m]", f"{radius.max():.4f}"),
+        ("manipulability [m^3/rad^3]", f"{reach.manipulability.min():.3g} ... {reach.manipulability.max():.3g}"),
+    ]
+    width = max(len(name) for name, _ in rows)
+    print("\n".join(["", *(f"{name:<{width}}  {value:>18}" for name, value in rows)]))
+    print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+    return folder
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run from the command line; bad input ends with status 2."""
+    arguments = parser().parse_args(argv)
+    try:
+        run(arguments)
+    except sr.SoftRobotsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

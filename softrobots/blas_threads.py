@@ -1,0 +1,50 @@
+"""Linear algebra on one thread while an equilibrium is sought.
+
+The matrices are small (4 to 300 rows). From about a hundred rows on, BLAS splits them over all cores, which gains nothing, and
+costs a hundred times the work itself while another program uses one of the cores (measured: 0.2 ms become 25 to 130 ms).
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+_LARGE = 48  # rows; smaller matrices stay on one thread by themselves
+_LOCK = threading.Lock()
+
+
+class _Limit:
+    """The one limit of the process, shared by all threads that are solving: set by the first, lifted by the last."""
+
+    users = 0
+    controller: Any = None
+    limiter: Any = None
+
+
+@contextmanager
+def one_blas_thread(rows: int) -> Iterator[None]:
+    """Keep BLAS on one thread in a `with` block.
+
+    Args:
+        rows: Size of the matrices; for small ones nothing is done.
+    """
+    if rows < _LARGE:
+        yield
+        return
+    with _LOCK:
+        _Limit.users += 1
+        if _Limit.users == 1:
+            if _Limit.controller is None:
+                from threadpoolctl import ThreadpoolController
+
+                _Limit.controller = ThreadpoolController()
+            _Limit.limiter = _Limit.controller.limit(limits=1, user_api="blas")
+    try:
+        yield
+    finally:
+        with _LOCK:
+            _Limit.users -= 1
+            if _Limit.users == 0:
+                _Limit.limiter.restore_original_limits()

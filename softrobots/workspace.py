@@ -1,0 +1,153 @@
+"""What a robot can reach: random actuator coordinates within the limits, the tip there, and its manipulability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray, finite_array, positive_integer, read_only
+from softrobots.elastostatics import is_stable, settled
+from softrobots.errors import NeutralEquilibrium, ParameterError
+from softrobots.kinematics import frame_jacobian, frame_placement
+from softrobots.loads import Load
+from softrobots.model import SoftModel, check_model
+from softrobots.sensitivity import tip_motion
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """Sampled reach of a robot under a load; can be saved with `softrobots.save_result`."""
+
+    model: SoftModel
+    """The robot."""
+    load: Load
+    """The load."""
+    q_motors: FloatArray
+    """Sampled actuator coordinates, shape (n, n_motors) [rad, m or N]."""
+    q_springs: FloatArray
+    """Elastic coordinates in equilibrium there, shape (n, n_springs) [rad or m]."""
+    tip_positions: FloatArray
+    """Position of the loaded tip, shape (n, 3) [m]."""
+    manipulability: FloatArray
+    r"""Manipulability of the loaded tip, shape (n,) [m^3/rad^3].
+
+    :math:`\sqrt{\det(J J^T)}` with the elastostatic Jacobian `J` of the position, each actuator measured by
+    `SoftModel.motor_scale` (for muscles: their distance from the backbone). 0: the tip cannot move in some direction.
+    """
+    refused: int
+    """Samples left out: lengths that no shape of the robot has, or no stable equilibrium."""
+
+
+def sample_workspace(
+    model: SoftModel,
+    samples: int = 2000,
+    *,
+    force: Any = None,
+    wrench: Any = None,
+    frame: str | None = None,
+    gravity: Any = None,
+    seed: int = 0,
+    progress: bool | str = False,
+) -> Workspace:
+    """Sample what the tip can reach.
+
+    Actuator coordinates are uniform within their limits (muscle lengths of a segment that must fit together are made to).
+    At each the robot is brought to equilibrium under the load.
+
+    Args:
+        model: The robot, with at least one actuator.
+        samples: Number of samples to draw.
+        force: Force at `frame`, shape (3,) [N], world axes.
+        wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
+        frame: Frame of `force` and `wrench`; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        seed: Seed of the samples.
+        progress: Show a progress bar on stderr; a text is its label.
+
+    Returns:
+        The samples that are stable equilibria.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape or is out of range, the robot has no actuators, or no sample is left.
+        NameNotFound: If a frame does not exist.
+    """
+    check_model(model)
+    if model.n_motors == 0:
+        raise ParameterError("model", model, "a robot with at least one motor or muscle")
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    count = positive_integer("samples", samples, 10_000_000)
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ParameterError("seed", seed, "a whole number, zero or above")
+    low, high = model.motor_limits.T
+    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
+    drawn = np.random.default_rng(int(seed)).uniform(low, high, (count, model.n_motors))
+    rows = [row for motors in _with_progress(drawn, progress) if (row := _sample(model, load, motors)) is not None]
+    if not rows:
+        raise ParameterError("samples", samples, "such that one is a stable equilibrium; none is")
+    motors, springs, tips, measures = (read_only(np.array(column)) for column in zip(*rows, strict=True))
+    return Workspace(model, load, motors, springs, tips, measures, count - len(rows))
+
+
+def _sample(model: SoftModel, load: Load, drawn: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
+    """Motors, springs, tip and manipulability of a sample; None where there is no stable equilibrium."""
+    motors = model.consistent_motors(drawn)
+    low, high = model.motor_limits.T
+    if not model.admits(motors) or np.any((motors < low) | (motors > high)):
+        return None
+    state = settled(model, motors, load, model.rest)
+    if state is None or not is_stable(model, state.tangent, symmetric=load.conservative):
+        return None
+    by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, model.tip)[:3])
+    try:
+        slope = tip_motion(by_motors, by_springs, state.tangent, state.load.coupling)[0] @ model.motor_basis
+    except NeutralEquilibrium:
+        return None
+    tip = np.array(frame_placement(model, state.q, model.tip).translation)
+    values = np.linalg.svd(slope, compute_uv=False)
+    return motors, state.q_springs, tip, float(np.prod(values)) if len(values) == 3 else 0.0
+
+
+def workspace_at(
+    model: SoftModel, load: Load, q_motors: Any, q_springs: Any, tip_positions: Any, manipulability: Any, refused: int
+) -> Workspace:
+    """Make a workspace of arrays that were computed before; what a saved one is loaded with.
+
+    Args:
+        model: The robot.
+        load: The load.
+        q_motors: Actuator coordinates, shape (n, n_motors).
+        q_springs: Elastic coordinates, shape (n, n_springs).
+        tip_positions: Tip positions, shape (n, 3) [m].
+        manipulability: Manipulability, shape (n,).
+        refused: Samples left out.
+
+    Returns:
+        The workspace.
+
+    Raises:
+        ParameterError: If shapes do not fit, or a sample (a hundred are tried) is not what it claims.
+    """
+    motors = finite_array("q_motors", q_motors, (None, model.n_motors))
+    count = len(motors)
+    springs = finite_array("q_springs", q_springs, (count, model.n_springs))
+    tips = finite_array("tip_positions", tip_positions, (count, 3), "m")
+    measures = finite_array("manipulability", manipulability, (count,))
+    for row in np.unique(np.linspace(0, count - 1, min(count, 100)).astype(int)):
+        point = model.coordinates.at(model.checked_motors(motors[row]), springs[row])
+        tip = frame_placement(model, model.embed(point.joints), model.tip).translation
+        if not point.valid or np.abs(tip - tips[row]).max() > 1e-9 * max(model.reach, 1.0):
+            raise ParameterError("tip_positions", tips[row], f"the tip of its row {row}, {tip.tolist()}")
+    return Workspace(model, load, read_only(motors), read_only(springs), read_only(tips), read_only(measures), int(refused))
+
+
+def _with_progress(drawn: FloatArray, progress: bool | str) -> Iterable[FloatArray]:
+    if not progress:
+        return drawn
+    from tqdm import tqdm
+
+    label = progress if isinstance(progress, str) else "samples"
+    bar: Iterable[FloatArray] = tqdm(drawn, desc=label, unit="sample")
+    return bar
