@@ -11,19 +11,37 @@ import softrobots as sr
 from softrobots.browser import take_picture
 
 
+def loaded_inflatable_arm() -> tuple[sr.SoftModel, sr.Trajectory]:
+    """The default path of `ik_trajectory.py`, shown near its end."""
+    model = sr.load_model(sr.InflatableArm())
+    path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
+    return model, sr.follow_trajectory(model, path.positions, (0, 10, -15), times=path.times, elbow="up", progress=True)
+
+
+def loaded_pcc_arm() -> tuple[sr.SoftModel, sr.Equilibrium]:
+    """The arm of pneumatic muscles, bent and pulled."""
+    model = sr.load_model(sr.PccArm())
+    return model, sr.solve_equilibrium(model, (0.47, 0.53, 0.55, 0.50, 0.55, 0.53), (6, 4, -3), gravity=sr.EARTH_GRAVITY)
+
+
+PICTURES = {
+    "inflatable_arm": (loaded_inflatable_arm, "Inflatable arm, 18 N on the tip"),
+    "pcc_arm": (loaded_pcc_arm, "PCC arm, held muscle lengths, own weight and 8 N on the tip"),
+}
+"""What each picture shows, and its title."""
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Photograph the loaded arm near the end of the default path of `ik_trajectory.py`."""
+    """Photograph each robot under load."""
     parser = argparse.ArgumentParser(description=__doc__)
     folder = Path(__file__).resolve().parent.parent / "docs" / "images"
     parser.add_argument("--output", type=Path, default=folder, metavar="FOLDER", help="folder of the pictures (docs/images)")
     arguments = parser.parse_args(argv)
-    model = sr.load_model(sr.InflatableArm())
-    path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
-    trajectory = sr.follow_trajectory(model, path.positions, (0, 10, -15), times=path.times, elbow="up", progress=True)
     try:
-        with tempfile.TemporaryDirectory() as folder_name, sr.view(model, trajectory) as viewer:
-            page = viewer.write_html(Path(folder_name) / "scene.html", title="Inflatable arm, 18 N on the tip")
-            print(take_picture(page, arguments.output / "inflatable_arm.png", width=1000, height=560, share=0.85))
+        for name, (make, title) in PICTURES.items():
+            with tempfile.TemporaryDirectory() as folder_name, sr.view(*make()) as viewer:
+                page = viewer.write_html(Path(folder_name) / "scene.html", title=title)
+                print(take_picture(page, arguments.output / f"{name}.png", width=1000, height=560, share=0.85))
     except sr.SoftRobotsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

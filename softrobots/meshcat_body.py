@@ -26,7 +26,6 @@ class BodyDrawing:
     def __init__(self, root: Any) -> None:
         """Draw under `root`."""
         self._root = root
-        self._frames = 0
 
     def draw(self, segments: Sequence[SegmentBody], tensions: dict[str, float]) -> None:
         """Replace what is drawn.
@@ -41,7 +40,6 @@ class BodyDrawing:
     def clear(self) -> None:
         """Remove the body."""
         self._root.delete()
-        self._frames = 0
 
     def animate(self, animation: Any, frames: Mapping[int, tuple[Sequence[SegmentBody], dict[str, float]]]) -> None:
         """Draw one body a frame and let an animation show them in turn: meshcat can switch visibility, but bend nothing.
@@ -54,12 +52,12 @@ class BodyDrawing:
         numbers = sorted(frames)
         for place, number in enumerate(numbers):
             node = self._root[f"frame_{place}"]
+            node.set_property("visible", place == 0)  # before its shapes arrive, or they flash while the page loads
             self._draw(node, *frames[number])
-            node.set_property("visible", place == 0)
-            for when in {numbers[0], number, numbers[min(place + 1, len(numbers) - 1)]}:
+            # All tracks last as long as the animation: meshcat starts a shorter one anew when it is sought beyond its end.
+            for when in {numbers[0], number, numbers[min(place + 1, len(numbers) - 1)], numbers[-1]}:
                 shown = when == number
                 animation.at_frame(node, when).set_property("visible", "boolean", shown)
-        self._frames = len(numbers)
 
     def _draw(self, node: Any, segments: Sequence[SegmentBody], tensions: dict[str, float]) -> None:
         for segment in segments:

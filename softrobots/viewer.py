@@ -151,13 +151,14 @@ class Viewer:
         self._root["path"].set_object(cloud)
         self._traced = True
 
-    def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1) -> None:
+    def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1000) -> None:
         """Play a trajectory as a meshcat animation, path and forces included; it starts by itself and can be scrubbed.
 
         Args:
             trajectory: A trajectory of the viewer's robot.
             duration: Time of the animation [s]; the time of the trajectory by default.
-            repetitions: How often it plays.
+            repetitions: How often it plays. (At the end of the last one meshcat goes back to the start, and then mixes the two
+                when the slider is moved; hence not once by default.)
 
         Raises:
             ParameterError: If it belongs to another robot, or the duration is not positive.
