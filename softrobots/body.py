@@ -163,8 +163,8 @@ def _start(model: SoftModel, data: object, row: int) -> FloatArray:
     joints = [pin_model.getJointId(name) for name in section.joint_names]
     first = min(joints)
     before = data.oMi[pin_model.parents[first]] * pin_model.jointPlacements[first]  # type: ignore[attr-defined]
-    if section.lumped:  # the hinge stands in the middle
-        return np.asarray(before.homogeneous @ _transform(np.eye(3), (0.0, 0.0, -0.5 * section.length)))
+    if section.lumped:
+        return np.asarray(before.homogeneous @ _transform(np.eye(3), (0.0, 0.0, -section.hinge)))
     back = pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0)
     return np.asarray(before.homogeneous @ _transform(back, (0.0, 0.0, 0.0)))
 

@@ -52,10 +52,11 @@ class BodyDrawing:
         numbers = sorted(frames)
         for place, number in enumerate(numbers):
             node = self._root[f"frame_{place}"]
-            node.set_property("visible", place == 0)  # before its shapes arrive, or they flash while the page loads
+            if place > 0:  # before its shapes arrive, or they flash. A saved page starts to play before it sets properties: the
+                node.set_property("visible", False)  # first body, which is visible anyway, must not be told so again then
             self._draw(node, *frames[number])
             # All tracks last as long as the animation: meshcat starts a shorter one anew when it is sought beyond its end.
-            for when in {numbers[0], number, numbers[min(place + 1, len(numbers) - 1)], numbers[-1]}:
+            for when in sorted({numbers[0], number, numbers[min(place + 1, len(numbers) - 1)], numbers[-1]}):
                 shown = when == number
                 animation.at_frame(node, when).set_property("visible", "boolean", shown)
 

@@ -33,6 +33,7 @@ STRAINS = ("bend_x", "bend_y", "twist", "stretch")
 LARGEST_BENDING = np.deg2rad(120.0)
 """Bending of one section up to which the chain is meant to be used [rad]; use more sections beyond."""
 
+_LARGEST_TURN = 0.999 * 4.0 * np.pi**2  # of the squared rotation of a section: at a whole turn it has no chord
 _UPPER = np.triu(np.ones((6, 6)), 1)  # pairs of joints, the first nearer to the base
 
 
@@ -47,10 +48,10 @@ class SectionChain:
             rest_length: Rest length of a section, shape (...) [m].
         """
         self._screw = Screw(z, rest_length)
-        self.valid = _in_range(z, np.asarray(rest_length), self._screw)
-        """Whether the chain carries every section, see `in_range`; if not, the rest means nothing."""
         self.positions = _positions(self._screw.rotation, self._screw.position)
         """Joint positions `m`, shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad]."""
+        self.valid = _in_range(z, np.asarray(rest_length), self._screw, self.positions)
+        """Whether the chain carries every section, see `in_range`; if not, the rest means nothing."""
 
     @cached_property
     def first(self) -> FloatArray:
@@ -133,8 +134,9 @@ def joint_map(z: FloatArray, rest_length: FloatArray | float) -> JointMap:
 def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
     """Whether the chain carries every section.
 
-    Required of each: a positive length, a chord that points forwards at both ends (without twist: bending below 180 degrees),
-    and less than half a turn of twist.
+    Required of each: a positive length; less than a turn of rotation in all; a chord that points forwards at both ends (without
+    twist: bending below 180 degrees); and less than half a turn about the axis of its end, in the strain and in the joint r3,
+    which turns a little further than the twist.
 
     Args:
         z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
@@ -143,8 +145,11 @@ def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
     return SectionChain(z, rest_length).valid
 
 
-def _in_range(z: FloatArray, rest_length: FloatArray, end: Screw) -> bool:
-    if np.abs(z[..., 2]).max(initial=0.0) >= np.pi or not np.all(rest_length + z[..., 3] > 1e-3 * rest_length):
+def _in_range(z: FloatArray, rest_length: FloatArray, end: Screw, positions: FloatArray) -> bool:
+    turn, twist = (z[..., :3] * z[..., :3]).sum(axis=-1), np.abs(z[..., 2])
+    if not (np.all(turn < _LARGEST_TURN) and np.all(twist < np.pi) and np.all(rest_length + z[..., 3] > 1e-3 * rest_length)):
+        return False  # also where a number is none
+    if not np.all(np.abs(positions[..., 5] - z[..., 2]) < np.pi):  # r3 has gone past half a turn to the other side
         return False
     forwards = 1e-3 * np.sqrt((end.position * end.position).sum(axis=-1))
     at_end = (end.rotation[..., :, 2] * end.position).sum(axis=-1)

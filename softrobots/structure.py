@@ -46,6 +46,8 @@ class SectionRow(NamedTuple):
     """Radius of the body, for pictures [m]."""
     lumped: bool
     """Whether it is lumped into springs."""
+    hinge: float
+    """Height of its hinge above its start [m]; 0 if it is not lumped."""
     joint_names: tuple[str, ...]
     """Its joints."""
     rest_joints: FloatArray
@@ -151,11 +153,11 @@ class Structure:
         if tags:
             rest = joint_positions(rest_coordinates(tags), np.array([tag.length for tag in tags]))
             return tuple(
-                SectionRow(tag.name, tag.segment, tag.length, tag.radius, False, tag.joints, joints)
+                SectionRow(tag.name, tag.segment, tag.length, tag.radius, False, 0.0, tag.joints, joints)
                 for tag, joints in zip(tags, rest, strict=True)
             )
         return tuple(
-            SectionRow(tag.name, tag.segment, tag.length, tag.radius, True, tuple(tag.joints.values()), np.zeros(6))
+            SectionRow(tag.name, tag.segment, tag.length, tag.radius, True, tag.hinge, tuple(tag.joints.values()), np.zeros(6))
             for tag in self.lumped_sections
         )
 

@@ -35,7 +35,7 @@ def stumpff(x: FloatArray, highest: int) -> FloatArray:
     values = np.zeros((highest + 1, *x.shape))
     small = np.minimum(x, _SERIES_UP_TO)
     largest = float(small.max(initial=0.0))
-    terms = next(count for limit, count in _TERMS if largest <= limit)
+    terms = _TERMS[0][1] if largest <= _TERMS[0][0] else _TERMS[1][1]
     for k in (highest, highest - 1):
         total = np.ones_like(small)
         for j in range(terms, 0, -1):

@@ -75,6 +75,8 @@ class LumpedSectionTag:
     """Spring joint by section coordinate, `softrobots.strain_chain.STRAINS`; `twist` and `stretch` may be missing."""
     length: float
     """Rest length [m]."""
+    hinge: float
+    """Height of the joints above the start of the section [m]."""
     radius: float
     """Radius of the body, for pictures [m]."""
 
@@ -234,8 +236,8 @@ def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[
             f"{where} names the joints {joints}; bend_x and bend_y, each a spring joint of its own, are required "
             f"(twist and stretch may follow)"
         )
-    length, radius = _positive(element, "length", where), _positive(element, "radius", where)
-    return LumpedSectionTag(name, _segment(element, where), joints, length, radius)
+    length, hinge, radius = (_positive(element, key, where) for key in ("length", "hinge", "radius"))
+    return LumpedSectionTag(name, _segment(element, where), joints, length, hinge, radius)
 
 
 def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
@@ -249,6 +251,8 @@ def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
 
 def _check_together(tags: RobotTags, source: str) -> None:
     """Names are unique, no joint serves twice, and muscles run along segments that exist."""
+    if tags.sections and tags.lumped_sections:
+        raise DescriptionError(f"{source} has sections and lumped sections; one kind is required")
     _unique("section", [*(tag.name for tag in tags.sections), *(tag.name for tag in tags.lumped_sections)], source)
     _unique("muscle", [tag.name for tag in tags.muscles], source)
     used = [joint for tag in tags.sections for joint in tag.joints]

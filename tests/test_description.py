@@ -18,11 +18,22 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots.description import declared_arguments, expand, parse_xml
 from softrobots.paths import urdf_folder, xacro_folder
+from softrobots.robots import PccArm
 from softrobots.urdf_tags import NAMESPACE, read_tags
 from tests.oracles import tube_points
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO
+KINDS = (sr.InflatableArm, PccArm)
 ODD = {"link_lengths": (0.5, 0.4, 0.3), "hinge_offset": (0.03, 0.05, 0.02), "stiffness": (250.0, 120.0, 80.0), "rest_up": 0.1}
+ODD_PCC = {
+    "segment_lengths": (0.5, 0.4, 0.3),
+    "offset": (0.1, -1.0, 2.0),
+    "muscle_azimuths": (),
+    "bending_stiffness": (2.0, 1.5, 0.5),
+    "rgba": ((1.0, 0.5, 0.25, 1.0), (0.5, 0.25, 1.0, 1.0), (0.1, 0.2, 0.3, 0.4)),
+    "elastic_sections": 2,
+}
+ODD_LUMPED = {"chain": "lumped", "hinges": 3, "hinge_rule": "midpoint", "torsion": False, "radius": (0.05, 0.03)}
 
 
 def without_banner(text: str) -> str:
@@ -36,27 +47,49 @@ def test_committed_urdf_is_what_xacro_generates(name: str) -> None:
     assert (urdf_folder() / f"{name}.urdf").read_bytes() == sr.ROBOTS[name]().urdf().encode("utf-8")
 
 
-@pytest.mark.parametrize("parameters", [{}, ODD])
-def test_xacro_command_alone_gives_the_same_urdf(parameters: dict) -> None:
-    robot = sr.InflatableArm(**parameters)
+@pytest.mark.parametrize(
+    ("kind", "parameters"),
+    [
+        (sr.InflatableArm, {}),
+        (sr.InflatableArm, ODD),
+        (PccArm, {}),
+        (PccArm, ODD_PCC),
+        (PccArm, ODD_LUMPED),
+        (PccArm, {"chain": "lumped"}),
+    ],
+)
+def test_xacro_command_alone_gives_the_same_urdf(kind: type, parameters: dict) -> None:
+    robot = kind(**parameters)
     given_arguments = [f"{name}:={value}" for name, value in robot.xacro_arguments().items()] if parameters else []
-    command = [str(Path(sys.executable).parent / "xacro"), str(XACRO), *given_arguments]
+    command = [str(Path(sys.executable).parent / "xacro"), str(xacro_folder() / kind.XACRO), *given_arguments]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert without_banner(printed) == robot.urdf()
 
 
-def test_defaults_of_dataclass_and_xacro_agree() -> None:
-    declared = declared_arguments(XACRO)
-    fields = {field.name: field.default for field in dataclasses.fields(sr.InflatableArm)}
+@pytest.mark.parametrize("kind", KINDS)
+def test_defaults_of_dataclass_and_xacro_agree(kind: type) -> None:
+    """Numbers and lists are read as Python reads them, truth values are true and false, words stand for themselves."""
+    declared = declared_arguments(xacro_folder() / kind.XACRO)
+    fields = {field.name: field.default for field in dataclasses.fields(kind)}
     assert list(declared) == list(fields)
     for name, default in fields.items():
         text = declared[name]
-        numbers = [float(n) for n in text.split()] if name == "rgba" else ast.literal_eval(text)
-        assert np.array_equal(numbers, default), name
+        if name == "rgba":
+            assert np.array_equal([float(n) for n in text.split()], default)
+        elif isinstance(default, bool):
+            assert text == {True: "true", False: "false"}[default], name
+        elif isinstance(default, str):
+            assert text == default, name
+        else:
+            value = ast.literal_eval(text)
+            assert np.array_equal(value, default), name
+            assert isinstance(value, int) == isinstance(default, int), name
 
 
-def test_every_argument_says_meaning_unit_and_source() -> None:
-    lines = XACRO.read_text(encoding="utf-8").splitlines()
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_argument_says_meaning_unit_and_source(kind: type) -> None:
+    lines = (xacro_folder() / kind.XACRO).read_text(encoding="utf-8").splitlines()
+    assert sum("<xacro:arg " in line for line in lines) == len(dataclasses.fields(kind))
     for number, line in enumerate(lines):
         if "<xacro:arg " in line:
             comment = lines[number - 1]
@@ -158,10 +191,12 @@ def test_many_links_expand() -> None:
     assert model.n_springs == 180
 
 
-def test_yourdfpy_finds_the_file_valid(tmp_path: Path) -> None:
+@pytest.mark.parametrize("file", sorted(urdf_folder().glob("*.urdf")), ids=lambda file: file.stem)
+def test_yourdfpy_finds_every_file_valid(file: Path) -> None:
     import yourdfpy
 
-    robot = yourdfpy.URDF.load(str(urdf_folder() / "inflatable_arm.urdf"))
+    assert file.stem in sr.ROBOTS
+    robot = yourdfpy.URDF.load(str(file))
     assert robot.validate()
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import softrobots as sr
@@ -112,6 +113,141 @@ def test_pybullet(tool: Callable[[str], ModuleType], arm: sr.SoftModel, configur
         assert sum(masses) == pytest.approx(2.0 + sum(i.mass for i in arm.pinocchio.inertias[1:]), rel=1e-6)
     finally:
         pybullet.disconnect(client)
+
+
+# --- The two chains of the PCC arm: every joint by itself, as other tools see it
+
+PCC_FILES = [urdf_folder() / "pcc_arm.urdf", urdf_folder() / "pcc_arm_lumped.urdf"]
+PCC_FRAMES = ("segment_1", "tip")
+
+
+def poses_anywhere(file: Path) -> tuple[dict[str, bool], float, list[tuple[dict[str, float], dict[str, np.ndarray]]]]:
+    """Joints (and whether they slide), moving mass, and Pinocchio's poses at five draws of joint values within the limits.
+
+    Pinocchio alone: nothing of softrobots stands between.
+    """
+    model = pin.buildModelFromUrdf(str(file))
+    data, rng = model.createData(), np.random.default_rng(6)
+    names = list(model.names)[1:]
+    cases = []
+    for _ in range(5):
+        q = rng.uniform(0.4 * model.lowerPositionLimit, 0.4 * model.upperPositionLimit)
+        pin.framesForwardKinematics(model, data, q)
+        poses = {frame: data.oMf[model.getFrameId(frame)].homogeneous.copy() for frame in PCC_FRAMES}
+        cases.append((dict(zip(names, q.tolist(), strict=True)), poses))
+    sliding = {name: model.joints[model.getJointId(name)].shortname().startswith("JointModelP") for name in names}
+    return sliding, 1.048 * 0.6, cases
+
+
+@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
+def test_pcc_arm_in_yourdfpy(file: Path) -> None:
+    import yourdfpy
+
+    joints, _, cases = poses_anywhere(file)
+    robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_collision_scene_graph=False)
+    assert set(robot.actuated_joint_names) == set(joints)
+    for values, poses in cases:
+        robot.update_cfg(values)
+        for frame, pose in poses.items():
+            assert np.allclose(robot.get_transform(frame, "world"), pose, atol=1e-9)
+
+
+@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
+def test_pcc_arm_in_mujoco(tool: Callable[[str], ModuleType], file: Path) -> None:
+    mujoco = tool("mujoco")
+    joints, mass, cases = poses_anywhere(file)
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    assert model.nq == len(joints)
+    assert model.body_mass.sum() == pytest.approx(2.0 + mass, rel=1e-12)
+    for values, poses in cases:
+        for name, value in values.items():
+            data.qpos[model.joint(name).qposadr[0]] = value
+        mujoco.mj_kinematics(model, data)
+        for frame, pose in poses.items():
+            assert np.allclose(data.body(frame).xpos, pose[:3, 3], atol=1e-9)
+            assert np.allclose(data.body(frame).xmat.reshape(3, 3), pose[:3, :3], atol=1e-9)
+
+
+@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
+def test_pcc_arm_in_drake(tool: Callable[[str], ModuleType], file: Path) -> None:
+    tool("pydrake")
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    joints, mass, cases = poses_anywhere(file)
+    plant = MultibodyPlant(time_step=0.0)
+    Parser(plant).AddModels(str(file))
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    assert plant.num_positions() == len(joints)
+    assert plant.CalcTotalMass(context) == pytest.approx(2.0 + mass, rel=1e-12)
+    for values, poses in cases:
+        for name, value in values.items():
+            joint = plant.GetJointByName(name)
+            (joint.set_translation if joints[name] else joint.set_angle)(context, value)
+        for frame, pose in poses.items():
+            found = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(frame)).GetAsMatrix4()
+            assert np.allclose(found, pose, atol=1e-9)
+
+
+@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
+def test_pcc_arm_in_pybullet(tool: Callable[[str], ModuleType], file: Path) -> None:
+    """Single precision inside: 1e-5."""
+    if sys.version_info >= (3, 12):
+        pytest.skip("pybullet has no wheels above Python 3.11")
+    pybullet = tool("pybullet")
+    joints, mass, cases = poses_anywhere(file)
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        robot = pybullet.loadURDF(str(file), useFixedBase=True, physicsClientId=client)
+        info = [pybullet.getJointInfo(robot, i, physicsClientId=client) for i in range(pybullet.getNumJoints(robot, client))]
+        places = {row[1].decode(): row[0] for row in info}
+        links = {row[12].decode(): row[0] for row in info}
+        assert set(joints) <= set(places)
+        for values, poses in cases:
+            for name, value in values.items():
+                pybullet.resetJointState(robot, places[name], value, physicsClientId=client)
+            for frame, pose in poses.items():
+                state = pybullet.getLinkState(robot, links[frame], computeForwardKinematics=True, physicsClientId=client)
+                turn = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+                assert np.allclose(state[4], pose[:3, 3], atol=1e-5)
+                assert np.allclose(turn, pose[:3, :3], atol=1e-5)
+        masses = [pybullet.getDynamicsInfo(robot, place, physicsClientId=client)[0] for place in links.values()]
+        assert sum(masses) == pytest.approx(2.0 + mass, rel=1e-6)
+    finally:
+        pybullet.disconnect(client)
+
+
+@pytest.mark.parametrize(
+    "parameters", [{}, {"torsion": False, "extension": False}, {"radius": 0.02, "hinge_rule": "midpoint"}], ids=str
+)
+def test_mujoco_agrees_with_the_equilibrium_of_a_lumped_arm(tool: Callable[[str], ModuleType], parameters: dict) -> None:
+    """Without muscles, under its weight and a tip force, with the stiffness set by hand: MuJoCo's static torques vanish.
+
+    1e-8 N m: the solver stops at 1e-10 of some newton metres, MuJoCo's bias forces round at 1e-15 of each of 56 joints.
+    """
+    mujoco = tool("mujoco")
+    robot = sr.robots.PccArm(muscle_azimuths=(), chain="lumped", hinges=7, **parameters)
+    ours = sr.load_model(robot)
+    force = np.array([3.0, -4.5, 1.3])
+    found = sr.solve_equilibrium(ours, [], force, gravity=sr.EARTH_GRAVITY)
+    assert np.hypot(*found.tip_position[:2]) > 0.3  # bent in earnest
+    model = mujoco.MjModel.from_xml_string(robot.urdf())
+    data = mujoco.MjData(model)
+    assert {model.joint(i).name for i in range(model.njnt)} == set(ours.spring_joints)
+    model.opt.gravity[:] = sr.EARTH_GRAVITY
+    for name, value in zip(ours.spring_joints, found.q_springs, strict=True):
+        joint = model.joint(name)
+        model.jnt_stiffness[joint.id], model.qpos_spring[joint.qposadr[0]] = ours.spring_table[name]
+        data.qpos[joint.qposadr[0]] = value
+    mujoco.mj_forward(model, data)
+    jacobian = np.zeros((3, model.nv))
+    mujoco.mj_jacBody(model, data, jacobian, None, model.body("tip").id)
+    balance = jacobian.T @ force + data.qfrc_passive - data.qfrc_bias
+    assert np.abs(balance).max() < 1e-8
+    assert np.allclose(data.body("tip").xpos, found.tip_position, atol=1e-12)
+    assert data.ncon == 0
 
 
 def test_a_third_party_robot_with_springs_said_by_the_caller() -> None:
