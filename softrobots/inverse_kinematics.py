@@ -183,7 +183,7 @@ def _orientation(value: Any) -> FloatArray | None:
     given = finite_array("orientation", value, None)
     if given.shape == (3,) and float(np.linalg.norm(given)) > 0.0:
         return np.asarray(given / np.linalg.norm(given))
-    if given.shape == (3, 3) and np.allclose(given @ given.T, np.eye(3), atol=1e-9) and np.linalg.det(given) > 0.0:
+    if given.shape == (3, 3) and np.allclose(given @ given.T, np.eye(3), rtol=0.0, atol=1e-9) and np.linalg.det(given) > 0.0:
         return given
     raise ParameterError(
         "orientation", value, "a rotation matrix, shape (3, 3), or a direction different from zero, shape (3,)"

@@ -270,6 +270,30 @@ class SoftModel:
         """Whether some shape of the robot has these actuator coordinates, shape (n_motors,), as in `checked_motors`."""
         return self._structure.held is None or self._structure.held.refusal(motors) is None
 
+    def within_range(self, motors: FloatArray) -> FloatArray:
+        """Actuator coordinates with segments that they bend too far bent up to the range of their sections, (n_motors,)."""
+        return motors if self._structure.held is None else self._structure.held.within_range(motors)
+
+    def active_limits(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Limits that actuator coordinates have reached: of actuators, and the range of sections with given muscle lengths.
+
+        Args:
+            motors: Actuator coordinates, shape (n_motors,).
+
+        Returns:
+            Outward normals, and rows whose outer product with themselves is the second derivative of the limited quantity (zero
+            for the flat limits of actuators), each shape (n, n_motors).
+        """
+        low, high = self.motor_limits.T
+        slack, units = 1e-12 * self.motor_scale, np.diag(1.0 / self.motor_scale)
+        rows = [-units[motors <= low + slack], units[motors >= high - slack]]
+        curvatures = [np.zeros_like(row) for row in rows]
+        if self._structure.held is not None:
+            normals, bends = self._structure.held.reached_range(motors)
+            rows.append(normals)
+            curvatures.append(bends)
+        return np.concatenate(rows), np.concatenate(curvatures)
+
     def consistent_motors(self, motors: FloatArray) -> FloatArray:
         """Nearest actuator coordinates whose muscle lengths fit together, shape (n_motors,)."""
         return motors if self._structure.held is None else self._structure.held.consistent(motors)

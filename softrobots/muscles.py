@@ -241,15 +241,53 @@ class MuscleLengths:
                 f"muscle lengths that one arc a segment explains{stretch}; those of segment {segment} miss the nearest arc by "
                 f"{misfit.max():.3g} m, allowed {CONSISTENT:g} m"
             )
-        spread = self._spread @ change
-        for segment, places in self._segments.items():
-            bending = float(np.hypot(spread[list(places["bend_x"])], spread[list(places["bend_y"])]).max())
-            if bending > self._largest_bending:
+        for segment, bending, _ in self._bendings(motors):
+            if bending > self._largest_bending * (1.0 + 1e-9):
                 return (
                     f"within the chain's range: segment {segment} would bend by {bending:.4g} rad a section, allowed "
                     f"{self._largest_bending:.4g} rad (more sections a segment allow more)"
                 )
         return None
+
+    def within_range(self, motors: FloatArray) -> FloatArray:
+        """Actuators with each segment bent no further than its sections may, its mean length kept, shape (n_motors,)."""
+        made = np.array(motors)
+        first = len(motors) - len(self._tags)
+        for segment, bending, _ in self._bendings(motors):
+            if bending > self._largest_bending:
+                rows = [first + row for row, tag in enumerate(self._tags) if tag.segment == segment]
+                arms = _arms([tag for tag in self._tags if tag.segment == segment])
+                rest = self._rest_lengths[[row - first for row in rows]]
+                sums = np.linalg.lstsq(arms, made[rows] - rest, rcond=None)[0]
+                made[rows] -= arms[:, :2] @ sums[:2] * (1.0 - self._largest_bending / bending)
+        return made
+
+    def reached_range(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Slopes of the bending of segments that have reached the range of their sections; see `SoftModel.active_limits`."""
+        slopes, bends = [], []
+        for _, bending, (along, across) in self._bendings(motors):
+            if bending >= self._largest_bending * (1.0 - 1e-9):
+                slopes.append(along)
+                bends.append(across / np.sqrt(bending))
+        count = len(motors)
+        return np.array(slopes).reshape(-1, count), np.array(bends).reshape(-1, count)
+
+    def _bendings(self, motors: FloatArray) -> list[tuple[int, float, tuple[FloatArray, FloatArray]]]:
+        """Each segment with muscles: number, largest bending of a section [rad], slopes of bending it and of turning it."""
+        first = len(motors) - len(self._tags)
+        spread = self._spread @ (motors[first:] - self._rest_lengths)
+        found = []
+        for segment in sorted({tag.segment for tag in self._tags}):
+            about_x, about_y = (list(self._segments[segment][key]) for key in ("bend_x", "bend_y"))
+            bendings = np.hypot(spread[about_x], spread[about_y])
+            most = int(np.argmax(bendings))
+            x, y = about_x[most], about_y[most]
+            size = max(float(bendings[most]), 1e-300)
+            along, across = np.zeros(len(motors)), np.zeros(len(motors))
+            along[first:] = (spread[x] * self._spread[x] + spread[y] * self._spread[y]) / size
+            across[first:] = (spread[x] * self._spread[y] - spread[y] * self._spread[x]) / size
+            found.append((segment, float(bendings[most]), (along, across)))
+        return found
 
 
 class MuscleLengthPoint(NamedTuple):

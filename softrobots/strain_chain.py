@@ -30,8 +30,9 @@ JOINTS = ("u1", "u2", "c", "r1", "r2", "r3")
 STRAINS = ("bend_x", "bend_y", "twist", "stretch")
 """The section coordinates: rotation over the section about x, y and z [rad], elongation [m]."""
 
-LARGEST_BENDING = np.deg2rad(120.0)
-"""Bending of one section up to which the chain is meant to be used [rad]; use more sections beyond."""
+LARGEST_BENDING = np.deg2rad(170.0)
+"""Bending of one section that muscle lengths may ask for [rad]. The chain ends at 180 degrees; from 120 on, rather use more
+sections."""
 
 _LARGEST_TURN = 0.999 * 4.0 * np.pi**2  # of the squared rotation of a section: at a whole turn it has no chord
 _UPPER = np.triu(np.ones((6, 6)), 1)  # pairs of joints, the first nearer to the base

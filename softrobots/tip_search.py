@@ -32,6 +32,7 @@ _FIRST_DAMPING = 0.03  # of the first step, relative to the reach
 _LAST_DAMPING = 1e-8
 _LARGEST_STEP = 0.5  # [rad], norm of one step over the scale of the actuators
 _STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as no slope: nothing nearer is near
+_NEAR = 0.02  # distance from the goal, relative to the reach, that the way home may cost for a step
 _LEVER = 0.2  # distance that a radian of orientation counts for, relative to the reach
 
 
@@ -139,6 +140,7 @@ def search(
     mu, redundant, unsettled, pace = damping * model.reach, basis.shape[1] > goal.rows, 0, 1.0
     home = q_motors if home is None else home
     last: tuple[FloatArray, FloatArray] | None = None  # step and drift that led here
+    reached: LocalSolution | None = None  # the last place on the way home that is at the goal
     for iteration in range(1, max_iterations + 1):
         translation, turn = goal.missing(model, here.state.q)
         missing = translation if goal.rotation is None else np.concatenate([translation, _LEVER * model.reach * turn])
@@ -148,9 +150,11 @@ def search(
         except NeutralEquilibrium:
             break
         slope = slope @ basis
-        homeward = np.linalg.pinv(basis) @ (home - here.q_motors) if redundant else np.zeros(basis.shape[1])
-        towards, drift, free = _step(model, here.q_motors, slope, missing, mu, homeward)
         arrived = here.arrived(tolerance)
+        reached = here if arrived else reached
+        going_home = redundant and reached is not None
+        homeward = np.linalg.pinv(basis) @ (home - here.q_motors) if going_home else np.zeros(basis.shape[1])
+        towards, drift, free = _step(model, here.q_motors, slope, missing, mu, homeward)
         if arrived and float(np.abs(drift).max()) <= SAME:
             return here._replace(iterations=iteration - 1, unsettled=unsettled)
         pace = pace if last is None else _pace(*last, drift)
@@ -165,7 +169,7 @@ def search(
         unsettled += there is None
         # Drifting home costs distance in second order, which the next step makes good.
         drifted = pace * float(np.linalg.norm(drift))
-        allowed = max(10.0 * tolerance, 4.0 * model.reach * drifted**2) if redundant else 0.0
+        allowed = max(10.0 * tolerance, model.reach * min(4.0 * drifted**2, _NEAR)) if going_home else 0.0
         if there is not None and (there.miss(model) < miss or there.miss(model) <= allowed):
             here, mu, last = there, 0.1 * mu if mu > _LAST_DAMPING * model.reach else 0.0, (step, drift)
         elif drifted > float(np.linalg.norm(towards)):
@@ -174,13 +178,15 @@ def search(
             mu = max(10.0 * mu, 10.0 * _LAST_DAMPING * model.reach)
             if mu > 1e6 * model.reach:
                 break
-    return here._replace(iterations=iteration, unsettled=unsettled)
+    ended = here if reached is None or here.arrived(tolerance) else reached
+    return ended._replace(iterations=iteration, unsettled=unsettled)
 
 
 def within_limits(model: SoftModel, q_motors: FloatArray, step: FloatArray) -> FloatArray:
     """Go a step from actuator coordinates, as far as the limits allow.
 
-    Independent actuators stop one by one. Muscle lengths that must fit together stop together.
+    Independent actuators stop one by one. Muscle lengths that must fit together stop together. Segments that would bend beyond
+    the range of their sections bend up to it.
 
     Args:
         model: The robot.
@@ -192,10 +198,10 @@ def within_limits(model: SoftModel, q_motors: FloatArray, step: FloatArray) -> F
     """
     low, high = model.motor_limits.T
     if model.independent_motors:
-        return np.asarray(np.clip(q_motors + step, low, high))
+        return model.within_range(np.clip(q_motors + step, low, high))
     ahead = np.where(step > 0.0, high - q_motors, q_motors - low)
     share = float(np.min(np.where(step == 0.0, np.inf, ahead / np.maximum(np.abs(step), 1e-300)), initial=1.0))
-    return np.asarray(q_motors + max(share, 0.0) * step)
+    return model.within_range(q_motors + max(share, 0.0) * step)
 
 
 def _settle_at(
@@ -222,22 +228,27 @@ def _step(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Step towards the goal, and the part of the way home that does not move the tip, without pressing against limits.
 
-    Actuators that stand at a limit which the step would press them against are held, one set after the other.
+    Limits that are reached and that the step would press against are held, one set after the other.
 
     Returns:
         Both parts, shape (n,), and the projector on the steps that are left free, shape (n, n).
     """
-    low, high = model.motor_limits.T
-    slack, basis = 1e-12 * model.motor_scale, model.motor_basis
-    held = np.zeros(len(motors), dtype=bool)
+    basis = model.motor_basis
+    normals, bends = (rows @ basis for rows in model.active_limits(motors))
+    pull = normals @ (slope.T @ missing) / np.maximum((normals * normals).sum(axis=1), 1e-300)
+    held = np.zeros(len(normals), dtype=bool)
     while True:
-        rows = basis[held]
+        rows = normals[held]
         free = np.eye(basis.shape[1]) - np.linalg.pinv(rows) @ rows
         open_slope = slope @ free
-        towards = free @ _damped_step(open_slope, missing, damping, 1e-12 * model.reach)
+        # Going along a curved limit costs what the pull against it times its curvature gives: rows of their own.
+        curved = np.sqrt(np.maximum(pull[held], 0.0))[:, None] * bends[held] @ free
+        whole = np.concatenate([open_slope, curved[curved.any(axis=1)]])
+        towards = free @ _damped_step(
+            whole, np.concatenate([missing, np.zeros(len(whole) - len(missing))]), damping, 1e-12 * model.reach
+        )
         drift = free @ (homeward - np.linalg.pinv(open_slope, rcond=1e-9) @ (open_slope @ homeward))
-        change = basis @ (towards + drift)
-        pressed = ~held & ((motors <= low + slack) & (change < -slack) | (motors >= high - slack) & (change > slack))
+        pressed = ~held & (normals @ (towards + drift) > 1e-12)
         if not pressed.any():
             return towards, drift, free
         held |= pressed
