@@ -108,7 +108,7 @@ def solve_ik(
     first = start_motors(model, q_motors0)
     if elbow is not None and not _has_elbow(model):
         raise ParameterError("elbow", elbow, "None for this robot: its last motor joint is where its first one is")
-    freedom = model.motor_basis.shape[1]
+    freedom = model.actuators.basis.shape[1]
     if goal.rotation is not None and freedom < goal.rows:
         raise ParameterError(
             "orientation", orientation, f"None for this robot: it has {freedom} freedoms, {goal.rows} are needed"
@@ -169,7 +169,7 @@ def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
         raise ParameterError("model", model, "a robot with at least one motor or muscle")
     low, high = model.motor_limits.T
     if q_motors0 is None:
-        return model.relaxed_motors
+        return np.array(model.relaxed_motors)
     motors = model.checked_motors(q_motors0, "q_motors0")
     if np.any((motors < low) | (motors > high)):
         raise ParameterError("q_motors0", q_motors0, f"within the motor limits {model.motor_limits.tolist()}")
@@ -220,7 +220,7 @@ def _has_elbow(model: SoftModel) -> bool:
 def _same_pose(model: SoftModel, one: LocalSolution, other: LocalSolution) -> bool:
     """Whether two solutions are one, up to whole turns of a motor."""
     apart = one.q_motors - other.q_motors
-    apart = np.where(model.turning_motors, apart - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)), apart)
+    apart = np.where(model.actuators.turning, apart - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)), apart)
     return float(np.abs(apart / model.motor_scale).max()) <= SAME
 
 
@@ -237,14 +237,12 @@ def _raise_unsettled(model: SoftModel, motors: FloatArray, load: Load, method: s
 
 
 def _starts(model: SoftModel, first: FloatArray, count: int) -> list[FloatArray]:
-    low, high = model.motor_limits.T
-    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
     random = np.random.default_rng(_SEED)
     made = [first]
     for _ in range(20 * count):  # some lengths fit together nowhere, or bend too far
         if len(made) == count:
             break
-        start = model.consistent_motors(random.uniform(low, high))
-        if model.admits(start) and np.all((start >= low) & (start <= high)):
+        start = model.actuators.draw(random)
+        if start is not None:
             made.append(start)
     return made

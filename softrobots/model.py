@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots import inflated_beam
+from softrobots.actuators import Actuators
 from softrobots.checks import FloatArray, finite_array, read_only
 from softrobots.coordinates import Coordinates
 from softrobots.errors import DescriptionError, NameNotFound, ParameterError
@@ -115,6 +116,11 @@ class SoftModel:
         return self._structure
 
     @property
+    def actuators(self) -> Actuators:
+        """Motors and muscles, with their limits."""
+        return self._structure.actuators
+
+    @property
     def coordinates(self) -> Coordinates:
         """The map from actuators and elastic coordinates to joint positions."""
         return self._structure.coordinates
@@ -122,7 +128,7 @@ class SoftModel:
     @property
     def motor_joints(self) -> tuple[str, ...]:
         """Names of the actuators: motor joints, then muscles."""
-        return (*self._structure.motor_joints, *(muscle.name for muscle in self._structure.muscles))
+        return self.actuators.names
 
     @property
     def muscles(self) -> tuple[MuscleTag, ...]:
@@ -192,7 +198,7 @@ class SoftModel:
     @property
     def n_motors(self) -> int:
         """Number of actuators: motor joints and muscles."""
-        return len(self._structure.motor_joints) + len(self._structure.muscles)
+        return len(self.actuators.names)
 
     @property
     def n_springs(self) -> int:
@@ -202,22 +208,20 @@ class SoftModel:
     @property
     def motor_limits(self) -> FloatArray:
         """Lower and upper limit of each actuator, shape (n_motors, 2) [rad, m or N], read-only; infinite if continuous."""
-        return self._structure.motor_limits
+        return self.actuators.limits
 
     @property
     def motor_scale(self) -> FloatArray:
         """Change of each actuator that moves the robot about as much as a radian, shape (n_motors,), read-only."""
-        return self._structure.motor_scale
+        return self.actuators.scale
 
     @property
     def relaxed_motors(self) -> FloatArray:
-        """Motor joints at zero, muscles at their rest lengths or without tension, shape (n_motors,) [rad, m or N].
+        """Motor joints at zero, muscles at rest or without tension, shape (n_motors,) [rad, m or N], read-only.
 
         Or as near to that as the limits allow.
         """
-        muscles = self._structure.muscle_rest if self.muscle_input == "lengths" else np.zeros(len(self.muscles))
-        relaxed = np.concatenate([np.zeros(len(self._structure.motor_joints)), muscles])
-        return np.asarray(np.clip(relaxed, *self.motor_limits.T))
+        return self.actuators.relaxed
 
     @property
     def spring_limits(self) -> FloatArray:
@@ -234,13 +238,6 @@ class SoftModel:
         """Places of the spring joints in Pinocchio's velocity vector."""
         return self._structure.spring_indices
 
-    @property
-    def turning_motors(self) -> Any:
-        """Which actuators turn rather than slide or pull, shape (n_motors,), truth values."""
-        joints = [self._pin.joints[self._pin.getJointId(name)] for name in self._structure.motor_joints]
-        turning = [joint.shortname().startswith("JointModelR") for joint in joints]
-        return np.array(turning + [False] * len(self.muscles), dtype=bool)
-
     def checked_motors(self, q_motors: Any, field: str = "q_motors") -> FloatArray:
         """Return actuator coordinates that the robot can take, as a new array.
 
@@ -251,52 +248,7 @@ class SoftModel:
         Raises:
             ParameterError: If the shape differs, a number is not finite, or no shape of the robot has such muscle lengths.
         """
-        motors = finite_array(field, q_motors, (self.n_motors,), self._motor_unit())
-        if self._structure.held is not None:
-            self._structure.held.check(field, motors)
-        return motors
-
-    @property
-    def independent_motors(self) -> bool:
-        """Whether each actuator can be set by itself; more than three muscles along a segment must fit together."""
-        return bool(self.motor_basis.shape[0] == self.motor_basis.shape[1])
-
-    @property
-    def motor_basis(self) -> FloatArray:
-        """Independent changes of the actuators, shape (n_motors, n), each about a radian's worth of motion, read-only."""
-        return self._structure.motor_basis
-
-    def admits(self, motors: FloatArray) -> bool:
-        """Whether some shape of the robot has these actuator coordinates, shape (n_motors,), as in `checked_motors`."""
-        return self._structure.held is None or self._structure.held.refusal(motors) is None
-
-    def within_range(self, motors: FloatArray) -> FloatArray:
-        """Actuator coordinates with segments that they bend too far bent up to the range of their sections, (n_motors,)."""
-        return motors if self._structure.held is None else self._structure.held.within_range(motors)
-
-    def active_limits(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Limits that actuator coordinates have reached: of actuators, and the range of sections with given muscle lengths.
-
-        Args:
-            motors: Actuator coordinates, shape (n_motors,).
-
-        Returns:
-            Outward normals, and rows whose outer product with themselves is the second derivative of the limited quantity (zero
-            for the flat limits of actuators), each shape (n, n_motors).
-        """
-        low, high = self.motor_limits.T
-        slack, units = 1e-12 * self.motor_scale, np.diag(1.0 / self.motor_scale)
-        rows = [-units[motors <= low + slack], units[motors >= high - slack]]
-        curvatures = [np.zeros_like(row) for row in rows]
-        if self._structure.held is not None:
-            normals, bends = self._structure.held.reached_range(motors)
-            rows.append(normals)
-            curvatures.append(bends)
-        return np.concatenate(rows), np.concatenate(curvatures)
-
-    def consistent_motors(self, motors: FloatArray) -> FloatArray:
-        """Nearest actuator coordinates whose muscle lengths fit together, shape (n_motors,)."""
-        return motors if self._structure.held is None else self._structure.held.consistent(motors)
+        return self.actuators.checked(q_motors, field)
 
     def configuration(self, q_motors: Any, q_springs: Any | None = None) -> FloatArray:
         """Pinocchio's configuration vector from actuator and elastic coordinates.
@@ -374,11 +326,6 @@ class SoftModel:
                     del pairs[kept[0]]
             pair = pairs[gravity] = (model, model.createData())
         return pair
-
-    def _motor_unit(self) -> str:
-        if not self.muscles:
-            return "rad"
-        return "m" if self.muscle_input == "lengths" else "N"
 
     def _chain_length(self) -> float:
         names = [name for section in self._structure.section_table for name in section.joint_names]

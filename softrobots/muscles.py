@@ -8,9 +8,9 @@ with the bending `a` about x and `b` about y [rad] and the elongation `e` [m] of
 coordinates. (Twist lengthens a muscle too, in second order: by `(d t)^2 / (2 l)` for a segment twisted by `t`. That is
 neglected: 1 mm in 0.524 m for 0.8 rad at 0.04 m.)
 
-- *Lengths given*: they fix the sums of bending and elongation over a segment. Free are the differences between its sections,
-  and twist: `z = z_u + N y` with `A N = 0`. The part `z_u` spreads the sums as the stiffness wants it, so that
-  `N^T K z_u = 0` and the stiffness of `y` is diagonal.
+- *Lengths given* (`softrobots.muscle_lengths`): they fix the sums of bending and elongation over a segment. Free are the
+  differences between its sections, and twist: `z = z_u + N y` with `A N = 0`. The part `z_u` spreads the sums as the stiffness
+  wants it, so that `N^T K z_u = 0` and the stiffness of `y` is diagonal.
 - *Forces given*: all section coordinates are free, and a tension `t` adds the energy `t A z`.
 """
 
@@ -23,18 +23,14 @@ import numpy as np
 
 from softrobots.checks import FloatArray
 from softrobots.coordinates import Coordinates, Point, ReducedLoad
-from softrobots.errors import DescriptionError, ParameterError
 from softrobots.joint_loads import JointLoad
-from softrobots.strain_chain import LARGEST_BENDING
 from softrobots.urdf_tags import MuscleTag
 
 MUSCLE_INPUTS = ("lengths", "forces")
 """What can be given of the muscles."""
 
-CONSISTENT = 1e-6
-"""Muscle lengths of a segment that miss those of the nearest arc by more than this are refused [m]."""
-
-_HELD = ("bend_x", "bend_y", "stretch")  # the section coordinates whose sums over a segment the muscles hold
+HELD = ("bend_x", "bend_y", "stretch")
+"""The section coordinates that muscles feel: the sums of these over a segment."""
 
 
 class ElasticLaw(NamedTuple):
@@ -58,13 +54,13 @@ def muscle_matrix(tags: Sequence[MuscleTag], segments: Segments, count: int) -> 
     """Derivative `A` of the muscle lengths with respect to `count` elastic coordinates, shape (n_muscles, count)."""
     matrix = np.zeros((len(tags), count))
     for row, tag in enumerate(tags):
-        arms = _arms([tag])[0]
-        for coordinate, arm in zip(_HELD, arms, strict=True):
+        row_arms = muscle_arms([tag])[0]
+        for coordinate, arm in zip(HELD, row_arms, strict=True):
             matrix[row, list(segments[tag.segment].get(coordinate, ()))] = arm
     return matrix
 
 
-def _arms(tags: Sequence[MuscleTag]) -> FloatArray:
+def muscle_arms(tags: Sequence[MuscleTag]) -> FloatArray:
     """Derivative of the lengths with respect to the sums of bending and elongation, shape (n, 3) [m/rad, m/rad, -]."""
     return np.array([(tag.distance * np.sin(tag.azimuth), -tag.distance * np.cos(tag.azimuth), 1.0) for tag in tags])
 
@@ -120,226 +116,3 @@ class MuscleForcePoint(NamedTuple):
         """Tensions alone move nothing."""
         motors, elastic = self.inner.columns(jacobian)
         return np.concatenate([motors, np.zeros((len(jacobian), len(self.tensions)))], axis=1), elastic
-
-
-class MuscleLengths:
-    """Coordinates of a robot whose muscles hold given lengths: motors, then lengths, are given; what lengths leave is free."""
-
-    def __init__(
-        self,
-        inner: Coordinates,
-        tags: Sequence[MuscleTag],
-        segments: Segments,
-        law: ElasticLaw,
-        largest_bending: float | None = None,
-    ) -> None:
-        """Find the free coordinates.
-
-        Args:
-            inner: The robot without muscles.
-            tags: The muscles.
-            segments: Which of its elastic coordinates belong to which segment.
-            law: Stiffness of its elastic coordinates.
-            largest_bending: Bending of one section that lengths may ask for [rad]; `LARGEST_BENDING` by default.
-
-        Raises:
-            DescriptionError: If the muscles of a segment do not fix its bending and elongation.
-        """
-        self._inner, self._law, self._segments = inner, law, segments
-        self._largest_bending = LARGEST_BENDING if largest_bending is None else largest_bending
-        self._tags = tuple(tags)
-        self._rest_lengths = np.array([tag.rest_length for tag in tags])
-        count = len(law.names)
-        self._spread = np.zeros((count, len(tags)))
-        self._misfit = np.zeros((len(tags), len(tags)))
-        held: dict[int, FloatArray] = {}
-        modes, names, turning = [], [], []
-        for segment in sorted({tag.segment for tag in tags}):
-            rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
-            places = {key: list(segments[segment][key]) for key in _HELD if key in segments[segment]}
-            arms = _arms([tags[row] for row in rows])[:, [_HELD.index(key) for key in places]]
-            if np.linalg.matrix_rank(arms, tol=1e-9 * float(np.abs(arms).max())) < len(places):
-                raise DescriptionError(
-                    f"the {len(rows)} muscles of segment {segment} do not fix its bending and elongation; "
-                    f"three or more at different azimuths are required"
-                )
-            inverse = np.linalg.pinv(arms)
-            self._misfit[np.ix_(rows, rows)] = np.eye(len(rows)) - arms @ inverse
-            for key, row_of_inverse in zip(places, inverse, strict=True):
-                softness = 1.0 / law.stiffness[places[key]]
-                self._spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
-                held |= dict.fromkeys(places[key], softness)
-                basis = _differences(law.stiffness[places[key]])
-                for number, mode in enumerate(basis.T, start=1):
-                    column = np.zeros(count)
-                    column[places[key]] = mode
-                    modes.append(column)
-                    names.append(f"segment_{segment}_{key}_mode_{number}")
-                    turning.append(key != "stretch")
-        free = [place for place in range(count) if place not in held]
-        columns = [np.eye(count)[place] for place in free] + modes
-        self._free = np.array(columns).reshape(-1, count).T
-        stiffness = np.einsum("ik,i,ik->k", self._free, law.stiffness, self._free)
-        rest = (law.stiffness * law.rest) @ self._free / stiffness
-        angles = np.array([*(law.turning[place] for place in free), *turning], dtype=bool)
-        self.law = ElasticLaw((*(law.names[place] for place in free), *names), stiffness, np.asarray(rest), angles)
-        """Stiffness of the free coordinates."""
-
-    def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleLengthPoint:
-        """Go to given coordinates."""
-        count = len(motors) - len(self._tags)
-        strains = self.strains(motors, elastic)
-        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self._spread, self._free, self._law, strains)
-
-    def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
-        """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
-        change = motors[len(motors) - len(self._tags) :] - self._rest_lengths
-        return np.asarray(self._spread @ change + self._free @ elastic)
-
-    def consistent(self, motors: FloatArray) -> FloatArray:
-        """Nearest motors and lengths that arcs explain, shape (n_motors,)."""
-        made = np.array(motors)
-        lengths = made[len(motors) - len(self._tags) :]
-        lengths -= self._misfit @ (lengths - self._rest_lengths)
-        return made
-
-    def basis(self, scale: FloatArray) -> FloatArray:
-        """Independent changes of motors and lengths, of size `scale`, shape (n_motors, n)."""
-        count = len(scale) - len(self._tags)
-        consistent = np.eye(len(self._tags)) - self._misfit
-        if not np.any(np.abs(self._misfit) > 1e-12):
-            return np.diag(scale)
-        values, vectors = np.linalg.eigh(consistent)
-        directions = np.asarray(vectors[:, values > 0.5])
-        made = np.zeros((len(scale), count + directions.shape[1]))
-        made[:count, :count] = np.diag(scale[:count])
-        made[count:, count:] = scale[count:, None] * directions
-        return made
-
-    def check(self, field: str, motors: FloatArray) -> None:
-        """Refuse lengths that no shape of the robot has.
-
-        Raises:
-            ParameterError: If a length is not positive, if no arc explains the lengths of a segment, or if they would bend a
-                section beyond the range of the chain or leave it without length.
-        """
-        requirement = self.refusal(motors)
-        if requirement is not None:
-            raise ParameterError(field, motors, requirement)
-
-    def refusal(self, motors: FloatArray) -> str | None:
-        """What lengths would have to be, if no shape of the robot has the given ones; None if one has."""
-        lengths = motors[len(motors) - len(self._tags) :]
-        if np.any(lengths <= 0.0):
-            return "positive muscle lengths [m]"
-        change = lengths - self._rest_lengths
-        misfit = np.abs(self._misfit @ change)
-        if misfit.max() > CONSISTENT:
-            segment = self._tags[int(np.argmax(misfit))].segment
-            stretch = "" if "stretch" in self._segments[segment] else ", without elongation (this chain has no stretch joints)"
-            return (
-                f"muscle lengths that one arc a segment explains{stretch}; those of segment {segment} miss the nearest arc by "
-                f"{misfit.max():.3g} m, allowed {CONSISTENT:g} m"
-            )
-        for segment, bending, _ in self._bendings(motors):
-            if bending > self._largest_bending * (1.0 + 1e-9):
-                return (
-                    f"within the chain's range: segment {segment} would bend by {bending:.4g} rad a section, allowed "
-                    f"{self._largest_bending:.4g} rad (more sections a segment allow more)"
-                )
-        return None
-
-    def within_range(self, motors: FloatArray) -> FloatArray:
-        """Actuators with each segment bent no further than its sections may, its mean length kept, shape (n_motors,)."""
-        made = np.array(motors)
-        first = len(motors) - len(self._tags)
-        for segment, bending, _ in self._bendings(motors):
-            if bending > self._largest_bending:
-                rows = [first + row for row, tag in enumerate(self._tags) if tag.segment == segment]
-                arms = _arms([tag for tag in self._tags if tag.segment == segment])
-                rest = self._rest_lengths[[row - first for row in rows]]
-                sums = np.linalg.lstsq(arms, made[rows] - rest, rcond=None)[0]
-                made[rows] -= arms[:, :2] @ sums[:2] * (1.0 - self._largest_bending / bending)
-        return made
-
-    def reached_range(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Slopes of the bending of segments that have reached the range of their sections; see `SoftModel.active_limits`."""
-        slopes, bends = [], []
-        for _, bending, (along, across) in self._bendings(motors):
-            if bending >= self._largest_bending * (1.0 - 1e-9):
-                slopes.append(along)
-                bends.append(across / np.sqrt(bending))
-        count = len(motors)
-        return np.array(slopes).reshape(-1, count), np.array(bends).reshape(-1, count)
-
-    def _bendings(self, motors: FloatArray) -> list[tuple[int, float, tuple[FloatArray, FloatArray]]]:
-        """Each segment with muscles: number, largest bending of a section [rad], slopes of bending it and of turning it."""
-        first = len(motors) - len(self._tags)
-        spread = self._spread @ (motors[first:] - self._rest_lengths)
-        found = []
-        for segment in sorted({tag.segment for tag in self._tags}):
-            about_x, about_y = (list(self._segments[segment][key]) for key in ("bend_x", "bend_y"))
-            bendings = np.hypot(spread[about_x], spread[about_y])
-            most = int(np.argmax(bendings))
-            x, y = about_x[most], about_y[most]
-            size = max(float(bendings[most]), 1e-300)
-            along, across = np.zeros(len(motors)), np.zeros(len(motors))
-            along[first:] = (spread[x] * self._spread[x] + spread[y] * self._spread[y]) / size
-            across[first:] = (spread[x] * self._spread[y] - spread[y] * self._spread[x]) / size
-            found.append((segment, float(bendings[most]), (along, across)))
-        return found
-
-
-class MuscleLengthPoint(NamedTuple):
-    """A robot with held muscle lengths."""
-
-    inner: Point
-    """The robot without muscles."""
-    spread: FloatArray
-    """Derivative of its elastic coordinates with respect to the lengths."""
-    free: FloatArray
-    """The same with respect to the free coordinates."""
-    law: ElasticLaw
-    """Its stiffness."""
-    strains: FloatArray
-    """Its elastic coordinates."""
-
-    @property
-    def joints(self) -> FloatArray:
-        """Joint positions."""
-        return self.inner.joints
-
-    @property
-    def valid(self) -> bool:
-        """Whether the chain can be there."""
-        return self.inner.valid
-
-    def reduce(self, joints: JointLoad) -> ReducedLoad:
-        """Carry over to lengths and free coordinates; the load on a muscle is its tension, spring-back included."""
-        load = self.inner.reduce(joints)
-        unbalanced = load.elastic - self.law.stiffness * (self.strains - self.law.rest)
-        half = self.free.T @ load.derivative
-        return ReducedLoad(
-            np.concatenate([load.motors, unbalanced @ self.spread]),
-            load.elastic @ self.free,
-            half @ self.free,
-            np.concatenate([self.free.T @ load.coupling, half @ self.spread], axis=1),
-            load.potential,
-            load.scale,
-        )
-
-    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Combine the columns of the strains."""
-        motors, elastic = self.inner.columns(jacobian)
-        return np.concatenate([motors, elastic @ self.spread], axis=1), elastic @ self.free
-
-
-def _differences(stiffness: FloatArray) -> FloatArray:
-    """Orthonormal columns without sum, shape (n, n - 1), that make the stiffness diagonal; cosines where it is uniform."""
-    n = len(stiffness)
-    places = (np.arange(n) + 0.5)[:, None]
-    cosines = np.sqrt(2.0 / n) * np.cos(np.pi * places * np.arange(1, n) / n)
-    if np.ptp(stiffness) <= 1e-12 * float(stiffness.max()):
-        return np.asarray(cosines)
-    vectors: Any = np.linalg.eigh(cosines.T @ (stiffness[:, None] * cosines))[1]
-    return np.asarray(cosines @ vectors)

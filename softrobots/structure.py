@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softrobots.actuators import Actuators
 from softrobots.checks import FloatArray, read_only
 from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections, rest_coordinates
-from softrobots.muscles import ElasticLaw, MuscleForces, MuscleLengths, Segments, muscle_matrix
+from softrobots.muscle_lengths import MuscleLengths
+from softrobots.muscles import ElasticLaw, MuscleForces, Segments, muscle_matrix
 from softrobots.strain_chain import STRAINS, joint_positions
 from softrobots.urdf_tags import LumpedSectionTag, MuscleTag, SectionTag, SpringTag
 
@@ -106,15 +108,10 @@ class Structure:
             largest = np.pi / 2 if self.sections is None else None
             self.held = MuscleLengths(self.coordinates, self.muscles, self.segments, self.strain_law, largest)
             self.coordinates, self.law = self.held, self.held.law
-        self.motor_limits = read_only(np.concatenate([self.joint_limits(self.motor_joints), self._muscle_limits()]))
-        """Limits of the actuators, shape (n_motors, 2) [rad, m or N]."""
         self.elastic_limits = self._elastic_limits()
         """Limits of the joints that springs and sections move, in the order of Pinocchio's velocities, shape (nv, 2)."""
-        self.motor_scale = read_only(np.concatenate([np.ones(len(self.motor_joints)), self._muscle_scale()]))
-        """Change of each actuator that moves the robot about as much as a radian, shape (n_motors,) [rad, m or N]."""
-        basis = np.diag(self.motor_scale) if self.held is None else self.held.basis(self.motor_scale)
-        self.motor_basis = read_only(basis)
-        """Independent changes of the actuators, shape (n_motors, n)."""
+        self.actuators = self._actuators()
+        """Motors and muscles."""
 
     def indices(self, names: Sequence[str]) -> Any:
         """Places of joints in Pinocchio's velocity vector."""
@@ -198,17 +195,17 @@ class Structure:
                 made.setdefault(section.segment, {}).setdefault(name, []).append(self.spring_joints.index(joint))
         return made
 
-    def _muscle_limits(self) -> FloatArray:
-        limits = [
-            (tag.shortest, tag.longest) if self.parts.muscle_input == "lengths" else (-tag.strongest, tag.strongest)
-            for tag in self.muscles
+    def _actuators(self) -> Actuators:
+        joints = [self._pin.joints[self._pin.getJointId(name)] for name in self.motor_joints]
+        softness = [
+            float((1.0 / self.strain_law.stiffness[list(self.segments[tag.segment]["bend_x"])]).sum()) for tag in self.muscles
         ]
-        return np.array(limits).reshape(-1, 2)
-
-    def _muscle_scale(self) -> FloatArray:
-        scale = [tag.distance for tag in self.muscles]
-        if self.parts.muscle_input == "forces":
-            for row, tag in enumerate(self.muscles):
-                softness = 1.0 / self.strain_law.stiffness[list(self.segments[tag.segment]["bend_x"])]
-                scale[row] = 1.0 / (float(softness.sum()) * tag.distance)
-        return np.array(scale)
+        return Actuators(
+            self.motor_joints,
+            self.joint_limits(self.motor_joints),
+            [joint.shortname().startswith("JointModelR") for joint in joints],
+            self.muscles,
+            self.muscle_rest,
+            np.array(softness),
+            self.held,
+        )

@@ -136,7 +136,7 @@ def search(
     here = _settle_at(model, q_motors, load, q_springs, method, goal)
     if here is None:
         return None
-    basis = model.motor_basis
+    basis = model.actuators.basis
     mu, redundant, unsettled, pace = damping * model.reach, basis.shape[1] > goal.rows, 0, 1.0
     home = q_motors if home is None else home
     last: tuple[FloatArray, FloatArray] | None = None  # step and drift that led here
@@ -163,7 +163,7 @@ def search(
             break
         step = towards + pace * drift
         step *= min(1.0, _LARGEST_STEP / max(float(np.linalg.norm(step)), 1e-300))
-        moved = within_limits(model, here.q_motors, basis @ step)
+        moved = model.actuators.go(here.q_motors, basis @ step)
         guess = here.state.q_springs + follow @ (moved - here.q_motors)
         there = _settle_at(model, moved, load, guess, method, goal)
         unsettled += there is None
@@ -182,33 +182,11 @@ def search(
     return ended._replace(iterations=iteration, unsettled=unsettled)
 
 
-def within_limits(model: SoftModel, q_motors: FloatArray, step: FloatArray) -> FloatArray:
-    """Go a step from actuator coordinates, as far as the limits allow.
-
-    Independent actuators stop one by one. Muscle lengths that must fit together stop together. Segments that would bend beyond
-    the range of their sections bend up to it.
-
-    Args:
-        model: The robot.
-        q_motors: Actuator coordinates within the limits, shape (n_motors,).
-        step: The step, shape (n_motors,).
-
-    Returns:
-        Shape (n_motors,).
-    """
-    low, high = model.motor_limits.T
-    if model.independent_motors:
-        return model.within_range(np.clip(q_motors + step, low, high))
-    ahead = np.where(step > 0.0, high - q_motors, q_motors - low)
-    share = float(np.min(np.where(step == 0.0, np.inf, ahead / np.maximum(np.abs(step), 1e-300)), initial=1.0))
-    return model.within_range(q_motors + max(share, 0.0) * step)
-
-
 def _settle_at(
     model: SoftModel, q_motors: FloatArray, load: Load, start: FloatArray, method: str, goal: Goal
 ) -> LocalSolution | None:
     """Elastic coordinates in equilibrium and the distance of the tip; None if they do not settle."""
-    if not model.admits(q_motors):
+    if not model.actuators.admit(q_motors):
         return None
     state = settled(model, q_motors, load, start, method=method)
     if state is None:
@@ -233,8 +211,8 @@ def _step(
     Returns:
         Both parts, shape (n,), and the projector on the steps that are left free, shape (n, n).
     """
-    basis = model.motor_basis
-    normals, bends = (rows @ basis for rows in model.active_limits(motors))
+    basis = model.actuators.basis
+    normals, bends = (rows @ basis for rows in model.actuators.active_limits(motors))
     pull = normals @ (slope.T @ missing) / np.maximum((normals * normals).sum(axis=1), 1e-300)
     held = np.zeros(len(normals), dtype=bool)
     while True:

@@ -21,7 +21,7 @@ from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
 from softrobots.sensitivity import tip_motion
-from softrobots.tip_search import POSITION_TOLERANCE, Goal, LocalSolution, search, within_limits
+from softrobots.tip_search import POSITION_TOLERANCE, Goal, LocalSolution, search
 
 METHODS = ("newton", "fixed_point", "paper")
 """How `follow_trajectory` follows: exact steps with the springs settled by Newton or by the paper's recursion, or the paper's
@@ -248,10 +248,10 @@ def _advance(
         slope, follow = tip_motion(by_motors, by_springs, here.state.tangent, here.state.load.coupling)
     except NeutralEquilibrium:  # about to buckle: no linear prediction leads on
         return None
-    basis, missing = model.motor_basis, target - frame_placement(model, here.state.q, model.tip).translation
+    basis, missing = model.actuators.basis, target - frame_placement(model, here.state.q, model.tip).translation
     step = np.linalg.pinv(slope @ basis, rcond=1e-6) @ missing
     if float(np.linalg.norm(step)) <= 0.5:
-        motors = within_limits(model, here.q_motors, basis @ step)
+        motors = model.actuators.go(here.q_motors, basis @ step)
         springs = here.state.q_springs + follow @ (motors - here.q_motors)
         found = search(
             model,

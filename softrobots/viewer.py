@@ -17,10 +17,10 @@ from softrobots.equilibrium import Equilibrium, check_same_model
 from softrobots.errors import ParameterError, ViewerError
 from softrobots.files import new_file, write_atomically
 from softrobots.kinematics import frame_placement
+from softrobots.meshcat_arrows import ArrowDrawing
 from softrobots.meshcat_body import BodyDrawing
 from softrobots.meshcat_server import connect, end_server, start_server
 from softrobots.meshcat_shapes import (
-    FORCE_COLOUR,
     PATH_COLOUR,
     RIGID_COLOUR,
     floor_lines,
@@ -32,12 +32,8 @@ from softrobots.model import SoftModel, check_model
 from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.trajectory import Trajectory
 
-ARROW_LENGTH = 0.2
-"""Length of the arrow of the largest force, relative to the reach; other arrows are shorter in proportion."""
-
 _FRAME_RATE = 30
 _MOST_BODIES = 60  # shapes of a continuous body that an animation goes through
-_NO_FORCE = 1e-12  # [N], forces below have no arrow
 
 
 class Viewer:
@@ -63,7 +59,7 @@ class Viewer:
         try:
             self._page = connect(zmq_url, self._url)
             self._root = self._page["softrobots"]
-            self._arrows: set[str] = set()
+            self._arrows = ArrowDrawing(self._root["load"])
             self._traced = False
             self._levels: dict[int, int] = {}
             self._body = BodyDrawing(self._root["body"])
@@ -113,7 +109,7 @@ class Viewer:
         self._body.draw(body(equilibrium), _tensions(equilibrium))
         for link in range(len(self._model.spring_groups)):
             self._colour(link, wrinkling_level(equilibrium, link))
-        self._draw_arrows(equilibrium)
+        self._arrows.draw(equilibrium)
 
     def show_configuration(self, q: FloatArray) -> None:
         """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling, the chain alone.
@@ -127,8 +123,6 @@ class Viewer:
         self._body.clear()
         for link in range(len(self._model.spring_groups)):
             self._colour(link, 0)
-        for name in self._arrows:
-            self._root[f"load/{name}"].delete()
         self._arrows.clear()
 
     def trace(self, points: Any) -> None:
@@ -214,7 +208,7 @@ class Viewer:
             self._page.static_html(),
             title,
             path=self._traced,
-            force=bool(self._arrows),
+            force=bool(self._arrows.names),
             colours=bool(self._model.spring_groups),
             muscles=muscles,
         )
@@ -308,39 +302,12 @@ class Viewer:
                 self._root[f"deformed/{shape.name}/level_{level}"].set_property("visible", True)
         self._levels[link] = level
 
-    def _draw_arrows(self, equilibrium: Equilibrium) -> None:
-        import meshcat.geometry as geometry
-
-        wanted = {
-            name: wrench[:3] for name, wrench in equilibrium.load.wrenches.items() if np.linalg.norm(wrench[:3]) > _NO_FORCE
-        }
-        for name in self._arrows - wanted.keys():
-            self._root[f"load/{name}"].delete()
-        self._arrows = set(wanted)
-        largest = max((float(np.linalg.norm(force)) for force in wanted.values()), default=1.0)
-        for name, force in wanted.items():
-            length = ARROW_LENGTH * self._model.reach * float(np.linalg.norm(force)) / largest
-            width = 0.009 * self._model.reach
-            green = geometry.MeshLambertMaterial(color=FORCE_COLOUR)
-            node = self._root[f"load/{name}"]
-            for part, drawn, height in (
-                ("shaft", geometry.Cylinder(length, width), 0.5 * length),
-                ("head", geometry.Cylinder(7.0 * width, radiusTop=0.0, radiusBottom=2.5 * width), length + 3.5 * width),
-            ):
-                node[part].set_object(drawn, green)
-                raised = np.eye(4)
-                raised[1, 3] = height
-                node[part].set_transform(raised)
-            node.set_transform(_arrow_pose(equilibrium, name, force))
-
     def _add_frame(self, animation: Any, number: int, equilibrium: Equilibrium) -> None:
         rigid = self._model.configuration(equilibrium.q_motors)
         for group, q in (("deformed", equilibrium.q), ("rigid", rigid)):
             for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
                 animation.at_frame(self._root[f"{group}/{shape.name}"], number).set_transform(transform)
-        for name in self._arrows:
-            pose = _arrow_pose(equilibrium, name, equilibrium.load.wrenches[name][:3])
-            animation.at_frame(self._root[f"load/{name}"], number).set_transform(pose)
+        self._arrows.add_frame(animation, number, equilibrium)
         for shape in self._scene.shapes:
             if shape.inflated_link is None:
                 continue
@@ -375,18 +342,6 @@ def view(model: SoftModel, result: Equilibrium | Trajectory | None = None) -> Vi
         viewer.close()
         raise
     return viewer
-
-
-def _arrow_pose(equilibrium: Equilibrium, frame: str, force: FloatArray) -> FloatArray:
-    """Pose with y along the force, at the frame, (4, 4)."""
-    along = force / np.linalg.norm(force)
-    aside = np.eye(3)[int(np.argmin(np.abs(along)))]
-    first = np.cross(along, aside)
-    first /= np.linalg.norm(first)
-    pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([first, along, np.cross(first, along)])
-    pose[:3, 3] = frame_placement(equilibrium.model, equilibrium.q, frame).translation
-    return pose
 
 
 def _tensions(equilibrium: Equilibrium) -> dict[str, float]:

@@ -81,28 +81,23 @@ def sample_workspace(
     count = positive_integer("samples", samples, 10_000_000)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ParameterError("seed", seed, "a whole number, zero or above")
-    low, high = model.motor_limits.T
-    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
-    drawn = np.random.default_rng(int(seed)).uniform(low, high, (count, model.n_motors))
-    rows = [row for motors in _with_progress(drawn, progress) if (row := _sample(model, load, motors)) is not None]
+    random = np.random.default_rng(int(seed))
+    drawn = (model.actuators.draw(random) for _ in _with_progress(count, progress))
+    rows = [row for motors in drawn if motors is not None and (row := _sample(model, load, motors)) is not None]
     if not rows:
         raise ParameterError("samples", samples, "such that one is a stable equilibrium; none is")
     motors, springs, tips, measures = (read_only(np.array(column)) for column in zip(*rows, strict=True))
     return Workspace(model, load, motors, springs, tips, measures, count - len(rows))
 
 
-def _sample(model: SoftModel, load: Load, drawn: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
+def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
     """Motors, springs, tip and manipulability of a sample; None where there is no stable equilibrium."""
-    motors = model.consistent_motors(drawn)
-    low, high = model.motor_limits.T
-    if not model.admits(motors) or np.any((motors < low) | (motors > high)):
-        return None
     state = settled(model, motors, load, model.rest)
     if state is None or not is_stable(model, state.tangent, symmetric=load.conservative):
         return None
     by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, model.tip)[:3])
     try:
-        slope = tip_motion(by_motors, by_springs, state.tangent, state.load.coupling)[0] @ model.motor_basis
+        slope = tip_motion(by_motors, by_springs, state.tangent, state.load.coupling)[0] @ model.actuators.basis
     except NeutralEquilibrium:
         return None
     tip = np.array(frame_placement(model, state.q, model.tip).translation)
@@ -143,11 +138,10 @@ def workspace_at(
     return Workspace(model, load, read_only(motors), read_only(springs), read_only(tips), read_only(measures), int(refused))
 
 
-def _with_progress(drawn: FloatArray, progress: bool | str) -> Iterable[FloatArray]:
+def _with_progress(count: int, progress: bool | str) -> Iterable[int]:
     if not progress:
-        return drawn
+        return range(count)
     from tqdm import tqdm
 
-    label = progress if isinstance(progress, str) else "samples"
-    bar: Iterable[FloatArray] = tqdm(drawn, desc=label, unit="sample")
+    bar: Iterable[int] = tqdm(range(count), desc=progress if isinstance(progress, str) else "samples", unit="sample")
     return bar

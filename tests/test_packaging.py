@@ -98,7 +98,9 @@ def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
         "screws",
         "strain_chain",
     ]
-    files = [PACKAGE / f"{name}.py" for name in (*names, "coordinates", "muscles")]
+    files = [
+        PACKAGE / f"{name}.py" for name in (*names, "coordinates", "joint_loads", "muscles", "muscle_lengths", "actuators")
+    ]
     for folder in ("inflated_beam", "constant_curvature", "robots"):
         files += (PACKAGE / folder).glob("*.py")
     assert len(files) > 20

@@ -1,0 +1,77 @@
+"""Forces in the browser view, as arrows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray
+from softrobots.equilibrium import Equilibrium
+from softrobots.kinematics import frame_placement
+from softrobots.meshcat_shapes import FORCE_COLOUR
+
+ARROW_LENGTH = 0.2
+"""Length of the arrow of the largest force, relative to the reach; other arrows are shorter in proportion."""
+
+_NO_FORCE = 1e-12  # [N], forces below have no arrow
+
+
+class ArrowDrawing:
+    """One arrow a force under one node of a meshcat page."""
+
+    def __init__(self, root: Any) -> None:
+        """Draw under `root`."""
+        self._root = root
+        self.names: set[str] = set()
+        """Frames whose force is drawn."""
+
+    def draw(self, equilibrium: Equilibrium) -> None:
+        """Replace the arrows by those of a loaded robot."""
+        import meshcat.geometry as geometry
+
+        wanted = {
+            name: wrench[:3] for name, wrench in equilibrium.load.wrenches.items() if np.linalg.norm(wrench[:3]) > _NO_FORCE
+        }
+        self.clear(self.names - wanted.keys())
+        self.names = set(wanted)
+        reach = equilibrium.model.reach
+        largest = max((float(np.linalg.norm(force)) for force in wanted.values()), default=1.0)
+        for name, force in wanted.items():
+            length = ARROW_LENGTH * reach * float(np.linalg.norm(force)) / largest
+            width = 0.009 * reach
+            green = geometry.MeshLambertMaterial(color=FORCE_COLOUR)
+            node = self._root[name]
+            for part, drawn, height in (
+                ("shaft", geometry.Cylinder(length, width), 0.5 * length),
+                ("head", geometry.Cylinder(7.0 * width, radiusTop=0.0, radiusBottom=2.5 * width), length + 3.5 * width),
+            ):
+                node[part].set_object(drawn, green)
+                raised = np.eye(4)
+                raised[1, 3] = height
+                node[part].set_transform(raised)
+            node.set_transform(_pose(equilibrium, name, force))
+
+    def clear(self, names: set[str] | None = None) -> None:
+        """Remove the arrows at some frames, all by default."""
+        for name in self.names if names is None else names:
+            self._root[name].delete()
+        self.names = set() if names is None else self.names - names
+
+    def add_frame(self, animation: Any, number: int, equilibrium: Equilibrium) -> None:
+        """Put the arrows where they are at a loaded robot, at a frame of an animation."""
+        for name in self.names:
+            pose = _pose(equilibrium, name, equilibrium.load.wrenches[name][:3])
+            animation.at_frame(self._root[name], number).set_transform(pose)
+
+
+def _pose(equilibrium: Equilibrium, frame: str, force: FloatArray) -> FloatArray:
+    """Pose with y along the force, at the frame, (4, 4)."""
+    along = force / np.linalg.norm(force)
+    aside = np.eye(3)[int(np.argmin(np.abs(along)))]
+    first = np.cross(along, aside)
+    first /= np.linalg.norm(first)
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([first, along, np.cross(first, along)])
+    pose[:3, 3] = frame_placement(equilibrium.model, equilibrium.q, frame).translation
+    return pose
