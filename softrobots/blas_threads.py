@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 _LARGE = 48  # rows; smaller matrices stay on one thread by themselves
 _LOCK = threading.Lock()
+_NOTHING = nullcontext()
 
 
 class _Limit:
@@ -23,16 +24,17 @@ class _Limit:
     limiter: Any = None
 
 
-@contextmanager
-def one_blas_thread(rows: int) -> Iterator[None]:
+def one_blas_thread(rows: int) -> AbstractContextManager[None]:
     """Keep BLAS on one thread in a `with` block.
 
     Args:
         rows: Size of the matrices; for small ones nothing is done.
     """
-    if rows < _LARGE:
-        yield
-        return
+    return _NOTHING if rows < _LARGE else _limited()
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
     with _LOCK:
         _Limit.users += 1
         if _Limit.users == 1:

@@ -104,7 +104,7 @@ class Load:
         x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
         return cls(total, (x, y, z))
 
-    @property
+    @cached_property
     def conservative(self) -> bool:
         """Whether the load has a potential: no moment in it."""
         return all(term.moment_cross is None for term in self.terms)
@@ -144,20 +144,17 @@ def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> JointLoad:
     pin.computeJointJacobians(pin_model, data, q)
     torque: FloatArray = np.zeros(nv)
     potential = scale = 0.0
-    count = len(load.terms)
-    angular, by_force = np.zeros((3 * count, nv)), np.zeros((3 * count, nv))
-    by_moment = None if load.conservative else np.zeros((3 * count, nv))
-    for number, term in enumerate(load.terms):
-        rows = slice(3 * number, 3 * number + 3)
+    angular, by_force, by_moment = [], [], []
+    for term in load.terms:
         frame = model.frame_id(term.frame)
         jacobian = pin.getFrameJacobian(pin_model, data, frame, _AXES).reshape(6, nv)
         torque += term.wrench @ jacobian
         scale += term.norms[0] * model.reach + term.norms[1]
         potential -= float(term.force @ pin.updateFramePlacement(pin_model, data, frame).translation)
-        angular[rows] = jacobian[3:]
-        by_force[rows] = term.force_cross_transposed @ jacobian[:3]
-        if by_moment is not None and term.moment_cross is not None:
-            by_moment[rows] = term.moment_cross @ jacobian[3:]
+        angular.append(jacobian[3:])
+        by_force.append(term.force_cross_transposed @ jacobian[:3])
+        if not load.conservative:
+            by_moment.append(np.zeros((3, nv)) if term.moment_cross is None else term.moment_cross @ jacobian[3:])
     gravity_derivative: FloatArray | None = None
     if load.gravity is not None:
         gravity_derivative = -pin.computeGeneralizedGravityDerivatives(pin_model, data, q)
@@ -165,7 +162,12 @@ def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> JointLoad:
         torque -= gravity_torque
         scale += math.sqrt(float(gravity_torque @ gravity_torque))
         potential += pin.computePotentialEnergy(pin_model, data)
-    return JointLoad(torque, angular, by_force, by_moment, gravity_derivative, potential, scale)
+    moments = None if load.conservative else _stacked(by_moment, nv)
+    return JointLoad(torque, _stacked(angular, nv), _stacked(by_force, nv), moments, gravity_derivative, potential, scale)
+
+
+def _stacked(rows: list[FloatArray], columns: int) -> FloatArray:
+    return rows[0] if len(rows) == 1 else np.concatenate([np.zeros((0, columns)), *rows])
 
 
 def cross_matrix(vector: FloatArray) -> FloatArray:
