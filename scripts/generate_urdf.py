@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import softrobots as sr
-from softrobots.files import write_atomically
+from softrobots.files import make_folder, write_atomically
 from softrobots.paths import urdf_folder
 
 
@@ -20,16 +20,26 @@ def main(argv: list[str] | None = None) -> int:
     folder = arguments.output or urdf_folder()
     if folder.exists() and not folder.is_dir():
         parser.error(f"--output {folder} is a file; a folder is required")
+    try:
+        stale = update(folder, check=arguments.check)
+    except sr.SoftRobotsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 1 if arguments.check and stale else 0
+
+
+def update(folder: Path, *, check: bool) -> int:
+    """Write or compare the files in a folder; return how many differed."""
     stale = 0
     for name, robot in sr.ROBOTS.items():
         path, text = folder / f"{name}.urdf", robot().urdf().encode("utf-8")
         same = path.is_file() and path.read_bytes() == text
-        if not arguments.check and not same:
-            folder.mkdir(parents=True, exist_ok=True)
+        if not check and not same:
+            make_folder(folder)
             write_atomically(path, lambda file, content=text: file.write(content))
         stale += not same
-        print(f"{path}: {'up to date' if same else 'differs' if arguments.check else 'written'}")
-    return 1 if arguments.check and stale else 0
+        print(f"{path}: {'up to date' if same else 'differs' if check else 'written'}")
+    return stale
 
 
 if __name__ == "__main__":

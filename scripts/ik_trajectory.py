@@ -16,7 +16,7 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots import inflated_beam, plots
-from softrobots.files import free_folder
+from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
 from softrobots.trajectory import METHODS
 
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> Path:
     figures = {} if arguments.no_plots else _figures(trajectory, rigid, uncompensated, paper)
 
     with sr.view(model, trajectory) as viewer:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         results = {"trajectory": trajectory, "rigid": rigid, "uncompensated": uncompensated} | (
             {} if paper is None else {"paper": paper}
         )

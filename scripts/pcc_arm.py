@@ -17,8 +17,9 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import body_plots, plots
-from softrobots.files import free_folder
+from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
+from softrobots.model import MAX_DOF
 from softrobots.robots.pcc_arm import CHAINS
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
@@ -47,11 +48,14 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
     made.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
     made.add_argument(
-        "--distance", type=float, default=0.04, help="distance of the muscles from the backbone [m] (%(default)s)"
+        "--distance",
+        type=float,
+        default=0.04,
+        help="of the muscles from the backbone; the body is drawn 1.25 times as wide [m] (%(default)s)",
     )
     made.add_argument("--chain", choices=CHAINS, default="sections", help="form of the equivalent rigid chain (%(default)s)")
-    made.add_argument("--elastic-sections", type=int, default=4, help="sections a segment, for --chain sections (%(default)s)")
-    made.add_argument("--hinges", type=int, default=12, help="hinges a segment, for --chain lumped (%(default)s)")
+    made.add_argument("--elastic-sections", type=int, metavar="N", help="sections a segment, for --chain sections (4)")
+    made.add_argument("--hinges", type=int, metavar="N", help="hinges a segment, for --chain lumped (12)")
     made.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder of the results (output/pcc_arm_<time>)"
     )
@@ -68,12 +72,7 @@ def run(arguments: argparse.Namespace) -> Path:
     waypoints = None if arguments.csv is None else sr.read_waypoints(arguments.csv)
     if not arguments.no_plots:
         plots.require_matplotlib()  # tells at once what is missing
-    model = sr.load_model(
-        sr.PccArm(
-            segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance, chain=arguments.chain,
-            elastic_sections=arguments.elastic_sections, hinges=arguments.hinges,
-        )
-    )  # fmt: skip
+    model = sr.load_model(_robot(arguments))
     Load.of(model, arguments.force, gravity=gravity)
     folder = free_folder(arguments.output or Path("output") / f"pcc_arm_{datetime.now():%Y%m%d_%H%M%S}")
     results: dict[str, object] = {}
@@ -94,7 +93,7 @@ def run(arguments: argparse.Namespace) -> Path:
     summary = summarise(last)
     figure = None if arguments.no_plots else body_plots.shape(last)
     with sr.view(model, shown) as viewer:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         for name, result in results.items():
             sr.save_result(result, folder / f"{name}.npz")
         if waypoints is not None:
@@ -113,13 +112,37 @@ def run(arguments: argparse.Namespace) -> Path:
     return folder
 
 
+def _robot(arguments: argparse.Namespace) -> sr.PccArm:
+    """The robot, refused before it is made if it is too large to be solved."""
+    wrong = "hinges" if arguments.chain == "sections" else "elastic_sections"
+    if getattr(arguments, wrong) is not None:
+        raise sr.ParameterError(
+            f"--{wrong.replace('_', '-')}", getattr(arguments, wrong), f"left out with --chain {arguments.chain}"
+        )
+    count = {name: getattr(arguments, name) for name in ("hinges", "elastic_sections") if getattr(arguments, name) is not None}
+    robot = sr.PccArm(
+        segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance,
+        radius=1.25 * arguments.distance if arguments.distance > 0.0 else 0.05, chain=arguments.chain, **count,
+    )  # fmt: skip
+    if robot.n_joints > MAX_DOF:
+        raise sr.ParameterError(
+            "--segments", arguments.segments, f"so few that the chain has at most {MAX_DOF} joints, not {robot.n_joints}"
+        )
+    return robot
+
+
 def summarise(equilibrium: sr.Equilibrium) -> dict[str, object]:
     """Collect the numbers of the table: muscles, the arcs that their lengths stand for, and the tip with and without load."""
     model = equilibrium.model
     lengths = equilibrium.muscle_lengths.reshape(model.structure.section_table[-1].segment, -1)
     azimuths = [muscle.azimuth for muscle in model.muscles[: lengths.shape[1]]]
     arcs = sr.constant_curvature.arc_from_muscles(lengths, model.muscles[0].distance, azimuths)
+    section_table = model.structure.section_table
+    rows = list(
+        zip(section_table, model.structure.section_coordinates(equilibrium.q_motors, equilibrium.q_springs), strict=True)
+    )
     unloaded = sr.constant_curvature.chain_transform(arcs)[:3, 3]
+    twist = [float(sum(z[2] for row, z in rows if row.segment == segment + 1)) for segment in range(len(lengths))]
     return {
         "muscles": [muscle.name for muscle in model.muscles],
         "muscle_lengths_m": equilibrium.muscle_lengths.tolist(),
@@ -127,6 +150,11 @@ def summarise(equilibrium: sr.Equilibrium) -> dict[str, object]:
         "arc_length_m": arcs.length.tolist(),
         "arc_bending_deg": np.degrees(arcs.bending).tolist(),
         "arc_azimuth_deg": np.degrees(arcs.azimuth).tolist(),
+        "twist_under_load_deg": np.degrees(twist).tolist(),
+        "neglected_by_twist_m": [
+            float((model.muscles[0].distance * turn) ** 2 / (2.0 * length))
+            for turn, length in zip(twist, arcs.length, strict=True)
+        ],
         "tip_m": equilibrium.tip_position.tolist(),
         "tip_direction": np.array(equilibrium.transform_tip_to_world.rotation)[:, 2].tolist(),
         "tip_without_load_m": unloaded.tolist(),
@@ -140,25 +168,30 @@ def table(summary: dict[str, object]) -> str:
     """Format the numbers for a person."""
 
     def vector(name: str, digits: int) -> str:
-        return "  ".join(f"{value:.{digits}f}" for value in summary[name])  # type: ignore[attr-defined]
+        return "  ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in summary[name])  # type: ignore[attr-defined]
 
     lines = ["", f"{'muscle':<14}{'length [m]':>12}{'tension [N]':>13}"]
     rows = zip(summary["muscles"], summary["muscle_lengths_m"], summary["muscle_forces_N"], strict=True)  # type: ignore[call-overload]
     lines += [f"{name:<14}{length:>12.6f}{force:>13.3f}" for name, length, force in rows]
+    lines += ["", "arcs that these muscle lengths stand for, and the twist that the load adds:"]
+    lines += [f"{'segment':<10}{'length [m]':>12}{'bending [deg]':>15}{'azimuth [deg]':>15}{'twist [deg]':>13}"]
+    names = ("arc_length_m", "arc_bending_deg", "arc_azimuth_deg", "twist_under_load_deg")
+    arcs = zip(*(summary[name] for name in names), strict=True)  # type: ignore[call-overload]
     lines += [
-        "",
-        f"{'segment':<10}{'length [m]':>12}{'bending [deg]':>15}{'azimuth [deg]':>15}   (arcs of these muscle lengths)",
+        f"{i:<10}{length:>12.6f}{bend:>15.3f}{azimuth:>15.3f}{round(turn, 3) + 0.0:>13.3f}"
+        for i, (length, bend, azimuth, turn) in enumerate(arcs, start=1)
     ]
-    arcs = zip(summary["arc_length_m"], summary["arc_bending_deg"], summary["arc_azimuth_deg"], strict=True)  # type: ignore[call-overload]
-    lines += [f"{i:<10}{length:>12.6f}{bend:>15.3f}{azimuth:>15.3f}" for i, (length, bend, azimuth) in enumerate(arcs, start=1)]
     lines += [
         "",
         f"tip [m]                 {vector('tip_m', 6)}",
-        f"tip without load [m]    {vector('tip_without_load_m', 6)}   (closed form)",
+        f"tip without load [m]    {vector('tip_without_load_m', 6)}   (of those arcs, in closed form)",
         f"tip points along        {vector('tip_direction', 4)}",
         f"certified stable        {'yes' if summary['stable'] else 'NO'}   (residual {summary['residual_N_m']:.1e} N m)",
-        f"within limits           {'yes' if summary['within_limits'] else 'NO'}",
+        f"within limits           {'yes' if summary['within_limits'] else 'NO'}   (muscle lengths and tensions, joints)",
     ]
+    most = max(summary["neglected_by_twist_m"])  # type: ignore[call-overload]
+    if most > 1e-3:
+        lines.append(f"WARNING: so much twist would lengthen the muscles by {1e3 * most:.1f} mm, which the model neglects.")
     return "\n".join(lines)
 
 
@@ -175,6 +208,9 @@ def main(argv: list[str] | None = None) -> int:
     except sr.SoftRobotsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
     return 0
 
 

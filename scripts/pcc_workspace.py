@@ -15,7 +15,8 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import body_plots, plots
-from softrobots.files import free_folder
+from softrobots.files import free_folder, make_folder
+from softrobots.model import MAX_DOF
 
 
 def parser() -> argparse.ArgumentParser:
@@ -51,17 +52,20 @@ def run(arguments: argparse.Namespace) -> Path:
         raise sr.ParameterError("--segments", arguments.segments, "at least 1")
     if not arguments.no_plots:
         plots.require_matplotlib()  # tells at once what is missing
-    model = sr.load_model(
-        sr.PccArm(
-            segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance,
-            muscle_contraction=arguments.contraction, muscle_extension=arguments.extension,
-        )
+    robot = sr.PccArm(
+        segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance,
+        muscle_contraction=arguments.contraction, muscle_extension=arguments.extension,
     )  # fmt: skip
+    if robot.n_joints > MAX_DOF:
+        raise sr.ParameterError(
+            "--segments", arguments.segments, f"so few that the chain has at most {MAX_DOF} joints, not {robot.n_joints}"
+        )
+    model = sr.load_model(robot)
     folder = free_folder(arguments.output or Path("output") / f"pcc_workspace_{datetime.now():%Y%m%d_%H%M%S}")
     reach = sr.sample_workspace(
         model, arguments.samples, force=arguments.force, gravity=gravity, seed=arguments.seed, progress="muscle lengths"
     )
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     sr.save_result(reach, folder / "workspace.npz")
     if not arguments.no_plots:
         body_plots.workspace(reach).savefig(folder / "workspace.png")
@@ -87,6 +91,9 @@ def main(argv: list[str] | None = None) -> int:
     except sr.SoftRobotsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
     return 0
 
 

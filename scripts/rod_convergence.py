@@ -25,6 +25,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import plots
+from softrobots.files import new_file
 
 ROOT = Path(__file__).resolve().parent.parent
 FORMS = {
@@ -45,6 +46,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--cases", type=int, default=100, help="random load cases of the steel rod (%(default)s)")
     made.add_argument("--seed", type=int, default=2026, help="seed of the load cases (%(default)s)")
     made.add_argument("--output", type=Path, metavar="FOLDER", help="folder for rod_convergence.json and images/ (none)")
+    made.add_argument("--overwrite", action="store_true", help="replace those files if they are there")
     return made
 
 
@@ -163,6 +165,14 @@ def main(argv: list[str] | None = None) -> int:
     except ImportError as error:
         print(f"error: {error}; this script needs a checkout and the extra 'dev' (SciPy)", file=sys.stderr)
         return 2
+    files = []
+    try:
+        if arguments.output is not None:
+            names = ("rod_convergence.json", "images/rod_convergence.png")
+            files = [new_file(arguments.output / name, overwrite=arguments.overwrite) for name in names]
+    except sr.SoftRobotsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
     result = {
         "cases": arguments.cases,
         "seed": arguments.seed,
@@ -170,13 +180,12 @@ def main(argv: list[str] | None = None) -> int:
         "spatial": spatial(rods, arguments.cases, arguments.seed, lambda items: tqdm(items, desc="spatial")),
     }
     print(f"\nTip error over length, planar elastica, F l^2/EI = {LOAD:g}; then mean (largest) tip error [mm] of")
-    print(f"{arguments.cases} random load cases of the steel rod; by number of sections or hinges\n\n{tables(result)}")
+    print(f"{arguments.cases} random load cases of the steel rod; columns are numbers of sections or hinges")
+    print(f"(a few cases say little about the order)\n\n{tables(result)}")
     print(f"\nMedian time of a solve [ms]\n\n{timing(result)}")
-    if arguments.output is not None:
-        (arguments.output / "images").mkdir(parents=True, exist_ok=True)
-        text = json.dumps(result, indent=2) + "\n"
-        (arguments.output / "rod_convergence.json").write_text(text, encoding="utf-8")
-        figure(result).savefig(arguments.output / "images" / "rod_convergence.png")
+    if files:
+        files[0].write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        figure(result).savefig(files[1])
     return 0
 
 

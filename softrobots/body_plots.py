@@ -77,18 +77,24 @@ def workspace(samples: Workspace) -> Any:
     """
     if not isinstance(samples, Workspace):
         raise ParameterError("samples", samples, "a Workspace")
-    figure = new_figure((12.0, 4.6))
+    figure = new_figure((13.0, 4.4))
     tips, order = samples.tip_positions, np.argsort(samples.manipulability)
     scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 5, "linewidths": 0, "rasterized": True}
     all_axes = figure.subplots(1, 3)
+    centre, half = 0.5 * (tips.max(0) + tips.min(0)), 0.55 * max(float(np.ptp(tips, axis=0).max()), 1e-3)
     for axes, (one, two) in zip(all_axes, ((0, 2), (1, 2), (0, 1)), strict=True):
         dots = axes.scatter(tips[order, one], tips[order, two], **scale)
         axes.plot(0.0, 0.0, marker="+", color="k", ms=10, ls="none", label="base")
         axes.set(xlabel=f"{'xyz'[one]} [m]", ylabel=f"{'xyz'[two]} [m]", aspect="equal")
+        axes.set_xlim(centre[one] - half, centre[one] + half)
+        axes.set_ylim(centre[two] - half, centre[two] + half)
         axes.grid(alpha=0.3)
     all_axes[0].legend(loc="lower left", fontsize=9)
     figure.colorbar(dots, ax=all_axes, label="manipulability of the tip [m³/rad³]", pad=0.01)
-    figure.suptitle(f"{len(tips)} tip positions within the limits of the actuators")
+    force = sum((float(np.linalg.norm(wrench[:3])) for wrench in samples.load.wrenches.values()), 0.0)
+    load = ([f"{force:.3g} N"] if force > 0.0 else []) + (["gravity"] if samples.load.gravity is not None else [])
+    under = f" under {' and '.join(load)}" if load else ", no load"
+    figure.suptitle(f"{len(tips)} tip position{'s' * (len(tips) != 1)} within the limits of the actuators{under}")
     return figure
 
 

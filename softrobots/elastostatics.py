@@ -36,6 +36,7 @@ _MOMENT_FLOOR = 1e-3  # [N m], scale of the residual for vanishing loads
 _LARGEST_STEP = 0.5  # [rad], norm of one Newton step; the linear model of a revolute chain says little beyond
 _STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the largest stiffness
 _DESCENT = 1e-4  # share of the predicted decrease that a step must reach (Armijo)
+_SHORTEST = 1e-12  # share of a Newton step below which it is not halved again
 _ROUNDING = 1e-14  # energies this close, relative to their terms, cannot be told apart
 
 
@@ -220,10 +221,12 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
         scale = 1.0
         trial = case.state(state.q_springs + step)
         spent += 1
-        while trial.energy > state.energy + _DESCENT * scale * slope + rounding and spent < most:
+        while trial.energy > state.energy + _DESCENT * scale * slope + rounding and spent < most and scale > _SHORTEST:
             scale *= 0.5
             trial = case.state(state.q_springs + scale * step)
             spent += 1
+        if not math.isfinite(trial.energy):  # a section is at the end of its range, and the load presses it on
+            break
         # Below rounding the energy says nothing; there the residual must shrink.
         if not settled and -slope < rounding and trial.error >= state.error:
             break

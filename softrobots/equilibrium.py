@@ -111,9 +111,18 @@ class Equilibrium:
 
     @property
     def within_limits(self) -> bool:
-        """Whether every actuator and every elastic joint is within its limits; statics does not clip."""
+        """Whether every actuator and every elastic joint is within its limits; statics does not clip.
+
+        Of muscles both the length and the tension count, whichever is given.
+        """
+        structure = self.model.structure
         joints = self.model.coordinates.at(self.q_motors, self.q_springs).joints
-        return _within(self.q_motors, self.model.motor_limits) and _within(joints, self.model.structure.elastic_limits)
+        return (
+            _within(self.q_motors, self.model.motor_limits)
+            and _within(joints, structure.elastic_limits)
+            and _within(self.muscle_lengths, structure.muscle_length_limits)
+            and _within(self.muscle_forces, structure.muscle_force_limits)
+        )
 
     @cached_property
     def eigenvalues(self) -> FloatArray:
@@ -138,7 +147,9 @@ def solve_equilibrium(
     """Find the static equilibrium of the springs at given motor coordinates.
 
     It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
-    has no energy, the one reached by Newton from there, or while the load grows from zero.
+    has no energy, the one reached by Newton from there, or while the load grows from zero. A descent ends in a stable
+    equilibrium, or in one that is free to move without a force (a symmetric robot that has buckled can turn its bow about its
+    axis): that is not certified stable.
 
     Args:
         model: The robot.
@@ -165,6 +176,8 @@ def solve_equilibrium(
     motors = model.checked_motors(q_motors)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     start = model.rest if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
+    if not model.coordinates.at(motors, start).valid:
+        raise ParameterError("q_springs0", start, "within the range of every section (see strain_chain.in_range)")
     positive_number("tolerance", tolerance)
     most = (
         (200 if method == "newton" else 1000) if max_iterations is None else positive_integer("max_iterations", max_iterations)
@@ -174,12 +187,26 @@ def solve_equilibrium(
     if not result.converged:
         raise EquilibriumNotFound(
             f"no equilibrium by {method!r} in {iterations} iterations: residual {result.residual:.3g} N m, required "
-            f"{result.tolerance:.3g} N m" + ("; method='newton' converges for larger loads" if method == "fixed_point" else ""),
+            f"{result.tolerance:.3g} N m" + _hint(result),
             best=result,
             residual=result.residual,
             iterations=iterations,
         )
     return result
+
+
+def _hint(best: Equilibrium) -> str:
+    """What may help, for the error."""
+    ends = best.model.structure.at_range_end(best.q_motors, best.q_springs)
+    if ends:
+        return (
+            f"; the load presses {', '.join(ends)} to the end of its range (see strain_chain.in_range): more sections may help"
+        )
+    if best.method == "fixed_point":
+        return "; method='newton' converges for larger loads"
+    if not best.conservative:
+        return "; under a world-fixed moment the load is grown from zero, and stops where its path turns back"
+    return ""
 
 
 def equilibrium_from_state(

@@ -73,6 +73,21 @@ def free_folder(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def make_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder and those that it is in, if they are not there, and return its path.
+
+    Raises:
+        ParameterError: If it is no path.
+        OutputError: If it cannot be made, e.g. because a file is in the way.
+    """
+    target = as_path("path", path)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot make the folder {target}: {error}") from error
+    return target
+
+
 def write_atomically(target: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Write a file beside its place and move it there; an interruption leaves the old file, or none.
 

@@ -99,7 +99,7 @@ def solve_ik(
         EquilibriumNotFound: If the springs settle at none of the starts.
     """
     check_model(model)
-    goal = Goal(finite_array("target", target, (3,), "m"), _orientation(orientation))
+    goal = Goal(finite_array("target", target, (3,), "m"), checked_orientation(orientation))
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     choice("method", method, METHODS)
     if elbow is not None:
@@ -176,8 +176,15 @@ def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
     return motors
 
 
-def _orientation(value: Any) -> FloatArray | None:
-    """Check a wanted orientation."""
+def checked_orientation(value: Any) -> FloatArray | None:
+    """Return a wanted orientation of the tip, a direction with length 1.
+
+    Args:
+        value: A rotation matrix, shape (3, 3), a direction, shape (3,), or None.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
     if value is None:
         return None
     given = finite_array("orientation", value, None)

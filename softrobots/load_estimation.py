@@ -227,7 +227,10 @@ def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState
         unloaded = elastic_state(model, problem.motors, springs, problem.base).load
         found = np.asarray(np.linalg.lstsq(by_motors.T, problem.torques - unloaded.motors, rcond=None)[0], dtype=np.float64)
         springs = model.rest + (unloaded.elastic + by_springs.T @ found) / model.stiffness
-        force, state = found, elastic_state(model, problem.motors, springs, problem.load(found))
+        trial = elastic_state(model, problem.motors, springs, problem.load(found))
+        if not trial.point.valid:  # a section beyond its range: the recursion diverges
+            return force, state, iteration
+        force, state = found, trial
         still = state.error <= largest_residual(model, state.scale, TOLERANCE)
         if still and float(np.linalg.norm(problem.unexplained(state))) <= problem.tolerance:
             return force, state, iteration

@@ -50,7 +50,7 @@ class ArrowDrawing:
                 raised = np.eye(4)
                 raised[1, 3] = height
                 node[part].set_transform(raised)
-            node.set_transform(_pose(equilibrium, name, force))
+            node.set_transform(_pose(equilibrium, equilibrium.q, name))
 
     def clear(self, names: set[str] | None = None) -> None:
         """Remove the arrows at some frames, all by default."""
@@ -58,20 +58,21 @@ class ArrowDrawing:
             self._root[name].delete()
         self.names = set() if names is None else self.names - names
 
-    def add_frame(self, animation: Any, number: int, equilibrium: Equilibrium) -> None:
-        """Put the arrows where they are at a loaded robot, at a frame of an animation."""
+    def add_frame(self, animation: Any, number: int, equilibrium: Equilibrium, q: FloatArray) -> None:
+        """Put the arrows of a load where they are at a configuration, shape (nq,), at a frame of an animation."""
         for name in self.names:
-            pose = _pose(equilibrium, name, equilibrium.load.wrenches[name][:3])
+            pose = _pose(equilibrium, q, name)
             animation.at_frame(self._root[name], number).set_transform(pose)
 
 
-def _pose(equilibrium: Equilibrium, frame: str, force: FloatArray) -> FloatArray:
-    """Pose with y along the force, at the frame, (4, 4)."""
+def _pose(equilibrium: Equilibrium, q: FloatArray, frame: str) -> FloatArray:
+    """Pose with y along the force of a load, at its frame at a configuration, (4, 4)."""
+    force = equilibrium.load.wrenches[frame][:3]
     along = force / np.linalg.norm(force)
     aside = np.eye(3)[int(np.argmin(np.abs(along)))]
     first = np.cross(along, aside)
     first /= np.linalg.norm(first)
     pose = np.eye(4)
     pose[:3, :3] = np.column_stack([first, along, np.cross(first, along)])
-    pose[:3, 3] = frame_placement(equilibrium.model, equilibrium.q, frame).translation
+    pose[:3, 3] = frame_placement(equilibrium.model, q, frame).translation
     return pose

@@ -10,7 +10,7 @@ import numpy as np
 from softrobots.body import SegmentBody
 from softrobots.meshcat_shapes import material
 
-TUBE_COLOUR = (0.62, 0.70, 0.76, 0.30)
+TUBE_COLOUR = (0.85, 0.74, 0.50, 0.32)
 """Red, green, blue, opacity of the tube; the chain inside shows through."""
 PULL_COLOUR = (0.00, 0.45, 0.70)
 """Blue of muscles that pull."""
@@ -26,6 +26,8 @@ class BodyDrawing:
     def __init__(self, root: Any) -> None:
         """Draw under `root`."""
         self._root = root
+        self.entries: dict[str, tuple[float, ...]] = {}
+        """What is drawn, for the legend: colour by meaning."""
 
     def draw(self, segments: Sequence[SegmentBody], tensions: dict[str, float]) -> None:
         """Replace what is drawn.
@@ -40,6 +42,7 @@ class BodyDrawing:
     def clear(self) -> None:
         """Remove the body."""
         self._root.delete()
+        self.entries = {}
 
     def animate(self, animation: Any, frames: Mapping[int, tuple[Sequence[SegmentBody], dict[str, float]]]) -> None:
         """Draw one body a frame and let an animation show them in turn: meshcat can switch visibility, but bend nothing.
@@ -62,10 +65,13 @@ class BodyDrawing:
 
     def _draw(self, node: Any, segments: Sequence[SegmentBody], tensions: dict[str, float]) -> None:
         for segment in segments:
+            self.entries["body"] = TUBE_COLOUR
             at = node[f"segment_{segment.number}"]
             at["tube"].set_object(_mesh(*segment.surface()), material(TUBE_COLOUR))
             for name in segment.muscles:
-                colour = PUSH_COLOUR if tensions.get(name, 0.0) < 0.0 else PULL_COLOUR
+                pushes = tensions.get(name, 0.0) < 0.0
+                colour = PUSH_COLOUR if pushes else PULL_COLOUR
+                self.entries["muscle that pushes" if pushes else "muscle that pulls"] = colour
                 tube = segment.muscle_surface(name, _MUSCLE_RADIUS * segment.radius)
                 at[name].set_object(_mesh(*tube), material((*colour, 1.0)))
 

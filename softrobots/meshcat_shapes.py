@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,10 @@ from softrobots.scene import WRINKLING_COLOURS
 
 RIGID_COLOUR = (0.40, 0.50, 0.62, 0.20)
 """Red, green, blue, opacity of the rigid arm."""
-PATH_COLOUR = 0x0072B2
-"""Blue of the path; blue and green are a pair that colour-blind people tell apart."""
+PATH_COLOUR = 0xAA3377
+"""Purple of the path."""
 FORCE_COLOUR = 0x009E73
-"""Green of the forces."""
+"""Green of the forces; purple, green, blue and orange differ in lightness too."""
 
 
 def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:
@@ -48,6 +49,14 @@ def material(rgba: tuple[float, ...]) -> Any:
     )
 
 
+def _css(colour: tuple[float, ...] | int) -> str:
+    if isinstance(colour, int):
+        return f"#{colour:06x}"
+    red, green, blue = (round(255 * value) for value in colour[:3])
+    opacity = min(1.0, 2.0 * colour[3]) if len(colour) == 4 and colour[3] < 1.0 else 1.0  # faint things show better so
+    return f"rgba({red},{green},{blue},{opacity:g})"
+
+
 def floor_lines(reach: float) -> FloatArray:
     """Ends of floor lines along x, a sixth of the reach apart, shape (2 n, 3) [m]."""
     offsets = np.linspace(-1.0, 1.0, 13) * reach
@@ -55,33 +64,29 @@ def floor_lines(reach: float) -> FloatArray:
     return np.array(ends)
 
 
-def with_legend(page: str, title: str, *, path: bool, force: bool, colours: bool, muscles: str | None = None) -> str:
+def wrinkling_rows() -> list[tuple[tuple[float, ...], str]]:
+    """Colour and meaning of each level of wrinkling, for `with_legend`."""
+    rows: list[tuple[tuple[float, ...], str]] = []
+    above = 1.0
+    for least, rgb in WRINKLING_COLOURS:
+        text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"
+        rows.append((rgb, text))
+        above = least
+    return rows
+
+
+def with_legend(page: str, title: str, entries: Sequence[tuple[tuple[float, ...] | int, str]]) -> str:
     """Give a meshcat page a title and an explanation of what is drawn.
 
     Args:
         page: The page.
         title: Its title.
-        path: Whether a path is drawn.
-        force: Whether forces are drawn.
-        colours: Whether inflated links are coloured by wrinkling.
-        muscles: What is given of the muscles, "lengths" or "forces"; None without muscles.
+        entries: Colour (red, green, blue and perhaps opacity in [0, 1], or a number as in HTML) and meaning of each thing.
 
     Returns:
         The page.
     """
-    ghost = {"lengths": "without load, same muscle lengths", "forces": "straight, at rest"}
-    rows = [("rgba(115,140,165,0.45)", ghost.get(muscles or "", "rigid arm, same motor angles"))]
-    rows += [(f"#{PATH_COLOUR:06x}", "path of the tip")] * path
-    rows += [(f"#{FORCE_COLOUR:06x}", "force")] * force
-    if muscles is not None:
-        rows += [("#0073b3", "muscle that pulls"), ("#e67300", "muscle that pushes")]
-    if colours:
-        above = 1.0
-        for least, rgb in WRINKLING_COLOURS:
-            shade = "#" + "".join(f"{round(255 * value):02x}" for value in rgb)
-            text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"
-            rows.append((shade, text))
-            above = least
+    rows = [(_css(colour), text) for colour, text in entries]
     boxes = "".join(
         f'<div><span style="display:inline-block;width:1.1em;height:0.8em;margin-right:0.5em;background:{colour};'
         f'border:1px solid #888"></span>{html.escape(text)}</div>'

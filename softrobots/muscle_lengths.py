@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,8 @@ from softrobots.urdf_tags import MuscleTag
 CONSISTENT = 1e-6
 """Muscle lengths of a segment that miss those of the nearest arc by more than this are refused [m]."""
 
+_LEAST_LENGTH = 0.01  # of a section, relative to its rest length
+
 
 class MuscleLengths:
     """Coordinates of a robot whose muscles hold given lengths: motors, then lengths, are given; what lengths leave is free."""
@@ -28,6 +30,7 @@ class MuscleLengths:
         tags: Sequence[MuscleTag],
         segments: Segments,
         law: ElasticLaw,
+        section_lengths: Mapping[int, float],
         largest_bending: float | None = None,
     ) -> None:
         """Find the free coordinates.
@@ -37,12 +40,13 @@ class MuscleLengths:
             tags: The muscles.
             segments: Which of its elastic coordinates belong to which segment.
             law: Stiffness of its elastic coordinates.
+            section_lengths: Rest length of the sections of each segment [m].
             largest_bending: Bending of one section that lengths may ask for [rad]; `LARGEST_BENDING` by default.
 
         Raises:
             DescriptionError: If the muscles of a segment do not fix its bending and elongation.
         """
-        self._inner, self._law, self._segments = inner, law, segments
+        self._inner, self._law, self._segments, self._section_lengths = inner, law, segments, section_lengths
         self._largest_bending = LARGEST_BENDING if largest_bending is None else largest_bending
         self._tags = tuple(tags)
         self._rest_lengths = np.array([tag.rest_length for tag in tags])
@@ -138,7 +142,14 @@ class MuscleLengths:
                 f"muscle lengths that one arc a segment explains{stretch}; those of segment {segment} miss the nearest arc by "
                 f"{misfit.max():.3g} m, allowed {CONSISTENT:g} m"
             )
+        spread = self._spread @ change
         for segment, bending, _ in self._bendings(motors):
+            stretches = self._segments[segment].get("stretch")
+            length = self._section_lengths[segment]
+            if stretches is not None and length + float(spread[list(stretches)].min()) <= _LEAST_LENGTH * length:
+                return (
+                    f"long enough to leave segment {segment} a length: sections of {length:.4g} m would be pressed to nothing"
+                )
             if bending > self._largest_bending * (1.0 + 1e-9):
                 return (
                     f"within the chain's range: segment {segment} would bend by {bending:.4g} rad a section, allowed "

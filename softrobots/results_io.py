@@ -21,7 +21,7 @@ from softrobots.elastostatics import elastic_state, largest_residual
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import FileFormatError, ParameterError
 from softrobots.files import as_path, new_file, write_atomically
-from softrobots.inverse_kinematics import IkSolution
+from softrobots.inverse_kinematics import IkSolution, checked_orientation
 from softrobots.load_estimation import LoadEstimate, estimate_at
 from softrobots.loader import load_model
 from softrobots.loads import Load
@@ -200,6 +200,7 @@ def _pack_solution(solution: IkSolution) -> dict[str, Any]:
     return _pack_rows((solution.equilibrium,)) | {
         "target": solution.target,
         **({} if solution.orientation is None else {"orientation": solution.orientation}),
+        "error": np.array(solution.error),
         "steps": np.array(solution.iterations),
         "alternatives": np.array(solution.alternatives).reshape(-1, len(solution.q_motors)),
     }
@@ -209,11 +210,15 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
     (equilibrium,) = _unpack_rows(fields)
     target = finite_array("target", fields["target"], (3,), "m")
     others = finite_array("alternatives", fields["alternatives"], (None, equilibrium.model.n_motors), "rad")
-    orientation = read_only(finite_array("orientation", fields["orientation"], None)) if "orientation" in fields else None
+    for other in others:
+        equilibrium.model.checked_motors(other, "alternatives")
+    orientation = checked_orientation(fields["orientation"]) if "orientation" in fields else None
     translation, turn = Goal(target, orientation).missing(equilibrium.model, equilibrium.q)
+    if abs(float(fields["error"]) - float(np.linalg.norm(translation))) > 1e-9 * equilibrium.model.reach:
+        raise FileFormatError(f"its tip is {np.linalg.norm(translation):.3g} m from the target, not {fields['error']:.3g} m")
     return IkSolution(
         target=read_only(target),
-        orientation=orientation,
+        orientation=None if orientation is None else read_only(orientation),
         equilibrium=equilibrium,
         error=float(np.linalg.norm(translation)),
         orientation_error=float(np.linalg.norm(turn)),

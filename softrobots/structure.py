@@ -13,7 +13,7 @@ from softrobots.checks import FloatArray, read_only
 from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections, rest_coordinates
 from softrobots.muscle_lengths import MuscleLengths
 from softrobots.muscles import ElasticLaw, MuscleForces, Segments, muscle_matrix
-from softrobots.strain_chain import STRAINS, joint_positions
+from softrobots.strain_chain import STRAINS, in_range, joint_positions
 from softrobots.urdf_tags import LumpedSectionTag, MuscleTag, SectionTag, SpringTag
 
 
@@ -96,6 +96,12 @@ class Structure:
         """Derivative of the muscle lengths with respect to them, shape (n_muscles, n_strains)."""
         self.muscle_rest = read_only(np.array([tag.rest_length for tag in self.muscles]))
         """Muscle lengths where they are all zero, shape (n_muscles,) [m]."""
+        lengths = [(tag.shortest, tag.longest) for tag in self.muscles]
+        self.muscle_length_limits = read_only(np.array(lengths).reshape(-1, 2) + np.array([-1e-12, 1e-12]))
+        """Limits of the muscle lengths, with rounding, shape (n_muscles, 2) [m]."""
+        forces = [(-tag.strongest, tag.strongest) for tag in self.muscles]
+        self.muscle_force_limits = read_only(np.array(forces).reshape(-1, 2))
+        """Limits of the muscle tensions, shape (n_muscles, 2) [N]."""
         self.held: MuscleLengths | None = None
         """The muscles as lengths; None if forces are given or there are none."""
         self.law = self.strain_law
@@ -106,7 +112,8 @@ class Structure:
             self.coordinates = MuscleForces(self.coordinates, self.muscle_matrix)
         elif self.muscles:
             largest = np.pi / 2 if self.sections is None else None
-            self.held = MuscleLengths(self.coordinates, self.muscles, self.segments, self.strain_law, largest)
+            each = {row.segment: row.length for row in self.section_table}
+            self.held = MuscleLengths(self.coordinates, self.muscles, self.segments, self.strain_law, each, largest)
             self.coordinates, self.law = self.held, self.held.law
         self.elastic_limits = self._elastic_limits()
         """Limits of the joints that springs and sections move, in the order of Pinocchio's velocities, shape (nv, 2)."""
@@ -164,6 +171,13 @@ class Structure:
         for tag in self.parts.sections:
             limits[self.indices(tag.joints)] = self.joint_limits(tag.joints)
         return read_only(limits)
+
+    def at_range_end(self, motors: FloatArray, elastic: FloatArray) -> tuple[str, ...]:
+        """Names of the sections of constant strain that reach the end of their range with a twentieth more strain."""
+        if self.sections is None:
+            return ()
+        rows = zip(self.section_table, self.section_coordinates(motors, elastic), strict=True)
+        return tuple(row.name for row, z in rows if not in_range(1.05 * z, row.length))
 
     def _inner(self) -> Coordinates:
         if self.sections is None:

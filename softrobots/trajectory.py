@@ -160,6 +160,10 @@ def follow_trajectory(
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     positive_number("gain", gain, "1/s")
     start_motors(model, q_motors0)
+    if method == "paper" and model.muscles and model.muscle_input == "forces":
+        raise ParameterError(
+            "method", method, "'newton' or 'fixed_point' where tensions are given: they move nothing by themselves"
+        )
     if times is None:
         if method == "paper":
             raise ParameterError("times", times, "given for method='paper', which integrates over time")

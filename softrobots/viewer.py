@@ -7,7 +7,7 @@ import socket
 import time
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,12 +21,14 @@ from softrobots.meshcat_arrows import ArrowDrawing
 from softrobots.meshcat_body import BodyDrawing
 from softrobots.meshcat_server import connect, end_server, start_server
 from softrobots.meshcat_shapes import (
+    FORCE_COLOUR,
     PATH_COLOUR,
     RIGID_COLOUR,
     floor_lines,
     material,
     meshcat_geometry,
     with_legend,
+    wrinkling_rows,
 )
 from softrobots.model import SoftModel, check_model
 from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
@@ -61,6 +63,7 @@ class Viewer:
             self._root = self._page["softrobots"]
             self._arrows = ArrowDrawing(self._root["load"])
             self._traced = False
+            self._segments = bool(model.structure.section_table)
             self._levels: dict[int, int] = {}
             self._body = BodyDrawing(self._root["body"])
             self._prepare()
@@ -169,13 +172,14 @@ class Viewer:
         self.look_at(trajectory.tip_positions.mean(axis=0))
         self.trace(trajectory.tip_positions)
         animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
-        frames = _frames(trajectory, seconds)
-        for number, equilibrium in frames.items():
-            self._add_frame(animation, number, equilibrium)
-        if self._model.structure.section_table:
-            numbers = sorted(frames)
-            chosen = numbers[:: -(-len(numbers) // _MOST_BODIES)]
-            bodies = {number: (body(frames[number], 6), _tensions(frames[number])) for number in chosen}
+        frames = _waypoint_frames(trajectory, seconds) if not self._segments else _even_frames(trajectory, seconds)
+        for frame in frames:
+            self._add_frame(animation, frame)
+        if self._segments:
+            bodies = {
+                frame.number: (body_at(self._model, frame.q_motors, frame.q_springs, 6), _tensions(frame.equilibrium))
+                for frame in frames
+            }
             self._body.animate(animation, bodies)
         self._page.set_animation(animation, play=True, repetitions=repetitions)
 
@@ -203,15 +207,20 @@ class Viewer:
             ViewerError: If the viewer is closed.
         """
         self._check_open()
-        muscles = self._model.muscle_input if self._model.muscles else None
-        return with_legend(
-            self._page.static_html(),
-            title,
-            path=self._traced,
-            force=bool(self._arrows.names),
-            colours=bool(self._model.spring_groups),
-            muscles=muscles,
-        )
+        return with_legend(self._page.static_html(), title, self._legend())
+
+    def _legend(self) -> list[tuple[tuple[float, ...] | int, str]]:
+        """Colour and meaning of what is drawn."""
+        ghost = "rigid arm, same motor angles"
+        if self._model.muscles:
+            ghost = "without load, same muscle lengths" if self._model.muscle_input == "lengths" else "straight, at rest"
+        entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, ghost)]
+        if self._segments:
+            chain = next(shape for shape in self._scene.shapes if shape.name.startswith("section_"))
+            entries.append((chain.colour, "equivalent rigid chain"))
+        entries += [(colour, text) for text, colour in self._body.entries.items()]
+        entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
+        return entries + (list(wrinkling_rows()) if self._model.spring_groups else [])
 
     def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
         """Write `html` to a file.
@@ -302,12 +311,14 @@ class Viewer:
                 self._root[f"deformed/{shape.name}/level_{level}"].set_property("visible", True)
         self._levels[link] = level
 
-    def _add_frame(self, animation: Any, number: int, equilibrium: Equilibrium) -> None:
-        rigid = self._model.configuration(equilibrium.q_motors)
-        for group, q in (("deformed", equilibrium.q), ("rigid", rigid)):
+    def _add_frame(self, animation: Any, frame: _Frame) -> None:
+        equilibrium, number = frame.equilibrium, frame.number
+        deformed = self._model.embed(self._model.coordinates.at(frame.q_motors, frame.q_springs).joints)
+        rigid = self._model.embed(self._model.coordinates.at(frame.q_motors, self._model.rest).joints)
+        for group, q in (("deformed", deformed), ("rigid", rigid)):
             for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
                 animation.at_frame(self._root[f"{group}/{shape.name}"], number).set_transform(transform)
-        self._arrows.add_frame(animation, number, equilibrium)
+        self._arrows.add_frame(animation, number, equilibrium, deformed)
         for shape in self._scene.shapes:
             if shape.inflated_link is None:
                 continue
@@ -349,9 +360,38 @@ def _tensions(equilibrium: Equilibrium) -> dict[str, float]:
     return dict(zip(names, equilibrium.muscle_forces.tolist(), strict=True))
 
 
-def _frames(trajectory: Trajectory, seconds: float) -> dict[int, Equilibrium]:
-    """What each frame of the animation shows: the waypoint nearest to its time, in proportion."""
+class _Frame(NamedTuple):
+    """What a frame of an animation shows."""
+
+    number: int
+    q_motors: FloatArray
+    q_springs: FloatArray
+    equilibrium: Equilibrium
+    """The nearest waypoint."""
+
+
+def _waypoint_frames(trajectory: Trajectory, seconds: float) -> list[_Frame]:
+    """The waypoints, each at the frame nearest to its time."""
     span = float(trajectory.times[-1] - trajectory.times[0])
     share = (trajectory.times - trajectory.times[0]) / (span or 1.0)
     numbers = np.rint(share * seconds * _FRAME_RATE).astype(int).tolist()
-    return dict(zip(numbers, trajectory.equilibria, strict=True))
+    last = dict(zip(numbers, trajectory.equilibria, strict=True))
+    return [_Frame(number, e.q_motors, e.q_springs, e) for number, e in last.items()]
+
+
+def _even_frames(trajectory: Trajectory, seconds: float) -> list[_Frame]:
+    """Frames evenly over the time, between waypoints by linear interpolation: a bent body is drawn anew for each."""
+    total = max(round(seconds * _FRAME_RATE), 1)
+    numbers = np.unique(np.rint(np.linspace(0, total, min(_MOST_BODIES, total + 1))).astype(int))
+    times = trajectory.times[0] + (trajectory.times[-1] - trajectory.times[0]) * numbers / total
+    made = []
+    for number, moment in zip(numbers.tolist(), times, strict=True):
+        after = int(np.clip(np.searchsorted(trajectory.times, moment), 1, max(len(trajectory.times) - 1, 1)))
+        before, after = after - 1, min(after, len(trajectory.times) - 1)
+        interval = float(trajectory.times[after] - trajectory.times[before])
+        share = float(moment - trajectory.times[before]) / interval if interval > 0.0 else 0.0
+        motors, springs = (
+            (1.0 - share) * rows[before] + share * rows[after] for rows in (trajectory.q_motors, trajectory.q_springs)
+        )
+        made.append(_Frame(number, motors, springs, trajectory.equilibria[after if share > 0.5 else before]))
+    return made

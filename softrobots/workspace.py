@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray, finite_array, positive_integer, read_only
-from softrobots.elastostatics import is_stable, settled
+from softrobots.elastostatics import elastic_state, is_stable, largest_residual, settled
 from softrobots.errors import NeutralEquilibrium, ParameterError
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
@@ -130,10 +130,14 @@ def workspace_at(
     springs = finite_array("q_springs", q_springs, (count, model.n_springs))
     tips = finite_array("tip_positions", tip_positions, (count, 3), "m")
     measures = finite_array("manipulability", manipulability, (count,))
+    if count == 0 or int(refused) < 0 or measures.min() < 0.0:
+        raise ParameterError("manipulability", measures, "given for at least one sample, zero or above")
     for row in np.unique(np.linspace(0, count - 1, min(count, 100)).astype(int)):
-        point = model.coordinates.at(model.checked_motors(motors[row]), springs[row])
-        tip = frame_placement(model, model.embed(point.joints), model.tip).translation
-        if not point.valid or np.abs(tip - tips[row]).max() > 1e-9 * max(model.reach, 1.0):
+        state = elastic_state(model, model.checked_motors(motors[row]), springs[row], load)
+        if state.error > largest_residual(model, state.scale, 1e-9):
+            raise ParameterError("q_springs", springs[row], f"in balance; its row {row} is not")
+        tip = frame_placement(model, state.q, model.tip).translation
+        if np.abs(tip - tips[row]).max() > 1e-9 * max(model.reach, 1.0):
             raise ParameterError("tip_positions", tips[row], f"the tip of its row {row}, {tip.tolist()}")
     return Workspace(model, load, read_only(motors), read_only(springs), read_only(tips), read_only(measures), int(refused))
 

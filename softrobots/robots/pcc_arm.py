@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softrobots.checks import choice, finite_array, finite_number, positive_integer
-from softrobots.constant_curvature import AZIMUTHS
+from softrobots.constant_curvature import AZIMUTHS, muscle_residual
 from softrobots.errors import ParameterError
 from softrobots.robots.parameters import PerPart, argument_text, at_least, colours, expanded, numbers
 
@@ -133,12 +133,16 @@ class PccArm:
             ParameterError: If a value is out of range or a list has the wrong length.
         """
         lengths = numbers("segment_lengths", fields.get("segment_lengths", cls.segment_lengths), None, "m")
+        if not lengths:
+            raise ParameterError("segment_lengths", lengths, "at least one segment length [m]")
         stiffness = {}
         for name, field, value, unit in (
             ("bending", "bending_stiffness", bending, "N m/rad"),
             ("torsion", "torsional_stiffness", torsion, "N m/rad"),
             ("axial", "axial_stiffness", axial, "N/m"),
         ):
+            if field in fields:
+                raise ParameterError(field, fields[field], f"left out: {name} gives it")
             given = numbers(name, value, len(lengths), unit, "segments")
             at_least(name, given, 0.0, True, unit)
             stiffness[field] = tuple(k * length for k, length in zip(given, lengths, strict=True))
@@ -148,6 +152,12 @@ class PccArm:
     def n_segments(self) -> int:
         """Number of segments."""
         return len(self.segment_lengths)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of movable joints of the chain; above 300 Pinocchio's workspace is refused."""
+        each = 6 * self.elastic_sections if self.chain == "sections" else self.hinges * (2 + self.torsion + self.extension)
+        return self.n_segments * each
 
     @property
     def n_muscles(self) -> int:
@@ -182,11 +192,11 @@ class PccArm:
         if len(np.atleast_1d(self.muscle_azimuths)) == 0:
             return ()
         azimuths = finite_array("muscle_azimuths", self.muscle_azimuths, (None,), "rad")
-        apart = np.abs(np.exp(1j * azimuths[:, None]) - np.exp(1j * azimuths))[~np.eye(len(azimuths), dtype=bool)]
-        if len(azimuths) < 3 or apart.min() < 1e-6:
-            raise ParameterError(
-                "muscle_azimuths", self.muscle_azimuths, "none, or three or more that differ (modulo a turn) [rad]"
-            )
+        try:
+            muscle_residual(np.ones(len(azimuths)), 1.0, azimuths)  # knows what azimuths fix an arc
+        except ParameterError as error:
+            requirement = "none, or three or more that differ (modulo a turn) and do not all lie close together [rad]"
+            raise ParameterError("muscle_azimuths", self.muscle_azimuths, requirement) from error
         return tuple(azimuths.tolist())
 
 
