@@ -16,6 +16,7 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots import inflated_beam, plots
+from softrobots.command_line import add_load, exit_status, gravity_of
 from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
 from softrobots.trajectory import METHODS
@@ -35,16 +36,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--csv", type=Path, metavar="FILE", help="waypoints with columns t,x,y,z [s, m], instead of start and end"
     )
-    made.add_argument(
-        "--force", **numbers, metavar=("FX", "FY", "FZ"), default=(0.0, 10.0, -15.0), help="force on the tip [N] (0 10 -15)"
-    )
-    made.add_argument(
-        "--gravity",
-        type=float,
-        nargs="*",
-        metavar="G",
-        help="gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)",
-    )
+    add_load(made, (0.0, 10.0, -15.0))
     made.add_argument(
         "--stiffness", type=float, default=inflated_beam.MEAN_STIFFNESS, help="of every spring [N m/rad] (%(default)s)"
     )
@@ -62,7 +54,7 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> Path:
     """Do the whole job and return the folder of the results."""
-    gravity = arguments.gravity if arguments.gravity != [] else sr.EARTH_GRAVITY
+    gravity = gravity_of(arguments)
     path = _path(arguments)
     if not arguments.no_plots:
         plots.require_matplotlib()  # tells at once what is missing
@@ -198,15 +190,7 @@ def _figures(
 def main(argv: list[str] | None = None) -> int:
     """Run from the command line; bad input ends with status 2, a path that cannot be followed with 1."""
     arguments = parser().parse_args(argv)
-    try:
-        run(arguments)
-    except sr.NotConverged as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    except sr.SoftRobotsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return exit_status(lambda: run(arguments))
 
 
 if __name__ == "__main__":

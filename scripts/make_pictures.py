@@ -9,6 +9,7 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots.browser import take_picture
+from softrobots.command_line import exit_status
 
 
 def loaded_inflatable_arm() -> tuple[sr.SoftModel, sr.Trajectory]:
@@ -37,15 +38,14 @@ def main(argv: list[str] | None = None) -> int:
     folder = Path(__file__).resolve().parent.parent / "docs" / "images"
     parser.add_argument("--output", type=Path, default=folder, metavar="FOLDER", help="folder of the pictures (docs/images)")
     arguments = parser.parse_args(argv)
-    try:
+
+    def photograph() -> None:
         for name, (make, title) in PICTURES.items():
             with tempfile.TemporaryDirectory() as folder_name, sr.view(*make()) as viewer:
                 page = viewer.write_html(Path(folder_name) / "scene.html", title=title)
                 print(take_picture(page, arguments.output / f"{name}.png", width=1000, height=560, share=0.85))
-    except sr.SoftRobotsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+
+    return exit_status(photograph)
 
 
 if __name__ == "__main__":

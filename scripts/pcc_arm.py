@@ -17,9 +17,9 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import body_plots, plots
+from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large
 from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
-from softrobots.model import MAX_DOF
 from softrobots.robots.pcc_arm import CHAINS
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
@@ -38,13 +38,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), help="direction in which the tip points at --target"
     )
-    made.add_argument(
-        "--force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), default=(0.0, 0.0, 0.0), help="force on the tip [N] (0 0 0)"
-    )
-    made.add_argument(
-        "--gravity", type=float, nargs="*", metavar="G",
-        help="gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)",
-    )  # fmt: skip
+    add_load(made)
     made.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
     made.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
     made.add_argument(
@@ -66,7 +60,9 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> Path:
     """Do the whole job and return the folder of the results."""
-    gravity = arguments.gravity if arguments.gravity != [] else sr.EARTH_GRAVITY
+    gravity = gravity_of(arguments)
+    if arguments.segments < 1:
+        raise sr.ParameterError("--segments", arguments.segments, "at least 1")
     if arguments.direction is not None and arguments.target is None:
         raise sr.ParameterError("--direction", arguments.direction, "given with --target")
     waypoints = None if arguments.csv is None else sr.read_waypoints(arguments.csv)
@@ -124,10 +120,7 @@ def _robot(arguments: argparse.Namespace) -> sr.PccArm:
         segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance,
         radius=1.25 * arguments.distance if arguments.distance > 0.0 else 0.05, chain=arguments.chain, **count,
     )  # fmt: skip
-    if robot.n_joints > MAX_DOF:
-        raise sr.ParameterError(
-            "--segments", arguments.segments, f"so few that the chain has at most {MAX_DOF} joints, not {robot.n_joints}"
-        )
+    refuse_too_large(robot, "--segments", arguments.segments)
     return robot
 
 
@@ -198,20 +191,7 @@ def table(summary: dict[str, object]) -> str:
 def main(argv: list[str] | None = None) -> int:
     """Run from the command line; bad input ends with status 2, a target that cannot be reached with 1."""
     arguments = parser().parse_args(argv)
-    try:
-        if arguments.segments < 1:
-            raise sr.ParameterError("--segments", arguments.segments, "at least 1")
-        run(arguments)
-    except sr.NotConverged as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    except sr.SoftRobotsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
-    return 0
+    return exit_status(lambda: run(arguments))
 
 
 if __name__ == "__main__":

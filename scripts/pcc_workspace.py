@@ -15,8 +15,8 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import body_plots, plots
+from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large
 from softrobots.files import free_folder, make_folder
-from softrobots.model import MAX_DOF
 
 
 def parser() -> argparse.ArgumentParser:
@@ -24,13 +24,7 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     made.add_argument("--samples", type=int, default=5000, help="muscle lengths to draw (%(default)s)")
     made.add_argument("--seed", type=int, default=0, help="seed of the samples (%(default)s)")
-    made.add_argument(
-        "--force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), default=(0.0, 0.0, 0.0), help="force on the tip [N] (0 0 0)"
-    )
-    made.add_argument(
-        "--gravity", type=float, nargs="*", metavar="G",
-        help="gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)",
-    )  # fmt: skip
+    add_load(made)
     made.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
     made.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
     made.add_argument(
@@ -47,7 +41,7 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> Path:
     """Do the whole job and return the folder of the results."""
-    gravity = arguments.gravity if arguments.gravity != [] else sr.EARTH_GRAVITY
+    gravity = gravity_of(arguments)
     if arguments.segments < 1:
         raise sr.ParameterError("--segments", arguments.segments, "at least 1")
     if not arguments.no_plots:
@@ -56,10 +50,7 @@ def run(arguments: argparse.Namespace) -> Path:
         segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance,
         muscle_contraction=arguments.contraction, muscle_extension=arguments.extension,
     )  # fmt: skip
-    if robot.n_joints > MAX_DOF:
-        raise sr.ParameterError(
-            "--segments", arguments.segments, f"so few that the chain has at most {MAX_DOF} joints, not {robot.n_joints}"
-        )
+    refuse_too_large(robot, "--segments", arguments.segments)
     model = sr.load_model(robot)
     folder = free_folder(arguments.output or Path("output") / f"pcc_workspace_{datetime.now():%Y%m%d_%H%M%S}")
     reach = sr.sample_workspace(
@@ -86,15 +77,7 @@ def run(arguments: argparse.Namespace) -> Path:
 def main(argv: list[str] | None = None) -> int:
     """Run from the command line; bad input ends with status 2."""
     arguments = parser().parse_args(argv)
-    try:
-        run(arguments)
-    except sr.SoftRobotsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
-    return 0
+    return exit_status(lambda: run(arguments))
 
 
 if __name__ == "__main__":

@@ -39,10 +39,13 @@ class Actuators:
         self._held = held
         lengths = held is not None
         distance = np.array([muscle.distance for muscle in muscles])
-        limits = [(m.shortest, m.longest) if lengths else (-m.strongest, m.strongest) for m in muscles]
+        self.muscle_lengths = read_only(np.array([(m.shortest, m.longest) for m in muscles]).reshape(-1, 2))
+        """Limits of the muscle lengths, shape (n_muscles, 2) [m]."""
+        self.muscle_forces = read_only(np.array([(-m.strongest, m.strongest) for m in muscles]).reshape(-1, 2))
+        """Limits of the muscle tensions, shape (n_muscles, 2) [N]."""
         self.names = (*joints, *(muscle.name for muscle in muscles))
         """Name of each."""
-        self.limits = read_only(np.concatenate([joint_limits, np.array(limits).reshape(-1, 2)]))
+        self.limits = read_only(np.concatenate([joint_limits, self.muscle_lengths if lengths else self.muscle_forces]))
         """Lower and upper limits, shape (n_motors, 2) [rad, m or N]."""
         self.scale = read_only(np.concatenate([np.ones(len(joints)), distance if lengths else 1.0 / (softness * distance)]))
         """Change of each that moves the robot about as much as a radian, shape (n_motors,) [rad, m or N]."""

@@ -163,13 +163,5 @@ def _start(model: SoftModel, data: object, row: int) -> FloatArray:
     joints = [pin_model.getJointId(name) for name in section.joint_names]
     first = min(joints)
     before = data.oMi[pin_model.parents[first]] * pin_model.jointPlacements[first]  # type: ignore[attr-defined]
-    if section.lumped:
-        return np.asarray(before.homogeneous @ _transform(np.eye(3), (0.0, 0.0, -section.hinge)))
-    back = pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0)
-    return np.asarray(before.homogeneous @ _transform(back, (0.0, 0.0, 0.0)))
-
-
-def _transform(rotation: FloatArray, translation: tuple[float, float, float]) -> FloatArray:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = rotation, translation
-    return made
+    back = pin.SE3(pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0), np.array([0.0, 0.0, -section.hinge]))
+    return np.array((before * back).homogeneous)

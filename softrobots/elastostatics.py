@@ -34,7 +34,7 @@ TOLERANCE = 1e-10
 
 _MOMENT_FLOOR = 1e-3  # [N m], scale of the residual for vanishing loads
 _LARGEST_STEP = 0.5  # [rad], norm of one Newton step; the linear model of a revolute chain says little beyond
-_STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the largest stiffness
+_STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the springs' own stiffness
 _DESCENT = 1e-4  # share of the predicted decrease that a step must reach (Armijo)
 _SHORTEST = 1e-12  # share of a Newton step below which it is not halved again
 _ROUNDING = 1e-14  # energies this close, relative to their terms, cannot be told apart

@@ -18,6 +18,8 @@ from softrobots.kinematics import frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
 
+_LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are computed from the shape
+
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
@@ -120,8 +122,8 @@ class Equilibrium:
         return (
             _within(self.q_motors, self.model.motor_limits)
             and _within(joints, structure.elastic_limits)
-            and _within(self.muscle_lengths, structure.muscle_length_limits)
-            and _within(self.muscle_forces, structure.muscle_force_limits)
+            and _within(self.muscle_lengths, self.model.actuators.muscle_lengths + _LENGTH_ROUNDING)
+            and _within(self.muscle_forces, self.model.actuators.muscle_forces)
         )
 
     @cached_property
@@ -176,7 +178,7 @@ def solve_equilibrium(
     motors = model.checked_motors(q_motors)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     start = model.rest if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
-    if not model.coordinates.at(motors, start).valid:
+    if q_springs0 is not None and not model.coordinates.at(motors, start).valid:
         raise ParameterError("q_springs0", start, "within the range of every section (see strain_chain.in_range)")
     positive_number("tolerance", tolerance)
     most = (

@@ -14,10 +14,10 @@ from softrobots.scene import WRINKLING_COLOURS
 
 RIGID_COLOUR = (0.40, 0.50, 0.62, 0.20)
 """Red, green, blue, opacity of the rigid arm."""
-PATH_COLOUR = 0xAA3377
-"""Purple of the path."""
+PATH_COLOUR = 0x1A1A1A
+"""Near black of the path: none of the colours of wrinkling and muscles."""
 FORCE_COLOUR = 0x009E73
-"""Green of the forces; purple, green, blue and orange differ in lightness too."""
+"""Green of the forces."""
 
 
 def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:

@@ -53,7 +53,7 @@ class MuscleLengths:
         count = len(law.names)
         self._spread = np.zeros((count, len(tags)))
         self._misfit = np.zeros((len(tags), len(tags)))
-        held: dict[int, FloatArray] = {}
+        held: set[int] = set()
         modes, names, turning = [], [], []
         for segment in sorted({tag.segment for tag in tags}):
             rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
@@ -69,7 +69,7 @@ class MuscleLengths:
             for key, row_of_inverse in zip(places, inverse, strict=True):
                 softness = 1.0 / law.stiffness[places[key]]
                 self._spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
-                held |= dict.fromkeys(places[key], softness)
+                held |= set(places[key])
                 basis = _differences(law.stiffness[places[key]])
                 for number, mode in enumerate(basis.T, start=1):
                     column = np.zeros(count)
@@ -171,7 +171,7 @@ class MuscleLengths:
         return made
 
     def reached_range(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Slopes of the bending of segments that have reached the range of their sections; see `SoftModel.active_limits`."""
+        """Slopes of the bending of segments that have reached the range of their sections; see `Actuators.active_limits`."""
         slopes, bends = [], []
         for _, bending, (along, across) in self._bendings(motors):
             if bending >= self._largest_bending * (1.0 - 1e-9):

@@ -10,10 +10,10 @@ import numpy as np
 
 from softrobots.actuators import Actuators
 from softrobots.checks import FloatArray, read_only
-from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections, rest_coordinates
+from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections
 from softrobots.muscle_lengths import MuscleLengths
 from softrobots.muscles import ElasticLaw, MuscleForces, Segments, muscle_matrix
-from softrobots.strain_chain import STRAINS, in_range, joint_positions
+from softrobots.strain_chain import STRAINS, in_range
 from softrobots.urdf_tags import LumpedSectionTag, MuscleTag, SectionTag, SpringTag
 
 
@@ -46,10 +46,8 @@ class SectionRow(NamedTuple):
     """Rest length [m]."""
     radius: float
     """Radius of the body, for pictures [m]."""
-    lumped: bool
-    """Whether it is lumped into springs."""
     hinge: float
-    """Height of its hinge above its start [m]; 0 if it is not lumped."""
+    """Height of its first joint above its start [m]; 0 if it is not lumped."""
     joint_names: tuple[str, ...]
     """Its joints."""
     rest_joints: FloatArray
@@ -82,12 +80,12 @@ class Structure:
         """Sections lumped into springs."""
         self.muscles = tuple(parts.muscles)
         """Muscles."""
-        self.section_table = self._section_table(tags)
-        """Every section, base to tip."""
         self.motor_indices, self.spring_indices = self.indices(self.motor_joints), self.indices(self.spring_joints)
         """Places of motors and springs in Pinocchio's velocity vector."""
         self.sections = Sections(tags, np.array([self.indices(tag.joints) for tag in tags])) if tags else None
         """Sections of constant strain; None without."""
+        self.section_table = self._section_table(tags)
+        """Every section, base to tip."""
         self.strain_law = self._strain_law()
         """Springs and section coordinates, all free."""
         self.segments = self._segments()
@@ -96,12 +94,6 @@ class Structure:
         """Derivative of the muscle lengths with respect to them, shape (n_muscles, n_strains)."""
         self.muscle_rest = read_only(np.array([tag.rest_length for tag in self.muscles]))
         """Muscle lengths where they are all zero, shape (n_muscles,) [m]."""
-        lengths = [(tag.shortest, tag.longest) for tag in self.muscles]
-        self.muscle_length_limits = read_only(np.array(lengths).reshape(-1, 2) + np.array([-1e-12, 1e-12]))
-        """Limits of the muscle lengths, with rounding, shape (n_muscles, 2) [m]."""
-        forces = [(-tag.strongest, tag.strongest) for tag in self.muscles]
-        self.muscle_force_limits = read_only(np.array(forces).reshape(-1, 2))
-        """Limits of the muscle tensions, shape (n_muscles, 2) [N]."""
         self.held: MuscleLengths | None = None
         """The muscles as lengths; None if forces are given or there are none."""
         self.law = self.strain_law
@@ -154,14 +146,13 @@ class Structure:
         return made
 
     def _section_table(self, tags: Sequence[SectionTag]) -> tuple[SectionRow, ...]:
-        if tags:
-            rest = joint_positions(rest_coordinates(tags), np.array([tag.length for tag in tags]))
+        if self.sections is not None:
             return tuple(
-                SectionRow(tag.name, tag.segment, tag.length, tag.radius, False, 0.0, tag.joints, joints)
-                for tag, joints in zip(tags, rest, strict=True)
+                SectionRow(tag.name, tag.segment, tag.length, tag.radius, 0.0, tag.joints, joints)
+                for tag, joints in zip(tags, self.sections.rest_joints, strict=True)
             )
         return tuple(
-            SectionRow(tag.name, tag.segment, tag.length, tag.radius, True, tag.hinge, tuple(tag.joints.values()), np.zeros(6))
+            SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, tuple(tag.joints.values()), np.zeros(6))
             for tag in self.lumped_sections
         )
 

@@ -172,7 +172,7 @@ class Viewer:
         self.look_at(trajectory.tip_positions.mean(axis=0))
         self.trace(trajectory.tip_positions)
         animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
-        frames = _waypoint_frames(trajectory, seconds) if not self._segments else _even_frames(trajectory, seconds)
+        frames = _even_frames(trajectory, seconds) if self._segments else _waypoint_frames(trajectory, seconds)
         for frame in frames:
             self._add_frame(animation, frame)
         if self._segments:
@@ -216,8 +216,9 @@ class Viewer:
             ghost = "without load, same muscle lengths" if self._model.muscle_input == "lengths" else "straight, at rest"
         entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, ghost)]
         if self._segments:
-            chain = next(shape for shape in self._scene.shapes if shape.name.startswith("section_"))
-            entries.append((chain.colour, "equivalent rigid chain"))
+            names = tuple(section.name for section in self._model.structure.section_table)
+            chain = [shape.colour for shape in self._scene.shapes if shape.name.startswith(names)]
+            entries += [(colour, "equivalent rigid chain") for colour in chain[:1]]
         entries += [(colour, text) for text, colour in self._body.entries.items()]
         entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
         return entries + (list(wrinkling_rows()) if self._model.spring_groups else [])

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softrobots import inflated_beam
-from softrobots.checks import finite_number
 from softrobots.errors import ParameterError
-from softrobots.robots.parameters import PerPart, argument_text, at_least, colours, expanded, numbers
+from softrobots.robots.parameters import Bounds, PerPart, check_fields, check_lengths, colours, expanded, xacro_arguments
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,19 +60,9 @@ class InflatableArm:
 
     def __post_init__(self) -> None:
         """Check every field and spread single numbers over the links."""
-        lengths = numbers("link_lengths", self.link_lengths, None, "m")
-        if not lengths:
-            raise ParameterError("link_lengths", self.link_lengths, "at least one link length [m]")
-        object.__setattr__(self, "link_lengths", lengths)
-        for name, (unit, low, strict) in _PER_LINK.items():
-            values = numbers(name, getattr(self, name), len(lengths), unit)
-            at_least(name, values, low, strict, unit)
-            object.__setattr__(self, name, values)
-        at_least("link_lengths", lengths, 0.0, True, "m")
-        for name, (unit, low) in _SINGLE.items():
-            value = finite_number(name, getattr(self, name), unit)
-            at_least(name, (value,), low, True, unit)
-            object.__setattr__(self, name, value)
+        count = check_lengths(self, "link_lengths", "link")
+        check_fields(self, _PER_LINK, _SINGLE, count, "links")
+        lengths = self._each("link_lengths")
         for offset, length in zip(self._each("hinge_offset"), lengths, strict=True):
             if offset >= length:
                 raise ParameterError("hinge_offset", self.hinge_offset, f"below the link lengths {lengths} m")
@@ -84,7 +72,7 @@ class InflatableArm:
         for name in ("rest_side", "rest_up"):
             if max(map(abs, self._each(name))) > math.pi / 2:
                 raise ParameterError(name, getattr(self, name), "within the spring limits +-pi/2 rad")
-        object.__setattr__(self, "rgba", colours(self.rgba, len(lengths)))
+        object.__setattr__(self, "rgba", colours(self.rgba, count))
 
     @property
     def n_links(self) -> int:
@@ -124,9 +112,7 @@ class InflatableArm:
 
     def xacro_arguments(self) -> dict[str, str]:
         """Return the parameters as arguments of the xacro file: text by name, full precision."""
-        arguments = {field.name: argument_text(getattr(self, field.name)) for field in dataclasses.fields(self)}
-        shades = [" ".join(map(repr, colour)) for colour in self._each("rgba")]
-        return arguments | {"rgba": ",".join(shades)}
+        return xacro_arguments(self)
 
     def urdf(self) -> str:
         """Return the robot as URDF text, with its springs inside.
@@ -147,8 +133,7 @@ class InflatableArm:
         return values
 
 
-_PER_LINK: dict[str, tuple[str, float, bool]] = {
-    # name: (unit, lowest value, is the lowest value itself refused)
+_PER_LINK: Bounds = {
     "hinge_offset": ("m", 0.0, True),
     "radius": ("m", 0.0, True),
     "wall_thickness": ("m", 0.0, True),
@@ -161,10 +146,9 @@ _PER_LINK: dict[str, tuple[str, float, bool]] = {
     "spring_damping": ("N m s/rad", 0.0, False),
 }
 
-_SINGLE: dict[str, tuple[str, float]] = {
-    # name: (unit, value that must be exceeded)
-    "motor_limit": ("rad", 0.0),
-    "motor_effort": ("N m", 0.0),
-    "motor_velocity": ("rad/s", 0.0),
-    "base_mass": ("kg", 1e-6),
+_SINGLE: Bounds = {
+    "motor_limit": ("rad", 0.0, True),
+    "motor_effort": ("N m", 0.0, True),
+    "motor_velocity": ("rad/s", 0.0, True),
+    "base_mass": ("kg", 1e-6, True),
 }

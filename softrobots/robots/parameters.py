@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -49,6 +50,48 @@ def at_least(name: str, values: tuple[float, ...], low: float, strict: bool, uni
         raise ParameterError(name, values, f"{'above' if strict else 'at least'} {low} [{unit}]")
 
 
+Bounds = Mapping[str, tuple[str, float, bool]]
+"""By field: its unit, its lowest value, and whether that value itself is refused."""
+
+
+def check_lengths(robot: Any, name: str, part: str) -> int:
+    """Check the lengths of the parts of a robot, store them as a tuple, and return how many there are.
+
+    Raises:
+        ParameterError: If there are none, or one is not positive.
+    """
+    given = getattr(robot, name)
+    lengths = numbers(name, given, None, "m")
+    if not lengths:
+        raise ParameterError(name, given, f"at least one {part} length [m]")
+    at_least(name, lengths, 0.0, True, "m")
+    object.__setattr__(robot, name, lengths)
+    return len(lengths)
+
+
+def check_fields(robot: Any, per_part: Bounds, single: Bounds, count: int, part: str) -> None:
+    """Check the numbers of a robot and store them: a tuple with one number a part, or a number.
+
+    Args:
+        robot: A frozen dataclass.
+        per_part: Fields with one number for all parts or one for each.
+        single: Fields with one number.
+        count: Number of parts.
+        part: What a part is called, in the plural, for the errors.
+
+    Raises:
+        ParameterError: If a value is out of bounds or a list has the wrong length; the message names the field.
+    """
+    for name, (unit, low, strict) in per_part.items():
+        values = numbers(name, getattr(robot, name), count, unit, part)
+        at_least(name, values, low, strict, unit)
+        object.__setattr__(robot, name, values)
+    for name, (unit, low, strict) in single.items():
+        value = finite_number(name, getattr(robot, name), unit)
+        at_least(name, (value,), low, strict, unit)
+        object.__setattr__(robot, name, value)
+
+
 def colours(value: Any, count: int, part: str = "links") -> tuple[tuple[float, ...], ...]:
     """Return `value` as `count` colours, a single one repeated.
 
@@ -64,6 +107,13 @@ def colours(value: Any, count: int, part: str = "links") -> tuple[tuple[float, .
     if checked.min() < 0.0 or checked.max() > 1.0:
         raise ParameterError("rgba", value, requirement)
     return tuple(tuple(colour) for colour in checked.tolist())
+
+
+def xacro_arguments(robot: Any) -> dict[str, str]:
+    """The fields of a robot, one of them `rgba`, as arguments of its xacro file: text by name, full precision."""
+    arguments = {field.name: argument_text(getattr(robot, field.name)) for field in dataclasses.fields(robot)}
+    shades = [" ".join(map(repr, colour)) for colour in robot.rgba]
+    return arguments | {"rgba": ",".join(shades)}
 
 
 def argument_text(value: Any) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +12,17 @@ import numpy as np
 from softrobots.checks import choice, finite_array, finite_number, positive_integer
 from softrobots.constant_curvature import AZIMUTHS, muscle_residual
 from softrobots.errors import ParameterError
-from softrobots.robots.parameters import PerPart, argument_text, at_least, colours, expanded, numbers
+from softrobots.robots.parameters import (
+    Bounds,
+    PerPart,
+    at_least,
+    check_fields,
+    check_lengths,
+    colours,
+    expanded,
+    numbers,
+    xacro_arguments,
+)
 
 CHAINS = ("sections", "lumped")
 """Forms of the equivalent rigid chain."""
@@ -71,7 +80,7 @@ class PccArm:
     """Pairs of orthogonal springs a segment, for chain="lumped"."""
     hinge_rule: str = "corrected"
     """Where the hinges stand: in the middle of their sections ("midpoint"), or the first and the last of a segment 1/24 section
-    nearer to its ends, which removes the leading error of the midpoint rule ("corrected")."""
+    nearer to its ends, which removes the boundary term of the midpoint rule's error ("corrected"). Both are of second order."""
     torsion: bool = True
     """Whether a lumped segment can twist: a torsional spring a hinge."""
     extension: bool = True
@@ -88,23 +97,12 @@ class PccArm:
 
     def __post_init__(self) -> None:
         """Check every field and spread single numbers over the segments."""
-        lengths = numbers("segment_lengths", self.segment_lengths, None, "m")
-        if not lengths:
-            raise ParameterError("segment_lengths", self.segment_lengths, "at least one segment length [m]")
-        at_least("segment_lengths", lengths, 0.0, True, "m")
-        object.__setattr__(self, "segment_lengths", lengths)
-        for name, (unit, low, strict) in _PER_SEGMENT.items():
-            values = numbers(name, getattr(self, name), len(lengths), unit, "segments")
-            at_least(name, values, low, strict, unit)
-            object.__setattr__(self, name, values)
+        count = check_lengths(self, "segment_lengths", "segment")
+        check_fields(self, _PER_SEGMENT, _SINGLE, count, "segments")
         if max(self._each("muscle_contraction")) >= 1.0:
             raise ParameterError("muscle_contraction", self.muscle_contraction, "below 1")
-        object.__setattr__(self, "offset", self._offsets(len(lengths)))
+        object.__setattr__(self, "offset", self._offsets(count))
         object.__setattr__(self, "muscle_azimuths", self._azimuths())
-        for name, (unit, low, strict) in _SINGLE.items():
-            value = finite_number(name, getattr(self, name), unit)
-            at_least(name, (value,), low, strict, unit)
-            object.__setattr__(self, name, value)
         choice("chain", self.chain, CHAINS)
         choice("hinge_rule", self.hinge_rule, HINGE_RULES)
         for name in ("elastic_sections", "hinges"):
@@ -112,7 +110,7 @@ class PccArm:
         for name in ("torsion", "extension"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(name, getattr(self, name), "True or False")
-        object.__setattr__(self, "rgba", colours(self.rgba, len(lengths), "segments"))
+        object.__setattr__(self, "rgba", colours(self.rgba, count, "segments"))
 
     @classmethod
     def measured(cls, *, bending: PerPart, torsion: PerPart, axial: PerPart, **fields: Any) -> PccArm:
@@ -166,9 +164,7 @@ class PccArm:
 
     def xacro_arguments(self) -> dict[str, str]:
         """Return the parameters as arguments of the xacro file: text by name, full precision."""
-        arguments = {field.name: argument_text(getattr(self, field.name)) for field in dataclasses.fields(self)}
-        shades = [" ".join(map(repr, colour)) for colour in self._each("rgba")]
-        return arguments | {"rgba": ",".join(shades)}
+        return xacro_arguments(self)
 
     def urdf(self) -> str:
         """Return the robot as URDF text, with its sections or springs and its muscles inside.
@@ -200,8 +196,7 @@ class PccArm:
         return tuple(azimuths.tolist())
 
 
-_PER_SEGMENT: dict[str, tuple[str, float, bool]] = {
-    # name: (unit, lowest value, is the lowest value itself refused)
+_PER_SEGMENT: Bounds = {
     "muscle_distance": ("m", 0.0, True),
     "muscle_contraction": ("-", 0.0, True),
     "muscle_extension": ("-", 0.0, True),
@@ -213,7 +208,7 @@ _PER_SEGMENT: dict[str, tuple[str, float, bool]] = {
     "radius": ("m", 0.0, True),
 }
 
-_SINGLE: dict[str, tuple[str, float, bool]] = {
+_SINGLE: Bounds = {
     "damping_time": ("s", 0.0, False),
     "base_mass": ("kg", 1e-6, True),
 }

@@ -1,0 +1,70 @@
+"""What the scripts share at the command line: the load, the size of a robot, and how a run ends."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from softrobots.errors import NotConverged, ParameterError, SoftRobotsError
+from softrobots.loads import EARTH_GRAVITY
+from softrobots.model import MAX_DOF
+
+
+class Sized(Protocol):
+    """A robot that knows its size before it is made."""
+
+    @property
+    def n_joints(self) -> int:
+        """Number of movable joints."""
+
+
+def add_load(parser: argparse.ArgumentParser, force: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    """Give a parser `--force` [N] with a default, and `--gravity` [m/s^2]; see `gravity_of`."""
+    told = " ".join(f"{number:g}" for number in force)
+    parser.add_argument(
+        "--force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), default=tuple(force), help=f"force on the tip [N] ({told})"
+    )
+    told = "gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)"
+    parser.add_argument("--gravity", type=float, nargs="*", metavar="G", help=told)
+
+
+def gravity_of(arguments: argparse.Namespace) -> Any:
+    """Gravity that `--gravity` asks for: the numbers given, the Earth's without numbers, None without the option."""
+    return arguments.gravity if arguments.gravity != [] else EARTH_GRAVITY
+
+
+def refuse_too_large(robot: Sized, option: str, value: Any) -> None:
+    """Refuse a robot that Pinocchio's workspace is not made for, before xacro spends minutes on it.
+
+    Args:
+        robot: The robot.
+        option: The option that made it so large, for the error.
+        value: Its value.
+
+    Raises:
+        ParameterError: If the robot has more than `MAX_DOF` joints.
+    """
+    if robot.n_joints > MAX_DOF:
+        raise ParameterError(option, value, f"so few that the chain has at most {MAX_DOF} joints, not {robot.n_joints}")
+
+
+def exit_status(run: Callable[[], object]) -> int:
+    """Run a script and tell how it ended; an error is a line on stderr.
+
+    Args:
+        run: The whole job.
+
+    Returns:
+        0, or 1 if there is no answer (`NotConverged`), 2 after any other error of ours, 130 after Ctrl-C.
+    """
+    try:
+        run()
+    except SoftRobotsError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 1 if isinstance(error, NotConverged) else 2
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        return 130
+    return 0
