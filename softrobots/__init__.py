@@ -1,6 +1,6 @@
 """Soft robots as rigid-body robot descriptions, with certified statics and inverse kinematics on Pinocchio."""
 
-from softrobots import constant_curvature, inflated_beam
+from softrobots import constant_curvature, helix, inflated_beam
 from softrobots.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.errors import (
     DescriptionError,
@@ -15,7 +15,9 @@ from softrobots.errors import (
     OutputError,
     OutputExists,
     ParameterError,
+    SelfIntersection,
     SoftRobotsError,
+    StraightTube,
     TargetUnreachable,
     ViewerError,
 )
@@ -56,9 +58,11 @@ __all__ = [
     "ParameterError",
     "Path3D",
     "PccArm",
+    "SelfIntersection",
     "SoftModel",
     "SoftRobotsError",
     "SpringGroup",
+    "StraightTube",
     "TargetUnreachable",
     "Trajectory",
     "Viewer",
@@ -71,6 +75,7 @@ __all__ = [
     "elastostatic_jacobian",
     "estimate_load",
     "follow_trajectory",
+    "helix",
     "inflated_beam",
     "load_model",
     "load_result",

@@ -55,6 +55,30 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
     return array
 
 
+def positive_array(name: str, value: Any, unit: str) -> FloatArray:
+    """Return `value` as an array of positive numbers, any shape.
+
+    Raises:
+        ParameterError: If a number is not finite or not positive.
+    """
+    array = finite_array(name, value, None, unit)
+    if np.any(array < 1.0 / LARGEST):
+        raise ParameterError(name, value, f"positive [{unit}], at least {1.0 / LARGEST:g}")
+    return array
+
+
+def common_shape(name: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the shape that arrays of these shapes broadcast to.
+
+    Raises:
+        ParameterError: If there is none.
+    """
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError as error:
+        raise ParameterError(name, shapes, "of a shape that broadcasts with the others (these are the shapes)") from error
+
+
 def finite_number(name: str, value: Any, unit: str = "") -> float:
     """Return `value` as a finite float.
 

@@ -63,6 +63,23 @@ class NameNotFound(SoftRobotsError, LookupError):
         return str(self.args[0])
 
 
+class StraightTube(SoftRobotsError, ValueError):
+    """A tube that is not bent at all: angle 0 and contraction 1, or so near that no helix radius can be told."""
+
+
+class SelfIntersection(SoftRobotsError, ValueError):
+    """A helix whose tube would run into itself.
+
+    Attributes:
+        contact: The `softrobots.helix.SelfContact` that tells where and by how much.
+    """
+
+    def __init__(self, message: str, *, contact: Any) -> None:
+        """Say what touches what, and keep the finding."""
+        super().__init__(message)
+        self.contact = contact
+
+
 class NotConverged(SoftRobotsError, RuntimeError):
     """An iteration that ended without an answer; it carries the best iterate.
 

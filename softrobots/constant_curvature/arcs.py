@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import LARGEST, FloatArray, finite_array, read_only
+from softrobots.checks import FloatArray, common_shape, finite_array, read_only
 from softrobots.errors import ParameterError
 
 
@@ -147,27 +147,3 @@ def stack_arcs(arcs: Arc | Sequence[Arc]) -> Arc:
     shape = common_shape("arcs", *(arc.shape for arc in arcs))
     columns = [(arc.length, arc.bending, arc.azimuth) for arc in arcs]
     return Arc(*(np.stack([np.broadcast_to(part, shape) for part in parts], axis=-1) for parts in zip(*columns, strict=True)))
-
-
-def positive_array(name: str, value: Any, unit: str) -> FloatArray:
-    """Return `value` as an array of positive numbers, any shape.
-
-    Raises:
-        ParameterError: If a number is not finite or not positive.
-    """
-    array = finite_array(name, value, None, unit)
-    if np.any(array < 1.0 / LARGEST):
-        raise ParameterError(name, value, f"positive [{unit}], at least {1.0 / LARGEST:g}")
-    return array
-
-
-def common_shape(name: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape that arrays of these shapes broadcast to.
-
-    Raises:
-        ParameterError: If there is none.
-    """
-    try:
-        return np.broadcast_shapes(*shapes)
-    except ValueError as error:
-        raise ParameterError(name, shapes, "of a shape that broadcasts with the others (these are the shapes)") from error

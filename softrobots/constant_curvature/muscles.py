@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, finite_array, non_negative_number
-from softrobots.constant_curvature.arcs import Arc, arc_from_strains, checked_arc, common_shape, positive_array
+from softrobots.checks import FloatArray, common_shape, finite_array, non_negative_number, positive_array
+from softrobots.constant_curvature.arcs import Arc, arc_from_strains, checked_arc
 from softrobots.errors import ParameterError
 
 AZIMUTHS = (0.0, -2.0 * math.pi / 3.0, 2.0 * math.pi / 3.0)

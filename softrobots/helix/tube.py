@@ -1,0 +1,163 @@
+r"""The tube that is bent into a helix: its turns, lengths, volume, twist, and the tension of the actuator.
+
+A tube of length `Lt` (uninflated, along its axis) has an outer path of length :math:`L_o = L_t/\cos\theta`, which is kept; the
+actuator contracts to :math:`\lambda L_o`, and the centre line becomes
+
+.. math:: L_c = L_t\,\frac{|1 + \zeta|}{2\cos\theta}, \qquad \zeta = \lambda e^{2 i\theta}
+
+The formulas follow from (12) of [Blumenschein 2018]; the volume, twist and tension are ours.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray, common_shape, finite_array, positive_array
+from softrobots.errors import ParameterError
+from softrobots.helix.shapes import HelixShape, checked_actuator, checked_shape, length_ratio, turning_sign
+
+
+def turns(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
+    r"""Turns that a tube makes: :math:`L_t / (2\pi\cos\theta\sqrt{R_o^2 + b^2})`, as the outer path keeps its length.
+
+    Args:
+        shape: The helix, shape (...).
+        angle: Angle `theta` of the actuator to the axis of the uninflated tube, in [0, pi/2) [rad].
+        length: Length `Lt` of the uninflated tube, positive [m].
+
+    Returns:
+        Turns, the common shape [-].
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    shape = checked_shape(shape)
+    angles, lengths = finite_array("angle", angle, None, "rad"), positive_array("length", length, "m")
+    if np.any(angles < 0.0) or np.any(angles >= 0.5 * np.pi):
+        raise ParameterError("angle", angle, "in [0, pi/2) rad")
+    common_shape("length", shape.shape, angles.shape, lengths.shape)
+    return np.asarray(lengths / (2.0 * np.pi * np.cos(angles) * np.hypot(shape.outer_radius, shape.pitch)))
+
+
+def height(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
+    """Rise of a tube along the axis of its helix, `turns 2 pi b` [m]; arguments, shapes and errors as in `turns`."""
+    return np.asarray(turns(shape, angle, length) * shape.turn_height)
+
+
+def length_for_turns(shape: HelixShape, angle: Any, count: Any) -> FloatArray:
+    """Length of the uninflated tube that makes so many turns [m]: the inverse of `turns`.
+
+    Args:
+        shape: The helix, shape (...).
+        angle: Angle `theta` of the actuator to the axis of the uninflated tube, in [0, pi/2) [rad].
+        count: Turns, positive [-].
+
+    Returns:
+        Length, the common shape [m].
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    return np.asarray(positive_array("count", count, "-") / turns(shape, angle, 1.0))
+
+
+def centre_length(contraction: Any, angle: Any, length: Any) -> FloatArray:
+    """Length `Lc` of the centre line of the actuated tube [m]; see the module.
+
+    Args:
+        contraction: Contracted over original length `lambda`, in (0, 1] [-].
+        angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
+        length: Length `Lt` of the uninflated tube, positive [m].
+
+    Returns:
+        Length, the common shape [m].
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    actuator, lengths = checked_actuator(contraction, angle, 1.0), positive_array("length", length, "m")
+    ratio = length_ratio(actuator.contraction, actuator.angle) / (2.0 * np.cos(actuator.angle))
+    common_shape("length", ratio.shape, lengths.shape)
+    return np.asarray(lengths * ratio)
+
+
+def volume(contraction: Any, angle: Any, diameter: Any, length: Any) -> FloatArray:
+    r"""Volume of the actuated tube, :math:`V = (\pi D^2/4) L_c` [m^3].
+
+    By Pappus: circular cross-sections normal to the centre line, through their centre.
+
+    Args:
+        contraction: Contracted over original length `lambda`, in (0, 1] [-].
+        angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
+        diameter: Diameter `D` of the tube, positive [m].
+        length: Length `Lt` of the uninflated tube, positive [m].
+
+    Returns:
+        Volume, the common shape [m^3].
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    sizes, lengths = positive_array("diameter", diameter, "m"), centre_length(contraction, angle, length)
+    common_shape("diameter", sizes.shape, lengths.shape)
+    return np.asarray(0.25 * np.pi * sizes**2 * lengths)
+
+
+def material_twist(contraction: Any, angle: Any, diameter: Any, handedness: str = "right") -> FloatArray:
+    r"""Twist of the wall of the tube per length of the uninflated tube [rad/m].
+
+    .. math:: \sigma\,\frac{2}{D}\left(\frac{2\lambda\sin\theta}{|1 + \zeta|} - \tan\theta\right)
+
+    The frames of the centre line follow the actuator, which winds around the tube by `2 tan(theta)/D` before it contracts; what
+    they turn more or less than that is twist of the wall: zero at contraction 1.
+
+    Args:
+        contraction: Contracted over original length `lambda`, in (0, 1] [-].
+        angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
+        diameter: Diameter `D` of the tube, positive [m].
+        handedness: "right" or "left".
+
+    Returns:
+        Twist, the common shape [rad/m].
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    shares, angles, sizes = checked_actuator(contraction, angle, diameter)
+    ratio = length_ratio(shares, angles)
+    cosine = np.cos(angles)
+    # |1 + zeta| - 2 lambda cos theta, as the difference of the squares over the sum: exactly 0 at lambda = 1
+    difference = (1.0 - shares) * ((1.0 - shares) + 4.0 * shares * cosine**2) / (ratio + 2.0 * shares * cosine)
+    return np.asarray(-2.0 * turning_sign(handedness) * np.sin(angles) * difference / (sizes * ratio * cosine))
+
+
+def actuator_tension(contraction: Any, angle: Any, diameter: Any, pressure: Any) -> FloatArray:
+    r"""Tension with which the actuator holds the inflated tube in its shape [N].
+
+    .. math:: T = P\,\frac{dV}{dL_a} = P\,\frac{\pi D^2}{4}\,\frac{\lambda + \cos 2\theta}{2\,|1 + \zeta|}, \qquad
+       L_a = \lambda L_t/\cos\theta
+
+    Only the work of the pressure counts: the wall is inextensible and wrinkles for nothing. At angle 0 it is half the cap force
+    whatever the contraction, and `T D` is the collapse moment `pi P r^3` of an inflated beam.
+
+    Args:
+        contraction: Contracted over original length `lambda`, in (0, 1] [-].
+        angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
+        diameter: Diameter `D` of the tube, positive [m].
+        pressure: Gauge pressure `P`, zero or positive [Pa].
+
+    Returns:
+        Tension, the common shape [N]; negative beyond 45 degrees where `lambda + cos 2theta` is: there the pressure pulls.
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    shares, angles, sizes = checked_actuator(contraction, angle, diameter)
+    pressures = finite_array("pressure", pressure, None, "Pa")
+    if np.any(pressures < 0.0):
+        raise ParameterError("pressure", pressure, "zero or positive [Pa]")
+    common_shape("pressure", shares.shape, angles.shape, sizes.shape, pressures.shape)
+    area = 0.25 * np.pi * sizes**2
+    return np.asarray(pressures * area * (shares + np.cos(2.0 * angles)) / (2.0 * length_ratio(shares, angles)))
