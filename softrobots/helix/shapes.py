@@ -1,14 +1,15 @@
 r"""Helical actuation in closed form: from the actuator on the tube to the helix, and back.
 
-An inflated tube of diameter `D` wrinkles along an actuator that runs around it at the angle `theta` to its axis and contracts to
-the share `lambda` of its length; the line opposite keeps its length. Tube, actuator (inner path) and opposite line (outer path)
-become helices about one axis with radii `Rc`, `Ri`, `Ro` and the common pitch `b` [m/rad]. With :math:`\zeta = \lambda e^{2i\theta}`
+An inflated tube of diameter `D` wrinkles along an actuator that runs around it at the angle `theta` to its axis and contracts
+to the share `lambda` of its length; the line opposite keeps its length. Tube, actuator (inner path) and opposite line (outer
+path) become helices about one axis with radii `Rc`, `Ri`, `Ro` and the common pitch `b` [m/rad]. With
+:math:`\zeta = \lambda e^{2i\theta}`
 
 .. math:: R_o + i b = \frac{D}{1 - \zeta}, \qquad R_i + i b = \frac{D\,\zeta}{1 - \zeta}, \qquad
    R_c + i b = \frac{D\,(1 + \zeta)}{2\,(1 - \zeta)}
 
-which is (12) of the paper without its 0/0; `1 - zeta` is taken as `(1 - lambda) + 2 lambda sin^2 theta - i lambda sin 2theta`, so
-that no digits are lost near straight. All is vectorised: numbers and arrays broadcast.
+which is (12) of the paper without its 0/0; `1 - zeta` is taken as `(1 - lambda) + 2 lambda sin^2 theta - i lambda sin 2theta`,
+so that no digits are lost near straight. All is vectorised: numbers and arrays broadcast.
 
 References:
     [Blumenschein 2018]: L. H. Blumenschein, N. S. Usevitch, B. H. Do, E. W. Hawkes, A. M. Okamura, Helical Actuation on a Soft
@@ -41,14 +42,15 @@ class HelixShape:
     Numbers and arrays are accepted; they are broadcast to their common shape.
 
     Raises:
-        ParameterError: If a number is not finite or no actuator makes the shape: the outer radius must exceed the inner one, which
-            must not be below minus the outer one; the pitch must not be negative, and be positive if the inner radius is not.
+        ParameterError: If a number is not finite or no actuator makes the shape: the outer radius must exceed the inner one,
+            which must not be below minus the outer one; the pitch must not be negative, and be positive if the inner radius is
+            not.
     """
 
     outer_radius: FloatArray
     """Radius `Ro` of the path opposite the actuator [m]."""
     inner_radius: FloatArray
-    """Radius `Ri` of the actuator's path [m]; negative where that lies beyond the axis of the helix, opposite the outer path."""
+    """Radius `Ri` of the actuator's path [m]; negative where that lies beyond the axis of the helix, opposite the outer one."""
     pitch: FloatArray
     """Normalised pitch `b`: rise per turn angle [m/rad], the same for all paths."""
 
@@ -116,15 +118,15 @@ def forward(contraction: Any, angle: Any, diameter: Any) -> HelixShape:
 
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
-        StraightTube: At contraction 1 and angle 0, where no helix exists, or within rounding of it; `actuator_curvature_torsion`
-            has a value there.
+        StraightTube: At contraction 1 and angle 0, where no helix exists, or within rounding of it;
+            `actuator_curvature_torsion` has a value there.
     """
     actuator = checked_actuator(contraction, angle, diameter)
     shrink, sine, size = _distance_from_straight(actuator)
     if np.any(size < 1.0 / LARGEST):
         raise StraightTube(
-            f"contraction {actuator.contraction} at angle {actuator.angle} rad leaves the tube straight: it has no helix radius; "
-            f"a contraction below 1 or an angle above 0 is required (actuator_curvature_torsion gives (0, 0))"
+            f"contraction {actuator.contraction} at angle {actuator.angle} rad leaves the tube straight, without a helix radius; "
+            "a contraction below 1 or an angle above 0 is required (actuator_curvature_torsion gives (0, 0))"
         )
     apart, turned = shrink / size / size, 0.5 * (sine / size) ** 2
     outer = actuator.diameter * (apart + turned)
@@ -217,8 +219,8 @@ def checked_actuator(contraction: Any, angle: Any, diameter: Any) -> Actuator:
     """Return contraction, angle and diameter as arrays that broadcast.
 
     Raises:
-        ParameterError: If the contraction is not in (0, 1], the angle not in [0, pi/2), the diameter not positive, or the shapes
-            do not broadcast.
+        ParameterError: If the contraction is not in (0, 1], the angle not in [0, pi/2), the diameter not positive, or the
+            shapes do not broadcast.
     """
     shares, angles = positive_array("contraction", contraction, "-"), finite_array("angle", angle, None, "rad")
     if np.any(shares > 1.0):
