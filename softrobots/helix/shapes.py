@@ -125,7 +125,7 @@ def forward(contraction: Any, angle: Any, diameter: Any) -> HelixShape:
     shrink, sine, size = _distance_from_straight(actuator)
     if np.any(size < 1.0 / LARGEST):
         raise StraightTube(
-            f"contraction {actuator.contraction} at angle {actuator.angle} rad leaves the tube straight, without a helix radius; "
+            f"contraction {actuator.contraction} at angle {actuator.angle} rad leaves the tube straight: no helix radius; "
             "a contraction below 1 or an angle above 0 is required (actuator_curvature_torsion gives (0, 0))"
         )
     apart, turned = shrink / size / size, 0.5 * (sine / size) ** 2
