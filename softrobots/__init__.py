@@ -27,7 +27,7 @@ from softrobots.loader import load_model
 from softrobots.loads import EARTH_GRAVITY
 from softrobots.model import SoftModel, SpringGroup
 from softrobots.results_io import load_result, save_csv, save_result
-from softrobots.robots import ROBOTS, InflatableArm, PccArm
+from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
 from softrobots.sensitivity import compliance, elastostatic_jacobian
 from softrobots.stability import critical_load
 from softrobots.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
@@ -44,6 +44,7 @@ __all__ = [
     "Equilibrium",
     "EquilibriumNotFound",
     "FileFormatError",
+    "HelixTube",
     "IkSolution",
     "InflatableArm",
     "LoadEstimate",

@@ -163,5 +163,6 @@ def _start(model: SoftModel, data: object, row: int) -> FloatArray:
     joints = [pin_model.getJointId(name) for name in section.joint_names]
     first = min(joints)
     before = data.oMi[pin_model.parents[first]] * pin_model.jointPlacements[first]  # type: ignore[attr-defined]
-    back = pin.SE3(pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0), np.array([0.0, 0.0, -section.hinge]))
-    return np.array((before * back).homogeneous)
+    rigid = Screw(section.to_joints, section.hinge)  # of a lumped section
+    back = pin.SE3(pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0), np.zeros(3))
+    return np.array((before * back * pin.SE3(rigid.rotation, rigid.position).inverse()).homogeneous)

@@ -20,7 +20,7 @@ import numpy as np
 from softrobots.checks import FloatArray, read_only
 from softrobots.joint_loads import JointLoad
 from softrobots.strain_chain import STRAINS, SectionChain, joint_positions
-from softrobots.urdf_tags import SectionTag
+from softrobots.urdf_tags import LumpedSectionTag, SectionTag
 
 
 class ReducedLoad(NamedTuple):
@@ -133,7 +133,7 @@ class Sections:
         """Names of the section coordinates, (4 n)."""
 
 
-def rest_coordinates(tags: Sequence[SectionTag]) -> FloatArray:
+def rest_coordinates(tags: Sequence[SectionTag | LumpedSectionTag]) -> FloatArray:
     """Section coordinates at rest, shape (n, 4) [rad, rad, rad, m]: strains times rest length."""
     strains = np.array([tag.rest for tag in tags], dtype=np.float64)
     strains[:, 3] -= 1.0

@@ -93,7 +93,7 @@ def load_model(
         pinocchio_model=model,
         urdf=urdf,
         parts=Parts(spring_tags, motor_names, tags.sections, lumped, tags.muscles, muscles),
-        inflated_links=[link for link in tags.inflated_links if all(name in spring_tags for name in link.springs)],
+        inflated_links=tags.inflated_links,
         tip=_tip(model, tip, label),
     )
 

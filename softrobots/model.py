@@ -71,6 +71,7 @@ class SoftModel:
         self._groups = tuple(
             SpringGroup(tuple(names.index(name) for name in link.springs), link.radius, link.pressure)
             for link in inflated_links
+            if all(name in names for name in link.springs)
         )
         self._circles = {
             self._pin.joints[i].idx_v: self._pin.joints[i].idx_q

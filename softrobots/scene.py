@@ -76,8 +76,17 @@ class Scene:
         """Inflated link of every shape: what hangs on its last spring, and the tube of its radius just before its first."""
         pin_model, objects = self._model.pinocchio, self._geometry.geometryObjects
         links: list[int | None] = [None] * len(objects)
+        sections = {name: section.joint_names for section in self._model.structure.section_table for name in (section.name,)}
         for number, group in enumerate(self._model.spring_groups):
-            first, last = (pin_model.getJointId(self._model.spring_joints[group.springs[place]]) for place in (0, -1))
+            names = [self._model.spring_joints[place] for place in group.springs]
+            section = sections.get(names[0].removesuffix("_bend_x"))
+            if section is not None:  # the pieces of one section
+                joints = [pin_model.getJointId(name) for name in section]
+                for place, shape in enumerate(objects):
+                    if shape.parentJoint in joints:
+                        links[place] = number
+                continue
+            first, last = (pin_model.getJointId(names[place]) for place in (0, -1))
             for place, shape in enumerate(objects):
                 tube = isinstance(shape.geometry, coal.Cylinder) and math.isclose(shape.geometry.radius, group.radius)
                 before = tube and shape.parentJoint == pin_model.parents[first]

@@ -10,7 +10,7 @@ import numpy as np
 
 from softrobots.actuators import Actuators
 from softrobots.checks import FloatArray, read_only
-from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections
+from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections, rest_coordinates
 from softrobots.muscle_lengths import MuscleLengths
 from softrobots.muscles import ElasticLaw, MuscleForces, Segments, muscle_matrix
 from softrobots.strain_chain import STRAINS, in_range
@@ -46,8 +46,10 @@ class SectionRow(NamedTuple):
     """Rest length [m]."""
     radius: float
     """Radius of the body, for pictures [m]."""
+    to_joints: FloatArray
+    """Section coordinates at rest of the piece from its start to its joints, shape (4,); zeros if it is not lumped."""
     hinge: float
-    """Height of its first joint above its start [m]; 0 if it is not lumped."""
+    """Length of that piece [m]."""
     joint_names: tuple[str, ...]
     """Its joints."""
     rest_joints: FloatArray
@@ -139,20 +141,29 @@ class Structure:
         strains = self.strains(motors, elastic)
         if self.sections is not None:
             return strains[len(self.spring_joints) :].reshape(-1, 4)
-        made = np.zeros((len(self.lumped_sections), 4))
+        made = rest_coordinates(self.lumped_sections) if self.lumped_sections else np.zeros((0, 4))
         for row, section in enumerate(self.lumped_sections):
             for name, joint in section.joints.items():
-                made[row, STRAINS.index(name)] = strains[self.spring_joints.index(joint)]
+                made[row, STRAINS.index(name)] += strains[self.spring_joints.index(joint)]
         return made
 
     def _section_table(self, tags: Sequence[SectionTag]) -> tuple[SectionRow, ...]:
         if self.sections is not None:
             return tuple(
-                SectionRow(tag.name, tag.segment, tag.length, tag.radius, 0.0, tag.joints, joints)
+                SectionRow(tag.name, tag.segment, tag.length, tag.radius, np.zeros(4), 0.0, tag.joints, joints)
                 for tag, joints in zip(tags, self.sections.rest_joints, strict=True)
             )
         return tuple(
-            SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, tuple(tag.joints.values()), np.zeros(6))
+            SectionRow(
+                tag.name,
+                tag.segment,
+                tag.length,
+                tag.radius,
+                rest_coordinates([tag])[0] * (tag.hinge / tag.length),
+                tag.hinge,
+                tuple(tag.joints.values()),
+                np.zeros(6),
+            )
             for tag in self.lumped_sections
         )
 

@@ -16,6 +16,9 @@ NAMESPACE = "urn:softrobots:urdf"
 ROLES = ("motor", "spring", "section", "locked")
 """What a movable joint can be."""
 
+COORDINATES = ("bend_x", "bend_y", "twist", "stretch")
+"""The coordinates of a section, `softrobots.strain_chain.STRAINS`."""
+
 
 @dataclass(frozen=True)
 class SpringTag:
@@ -32,7 +35,7 @@ class InflatedLinkTag:
     """The springs that stand for one inflated link, and what sets its wrinkling moment."""
 
     springs: tuple[str, ...]
-    """Names of the spring joints."""
+    """Names of the spring joints, or of coordinates of a section, `<section>_bend_x` and so on."""
     radius: float
     """Tube radius [m]."""
     pressure: float
@@ -76,7 +79,9 @@ class LumpedSectionTag:
     length: float
     """Rest length [m]."""
     hinge: float
-    """Height of the joints above the start of the section [m]."""
+    """Length of rod from the start of the section to the joints [m]."""
+    rest: tuple[float, ...]
+    """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
     radius: float
     """Radius of the body, for pictures [m]."""
 
@@ -145,11 +150,13 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
     roles: dict[str, str] = {}
     for joint in root.findall("joint"):
         _read_joint(joint, source, springs, roles)
+    sections = tuple(_section(element, source, roles) for element in _ours(root, "section"))
+    elastic = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in COORDINATES)]
     tags = RobotTags(
         springs=springs,
         roles=roles,
-        inflated_links=tuple(_inflated_link(element, source, springs) for element in _ours(root, "inflated_link")),
-        sections=tuple(_section(element, source, roles) for element in _ours(root, "section")),
+        inflated_links=tuple(_inflated_link(element, source, elastic) for element in _ours(root, "inflated_link")),
+        sections=sections,
         lumped_sections=tuple(_lumped_section(element, source, springs) for element in _ours(root, "lumped_section")),
         muscles=tuple(_muscle(element, source) for element in _ours(root, "muscle")),
         mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
@@ -181,7 +188,7 @@ def _read_joint(joint: ElementTree.Element, source: str, springs: dict[str, Spri
         roles[name] = value
 
 
-def _inflated_link(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> InflatedLinkTag:
+def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[str]) -> InflatedLinkTag:
     names = tuple(element.get("springs", "").split())
     missing = [name for name in names if name not in springs]
     if not names or missing:
@@ -204,13 +211,6 @@ def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]
         raise DescriptionError(
             f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
         )
-    rest = element.get("rest", "").split()
-    try:
-        numbers = tuple(float(text) for text in rest)
-    except ValueError:
-        numbers = ()
-    if len(numbers) != 4 or not all(map(math.isfinite, numbers)) or numbers[3] <= 0.0:
-        raise DescriptionError(f"{where} has rest = {' '.join(rest)!r}; kx, ky, twist and a positive stretch are required")
     return SectionTag(
         name,
         _segment(element, where),
@@ -219,16 +219,26 @@ def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]
         _positive(element, "EI", where),
         _positive(element, "GJ", where),
         _positive(element, "EA", where),
-        numbers,
+        _rest(element, where),
         _positive(element, "radius", where),
     )
+
+
+def _rest(element: ElementTree.Element, where: str) -> tuple[float, ...]:
+    rest = element.get("rest", "").split()
+    try:
+        numbers = tuple(float(text) for text in rest)
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 4 or not all(map(math.isfinite, numbers)) or numbers[3] <= 0.0:
+        raise DescriptionError(f"{where} has rest = {' '.join(rest)!r}; kx, ky, twist and a positive stretch are required")
+    return numbers
 
 
 def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> LumpedSectionTag:
     name = element.get("name", "")
     where = f"the lumped section {name!r} of {source}"
-    coordinates = ("bend_x", "bend_y", "twist", "stretch")
-    joints = {key: element.get(key, "") for key in coordinates if element.get(key)}
+    joints = {key: element.get(key, "") for key in COORDINATES if element.get(key)}
     missing = [key for key in ("bend_x", "bend_y") if key not in joints]
     strangers = [joint for joint in joints.values() if joint not in springs]
     if missing or strangers or len(set(joints.values())) != len(joints):
@@ -237,7 +247,7 @@ def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[
             f"(twist and stretch may follow)"
         )
     length, hinge, radius = (_positive(element, key, where) for key in ("length", "hinge", "radius"))
-    return LumpedSectionTag(name, _segment(element, where), joints, length, hinge, radius)
+    return LumpedSectionTag(name, _segment(element, where), joints, length, hinge, _rest(element, where), radius)
 
 
 def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:

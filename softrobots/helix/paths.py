@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray, choice, common_shape, finite_array
-from softrobots.errors import ParameterError
 from softrobots.helix.shapes import PATHS, HelixShape, checked_actuator, checked_shape, length_ratio, turning_sign
 
 
@@ -75,7 +74,7 @@ def actuator_curvature_torsion(
     if path == "outer":
         return np.asarray((shrink + shares * twice) / sizes), np.asarray(shares * sine / sizes)
     if path == "inner":
-        return np.asarray((shrink - twice) / (sizes * shares)), np.asarray((sine + 0.0 * shares) / (sizes * shares))
+        return np.asarray((shrink - twice) / (sizes * shares)), np.asarray(sine / (sizes * shares))
     scale = sizes * length_ratio(shares, angles) ** 2
     return np.asarray(2.0 * shrink * (1.0 + shares) / scale), np.asarray(4.0 * shares * sine / scale)
 
@@ -135,8 +134,6 @@ def frames(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "r
     """
     shape, angles, radius, sign = _checked(shape, s, path, handedness)
     size = np.hypot(radius, shape.pitch)
-    if np.any(size == 0.0):
-        raise ParameterError("path", path, "one whose length is not zero: a path on the axis without pitch has no tangent")
     along, across = shape.pitch / size, radius / size
     sine, cosine = np.sin(angles), np.cos(angles)
     columns = (
@@ -184,10 +181,7 @@ def turn_angle(shape: HelixShape, arc_length: Any, path: str = "centre") -> Floa
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
     shape, lengths, radius, _ = _checked(shape, arc_length, path, "right", "arc_length")
-    size = np.hypot(radius, shape.pitch)
-    if np.any(size == 0.0):
-        raise ParameterError("path", path, "one whose length is not zero")
-    return np.asarray(lengths / size)
+    return np.asarray(lengths / np.hypot(radius, shape.pitch))
 
 
 def _checked(

@@ -33,6 +33,7 @@ HANDEDNESS = ("right", "left")
 """Which way the helix winds; a right-handed one goes up as it turns anticlockwise seen from above."""
 
 _ROUNDING = 1e-12  # of the diameter: what rounding may take from a radius
+_SMALLEST = LARGEST**-3  # [m]: forward gives no path below it, and its curvatures stay finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class HelixShape:
     Raises:
         ParameterError: If a number is not finite or no actuator makes the shape: the outer radius must exceed the inner one,
             which must not be below minus the outer one; the pitch must not be negative, and be positive if the inner radius is
-            not.
+            not; nothing that must be positive may be below 1e-90 m.
     """
 
     outer_radius: FloatArray
@@ -59,13 +60,13 @@ class HelixShape:
         outer, inner, pitch = (finite_array(name, getattr(self, name), None, "m") for name in self.__dataclass_fields__)
         shape = common_shape("pitch", outer.shape, inner.shape, pitch.shape)
         outer, inner, pitch = (np.array(np.broadcast_to(values, shape)) for values in (outer, inner, pitch))
-        if np.any(outer <= inner):
+        if np.any(outer - inner < _SMALLEST):
             raise ParameterError("inner_radius", self.inner_radius, f"below the outer radius {outer} m (they differ by D)")
         if np.any(outer + inner < -_ROUNDING * (outer - inner)):
             raise ParameterError("inner_radius", self.inner_radius, f"at least minus the outer radius {outer} m")
         if np.any(pitch < 0.0):
             raise ParameterError("pitch", self.pitch, "zero or positive; handedness is said where it matters")
-        if np.any((pitch == 0.0) & (inner <= 0.0)):
+        if np.any((pitch < _SMALLEST) & (inner < _SMALLEST)):
             raise ParameterError("pitch", self.pitch, f"positive where the inner radius {inner} m is not")
         for name, values in (("outer_radius", outer), ("inner_radius", inner), ("pitch", pitch)):
             object.__setattr__(self, name, read_only(values))
@@ -161,15 +162,15 @@ def inverse(shape: HelixShape) -> Actuator:
         Contraction [-], angle [rad] and diameter [m]; contraction 0 cannot come out.
 
     Raises:
-        ParameterError: If `shape` is not a `HelixShape`, or its inner path is a point: no actuator contracts to nothing.
+        ParameterError: If `shape` is not a `HelixShape`, or its actuator runs across the tube to rounding (angle pi/2).
     """
     shape = checked_shape(shape)
     diameter, pitch = shape.diameter, shape.pitch
     scaled = (shape.inner_radius / diameter) * (shape.outer_radius / diameter) + (pitch / diameter) ** 2
     angle = 0.5 * np.arctan2(pitch / diameter, scaled)
     contraction = np.hypot(pitch, shape.inner_radius) / np.hypot(pitch, shape.outer_radius)
-    if np.any(contraction <= 0.0) or np.any(angle >= 0.5 * np.pi):
-        raise ParameterError("shape", shape, "a helix whose inner path has a length and whose pitch can be told from zero")
+    if np.any(angle >= 0.5 * np.pi):
+        raise ParameterError("shape", shape, "a helix whose pitch can be told from zero")
     return Actuator(np.minimum(contraction, 1.0), angle, diameter)
 
 

@@ -160,4 +160,5 @@ def actuator_tension(contraction: Any, angle: Any, diameter: Any, pressure: Any)
         raise ParameterError("pressure", pressure, "zero or positive [Pa]")
     common_shape("pressure", shares.shape, angles.shape, sizes.shape, pressures.shape)
     area = 0.25 * np.pi * sizes**2
-    return np.asarray(pressures * area * (shares + np.cos(2.0 * angles)) / (2.0 * length_ratio(shares, angles)))
+    rate = 2.0 * np.cos(angles) ** 2 - (1.0 - shares)  # lambda + cos(2 theta), exact at lambda = 1
+    return np.asarray(pressures * area * rate / (2.0 * length_ratio(shares, angles)))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Protocol
 
+from softrobots.robots.helix_tube import HelixTube
 from softrobots.robots.inflatable_arm import InflatableArm
 from softrobots.robots.pcc_arm import PccArm
 
@@ -22,7 +23,9 @@ ROBOTS: Mapping[str, Callable[[], Robot]] = {
     "inflatable_arm": InflatableArm,
     "pcc_arm": PccArm,
     "pcc_arm_lumped": partial(PccArm, chain="lumped"),
+    "helix_tube": HelixTube,
+    "helix_tube_lumped": partial(HelixTube, chain="lumped"),
 }
 """What makes each robot with its default parameters, by the name of its URDF file."""
 
-__all__ = ["ROBOTS", "InflatableArm", "PccArm", "Robot"]
+__all__ = ["ROBOTS", "HelixTube", "InflatableArm", "PccArm", "Robot"]

@@ -117,9 +117,11 @@ def xacro_arguments(robot: Any) -> dict[str, str]:
 
 
 def argument_text(value: Any) -> str:
-    """A value as the text of a xacro argument, full precision."""
+    """A value as the text of a xacro argument, full precision; None is empty."""
     if isinstance(value, str):
         return value
+    if value is None:
+        return ""
     if isinstance(value, bool):
         return str(value).lower()
     return "[" + ",".join(map(repr, value)) + "]" if isinstance(value, tuple) else repr(value)

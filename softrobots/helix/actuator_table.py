@@ -1,0 +1,289 @@
+"""A measured table of pressure against contraction, as model of a pneumatic muscle along the tube.
+
+The inverse pneumatic muscle of [Blumenschein 2018] lengthens with pressure, so its contraction `lambda` (contracted over original
+length) rises towards 1; a contracting muscle has a falling table. The paper says that such a mapping must be measured and
+publishes none: the table, its CSV file and the interpolation are ours.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from softrobots.checks import LARGEST, FloatArray, choice, finite_array, positive_array, read_only
+from softrobots.errors import FileFormatError, MissingDependency, ParameterError
+from softrobots.files import as_path, new_file, write_atomically
+from softrobots.helix.shapes import HelixShape, forward
+
+INTERPOLATIONS = ("linear", "pchip")
+"""Straight between the rows, or SciPy's monotone cubic, which has a continuous slope."""
+
+_COLUMNS = ("pressure_Pa", "contraction")
+_LARGEST_FILE = 10_000_000  # bytes
+_HALVINGS = 60  # of an interval of the table: past the last digit
+
+
+@dataclass(frozen=True, eq=False)
+class ActuatorTable:
+    """Contraction of an actuator measured at some pressures; between them it is interpolated, beyond them nothing is said.
+
+    Raises:
+        ParameterError: If there are fewer than two rows, a number is not finite, the pressures do not increase, a contraction is
+            not in (0, 1], or the contractions neither rise throughout nor fall throughout.
+        MissingDependency: For "pchip", if SciPy is not installed.
+    """
+
+    pressure: FloatArray
+    """Gauge pressures, increasing, shape (n,) [Pa]; negative ones are vacuum."""
+    contraction: FloatArray
+    """Contracted over original length `lambda` at each of them, in (0, 1], strictly rising or falling, shape (n,) [-]."""
+    interpolation: str = "linear"
+    """One of `INTERPOLATIONS`."""
+
+    def __post_init__(self) -> None:
+        """Check and freeze the columns."""
+        pressures = finite_array("pressure", self.pressure, (None,), "Pa")
+        if len(pressures) < 2:
+            raise ParameterError("pressure", self.pressure, "at least two rows [Pa]")
+        if np.any(np.diff(pressures) < 1.0 / LARGEST):
+            raise ParameterError("pressure", self.pressure, f"increasing, by at least {1.0 / LARGEST:g} Pa a row")
+        shares = positive_array("contraction", self.contraction, "-")
+        if shares.shape != pressures.shape:
+            raise ParameterError("contraction", self.contraction, f"of the shape {pressures.shape} of the pressures")
+        if np.any(shares > 1.0):
+            raise ParameterError("contraction", self.contraction, "in (0, 1]: contracted over original length")
+        steps = np.diff(shares)
+        if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+            raise ParameterError("contraction", self.contraction, "strictly rising or strictly falling with the pressure")
+        object.__setattr__(self, "pressure", read_only(pressures))
+        object.__setattr__(self, "contraction", read_only(shares))
+        if choice("interpolation", self.interpolation, INTERPOLATIONS) == "pchip":
+            self._cubic()
+
+    @classmethod
+    def read_csv(cls, path: str | os.PathLike[str], interpolation: str = "linear") -> ActuatorTable:
+        """Read a table from a CSV file whose first line names the columns `pressure_Pa` and `contraction`.
+
+        Other columns and empty lines are ignored.
+
+        Args:
+            path: The file.
+            interpolation: One of `INTERPOLATIONS`; the file does not hold it.
+
+        Returns:
+            The table.
+
+        Raises:
+            ParameterError: If the path is none or there is no such interpolation.
+            FileFormatError: If the file cannot be read, lacks a column or has it twice, has fewer than two rows, or (naming the
+                line) has a cell that is no finite number, more or fewer cells than the first line, a pressure not above the one
+                before, or a contraction outside (0, 1] or that turns back.
+            MissingDependency: For "pchip", if SciPy is not installed.
+        """
+        file, kind = as_path("path", path), choice("interpolation", interpolation, INTERPOLATIONS)
+        try:
+            if file.stat().st_size > _LARGEST_FILE:
+                raise FileFormatError(f"{file} has {file.stat().st_size} bytes; at most {_LARGEST_FILE} are read")
+            lines, rows = _rows(file, file.read_text(encoding="utf-8-sig"))
+        except (OSError, ValueError) as error:
+            if isinstance(error, FileFormatError):
+                raise
+            raise FileFormatError(f"cannot read an actuator table from {file}: {error}") from error
+        for place, line in enumerate(lines):
+            _check_row(f"{file}, line {line}", rows, place)
+        if len(rows) < 2:
+            raise FileFormatError(f"{file} has {len(rows)} rows of numbers; at least two are required")
+        try:
+            return cls(np.array(rows)[:, 0], np.array(rows)[:, 1], kind)
+        except ParameterError as error:  # numbers too large or too small, rows too near
+            raise FileFormatError(f"{file}: {error}") from error
+
+    def write_csv(self, path: str | os.PathLike[str], overwrite: bool = False) -> Path:
+        """Write the table as CSV, one line a row, full precision.
+
+        Args:
+            path: File to write.
+            overwrite: Replace an existing file.
+
+        Returns:
+            The path of the file.
+
+        Raises:
+            ParameterError: If the path is none.
+            OutputExists: If the file exists and `overwrite` is false.
+            OutputError: If the file cannot be written.
+        """
+        target = new_file(path, overwrite=overwrite)
+        rows = zip(self.pressure.tolist(), self.contraction.tolist(), strict=True)
+        text = "\n".join([",".join(_COLUMNS), *(f"{pressure!r},{share!r}" for pressure, share in rows), ""])
+
+        def write(file: IO[bytes]) -> None:
+            file.write(text.encode("ascii"))
+
+        write_atomically(target, write)
+        return target
+
+    @property
+    def pressure_limits(self) -> tuple[float, float]:
+        """Lowest and highest measured pressure [Pa]."""
+        return float(self.pressure[0]), float(self.pressure[-1])
+
+    @property
+    def contraction_limits(self) -> tuple[float, float]:
+        """Smallest and largest measured contraction [-]."""
+        return float(self.contraction.min()), float(self.contraction.max())
+
+    def contraction_at(self, pressure: Any) -> FloatArray:
+        """Contraction at a pressure, interpolated between the rows.
+
+        Args:
+            pressure: Gauge pressure within `pressure_limits`, shape (...) [Pa].
+
+        Returns:
+            Contraction, shape (...) [-].
+
+        Raises:
+            ParameterError: If a pressure is not finite or beyond the limits.
+        """
+        pressures = _within("pressure", pressure, self.pressure_limits, "Pa")
+        if self.interpolation == "pchip":
+            shares = self._cubic()(pressures)
+        else:
+            shares = np.interp(pressures, self.pressure, self.contraction)
+        return np.asarray(np.clip(shares, *self.contraction_limits))  # rounding must not lead out of the table
+
+    def pressure_for(self, contraction: Any) -> FloatArray:
+        """Pressure that makes a contraction: the inverse of `contraction_at`.
+
+        Args:
+            contraction: Contraction within `contraction_limits`, shape (...) [-].
+
+        Returns:
+            Gauge pressure, shape (...) [Pa].
+
+        Raises:
+            ParameterError: If a contraction is not finite or beyond the limits.
+        """
+        shares = _within("contraction", contraction, self.contraction_limits, "-")
+        rising = self.contraction[-1] > self.contraction[0]
+        known = (self.pressure, self.contraction) if rising else (self.pressure[::-1], self.contraction[::-1])
+        if self.interpolation == "linear":
+            return np.asarray(np.clip(np.interp(shares, known[1], known[0]), *self.pressure_limits))
+        cubic = self._cubic()
+        above = np.clip(np.searchsorted(known[1], shares), 1, len(known[1]) - 1)
+        low, high = known[0][above - 1], known[0][above]  # where the contraction is too small, and where it is not
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            enough = cubic(middle) >= shares
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        return np.asarray(high)
+
+    def slope_at(self, pressure: Any) -> FloatArray:
+        """Derivative of the contraction by the pressure.
+
+        Args:
+            pressure: Gauge pressure within `pressure_limits`, shape (...) [Pa].
+
+        Returns:
+            Slope, shape (...) [1/Pa]. A linear table has two at a row in its middle: the one above the row is given.
+
+        Raises:
+            ParameterError: If a pressure is not finite or beyond the limits.
+        """
+        pressures = _within("pressure", pressure, self.pressure_limits, "Pa")
+        if self.interpolation == "pchip":
+            return np.asarray(self._cubic()(pressures, 1))
+        place = np.clip(np.searchsorted(self.pressure, pressures, side="right"), 1, len(self.pressure) - 1)
+        return np.asarray((np.diff(self.contraction) / np.diff(self.pressure))[place - 1])
+
+    def shape_at(self, pressure: Any, angle: Any, diameter: Any) -> HelixShape:
+        """Helix that a tube with this actuator makes at a pressure of the actuator: `forward` after `contraction_at`.
+
+        Args:
+            pressure: Gauge pressure of the actuator within `pressure_limits` [Pa].
+            angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
+            diameter: Diameter `D` of the tube, positive [m].
+
+        Returns:
+            The shape, of the common shape of the arguments.
+
+        Raises:
+            ParameterError: If an argument is out of range or the shapes do not broadcast.
+            StraightTube: Where the contraction is 1 and the angle 0, or nearly so.
+        """
+        return forward(self.contraction_at(pressure), angle, diameter)
+
+    def _cubic(self) -> Any:
+        """SciPy's monotone cubic through the rows."""
+        try:
+            from scipy.interpolate import PchipInterpolator
+        except ImportError as error:
+            raise MissingDependency("scipy", "helix") from error
+        return PchipInterpolator(self.pressure, self.contraction)
+
+
+def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> FloatArray:
+    values = finite_array(name, value, None, unit)
+    if np.any(values < limits[0]) or np.any(values > limits[1]):
+        raise ParameterError(name, value, f"within the measured table, {limits[0]!r} to {limits[1]!r} [{unit}]")
+    return values
+
+
+def _rows(file: Path, text: str) -> tuple[list[int], list[tuple[float, float]]]:
+    """Line numbers and numbers of the rows of a CSV text."""
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
+    lines: list[int] = []
+    rows: list[tuple[float, float]] = []
+    try:
+        names = [name.strip() for name in next(reader, [])]
+        if any(names.count(name) != 1 for name in _COLUMNS):
+            raise FileFormatError(
+                f"{file}, line 1: it names {', '.join(names) or 'nothing'}; {' and '.join(_COLUMNS)} are required, each once"
+            )
+        places = [names.index(name) for name in _COLUMNS]
+        for cells in reader:
+            if not any(cell.strip() for cell in cells):
+                continue
+            if len(cells) != len(names):
+                raise FileFormatError(f"{file}, line {reader.line_num}: {len(cells)} cells; {len(names)} are required")
+            lines.append(reader.line_num)
+            pressure, share = (_number(f"{file}, line {reader.line_num}: {names[place]}", cells[place]) for place in places)
+            rows.append((pressure, share))
+    except csv.Error as error:
+        raise FileFormatError(f"{file}, line {reader.line_num}: {error}") from error
+    return lines, rows
+
+
+def _number(what: str, cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise FileFormatError(f"{what} = {cell!r}; a finite number is required")
+    return value
+
+
+def _check_row(where: str, rows: list[tuple[float, float]], place: int) -> None:
+    """Check a row by itself and against those before it."""
+    pressure, share = rows[place]
+    if not 0.0 < share <= 1.0:
+        raise FileFormatError(f"{where}: contraction = {share!r}; a number in (0, 1] is required")
+    if place == 0:
+        return
+    before = rows[place - 1]
+    if pressure <= before[0]:
+        raise FileFormatError(f"{where}: pressure_Pa = {pressure!r}; more than {before[0]!r}, the row before, is required")
+    if share == before[1]:
+        raise FileFormatError(f"{where}: contraction = {share!r} as in the row before; a change is required")
+    if (share > before[1]) != (rows[1][1] > rows[0][1]):
+        raise FileFormatError(
+            f"{where}: contraction = {share!r} turns back; rising throughout or falling throughout is required"
+        )

@@ -1,0 +1,158 @@
+"""Tables of helices and whether they can be built; the test grid of the paper. Data only, no pictures.
+
+[Blumenschein 2018] builds helices of a tube of 3.31 cm at actuator angles of 2.5, 5 and 10 degrees and contractions from 0.5 to
+0.9 (section III-B and Figure 7; the steps of 0.1 are ours), and one at 5 degrees and 0.66 a second time, 2.5 times as large.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from softrobots.files import new_file, write_atomically
+from softrobots.helix.contact import self_contact
+from softrobots.helix.shapes import Actuator, checked_actuator, forward
+
+PAPER_ANGLES = tuple(float(np.radians(degrees)) for degrees in (2.5, 5.0, 10.0))
+"""Actuator angles of the paper's tests [rad]."""
+
+PAPER_CONTRACTIONS = (0.5, 0.6, 0.7, 0.8, 0.9)
+"""Contractions that cover the range of the paper's tests [-]."""
+
+PAPER_DIAMETER = 0.0331
+"""Diameter of the tube in the paper's tests [m]."""
+
+PAPER_SCALED = Actuator(np.array(0.66), np.array(PAPER_ANGLES[1]), PAPER_DIAMETER * np.array([1.0, 2.5]))
+"""The helix that the paper builds in two sizes."""
+
+
+@dataclass(frozen=True)
+class ShapeRow:
+    """One helix of a table."""
+
+    angle: float
+    """Angle `theta` of the actuator to the axis of the tube [rad]."""
+    contraction: float
+    """Contracted over original length of the actuator `lambda` [-]."""
+    diameter: float
+    """Diameter `D` of the tube [m]."""
+    outer_radius: float
+    """Radius `Ro` of the path opposite the actuator [m]."""
+    inner_radius: float
+    """Radius `Ri` of the actuator's path [m]; negative beyond the axis of the helix."""
+    pitch: float
+    """Normalised pitch `b` [m/rad]."""
+    turn_distance: float | None
+    """Distance of the centre lines of neighbouring turns [m]; None where the helix is too steep to have any."""
+    realisable: bool
+    """Whether an endless tube does not run into itself; exact."""
+    realisable_by_simple_rule: bool
+    """Whether a turn rises by at least a diameter, `2 pi b >= D`."""
+
+
+@dataclass(frozen=True)
+class ShapeTable:
+    """Helices, one a row."""
+
+    rows: tuple[ShapeRow, ...]
+    """The rows, in the order of the arguments."""
+
+    def as_rows(self) -> list[dict[str, float | bool | None]]:
+        """One dictionary a helix, from column to value, SI units."""
+        return [{name: getattr(row, name) for name in _COLUMNS} for row in self.rows]
+
+    def to_markdown(self) -> str:
+        """The table in Markdown, rounded, angles in degrees."""
+        names = "angle [deg] | contraction | D [m] | Ro [m] | Ri [m] | b [m/rad] | turn distance [m] | realisable | 2 pi b >= D"
+        lines = [f"| {names} |", "|" + "---|" * len(_COLUMNS)]
+        for row in self.rows:
+            apart = "none" if row.turn_distance is None else f"{row.turn_distance:.5f}"
+            sizes = f"{row.diameter:.5f} | {row.outer_radius:.5f} | {row.inner_radius:.5f} | {row.pitch:.5f} | {apart}"
+            answers = " | ".join("yes" if answer else "no" for answer in (row.realisable, row.realisable_by_simple_rule))
+            lines.append(f"| {np.degrees(row.angle):.4g} | {row.contraction:.4g} | {sizes} | {answers} |")
+        return "\n".join(lines) + "\n"
+
+    def write_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the table as CSV, full precision: the fields of `ShapeRow` with their units, `true` or `false`, empty for None.
+
+        Args:
+            path: File to write.
+            overwrite: Replace an existing file.
+
+        Returns:
+            The path of the file.
+
+        Raises:
+            ParameterError: If it is no path.
+            OutputExists: If the file exists and `overwrite` is false.
+            OutputError: If it cannot be written.
+        """
+        target = new_file(path, overwrite=overwrite)
+
+        def write(file: IO[bytes]) -> None:
+            text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+            writer = csv.writer(text)
+            writer.writerow(f"{name} [{unit}]" if unit else name for name, unit in _COLUMNS.items())
+            writer.writerows([_cell(value) for value in row.values()] for row in self.as_rows())
+            text.flush()
+            text.detach()
+
+        write_atomically(target, write)
+        return target
+
+
+_UNITS = ("rad", "-", "m", "m", "m", "m/rad", "m", "", "")
+_COLUMNS = {field.name: unit for field, unit in zip(fields(ShapeRow), _UNITS, strict=True)}
+
+
+def shape_table(contraction: Any, angle: Any, diameter: Any) -> ShapeTable:
+    """Helices and whether they can be built, for any actuators.
+
+    Args:
+        contraction: Contracted over original length of the actuator `lambda`, in (0, 1] [-].
+        angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
+        diameter: Diameter `D` of the tube, positive [m].
+
+    Returns:
+        A row for each entry of the common shape of the arguments, the last axis fastest.
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+        StraightTube: At contraction 1 and angle 0, where no helix exists.
+    """
+    shares, angles, sizes = np.broadcast_arrays(*checked_actuator(contraction, angle, diameter))
+    shape = forward(shares, angles, sizes)
+    contact = self_contact(shape)
+    apart = contact.turn_distance.astype(object)
+    apart[~contact.has_neighbours] = None
+    columns = (
+        angles,
+        shares,
+        sizes,
+        shape.outer_radius,
+        shape.inner_radius,
+        shape.pitch,
+        apart,
+        ~contact.touches,
+        shape.turn_height >= sizes,
+    )
+    return ShapeTable(tuple(ShapeRow(*values) for values in zip(*(column.ravel().tolist() for column in columns), strict=True)))
+
+
+def paper_grid() -> ShapeTable:
+    """The helices of the paper: three angles by five contractions, then one helix in two sizes, `PAPER_SCALED`."""
+    grid = shape_table(PAPER_CONTRACTIONS, np.array(PAPER_ANGLES)[:, None], PAPER_DIAMETER)
+    return ShapeTable(grid.rows + shape_table(*PAPER_SCALED).rows)
+
+
+def _cell(value: float | bool | None) -> str:
+    """One cell of the CSV file."""
+    if value is None:
+        return ""
+    return repr(value).lower()

@@ -1,0 +1,135 @@
+r"""Grasp force of a pressurised helix around a cylinder that is thicker than its natural inner radius.
+
+[Blumenschein 2018] measures the force that closes a cylinder cut along its axis, and explains by virtual work why it is linear in
+the pressure, `F = P dV/dL` (18); `L` is the gap between the two halves. It gives no volume. The two bounds here are ours; the
+force is the smaller one, because the tube yields in the way that is easier:
+
+(a) *Unwrapping*. Opening by `dL` makes the way around both halves longer by `2 dL`, as a radius larger by `dR = dL/pi` would. The
+inner line keeps its length and the helix its pitch, so the tube unwinds a little and loses volume:
+
+.. math:: V(R) = \frac{\pi D^2}{4} L_i \sqrt{\frac{(R + D/2)^2 + b^2}{R^2 + b^2}}, \qquad
+   L_i = 2\pi N\sqrt{R_0^2 + b^2}, \qquad F_a = -\frac{P}{\pi}\frac{dV}{dR}\Big|_{R_0}
+
+(b) *Contact*. The object, of radius `R0`, presses the wall flat by `delta`, its radius less the natural inner one. The pressure
+acts on a strip as wide as the chord that cuts `delta` from the circular section, along the inner line:
+
+.. math:: F_b = 2 N P\,w \sqrt{R_0^2 + b^2}, \qquad w = 2\sqrt{\delta(D - \delta)}
+
+Assumptions: the wall is inextensible, wrinkles for nothing and has no stiffness; sections are circles normal to the centre line
+(in (b) but for the strip); pressure is constant; the object is a rigid circular cylinder along the axis of the helix; no friction;
+the helix touches all along its inner line, at the natural pitch; ends do nothing; force is averaged over where the cut lies, so
+that turns need not be whole. (a) does not depend on `delta`: the force rises with it up to (a) and stays there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.checks import FloatArray, common_shape, finite_array, positive_array, read_only
+from softrobots.errors import ParameterError
+
+
+class GraspTest(NamedTuple):
+    """What was grasped in a test, and by what helix."""
+
+    object_radius: float
+    """Radius of the object [m]."""
+    turn_height: float
+    """Rise of the helix per turn [m]."""
+    turns: float
+    """Turns around the object [-]."""
+    deflections: tuple[float, ...]
+    """Radius of the object less the natural inner radius of each helix tested [m]."""
+    diameter: float
+    """Diameter of the tube [m]."""
+
+
+PAPER_CYLINDER = GraspTest(object_radius=0.020, turn_height=0.080, turns=1.5, deflections=(0.0, 0.002, 0.004), diameter=0.0331)
+"""[Blumenschein 2018] section III-C: a cylinder 4.0 cm thick. The text tests helix radii up to "4.0 cm", where 2.0 must be meant.
+The diameter of the tube is not told there; 3.31 cm, that of the shape tests, is our assumption."""
+
+
+@dataclass(frozen=True, eq=False)
+class GraspForce:
+    """What `grasp_force` finds: read-only arrays of the common shape of its arguments, which are kept too."""
+
+    pressure: FloatArray
+    """Gauge pressure of the tube [Pa]."""
+    object_radius: FloatArray
+    """Radius of the cylinder [m]."""
+    deflection: FloatArray
+    """Radius of the cylinder less the natural inner radius of the helix [m]."""
+    turn_height: FloatArray
+    """Rise of the helix per turn [m]."""
+    turns: FloatArray
+    """Turns around the cylinder [-]."""
+    diameter: FloatArray
+    """Diameter of the tube [m]."""
+    volume: FloatArray
+    """Volume of the tube around the object [m^3]."""
+    volume_slope: FloatArray
+    """Its derivative `dV/dL` by the gap between the halves [m^2]; negative where the tube grips."""
+    contact_width: FloatArray
+    """Width of the flattened strip [m]."""
+    unwrapping: FloatArray
+    """Bound (a) [N]; zero where opening gains volume: on so steep a helix the pressure does not hold the turns closed."""
+    contact: FloatArray
+    """Bound (b) [N]."""
+    force: FloatArray
+    """Grasp force, the smaller bound [N]: what one half presses on the other."""
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name in self.__dataclass_fields__:
+            object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
+
+
+def grasp_force(
+    pressure: Any, *, object_radius: Any, deflection: Any, turn_height: Any, turns: Any, diameter: Any
+) -> GraspForce:
+    """Force with which a pressurised helix closes a cylinder cut along its axis; see the module for the model, which is ours.
+
+    Args:
+        pressure: Gauge pressure of the tube, zero or positive [Pa].
+        object_radius: Radius of the cylinder, positive [m].
+        deflection: Radius of the cylinder less the natural inner radius of the helix [m]; from 0 to the radius of the tube and
+            that of the cylinder.
+        turn_height: Rise of the helix per turn, `2 pi b`, zero or positive; beyond one turn at least the diameter of the tube [m].
+        turns: Turns around the cylinder, positive [-].
+        diameter: Diameter of the tube, positive [m].
+
+    Returns:
+        The force, its two bounds and the volume.
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    pressures, depths = finite_array("pressure", pressure, None, "Pa"), finite_array("deflection", deflection, None, "m")
+    if np.any(pressures < 0.0):
+        raise ParameterError("pressure", pressure, "zero or positive [Pa]")
+    radii, heights = positive_array("object_radius", object_radius, "m"), finite_array("turn_height", turn_height, None, "m")
+    if np.any(heights < 0.0):
+        raise ParameterError("turn_height", turn_height, "zero or positive [m]")
+    counts, sizes = positive_array("turns", turns, "-"), positive_array("diameter", diameter, "m")
+    given = (pressures, radii, depths, heights, counts, sizes)
+    shape = common_shape("diameter", *(values.shape for values in given))
+    pressures, radii, depths, heights, counts, sizes = (np.array(np.broadcast_to(values, shape)) for values in given)
+    if np.any(depths < 0.0) or np.any(depths > np.minimum(0.5 * sizes, radii)):
+        most = np.minimum(0.5 * sizes, radii)
+        raise ParameterError("deflection", deflection, f"from 0 to {most} m, the radius of the tube or that of the object")
+    if np.any((heights < sizes) & (counts > 1.0)):
+        raise ParameterError("turn_height", turn_height, f"at least the diameter of the tube {sizes} m, or the turns collide")
+    pitch = heights / (2.0 * np.pi)
+    inner, centre = np.hypot(radii, pitch), np.hypot(radii + 0.5 * sizes, pitch)  # path length per turn angle
+    area = 0.25 * np.pi * sizes**2
+    volume = area * 2.0 * np.pi * counts * centre
+    # d(centre/inner)/dR at a fixed inner length
+    change = 0.5 * sizes * (pitch / inner * (pitch / centre) - radii / inner * ((radii + 0.5 * sizes) / centre))
+    slope = 2.0 * counts * area * (change / inner)
+    width = 2.0 * np.sqrt(depths * (sizes - depths))
+    unwrapping, contact = pressures * np.maximum(-slope, 0.0), 2.0 * counts * pressures * width * inner
+    force = np.minimum(unwrapping, contact)
+    return GraspForce(pressures, radii, depths, heights, counts, sizes, volume, slope, width, unwrapping, contact, force)

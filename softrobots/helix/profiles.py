@@ -1,0 +1,115 @@
+"""A quantity of the actuator along the tube: a number, a function of the position, or a table; checked, and cut into pieces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import LARGEST, FloatArray, finite_array, finite_number
+from softrobots.errors import ParameterError
+
+_RANGES = {
+    "contraction": (1.0 / LARGEST, 1.0, "in (0, 1]: contracted over original length"),
+    "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), "in [0, pi/2) rad"),
+}
+_ROUNDING = 1e-12  # of the length: by how much a table may end too early
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """One quantity along the tube, as `checked_profile` makes it."""
+
+    name: str
+    """What it is: "contraction" or "angle"."""
+    length: float
+    """Length of the tube, from 0 [m]."""
+    function: Callable[[float], Any] | None
+    """A function of the position; None for a table."""
+    positions: FloatArray
+    """Positions of the table, not decreasing; a position that comes twice is a jump [m]. Empty for a function."""
+    values: FloatArray
+    """Values of the table."""
+
+    @property
+    def knots(self) -> list[float]:
+        """Positions inside the tube between which it is smooth, as far as known [m]."""
+        return [knot for knot in self.positions.tolist() if 0.0 < knot < self.length]
+
+    def on_piece(self, start: float, end: float) -> Callable[[float], float]:
+        """The quantity between two neighbouring breakpoints, with the values inside the piece at its ends.
+
+        Args:
+            start: Where the piece starts [m].
+            end: Where it ends [m].
+
+        Returns:
+            A function of the position in [start, end], which raises ParameterError where it has no acceptable value.
+        """
+        if self.function is not None:
+            first = start if start == 0.0 else math.nextafter(start, math.inf)  # a function may jump at a breakpoint
+            last = end if end == self.length else math.nextafter(end, -math.inf)
+            return lambda position: self._call(min(max(position, first), last))
+        place = min(int(np.searchsorted(self.positions, start, side="right")), len(self.positions) - 1)
+        left, right = self.positions[place - 1 : place + 1].tolist()
+        value, after = self.values[place - 1 : place + 1].tolist()
+        low, high, rate = min(value, after), max(value, after), (after - value) / (right - left)
+        return lambda position: min(max(value + rate * (position - left), low), high)
+
+    def _call(self, position: float) -> float:
+        """The value of the function, checked."""
+        low, high, requirement = _RANGES[self.name]
+        where = f" at the position {position!r} m"
+        try:
+            value = self.function(position) if self.function is not None else None
+        except Exception as error:  # the caller's function may raise anything
+            raise ParameterError(self.name, self.function, f"a function with a value{where}, which raised {error!r}") from error
+        if not isinstance(value, float):
+            given = np.asarray(value)
+            if given.shape != () or given.dtype.kind not in "fiu":
+                raise ParameterError(self.name, value, f"one number{where}")
+            value = float(given)
+        if not low <= value <= high:  # NaN too
+            raise ParameterError(self.name, value, requirement + where)
+        return value
+
+
+def checked_profile(name: str, given: Any, length: float) -> Profile:
+    """Return a quantity along the tube.
+
+    Args:
+        name: "contraction" or "angle".
+        given: A number, a function of the position [m], or a pair (positions, values).
+        length: Length of the tube [m].
+
+    Raises:
+        ParameterError: If it is none of these, a value is out of range, or the positions do not reach from 0 to the length, or
+            decrease, or come more than twice, or twice at an end.
+    """
+    low, high, requirement = _RANGES[name]
+    if callable(given):
+        return Profile(name, length, given, np.zeros(0), np.zeros(0))
+    if isinstance(given, tuple | list) or (isinstance(given, np.ndarray) and given.ndim > 0):
+        if len(given) != 2:
+            raise ParameterError(name, given, "a number, a function of the position, or a pair (positions, values)")
+        positions = finite_array(f"{name} positions", given[0], (None,), "m")
+        values = finite_array(name, given[1], positions.shape)
+        if len(positions) < 2 or positions[0] > 0.0 or positions[-1] < length * (1.0 - _ROUNDING):
+            raise ParameterError(f"{name} positions", given[0], f"a table of the whole tube, 0 to {length!r} m")
+        steps = np.diff(positions)
+        twice = steps == 0.0
+        if np.any(steps < 0.0) or twice[0] or twice[-1] or np.any(twice[1:] & twice[:-1]):
+            raise ParameterError(f"{name} positions", given[0], "increasing; one inside that comes twice is a jump")
+        if np.any((steps < 1.0 / LARGEST) & ~twice):
+            raise ParameterError(f"{name} positions", given[0], f"apart by at least {1.0 / LARGEST:g} m, or equal")
+    else:
+        number = finite_number(name, given)
+        positions, values = np.array([0.0, length]), np.array([number, number])
+    wrong = np.flatnonzero((values < low) | (values > high))
+    if wrong.size:
+        where = f" at the position {float(positions[wrong[0]])!r} m"
+        raise ParameterError(name, float(values[wrong[0]]), requirement + where)
+    return Profile(name, length, None, positions, values)

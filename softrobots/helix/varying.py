@@ -1,0 +1,285 @@
+r"""A tube whose actuator changes along it: contraction `lambda(s)` and angle `theta(s)`, the future work of [Blumenschein 2018].
+
+`s` is the position on the axis of the uninflated tube. The frames have z along the centre line and x towards the actuator, as
+those of a helix (`frames`). Per length of the uninflated tube they move along z by `v` and turn by `omega`:
+
+.. math:: v = \frac{|1 + \zeta|}{2\cos\theta}, \qquad
+   \omega = \left(0,\; v\,\kappa_c,\; \sigma\,\frac{4\lambda\sin\theta}{D\,|1 + \zeta|}\right), \qquad
+   \zeta = \lambda e^{2 i\theta}
+
+which are the formulas of the constant actuator, taken at each place (ours). With them the outer line keeps its length, the actuator
+contracts to `lambda` and the two lines enclose the angle `2 theta` at each place, exactly, for any `lambda(s)` and `theta(s)`: the
+constraints (6), (7) and (11) of the paper. The assumption is that nothing else acts between neighbouring places: sections stay
+circles normal to the centre line, as they do where the actuator changes slowly, i.e. little over one diameter of the tube.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import FloatArray, choice, finite_array, finite_number, positive_integer, positive_number, read_only
+from softrobots.errors import MissingDependency, ParameterError
+from softrobots.helix.paths import actuator_curvature_torsion
+from softrobots.helix.profiles import Profile, checked_profile
+from softrobots.helix.shapes import PATHS, turning_sign
+
+_MOST_ROTATION = 1e5  # rad along the tube, some 16000 turns: half a minute of integration
+_MOST_SAMPLES = 1_000_000
+_TIGHTEST, _LOOSEST = 1e-13, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class BentTube:
+    """A bent tube, sampled from base to tip, as `bent_tube` makes it; the arrays are read-only."""
+
+    rest_positions: FloatArray
+    """Positions `s` of the samples on the axis of the uninflated tube, shape (n,) [m]."""
+    poses: FloatArray
+    """Frames on the centre line in that of the base, shape (n, 4, 4) [m]: z along the tube, x towards the actuator."""
+    arc_length: FloatArray
+    """Length of the centre line from the base, shape (n,) [m]."""
+    contraction: FloatArray
+    """Contraction `lambda` there, shape (n,) [-]; where it jumps, the value after the jump."""
+    angle: FloatArray
+    """Angle `theta` there, shape (n,) [rad]; where it jumps, the value after the jump."""
+    curvature: FloatArray
+    """Rotation about y per centre length, `kappa_c`, shape (n,) [1/m]."""
+    torsion: FloatArray
+    """Rotation about z per centre length, `tau_c`, signed by handedness, shape (n,) [1/m]. It is the torsion of the centre line
+    where that is curved; the frame of a straight piece turns with the actuator too."""
+    diameter: float
+    """Diameter `D` of the tube [m]."""
+    length: float
+    """Length of the uninflated tube [m]."""
+    handedness: str
+    """ "right" or "left"."""
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name in ("rest_positions", "poses", "arc_length", "contraction", "angle", "curvature", "torsion"):
+            object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
+
+    @property
+    def centre_line(self) -> FloatArray:
+        """Points of the centre line, shape (n, 3) [m]."""
+        return self.points("centre")
+
+    @property
+    def inner_line(self) -> FloatArray:
+        """Points of the actuator, shape (n, 3) [m]."""
+        return self.points("inner")
+
+    @property
+    def outer_line(self) -> FloatArray:
+        """Points of the line opposite the actuator, shape (n, 3) [m]."""
+        return self.points("outer")
+
+    def points(self, path: str = "centre") -> FloatArray:
+        """Points of one of `PATHS`, shape (n, 3) [m].
+
+        Raises:
+            ParameterError: If there is no such path.
+        """
+        offset = {"inner": 0.5, "centre": 0.0, "outer": -0.5}[choice("path", path, PATHS)] * self.diameter
+        return read_only(self.poses[:, :3, 3] + offset * self.poses[:, :3, 0])
+
+
+def bent_tube(
+    contraction: Any,
+    angle: Any,
+    diameter: float,
+    length: float,
+    *,
+    handedness: str = "right",
+    samples: Any = 201,
+    tolerance: float = 1e-12,
+    breakpoints: Any = (),
+) -> BentTube:
+    """Shape of a tube whose actuator changes along it: the frames of the module, integrated by SciPy's DOP853.
+
+    Contraction and angle are each a number, a function that takes a position [m] and returns a number, or a pair
+    (positions, values): straight between them, and a jump where a position comes twice. The integrator starts anew at the
+    positions of tables and at breakpoints; through functions it goes in steps of at most the diameter, or 1/10000 of the tube if
+    that is more, so that it does not step over what they do. The tube starts at the origin along z, with the actuator on the side of x. A straight
+    tube (contraction 1, angle 0) or piece is as good as any. That turns do not collide is not checked.
+
+    Args:
+        contraction: Contracted over original length of the actuator `lambda`, in (0, 1] [-].
+        angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
+        diameter: Diameter `D` of the tube, positive [m].
+        length: Length of the uninflated tube, positive [m].
+        handedness: "right" or "left".
+        samples: How many samples, equally spaced with both ends, at least 2; or their positions, increasing, in [0, length] [m].
+        tolerance: Local error of the integrator, of lengths as a share of that of the tube and of rotations [rad]; from 1e-13 to
+            1e-3. The error at the tip is larger by about the number of radians that the tube turns.
+        breakpoints: Positions where a function jumps or has a kink, increasing, within the tube [m].
+
+    Returns:
+        The samples.
+
+    Raises:
+        ParameterError: If an argument is out of range; a function returns anything but one number in range somewhere, or raises
+            (the position is named); a table does not reach from 0 to the length; the tube turns by more than 1e5 rad; or the
+            integrator gets stuck, for a function that is not smooth between breakpoints.
+        MissingDependency: If SciPy is not installed.
+    """
+    size, extent = positive_number("diameter", diameter, "m"), positive_number("length", length, "m")
+    sign = turning_sign(handedness)
+    accuracy = finite_number("tolerance", tolerance)
+    if not _TIGHTEST <= accuracy <= _LOOSEST:
+        raise ParameterError("tolerance", tolerance, f"from {_TIGHTEST:g} to {_LOOSEST:g}")
+    shares, angles = checked_profile("contraction", contraction, extent), checked_profile("angle", angle, extent)
+    positions = _sample_positions(samples, extent)
+    cuts = finite_array("breakpoints", breakpoints, (None,), "m")
+    if np.any(cuts <= 0.0) or np.any(cuts >= extent) or np.any(np.diff(cuts) <= 0.0):
+        raise ParameterError("breakpoints", breakpoints, f"increasing, inside the tube, 0 to {extent!r} m")
+    ends = sorted({0.0, *shares.knots, *angles.knots, *cuts.tolist(), extent})
+    pieces = [_Piece(shares, angles, start, end, size, sign) for start, end in itertools.pairwise(ends)]
+    belongs = np.clip(np.searchsorted(ends, positions, side="right") - 1, 0, len(pieces) - 1)
+    local = np.array([pieces[i].actuator(s) for i, s in zip(belongs.tolist(), positions.tolist(), strict=True)])
+    scale = _scale(pieces, positions, extent, size)
+    smooth = shares.function is None and angles.function is None
+    states = _integrate(pieces, positions, belongs, scale, accuracy, math.inf if smooth else max(size, 1e-4 * extent))
+    curvature, torsion = actuator_curvature_torsion(local[:, 0], local[:, 1], size, "centre", handedness)
+    return BentTube(
+        rest_positions=positions,
+        poses=_poses(states, scale),
+        arc_length=scale * states[:, 7],
+        contraction=local[:, 0],
+        angle=local[:, 1],
+        curvature=curvature,
+        torsion=torsion,
+        diameter=size,
+        length=extent,
+        handedness=handedness,
+    )
+
+
+class _Piece:
+    """The tube between two neighbouring breakpoints."""
+
+    def __init__(self, shares: Profile, angles: Profile, start: float, end: float, diameter: float, sign: float) -> None:
+        self.start, self.end = start, end
+        self._share, self._angle = shares.on_piece(start, end), angles.on_piece(start, end)
+        self._diameter, self._sign = diameter, sign
+
+    def actuator(self, position: float) -> tuple[float, float]:
+        """Contraction and angle."""
+        return self._share(position), self._angle(position)
+
+    def rates(self, position: float) -> tuple[float, float, float]:
+        """Per length of the uninflated tube: length of the centre line [-], rotation about y and about z [rad/m]."""
+        share, angle = self._share(position), self._angle(position)
+        cosine = math.cos(angle)
+        ratio = math.hypot(1.0 - share, 2.0 * math.sqrt(share) * cosine)  # |1 + zeta|
+        scale = self._diameter * ratio
+        bending = (1.0 - share) * (1.0 + share) / (scale * cosine)
+        return ratio / (2.0 * cosine), bending, self._sign * 4.0 * share * math.sin(angle) / scale
+
+    def change(self, scale: float) -> Callable[[float, FloatArray], list[float]]:
+        """Derivative of the state: quaternion (w, x, y, z), position and centre length by `scale`."""
+
+        def derivative(position: float, state: FloatArray) -> list[float]:
+            w, x, y, z = state[:4].tolist()
+            along, bending, twist = self.rates(min(max(position, self.start), self.end))
+            share = along / scale
+            step = share / (w * w + x * x + y * y + z * z)
+            return [
+                -0.5 * (y * bending + z * twist),
+                0.5 * (y * twist - z * bending),
+                0.5 * (w * bending - x * twist),
+                0.5 * (w * twist + x * bending),
+                2.0 * step * (x * z + w * y),
+                2.0 * step * (y * z - w * x),
+                step * (w * w - x * x - y * y + z * z),
+                share,
+            ]
+
+        return derivative
+
+
+def _sample_positions(samples: Any, length: float) -> FloatArray:
+    """Positions of the samples."""
+    if not isinstance(samples, tuple | list | np.ndarray):
+        count = positive_integer("samples", samples, _MOST_SAMPLES)
+        if count < 2:
+            raise ParameterError("samples", samples, "at least 2, or positions [m]")
+        return np.linspace(0.0, length, count)
+    positions = finite_array("samples", samples, (None,), "m")
+    if not 0 < len(positions) <= _MOST_SAMPLES or np.any(np.diff(positions) <= 0.0):
+        raise ParameterError("samples", samples, f"increasing positions, from 1 to {_MOST_SAMPLES} of them [m]")
+    if positions[0] < 0.0 or positions[-1] > length:
+        raise ParameterError("samples", samples, f"positions from 0 to the length {length!r} m")
+    return positions
+
+
+def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter: float) -> float:
+    """Size of the bent tube [m], from a coarse look that also refuses more rotation than can be integrated."""
+    total, rotation = 0.0, 0.0
+    for piece in pieces:
+        inside = positions[(positions > piece.start) & (positions < piece.end)].tolist()
+        places = [piece.start, *inside, piece.end]
+        rates = [piece.rates(place) for place in places]
+        for (place, after), (one, two) in zip(itertools.pairwise(places), itertools.pairwise(rates), strict=True):
+            total += 0.5 * (after - place) * (one[0] + two[0])
+            rotation += 0.5 * (after - place) * (math.hypot(*one[1:]) + math.hypot(*two[1:]))
+    if rotation > _MOST_ROTATION:
+        raise ParameterError(
+            "length",
+            length,
+            f"such that a tube {diameter!r} m thick turns by at most {_MOST_ROTATION:g} rad, not {rotation:.3g}",
+        )
+    return max(total, length)
+
+
+def _integrate(
+    pieces: list[_Piece], positions: FloatArray, belongs: Any, scale: float, accuracy: float, longest: float
+) -> FloatArray:
+    """States at the samples, shape (n, 8)."""
+    try:
+        from scipy.integrate import solve_ivp
+    except ImportError as error:
+        raise MissingDependency("scipy", "helix") from error
+    state = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    states = np.zeros((len(positions), 8))
+    for place, piece in enumerate(pieces):
+        here = np.flatnonzero(belongs == place)
+        times = np.append(positions[here], piece.end)
+        if len(here) and times[-2] == piece.end:
+            times = times[:-1]
+        span = (piece.start, piece.end)
+        found = solve_ivp(piece.change(scale), span, state, "DOP853", times, max_step=longest, rtol=accuracy, atol=accuracy)
+        if not found.success:
+            raise ParameterError(
+                "breakpoints",
+                [p.start for p in pieces[1:]],
+                f"such that contraction and angle are smooth between them (stuck after {piece.start!r} m: {found.message})",
+            )
+        states[here] = found.y.T[: len(here)]
+        state = found.y[:, -1]
+        state[:4] /= np.linalg.norm(state[:4])
+    states[:, :4] /= np.linalg.norm(states[:, :4], axis=1, keepdims=True)
+    return states
+
+
+def _poses(states: FloatArray, scale: float) -> FloatArray:
+    """Frames from states, shape (n, 4, 4)."""
+    w, x, y, z = states[:, :4].T
+    made = np.zeros((len(states), 4, 4))
+    rows = (
+        (w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
+    for row, entries in enumerate(rows):
+        for column, entry in enumerate(entries):
+            made[:, row, column] = entry
+    made[:, :3, 3] = scale * states[:, 4:7]
+    made[:, 3, 3] = 1.0
+    return made
