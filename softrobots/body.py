@@ -12,6 +12,7 @@ from softrobots.equilibrium import Equilibrium
 from softrobots.errors import NameNotFound, ParameterError
 from softrobots.model import SoftModel
 from softrobots.screws import Screw
+from softrobots.urdf_tags import LineTag, MuscleTag
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,8 @@ class SegmentBody:
     """Radius of the body [m]."""
     muscles: dict[str, FloatArray]
     """Points along each muscle, by name, shape (n, 3) [m]."""
+    lines: dict[str, FloatArray]
+    """Points along each line that is only drawn, by name, shape (n, 3) [m]."""
 
     @property
     def backbone(self) -> FloatArray:
@@ -44,11 +47,40 @@ class SegmentBody:
         """
         return tube(self.poses[:, :3, :3], self.backbone, self.radius, sides)
 
-    def muscle_surface(self, name: str, radius: float, sides: int = 8) -> tuple[FloatArray, FloatArray]:
-        """Triangles of a tube around a muscle, as in `surface`.
+    def thinned(self, spacing: float) -> SegmentBody:
+        """The same body without frames that follow another within less than a spacing [m]; the last one stays."""
+        steps = np.linalg.norm(np.diff(self.backbone, axis=0), axis=1)
+        kept, run = [0], 0.0
+        for number, step in enumerate(steps.tolist(), start=1):
+            run += step
+            if run >= spacing:
+                kept.append(number)
+                run = 0.0
+        if kept[-1] != len(steps):
+            kept[-1:] = [kept[-1], len(steps)] if kept[-1] == 0 else [len(steps)]
+        chosen = {name: points[kept] for name, points in self.muscles.items()}
+        return SegmentBody(self.number, self.poses[kept], self.radius, chosen, {n: p[kept] for n, p in self.lines.items()})
+
+    def dome(self, sides: int = 24, rings: int = 6) -> tuple[FloatArray, FloatArray]:
+        """Triangles of half a ball on the end of the tube, the tip of a tube that everts there.
 
         Args:
-            name: The muscle.
+            sides: Corners of its cross-section.
+            rings: Cross-sections.
+
+        Returns:
+            Corners, shape ((rings + 1) sides + 2, 3) [m], and the corners of each triangle, as in `surface`.
+        """
+        angle = 0.5 * np.pi * np.arange(rings + 1) / (rings + 0.5)  # not to the pole, where a ring would be a point
+        poses = np.tile(self.poses[-1], (rings + 1, 1, 1))
+        poses[:, :3, 3] += self.radius * np.sin(angle)[:, None] * poses[:, :3, 2]
+        return tube(poses[:, :3, :3], poses[:, :3, 3], self.radius * np.cos(angle), sides)
+
+    def muscle_surface(self, name: str, radius: float, sides: int = 8) -> tuple[FloatArray, FloatArray]:
+        """Triangles of a tube around a muscle or a line, as in `surface`.
+
+        Args:
+            name: The muscle, or the line.
             radius: Radius of the tube [m].
             sides: Corners of its cross-section.
 
@@ -56,20 +88,21 @@ class SegmentBody:
             Corners and triangles.
 
         Raises:
-            NameNotFound: If no muscle of the segment is called that.
+            NameNotFound: If no muscle or line of the segment is called that.
         """
-        if name not in self.muscles:
-            raise NameNotFound("muscle", name, self.muscles)
-        return tube(self.poses[:, :3, :3], self.muscles[name], radius, sides)
+        there = self.muscles | self.lines
+        if name not in there:
+            raise NameNotFound("muscle", name, there)
+        return tube(self.poses[:, :3, :3], there[name], radius, sides)
 
 
-def tube(rotations: FloatArray, centres: FloatArray, radius: float, sides: int) -> tuple[FloatArray, FloatArray]:
+def tube(rotations: FloatArray, centres: FloatArray, radius: FloatArray | float, sides: int) -> tuple[FloatArray, FloatArray]:
     """Triangles of a closed tube.
 
     Args:
         rotations: Axes of each cross-section, which lies in x and y, shape (n, 3, 3).
         centres: Centre of each, shape (n, 3) [m].
-        radius: Radius [m].
+        radius: Radius of all, or of each, shape (n,) [m].
         sides: Corners of a cross-section.
 
     Returns:
@@ -77,8 +110,9 @@ def tube(rotations: FloatArray, centres: FloatArray, radius: float, sides: int) 
         anticlockwise.
     """
     rings, angle = len(centres), 2.0 * np.pi * np.arange(sides) / sides
-    ring = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
-    corners = np.einsum("nij,sj->nsi", rotations, ring) + centres[:, None, :]
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    sizes = np.broadcast_to(radius, rings)
+    corners = np.einsum("n,nij,sj->nsi", sizes, rotations, ring) + centres[:, None, :]
     start = sides * np.repeat(np.arange(rings - 1), sides)
     here, there = np.tile(np.arange(sides), rings - 1), np.tile((np.arange(sides) + 1) % sides, rings - 1)
     low = np.column_stack([start + here, start + there, start + sides + there])
@@ -147,14 +181,16 @@ def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, point
             poses.append(pose @ steps)
             pose = poses[-1][-1]
         frames = np.concatenate(poses)
-        muscles = {
-            tag.name: frames[:, :3, 3]
-            + tag.distance * (np.cos(tag.azimuth) * frames[:, :3, 0] + np.sin(tag.azimuth) * frames[:, :3, 1])
-            for tag in structure.muscles
-            if tag.segment == number
-        }
-        made.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles))
+        muscles = {tag.name: _along(frames, tag) for tag in structure.muscles if tag.segment == number}
+        lines = {tag.name: _along(frames, tag) for tag in structure.parts.lines if tag.segment == number}
+        made.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles, lines))
     return tuple(made)
+
+
+def _along(frames: FloatArray, tag: MuscleTag | LineTag) -> FloatArray:
+    """Points beside a backbone, shape (n, 3)."""
+    aside = np.cos(tag.azimuth) * frames[:, :3, 0] + np.sin(tag.azimuth) * frames[:, :3, 1]
+    return np.asarray(frames[:, :3, 3] + tag.distance * aside)
 
 
 def _start(model: SoftModel, data: object, row: int) -> FloatArray:

@@ -52,6 +52,8 @@ def shape(equilibrium: Equilibrium) -> Any:
             pushes = forces[name] < 0.0
             text = "muscle that pushes" if pushes else "muscle that pulls"
             axes.plot(*points.T, color=_PUSH if pushes else _PULL, lw=1.6, ls="--" if pushes else "-", label=label(text))
+        for name, points in segment.lines.items():
+            axes.plot(*points.T, color=_PULL, lw=1.6, label=label(name))
         for pose in segment.poses[:: max(1, len(segment.poses) // 6)]:
             axes.plot(*_circle(pose, segment.radius).T, color="0.7", lw=0.8)
         axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label=label("end of a segment"))

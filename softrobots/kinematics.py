@@ -49,3 +49,23 @@ def frame_jacobian(model: SoftModel, q: FloatArray, frame: str) -> FloatArray:
         return np.zeros((6, 0))
     jacobian = pin.computeFrameJacobian(pin_model, data, q, model.frame_id(frame), _AXES)
     return np.asarray(jacobian).reshape(6, pin_model.nv)
+
+
+def backbone(model: SoftModel, q: FloatArray) -> FloatArray:
+    """Origins of the joints from base to tip at a configuration, shape (n, 3) [m]; repeated points are dropped.
+
+    Args:
+        model: The robot.
+        q: Pinocchio's configuration, shape (nq,).
+    """
+    pin_model, data = model.workspace(None)
+    pin.forwardKinematics(pin_model, data, q)
+    frame = model.frame_id(model.tip)
+    points = [np.array(pin.updateFramePlacement(pin_model, data, frame).translation)]
+    joint = pin_model.frames[frame].parentJoint
+    while joint > 0:
+        point = np.array(data.oMi[joint].translation)
+        if float(np.linalg.norm(point - points[-1])) > 1e-12:
+            points.append(point)
+        joint = pin_model.parents[joint]
+    return np.array(points[::-1])

@@ -92,7 +92,7 @@ def load_model(
     return SoftModel(
         pinocchio_model=model,
         urdf=urdf,
-        parts=Parts(spring_tags, motor_names, tags.sections, lumped, tags.muscles, muscles),
+        parts=Parts(spring_tags, motor_names, tags.sections, lumped, tags.muscles, tags.lines, muscles),
         inflated_links=tags.inflated_links,
         tip=_tip(model, tip, label),
     )

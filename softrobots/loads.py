@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.checks import FloatArray, finite_array, read_only
+from softrobots.errors import ParameterError
 from softrobots.joint_loads import JointLoad
 from softrobots.model import SoftModel, check_model
 
@@ -122,6 +123,32 @@ class Load:
     def plus(self, frame: str, wrench: FloatArray) -> Load:
         """Return the load with one more wrench, shape (6,) [N, N m], at a frame."""
         return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity)
+
+
+def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, FloatArray]:
+    """A uniform dead force along the sections of a robot, as wrenches at its sections.
+
+    Each half of a section passes its share to the nearer end (lumped: each section to its hinge), an approximation of second
+    order in the length of a section, like the chain. The half at the base loads nothing that moves.
+
+    Args:
+        model: A robot with sections.
+        force_per_length: Force per rest length, shape (3,) [N/m], world axes.
+
+    Returns:
+        Wrench, shape (6,) [N, N m], by frame: for `wrench=` of `solve_equilibrium`.
+
+    Raises:
+        ParameterError: If the robot has no sections, the shape differs or a number is not finite.
+    """
+    rows = check_model(model).structure.section_table
+    if not rows:
+        raise ParameterError("model", model, "a robot with sections (a PccArm or a HelixTube)")
+    force = finite_array("force_per_length", force_per_length, (3,), "N/m")
+    lengths = np.array([row.length for row in rows])
+    if model.structure.sections is not None:
+        lengths = 0.5 * (lengths + np.append(lengths[1:], 0.0))
+    return {row.name: np.concatenate([share * force, np.zeros(3)]) for row, share in zip(rows, lengths.tolist(), strict=True)}
 
 
 def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> JointLoad:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.body import SegmentBody
+from softrobots.body import SegmentBody, tube
 from softrobots.meshcat_shapes import material
 
 TUBE_COLOUR = (0.85, 0.74, 0.50, 0.32)
@@ -17,6 +17,11 @@ PULL_COLOUR = (0.00, 0.45, 0.70)
 PUSH_COLOUR = (0.90, 0.45, 0.00)
 """Orange of muscles that push; the two differ in lightness too."""
 
+TAIL_COLOUR = (0.25, 0.25, 0.28, 0.8)
+"""Dark grey of the wall inside a growing tube."""
+
+_TAIL = 0.28  # radius of that wall, of the radius of the body
+_MARKS = 24  # on the whole of it
 _MUSCLE_RADIUS = 0.09  # of the radius of the body
 
 
@@ -44,12 +49,20 @@ class BodyDrawing:
         self._root.delete()
         self.entries = {}
 
-    def animate(self, animation: Any, frames: Mapping[int, tuple[Sequence[SegmentBody], dict[str, float]]]) -> None:
+    def animate(
+        self,
+        animation: Any,
+        frames: Mapping[int, tuple[Sequence[SegmentBody], dict[str, float]]],
+        *,
+        everting: float | None = None,
+    ) -> None:
         """Draw one body a frame and let an animation show them in turn: meshcat can switch visibility, but bend nothing.
 
         Args:
             animation: A meshcat animation.
             frames: Body and tensions by number of frame.
+            everting: For a tube that grows at its tip, its length when it is whole [m]: the tip is drawn round, and the wall
+                that has not come out as a dark string inside.
         """
         self.clear()
         numbers = sorted(frames)
@@ -57,23 +70,54 @@ class BodyDrawing:
             node = self._root[f"frame_{place}"]
             if place > 0:  # before its shapes arrive, or they flash. A saved page starts to play before it sets properties: the
                 node.set_property("visible", False)  # first body, which is visible anyway, must not be told so again then
-            self._draw(node, *frames[number])
+            segments, tensions = frames[number]
+            if everting is None:
+                self._draw(node, segments, tensions)
+            else:
+                short = [segment.thinned(0.1 * segment.radius) for segment in segments]
+                self._draw(node, short, tensions, 14)
+                self._draw_eversion(node, short[-1], everting)
             # All tracks last as long as the animation: meshcat starts a shorter one anew when it is sought beyond its end.
             for when in sorted({numbers[0], number, numbers[min(place + 1, len(numbers) - 1)], numbers[-1]}):
                 shown = when == number
                 animation.at_frame(node, when).set_property("visible", "boolean", shown)
 
-    def _draw(self, node: Any, segments: Sequence[SegmentBody], tensions: dict[str, float]) -> None:
+    def _draw(self, node: Any, segments: Sequence[SegmentBody], tensions: dict[str, float], sides: int = 24) -> None:
         for segment in segments:
             self.entries["body"] = TUBE_COLOUR
             at = node[f"segment_{segment.number}"]
-            at["tube"].set_object(_mesh(*segment.surface()), material(TUBE_COLOUR))
+            at["tube"].set_object(_mesh(*segment.surface(sides)), material(TUBE_COLOUR))
             for name in segment.muscles:
                 pushes = tensions.get(name, 0.0) < 0.0
                 colour = PUSH_COLOUR if pushes else PULL_COLOUR
                 self.entries["muscle that pushes" if pushes else "muscle that pulls"] = colour
-                tube = segment.muscle_surface(name, _MUSCLE_RADIUS * segment.radius)
-                at[name].set_object(_mesh(*tube), material((*colour, 1.0)))
+                self._draw_line(at[name], segment, name, colour)
+            for name in segment.lines:
+                self.entries[name] = PULL_COLOUR
+                self._draw_line(at[name], segment, name, PULL_COLOUR)
+
+    def _draw_line(self, node: Any, segment: SegmentBody, name: str, colour: tuple[float, ...]) -> None:
+        node.set_object(_mesh(*segment.muscle_surface(name, _MUSCLE_RADIUS * segment.radius)), material((*colour, 1.0)))
+
+    def _draw_eversion(self, node: Any, segment: SegmentBody, length: float) -> None:
+        """The round tip, and the wall that comes forward inside at twice the speed of the tip, with marks on it."""
+        node["dome"].set_object(_mesh(*segment.dome()), material(TUBE_COLOUR))
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(segment.backbone, axis=0), axis=1))])
+        grown = float(along[-1])
+        if grown > 0.98 * length:
+            return
+        self.entries["wall that has not come out"] = TAIL_COLOUR
+        points = segment.backbone
+        tail = tube(segment.poses[:, :3, :3], points, _TAIL * segment.radius, 8)
+        node["tail"].set_object(_mesh(*tail), material(TAIL_COLOUR))
+        spacing = length / _MARKS
+        for mark in range(1, _MARKS + 1):
+            place = 2.0 * grown - mark * spacing
+            if 0.0 < place < grown:
+                at = int(np.searchsorted(along, place))
+                rows = [max(at - 1, 0), min(at, len(points) - 1)]
+                ring = tube(segment.poses[rows, :3, :3], points[rows], 1.6 * _TAIL * segment.radius, 8)
+                node[f"mark_{mark}"].set_object(_mesh(*ring), material(TAIL_COLOUR))
 
 
 def _mesh(points: Any, triangles: Any) -> Any:

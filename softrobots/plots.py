@@ -9,12 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.checks import FloatArray, finite_array, positive_integer
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import MissingDependency, ParameterError
-from softrobots.model import SoftModel
+from softrobots.kinematics import backbone
 from softrobots.trajectory import Trajectory
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito
@@ -188,26 +187,6 @@ def link_moments(trajectory: Trajectory) -> Any:
     axes.grid(alpha=0.3)
     axes.legend(fontsize=9)
     return figure
-
-
-def backbone(model: SoftModel, q: FloatArray) -> FloatArray:
-    """Origins of the joints from base to tip at a configuration, shape (n, 3) [m]; repeated points are dropped.
-
-    Args:
-        model: The robot.
-        q: Pinocchio's configuration, shape (nq,).
-    """
-    pin_model, data = model.workspace(None)
-    pin.forwardKinematics(pin_model, data, q)
-    frame = model.frame_id(model.tip)
-    points = [np.array(pin.updateFramePlacement(pin_model, data, frame).translation)]
-    joint = pin_model.frames[frame].parentJoint
-    while joint > 0:
-        point = np.array(data.oMi[joint].translation)
-        if float(np.linalg.norm(point - points[-1])) > 1e-12:
-            points.append(point)
-        joint = pin_model.parents[joint]
-    return np.array(points[::-1])
 
 
 def equal_box(axes: Any, points: FloatArray) -> None:

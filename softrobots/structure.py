@@ -14,7 +14,7 @@ from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordi
 from softrobots.muscle_lengths import MuscleLengths
 from softrobots.muscles import ElasticLaw, MuscleForces, Segments, muscle_matrix
 from softrobots.strain_chain import STRAINS, in_range
-from softrobots.urdf_tags import LumpedSectionTag, MuscleTag, SectionTag, SpringTag
+from softrobots.urdf_tags import LineTag, LumpedSectionTag, MuscleTag, SectionTag, SpringTag
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Parts:
     """Sections lumped into springs."""
     muscles: Sequence[MuscleTag] = field(default_factory=tuple)
     """Muscles."""
+    lines: Sequence[LineTag] = field(default_factory=tuple)
+    """Lines that are drawn."""
     muscle_input: str = "lengths"
     """What is given of the muscles, "lengths" or "forces"."""
 

@@ -109,6 +109,20 @@ class MuscleTag:
 
 
 @dataclass(frozen=True)
+class LineTag:
+    """A line along a segment, parallel to its backbone, that is drawn and does nothing: the actuator of a helix."""
+
+    name: str
+    """Name of the line."""
+    segment: int
+    """Number of the segment, from 1."""
+    azimuth: float
+    """Where it runs, from the x axis of the segment towards y [rad]."""
+    distance: float
+    """Distance from the backbone [m]."""
+
+
+@dataclass(frozen=True)
 class RobotTags:
     """Everything softrobots reads from a URDF beyond what Pinocchio reads."""
 
@@ -124,6 +138,8 @@ class RobotTags:
     """Lumped sections, in the order of the file."""
     muscles: tuple[MuscleTag, ...]
     """Muscles, in the order of the file."""
+    lines: tuple[LineTag, ...]
+    """Lines, in the order of the file."""
     mimics: tuple[str, ...]
     """Names of the joints that mimic another joint."""
 
@@ -159,6 +175,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         sections=sections,
         lumped_sections=tuple(_lumped_section(element, source, springs) for element in _ours(root, "lumped_section")),
         muscles=tuple(_muscle(element, source) for element in _ours(root, "muscle")),
+        lines=tuple(_line(element, source) for element in _ours(root, "line")),
         mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
     )
     _check_together(tags, source)
@@ -259,12 +276,18 @@ def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
     return MuscleTag(name, _segment(element, where), _number(element, "azimuth", where), **positive)
 
 
+def _line(element: ElementTree.Element, source: str) -> LineTag:
+    name = element.get("name", "")
+    where = f"the line {name!r} of {source}"
+    return LineTag(name, _segment(element, where), _number(element, "azimuth", where), _positive(element, "distance", where))
+
+
 def _check_together(tags: RobotTags, source: str) -> None:
     """Names are unique, no joint serves twice, and muscles run along segments that exist."""
     if tags.sections and tags.lumped_sections:
         raise DescriptionError(f"{source} has sections and lumped sections; one kind is required")
     _unique("section", [*(tag.name for tag in tags.sections), *(tag.name for tag in tags.lumped_sections)], source)
-    _unique("muscle", [tag.name for tag in tags.muscles], source)
+    _unique("muscle or line", [*(tag.name for tag in tags.muscles), *(tag.name for tag in tags.lines)], source)
     used = [joint for tag in tags.sections for joint in tag.joints]
     used += [joint for lumped in tags.lumped_sections for joint in lumped.joints.values()]
     _unique("joint of a section", used, source)
@@ -272,10 +295,11 @@ def _check_together(tags: RobotTags, source: str) -> None:
     if orphans:
         raise DescriptionError(f"{source} has joints with the role 'section' that no section names: {', '.join(orphans)}")
     segments = {tag.segment for tag in tags.sections} | {tag.segment for tag in tags.lumped_sections}
-    for muscle in tags.muscles:
-        if muscle.segment not in segments:
+    named = [("muscle", tag.name, tag.segment) for tag in tags.muscles]
+    for what, name, segment in [*named, *(("line", tag.name, tag.segment) for tag in tags.lines)]:
+        if segment not in segments:
             raise DescriptionError(
-                f"the muscle {muscle.name!r} of {source} runs along segment {muscle.segment}; "
+                f"the {what} {name!r} of {source} runs along segment {segment}; "
                 f"available: {', '.join(map(str, sorted(segments))) or 'none'}"
             )
 

@@ -7,16 +7,17 @@ import socket
 import time
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from softrobots.animation_frames import FRAME_RATE, Frame, even_frames, growth_frames, waypoint_frames
 from softrobots.body import body, body_at
 from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number
 from softrobots.equilibrium import Equilibrium, check_same_model
 from softrobots.errors import ParameterError, ViewerError
 from softrobots.files import new_file, write_atomically
-from softrobots.kinematics import frame_placement
+from softrobots.kinematics import backbone, frame_placement
 from softrobots.meshcat_arrows import ArrowDrawing
 from softrobots.meshcat_body import BodyDrawing
 from softrobots.meshcat_server import connect, end_server, start_server
@@ -31,11 +32,9 @@ from softrobots.meshcat_shapes import (
     wrinkling_rows,
 )
 from softrobots.model import SoftModel, check_model
+from softrobots.robots import HelixTube
 from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.trajectory import Trajectory
-
-_FRAME_RATE = 30
-_MOST_BODIES = 60  # shapes of a continuous body that an animation goes through
 
 
 class Viewer:
@@ -61,7 +60,10 @@ class Viewer:
         try:
             self._page = connect(zmq_url, self._url)
             self._root = self._page["softrobots"]
-            self._arrows = ArrowDrawing(self._root["load"])
+            self._size = _extent(model)
+            self._arrows = ArrowDrawing(self._root["load"], self._size)
+            self._ghost = _ghost(model)
+            self._loaded = False
             self._traced = False
             self._segments = bool(model.structure.section_table)
             self._levels: dict[int, int] = {}
@@ -113,6 +115,7 @@ class Viewer:
         for link in range(len(self._model.spring_groups)):
             self._colour(link, wrinkling_level(equilibrium, link))
         self._arrows.draw(equilibrium)
+        self._ghost, self._loaded = _ghost(self._model), True
 
     def show_configuration(self, q: FloatArray) -> None:
         """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling, the chain alone.
@@ -127,6 +130,7 @@ class Viewer:
         for link in range(len(self._model.spring_groups)):
             self._colour(link, 0)
         self._arrows.clear()
+        self._loaded = False
 
     def trace(self, points: Any) -> None:
         """Draw a path as dots.
@@ -171,17 +175,52 @@ class Viewer:
         self.show(trajectory.equilibria[0])
         self.look_at(trajectory.tip_positions.mean(axis=0))
         self.trace(trajectory.tip_positions)
-        animation = meshcat.animation.Animation(default_framerate=_FRAME_RATE)
-        frames = _even_frames(trajectory, seconds) if self._segments else _waypoint_frames(trajectory, seconds)
+        animation = meshcat.animation.Animation(default_framerate=FRAME_RATE)
+        frames = even_frames(trajectory, seconds) if self._segments else waypoint_frames(trajectory, seconds)
         for frame in frames:
             self._add_frame(animation, frame)
         if self._segments:
-            bodies = {
-                frame.number: (body_at(self._model, frame.q_motors, frame.q_springs, 6), _tensions(frame.equilibrium))
-                for frame in frames
-            }
-            self._body.animate(animation, bodies)
+            self._body.animate(
+                animation,
+                {
+                    frame.number: (body_at(self._model, frame.q_motors, frame.q_springs, 6), _tensions(frame.equilibrium))
+                    for frame in frames
+                },
+            )
         self._page.set_animation(animation, play=True, repetitions=repetitions)
+
+    def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
+        """Play the growth of a helical tube: it everts at its tip, and the helix forms behind the tip.
+
+        Wall that has come out stays where it is; the rest waits inside (dark) and comes forward at twice the speed of the tip.
+
+        Args:
+            tube: The tube that the viewer's model was made of, with chain="sections".
+            duration: Time of the animation [s].
+            front: Length of tube behind the tip over which the helix forms [m]; three diameters by default, 0: at the tip.
+            hold: Share of the time at the end during which the whole tube is shown, in [0, 1).
+
+        Raises:
+            ParameterError: If the tube is not that of the viewer's model, or an argument is out of range.
+            ViewerError: If the viewer is closed.
+        """
+        import meshcat.animation
+
+        self._check_open()
+        if not isinstance(tube, HelixTube) or tube.urdf() != self._model.urdf:
+            raise ParameterError("tube", tube, "the HelixTube that the viewer's model was loaded from")
+        frames = growth_frames(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
+        self.show_configuration(self._model.configuration((), self._model.rest))
+        self._ghost = "the whole tube"
+        whole = body_at(self._model, frames[-1].q_motors, self._model.rest)
+        middle = np.concatenate([segment.backbone for segment in whole])
+        self.look_at(middle.max(axis=0) + middle.min(axis=0))
+        animation = meshcat.animation.Animation(default_framerate=FRAME_RATE)
+        for frame in frames:
+            self._add_frame(animation, frame)
+        bodies = {f.number: (body_at(self._model, f.q_motors, f.q_springs, 3), _tensions(None)) for f in frames}
+        self._body.animate(animation, bodies, everting=tube.centre_length)
+        self._page.set_animation(animation, play=True, repetitions=1000)
 
     def look_at(self, tip: FloatArray) -> None:
         """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
@@ -193,7 +232,7 @@ class Viewer:
         shift[:3, 3] = -0.5 * tip
         self._root.set_transform(shift)
         azimuth = np.arctan2(tip[1], tip[0]) - np.deg2rad(78.0)
-        x, y, z = 0.94 * self._model.reach * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
+        x, y, z = 0.94 * self._size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
         # meshcat's camera has y up: (x, z, -y) of the scene.
         self._page["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
 
@@ -211,17 +250,14 @@ class Viewer:
 
     def _legend(self) -> list[tuple[tuple[float, ...] | int, str]]:
         """Colour and meaning of what is drawn."""
-        ghost = "rigid arm, same motor angles"
-        if self._model.muscles:
-            ghost = "without load, same muscle lengths" if self._model.muscle_input == "lengths" else "straight, at rest"
-        entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, ghost)]
-        if self._segments:
+        entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, self._ghost)]
+        if self._segments and not self._model.spring_groups:
             names = tuple(section.name for section in self._model.structure.section_table)
             chain = [shape.colour for shape in self._scene.shapes if shape.name.startswith(names)]
             entries += [(colour, "equivalent rigid chain") for colour in chain[:1]]
         entries += [(colour, text) for text, colour in self._body.entries.items()]
         entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
-        return entries + (list(wrinkling_rows()) if self._model.spring_groups else [])
+        return entries + (list(wrinkling_rows()) if self._model.spring_groups and self._loaded else [])
 
     def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
         """Write `html` to a file.
@@ -272,16 +308,16 @@ class Viewer:
         """White background, floor, and the camera; meshcat's camera looks at the origin, so the scene moves."""
         import meshcat.geometry as geometry
 
-        reach = self._model.reach
+        size = self._size
         self._page["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
         self._page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
         self._page["/Axes"].set_property("visible", False)
         self._page["/Grid"].set_property("visible", False)
         q = self._model.configuration(self._model.relaxed_motors)
         tip = np.array(frame_placement(self._model, q, self._model.tip).translation)
-        upright = np.hypot(tip[0], tip[1]) < 0.1 * reach
-        self.look_at(tip + [0.3 * reach if upright else -0.1 * reach, 0.0, 0.0 if upright else 0.2 * reach])
-        ends = np.concatenate([floor_lines(reach), floor_lines(reach)[:, [1, 0, 2]]])
+        upright = np.hypot(tip[0], tip[1]) < 0.1 * size
+        self.look_at(tip + [0.3 * size if upright else -0.1 * size, 0.0, 0.0 if upright else 0.2 * size])
+        ends = np.concatenate([floor_lines(size), floor_lines(size)[:, [1, 0, 2]]])
         lines = geometry.PointsGeometry(ends.T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
 
@@ -312,13 +348,15 @@ class Viewer:
                 self._root[f"deformed/{shape.name}/level_{level}"].set_property("visible", True)
         self._levels[link] = level
 
-    def _add_frame(self, animation: Any, frame: _Frame) -> None:
+    def _add_frame(self, animation: Any, frame: Frame) -> None:
         equilibrium, number = frame.equilibrium, frame.number
         deformed = self._model.embed(self._model.coordinates.at(frame.q_motors, frame.q_springs).joints)
         rigid = self._model.embed(self._model.coordinates.at(frame.q_motors, self._model.rest).joints)
         for group, q in (("deformed", deformed), ("rigid", rigid)):
             for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
                 animation.at_frame(self._root[f"{group}/{shape.name}"], number).set_transform(transform)
+        if equilibrium is None:
+            return
         self._arrows.add_frame(animation, number, equilibrium, deformed)
         for shape in self._scene.shapes:
             if shape.inflated_link is None:
@@ -356,43 +394,21 @@ def view(model: SoftModel, result: Equilibrium | Trajectory | None = None) -> Vi
     return viewer
 
 
-def _tensions(equilibrium: Equilibrium) -> dict[str, float]:
+def _extent(model: SoftModel) -> float:
+    """Largest distance of the chain from its base at rest [m]: the scale of the picture. Of a straight robot its reach."""
+    points = backbone(model, model.configuration(model.relaxed_motors))
+    return max(float(np.linalg.norm(points - points[0], axis=1).max()), 0.05 * model.reach)
+
+
+def _ghost(model: SoftModel) -> str:
+    """What the translucent robot is."""
+    if not model.muscles:
+        return "rigid arm, same motor angles" if model.n_motors else "without load"
+    return "without load, same muscle lengths" if model.muscle_input == "lengths" else "straight, at rest"
+
+
+def _tensions(equilibrium: Equilibrium | None) -> dict[str, float]:
+    if equilibrium is None:
+        return {}
     names = (muscle.name for muscle in equilibrium.model.muscles)
     return dict(zip(names, equilibrium.muscle_forces.tolist(), strict=True))
-
-
-class _Frame(NamedTuple):
-    """What a frame of an animation shows."""
-
-    number: int
-    q_motors: FloatArray
-    q_springs: FloatArray
-    equilibrium: Equilibrium
-    """The nearest waypoint."""
-
-
-def _waypoint_frames(trajectory: Trajectory, seconds: float) -> list[_Frame]:
-    """The waypoints, each at the frame nearest to its time."""
-    span = float(trajectory.times[-1] - trajectory.times[0])
-    share = (trajectory.times - trajectory.times[0]) / (span or 1.0)
-    numbers = np.rint(share * seconds * _FRAME_RATE).astype(int).tolist()
-    last = dict(zip(numbers, trajectory.equilibria, strict=True))
-    return [_Frame(number, e.q_motors, e.q_springs, e) for number, e in last.items()]
-
-
-def _even_frames(trajectory: Trajectory, seconds: float) -> list[_Frame]:
-    """Frames evenly over the time, between waypoints by linear interpolation: a bent body is drawn anew for each."""
-    total = max(round(seconds * _FRAME_RATE), 1)
-    numbers = np.unique(np.rint(np.linspace(0, total, min(_MOST_BODIES, total + 1))).astype(int))
-    times = trajectory.times[0] + (trajectory.times[-1] - trajectory.times[0]) * numbers / total
-    made = []
-    for number, moment in zip(numbers.tolist(), times, strict=True):
-        after = int(np.clip(np.searchsorted(trajectory.times, moment), 1, max(len(trajectory.times) - 1, 1)))
-        before, after = after - 1, min(after, len(trajectory.times) - 1)
-        interval = float(trajectory.times[after] - trajectory.times[before])
-        share = float(moment - trajectory.times[before]) / interval if interval > 0.0 else 0.0
-        motors, springs = (
-            (1.0 - share) * rows[before] + share * rows[after] for rows in (trajectory.q_motors, trajectory.q_springs)
-        )
-        made.append(_Frame(number, motors, springs, trajectory.equilibria[after if share > 0.5 else before]))
-    return made

@@ -427,7 +427,7 @@ def test_whatever_shape_is_accepted_gives_finite_numbers(outer: float, inner: fl
         found = helix.inverse(shape)
     except ParameterError as error:
         assert error.field == "shape"
-        assert outer > 1e10 * pitch  # noqa: PT017 (an actuator across the tube)
+        assert outer > 1e10 * pitch
         return
     assert np.all(np.isfinite(found))
 

@@ -60,7 +60,9 @@ def length_for_turns(shape: HelixShape, angle: Any, count: Any) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    return np.asarray(positive_array("count", count, "-") / turns(shape, angle, 1.0))
+    counts, per_metre = positive_array("count", count, "-"), turns(shape, angle, 1.0)
+    common_shape("count", counts.shape, per_metre.shape)
+    return np.asarray(counts / per_metre)
 
 
 def centre_length(contraction: Any, angle: Any, length: Any) -> FloatArray:

@@ -30,6 +30,7 @@ from softrobots.helix.profiles import Profile, checked_profile
 from softrobots.helix.shapes import PATHS, turning_sign
 
 _MOST_ROTATION = 1e5  # rad along the tube, some 16000 turns: half a minute of integration
+_EVALUATIONS, _EVALUATIONS_PER_RAD = 500_000, 50  # several times what smooth tubes need
 _MOST_SAMPLES = 1_000_000
 _TIGHTEST, _LOOSEST = 1e-13, 1e-3
 
@@ -105,9 +106,9 @@ def bent_tube(
 
     Contraction and angle are each a number, a function that takes a position [m] and returns a number, or a pair
     (positions, values): straight between them, and a jump where a position comes twice. The integrator starts anew at the
-    positions of tables and at breakpoints; through functions it goes in steps of at most the diameter, or 1/10000 of the tube if
-    that is more, so that it does not step over what they do. The tube starts at the origin along z, with the actuator on the side of x. A straight
-    tube (contraction 1, angle 0) or piece is as good as any. That turns do not collide is not checked.
+    positions of tables and at breakpoints. Through functions it goes in steps of at most the diameter, or 1/10000 of the tube if
+    that is more, so that it does not step over what they do. The tube starts at the origin along z, with the actuator on the
+    side of x. A straight tube (contraction 1, angle 0) or piece is as good as any. That turns do not collide is not checked.
 
     Args:
         contraction: Contracted over original length of the actuator `lambda`, in (0, 1] [-].
@@ -143,9 +144,16 @@ def bent_tube(
     pieces = [_Piece(shares, angles, start, end, size, sign) for start, end in itertools.pairwise(ends)]
     belongs = np.clip(np.searchsorted(ends, positions, side="right") - 1, 0, len(pieces) - 1)
     local = np.array([pieces[i].actuator(s) for i, s in zip(belongs.tolist(), positions.tolist(), strict=True)])
-    scale = _scale(pieces, positions, extent, size)
+    scale, rotation = _scale(pieces, positions, extent, size)
+    budget = _EVALUATIONS + int(_EVALUATIONS_PER_RAD * rotation) + _EVALUATIONS_PER_RAD * len(pieces)
     smooth = shares.function is None and angles.function is None
-    states = _integrate(pieces, positions, belongs, scale, accuracy, math.inf if smooth else max(size, 1e-4 * extent))
+    states = _integrate(
+        [(piece, positions[belongs == place]) for place, piece in enumerate(pieces)],
+        scale=scale,
+        accuracy=accuracy,
+        longest=math.inf if smooth else max(size, 1e-4 * extent),
+        budget=budget,
+    )
     curvature, torsion = actuator_curvature_torsion(local[:, 0], local[:, 1], size, "centre", handedness)
     return BentTube(
         rest_positions=positions,
@@ -159,6 +167,9 @@ def bent_tube(
         length=extent,
         handedness=handedness,
     )
+
+
+_Change = Callable[[float, FloatArray], list[float]]
 
 
 class _Piece:
@@ -182,7 +193,7 @@ class _Piece:
         bending = (1.0 - share) * (1.0 + share) / (scale * cosine)
         return ratio / (2.0 * cosine), bending, self._sign * 4.0 * share * math.sin(angle) / scale
 
-    def change(self, scale: float) -> Callable[[float, FloatArray], list[float]]:
+    def change(self, scale: float) -> _Change:
         """Derivative of the state: quaternion (w, x, y, z), position and centre length by `scale`."""
 
         def derivative(position: float, state: FloatArray) -> list[float]:
@@ -219,8 +230,8 @@ def _sample_positions(samples: Any, length: float) -> FloatArray:
     return positions
 
 
-def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter: float) -> float:
-    """Size of the bent tube [m], from a coarse look that also refuses more rotation than can be integrated."""
+def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter: float) -> tuple[float, float]:
+    """Size of the bent tube [m] and its rotation [rad], by a coarse look that refuses more than can be integrated."""
     total, rotation = 0.0, 0.0
     for piece in pieces:
         inside = positions[(positions > piece.start) & (positions < piece.end)].tolist()
@@ -235,37 +246,47 @@ def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter:
             length,
             f"such that a tube {diameter!r} m thick turns by at most {_MOST_ROTATION:g} rad, not {rotation:.3g}",
         )
-    return max(total, length)
+    return max(total, length), rotation
 
 
 def _integrate(
-    pieces: list[_Piece], positions: FloatArray, belongs: Any, scale: float, accuracy: float, longest: float
+    parts: list[tuple[_Piece, FloatArray]], *, scale: float, accuracy: float, longest: float, budget: int
 ) -> FloatArray:
-    """States at the samples, shape (n, 8)."""
+    """States at the samples in each piece, shape (n, 8)."""
     try:
         from scipy.integrate import solve_ivp
     except ImportError as error:
         raise MissingDependency("scipy", "helix") from error
+    cuts = [piece.start for piece, _ in parts[1:]]
+    spent = 0
+
+    def stuck(place: float, why: str) -> ParameterError:
+        what = f"such that contraction and angle are smooth between them (stuck at the position {place!r} m: {why})"
+        return ParameterError("breakpoints", cuts, what)
+
     state = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    states = np.zeros((len(positions), 8))
-    for place, piece in enumerate(pieces):
-        here = np.flatnonzero(belongs == place)
-        times = np.append(positions[here], piece.end)
-        if len(here) and times[-2] == piece.end:
-            times = times[:-1]
+    states = [np.zeros((0, 8))]
+    for piece, here in parts:
+        change = piece.change(scale)
+
+        def counted(position: float, now: FloatArray, change: _Change = change) -> list[float]:
+            nonlocal spent
+            spent += 1
+            if spent > budget:
+                raise stuck(position, f"more than {budget} evaluations")
+            return change(position, now)
+
+        times = here if len(here) and here[-1] == piece.end else np.append(here, piece.end)
         span = (piece.start, piece.end)
-        found = solve_ivp(piece.change(scale), span, state, "DOP853", times, max_step=longest, rtol=accuracy, atol=accuracy)
+        found = solve_ivp(counted, span, state, "DOP853", times, max_step=longest, rtol=accuracy, atol=accuracy)
         if not found.success:
-            raise ParameterError(
-                "breakpoints",
-                [p.start for p in pieces[1:]],
-                f"such that contraction and angle are smooth between them (stuck after {piece.start!r} m: {found.message})",
-            )
-        states[here] = found.y.T[: len(here)]
+            raise stuck(piece.start, str(found.message))
+        states.append(found.y.T[: len(here)])
         state = found.y[:, -1]
         state[:4] /= np.linalg.norm(state[:4])
-    states[:, :4] /= np.linalg.norm(states[:, :4], axis=1, keepdims=True)
-    return states
+    made = np.vstack(states)
+    made[:, :4] /= np.linalg.norm(made[:, :4], axis=1, keepdims=True)
+    return made
 
 
 def _poses(states: FloatArray, scale: float) -> FloatArray:
