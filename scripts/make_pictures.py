@@ -25,9 +25,16 @@ def loaded_pcc_arm() -> tuple[sr.SoftModel, sr.Equilibrium]:
     return model, sr.solve_equilibrium(model, (0.47, 0.53, 0.55, 0.50, 0.55, 0.53), (6, 4, -3), gravity=sr.EARTH_GRAVITY)
 
 
+def sagging_helix_tube() -> tuple[sr.SoftModel, sr.Equilibrium]:
+    """The helical tube under its own weight, the axis of the helix upright."""
+    model = sr.load_model(sr.HelixTube(length=2.0, elastic_sections=32, upright="axis"))
+    return model, sr.solve_equilibrium(model, (), gravity=sr.EARTH_GRAVITY)
+
+
 PICTURES = {
     "inflatable_arm": (loaded_inflatable_arm, "Inflatable arm, 18 N on the tip"),
     "pcc_arm": (loaded_pcc_arm, "PCC arm, held muscle lengths, own weight and 8 N on the tip"),
+    "helix_tube": (sagging_helix_tube, "Helical tube under its own weight"),
 }
 """What each picture shows, and its title."""
 

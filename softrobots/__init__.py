@@ -24,7 +24,7 @@ from softrobots.errors import (
 from softrobots.inverse_kinematics import IkSolution, solve_ik
 from softrobots.load_estimation import LoadEstimate, estimate_load
 from softrobots.loader import load_model
-from softrobots.loads import EARTH_GRAVITY
+from softrobots.loads import EARTH_GRAVITY, distributed_force
 from softrobots.model import SoftModel, SpringGroup
 from softrobots.results_io import load_result, save_csv, save_result
 from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
@@ -73,6 +73,7 @@ __all__ = [
     "compliance",
     "constant_curvature",
     "critical_load",
+    "distributed_force",
     "elastostatic_jacobian",
     "estimate_load",
     "follow_trajectory",

@@ -287,7 +287,7 @@ def _check_together(tags: RobotTags, source: str) -> None:
     if tags.sections and tags.lumped_sections:
         raise DescriptionError(f"{source} has sections and lumped sections; one kind is required")
     _unique("section", [*(tag.name for tag in tags.sections), *(tag.name for tag in tags.lumped_sections)], source)
-    _unique("muscle or line", [*(tag.name for tag in tags.muscles), *(tag.name for tag in tags.lines)], source)
+    _unique("muscle", [*(tag.name for tag in tags.muscles), *(tag.name for tag in tags.lines)], source)
     used = [joint for tag in tags.sections for joint in tag.joints]
     used += [joint for lumped in tags.lumped_sections for joint in lumped.joints.values()]
     _unique("joint of a section", used, source)

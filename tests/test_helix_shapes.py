@@ -265,6 +265,15 @@ def test_a_radius_beyond_all_numbers_is_straight(contraction: float, diameter: f
         helix.forward(contraction, 0.0, diameter)
 
 
+def test_radii_that_rounding_made_unequal_are_a_straight_tube() -> None:
+    """Measured or computed radii of a straight tube may differ by rounding, to either side."""
+    for inner in (-1.0 - 1e-13, -1.0 + 1e-13):
+        shape = HelixShape(1.0, inner, 0.3)
+        assert 0.0 <= float(shape.centre_radius) <= 1e-13
+        assert 1.0 - 1e-12 < float(helix.inverse(shape).contraction) <= 1.0
+        assert helix.forward(*helix.inverse(shape)).shape == ()
+
+
 def test_both_ways_to_the_straight_tube_disagree() -> None:
     """Which is why it is an error: lambda -> 1 first gives (D/2, -D/2, inf), theta -> 0 first (inf, inf, 0)."""
     first = helix.forward(1.0, 1e-12, D)

@@ -1,8 +1,8 @@
 """A measured table of pressure against contraction, as model of a pneumatic muscle along the tube.
 
-The inverse pneumatic muscle of [Blumenschein 2018] lengthens with pressure, so its contraction `lambda` (contracted over original
-length) rises towards 1; a contracting muscle has a falling table. The paper says that such a mapping must be measured and
-publishes none: the table, its CSV file and the interpolation are ours.
+The inverse pneumatic muscle of [Blumenschein 2018] lengthens with pressure, so its contraction `lambda` (contracted over
+original length) rises towards 1; a contracting muscle has a falling table. The paper says that such a mapping must be measured
+and publishes none: the table, its CSV file and the interpolation are ours.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class ActuatorTable:
     """Contraction of an actuator measured at some pressures; between them it is interpolated, beyond them nothing is said.
 
     Raises:
-        ParameterError: If there are fewer than two rows, a number is not finite, the pressures do not increase, a contraction is
-            not in (0, 1], or the contractions neither rise throughout nor fall throughout.
+        ParameterError: If there are fewer than two rows, a number is not finite, the pressures do not increase, a contraction
+            is not in (0, 1], the contractions neither rise throughout nor fall throughout, or there is no such interpolation.
         MissingDependency: For "pchip", if SciPy is not installed.
     """
 

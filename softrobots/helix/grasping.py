@@ -1,11 +1,11 @@
 r"""Grasp force of a pressurised helix around a cylinder that is thicker than its natural inner radius.
 
-[Blumenschein 2018] measures the force that closes a cylinder cut along its axis, and explains by virtual work why it is linear in
-the pressure, `F = P dV/dL` (18); `L` is the gap between the two halves. It gives no volume. The two bounds here are ours; the
-force is the smaller one, because the tube yields in the way that is easier:
+[Blumenschein 2018] measures the force that closes a cylinder cut along its axis, and explains by virtual work why it is
+linear in the pressure, `F = P dV/dL` (18); `L` is the gap between the two halves. It gives no volume. The two bounds here are
+ours, not the paper's; the force is the smaller one, because the tube yields in the way that is easier:
 
-(a) *Unwrapping*. Opening by `dL` makes the way around both halves longer by `2 dL`, as a radius larger by `dR = dL/pi` would. The
-inner line keeps its length and the helix its pitch, so the tube unwinds a little and loses volume:
+(a) *Unwrapping*. Opening by `dL` makes the way around both halves longer by `2 dL`, as a radius larger by `dR = dL/pi` would.
+The inner line keeps its length and the helix its pitch, so the tube unwinds a little and loses volume:
 
 .. math:: V(R) = \frac{\pi D^2}{4} L_i \sqrt{\frac{(R + D/2)^2 + b^2}{R^2 + b^2}}, \qquad
    L_i = 2\pi N\sqrt{R_0^2 + b^2}, \qquad F_a = -\frac{P}{\pi}\frac{dV}{dR}\Big|_{R_0}
@@ -15,10 +15,12 @@ acts on a strip as wide as the chord that cuts `delta` from the circular section
 
 .. math:: F_b = 2 N P\,w \sqrt{R_0^2 + b^2}, \qquad w = 2\sqrt{\delta(D - \delta)}
 
-Assumptions: the wall is inextensible, wrinkles for nothing and has no stiffness; sections are circles normal to the centre line
-(in (b) but for the strip); pressure is constant; the object is a rigid circular cylinder along the axis of the helix; no friction;
-the helix touches all along its inner line, at the natural pitch; ends do nothing; force is averaged over where the cut lies, so
-that turns need not be whole. (a) does not depend on `delta`: the force rises with it up to (a) and stays there.
+Assumptions: the wall is inextensible, wrinkles for nothing and has no stiffness; sections are circles normal to the centre
+line (in (b) but for the strip); pressure is constant; the object is a rigid circular cylinder along the axis of the helix,
+without friction; the helix touches it all along the inner line, at its natural pitch; the ends do nothing; the force is the
+mean over where the cut lies, so that turns need not be whole. What follows: no force at `delta = 0`, as the paper argues (it
+measures some, and blames an object that is not quite round); force linear in the pressure, as measured; force rising with
+`delta` up to (a) and constant from there, where the paper finds only that it rises. Its measured forces are not compared.
 """
 
 from __future__ import annotations
@@ -48,8 +50,8 @@ class GraspTest(NamedTuple):
 
 
 PAPER_CYLINDER = GraspTest(object_radius=0.020, turn_height=0.080, turns=1.5, deflections=(0.0, 0.002, 0.004), diameter=0.0331)
-"""[Blumenschein 2018] section III-C: a cylinder 4.0 cm thick. The text tests helix radii up to "4.0 cm", where 2.0 must be meant.
-The diameter of the tube is not told there; 3.31 cm, that of the shape tests, is our assumption."""
+"""[Blumenschein 2018] section III-C: a cylinder 4.0 cm thick. The text lets the helix radius go up to that number, where half
+of it must be meant. The diameter of the tube is not told there; 3.31 cm, that of the shape tests, is our assumption."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ class GraspForce:
     contact_width: FloatArray
     """Width of the flattened strip [m]."""
     unwrapping: FloatArray
-    """Bound (a) [N]; zero where opening gains volume: on so steep a helix the pressure does not hold the turns closed."""
+    """Bound (a) [N]; zero on a helix so steep, `b^2 >= R0 (R0 + D/2)`, that opening gains volume: nothing holds it closed."""
     contact: FloatArray
     """Bound (b) [N]."""
     force: FloatArray
@@ -97,7 +99,8 @@ def grasp_force(
         object_radius: Radius of the cylinder, positive [m].
         deflection: Radius of the cylinder less the natural inner radius of the helix [m]; from 0 to the radius of the tube and
             that of the cylinder.
-        turn_height: Rise of the helix per turn, `2 pi b`, zero or positive; beyond one turn at least the diameter of the tube [m].
+        turn_height: Rise of the helix per turn, `2 pi b`, zero or positive [m]; beyond one turn at least the diameter of the
+            tube (the simple rule; `self_contact` is exact).
         turns: Turns around the cylinder, positive [-].
         diameter: Diameter of the tube, positive [m].
 

@@ -32,6 +32,7 @@ from softrobots.helix.shapes import HelixShape, inverse
 
 Limits = tuple[float, float]
 
+_TURN = 2.0 * math.pi
 _ROUNDING = 1e-12  # what rounding makes of a point on the border
 
 _Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # from a parameter in [0, 1] to centre radius and pitch
@@ -61,12 +62,14 @@ class WantedHelix(NamedTuple):
     def shape(self) -> HelixShape:
         """The wanted helix itself."""
         outwards = self.diameter if self.path == "inner" else 0.5 * self.diameter
-        return HelixShape(self.radius + outwards, self.radius + outwards - self.diameter, self.turn_height / (2.0 * math.pi))
+        return _helix(
+            np.asarray(self.radius + outwards - 0.5 * self.diameter), np.asarray(self.turn_height / _TURN), self.diameter
+        )
 
     def distance(self, centre_radius: FloatArray, pitch: FloatArray) -> FloatArray:
         """Distance `m` of helices whose radius and pitch are positive; see the module."""
         radius = centre_radius - (0.5 * self.diameter if self.path == "inner" else 0.0)
-        return np.hypot(np.log(radius / self.radius), np.log(2.0 * math.pi * pitch / self.turn_height))
+        return np.hypot(np.log(radius / self.radius), np.log(_TURN * pitch / self.turn_height))
 
 
 def nearest_realisable(wanted: WantedHelix, contraction_limits: Limits | None, angle_limits: Limits | None) -> HelixShape:
@@ -103,8 +106,7 @@ def nearest_realisable(wanted: WantedHelix, contraction_limits: Limits | None, a
         limits = f"contraction in {contraction_limits}, angle in {angle_limits} rad"
         room = " and has room for the object inside" if wanted.path == "inner" else ""
         raise ParameterError("limits", limits, "such that some helix within them is free of contact" + room)
-    _, radius, pitch = best
-    return HelixShape(radius + 0.5 * wanted.diameter, radius - 0.5 * wanted.diameter, pitch)
+    return _helix(np.asarray(best[1]), np.asarray(best[2]), wanted.diameter)
 
 
 def within(value: FloatArray, limits: Limits | None, rounding: float = _ROUNDING) -> BoolArray:
@@ -112,6 +114,11 @@ def within(value: FloatArray, limits: Limits | None, rounding: float = _ROUNDING
     if limits is None:
         return np.ones(np.shape(value), dtype=np.bool_)
     return np.asarray((value >= limits[0] - rounding) & (value <= limits[1] + rounding))
+
+
+def _helix(radius: FloatArray, pitch: FloatArray, diameter: float) -> HelixShape:
+    """Helix from the radius of its centre line."""
+    return HelixShape(np.asarray(radius + 0.5 * diameter), np.asarray(radius - 0.5 * diameter), pitch)
 
 
 def _realisable(
@@ -122,7 +129,7 @@ def _realisable(
     inside = radius - (0.5 * size if wanted.path == "inner" else 0.0)
     usable = (inside > _ROUNDING * size) & (pitch > _ROUNDING * size) & (np.hypot(radius, pitch) < size / _ROUNDING)
     radius, pitch = np.where(usable, radius, size), np.where(usable, pitch, size)
-    shape = HelixShape(radius + 0.5 * size, radius - 0.5 * size, pitch)
+    shape = _helix(radius, pitch, size)
     actuator = inverse(shape)
     contact = self_contact(shape, wanted.turns)
     usable &= (contact.fold_margin >= -_ROUNDING) & ~(contact.has_neighbours & (contact.turn_clearance < -_ROUNDING * size))

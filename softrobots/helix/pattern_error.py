@@ -7,13 +7,13 @@ along its normal, towards the actuator. With (15) of [Blumenschein 2018] each pi
 .. math:: \text{between:}\; \kappa_o = \frac{1 - \cos 2\theta}{D},\; \tau_o = \frac{\sin 2\theta}{D}, \qquad
    \text{pinch:}\; \kappa_o = \frac1D,\; \tau_o = 0
 
-over the lengths :math:`\lambda d` and :math:`(1 - \lambda) d`. As (15) is linear in the contraction, their mean is the curvature
-and torsion of the smooth helix, and the tube tends to it as `d` goes to 0. The centre line is `D/2` along the normal: straight
-between, an arc of the radius `D/2` in a pinch. All of this is ours.
+over the lengths :math:`\lambda d` and :math:`(1 - \lambda) d`. As (15) is linear in the contraction, their mean is the
+curvature and torsion of the smooth helix, and the tube tends to it as `d` goes to 0. The centre line is `D/2` along the normal:
+straight between, an arc of the radius `D/2` in a pinch. All of this is ours.
 
-Joined by the frames of the centre line instead, the same pieces would tend to another helix, whose rise is an eighth too small at
-contraction 0.66 and 5 degrees: a pinch folds square to the actuator, not to the tube, so the tangent of the centre line turns by
-`theta` about the normal where a pinch begins, and back where it ends.
+Joined by the frames of the centre line instead, the same pieces would tend to another helix, whose rise is an eighth too small
+at contraction 0.66 and 5 degrees: a pinch folds square to the actuator, not to the tube, so the tangent of the centre line
+turns by `theta` about the normal where a pinch begins, and back where it ends.
 
 Radius and rise of the helix that the periods make are wrong by an amount that falls with the square of the spacing; so are the
 ends of the periods, if the tube starts with half a straight piece. Within a period the centre line swings to the side of the
@@ -28,8 +28,8 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.checks import FloatArray, positive_integer, read_only
-from softrobots.helix.fabrication import Pattern, checked_pattern
 from softrobots.helix.paths import actuator_curvature_torsion, frames, points, transform_base_to_axis, turn_angle
+from softrobots.helix.pattern import Pattern, checked_pattern
 from softrobots.screws import Screw
 
 _MOST_POINTS = 500_000

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import LARGEST, FloatArray, finite_array, finite_number
+from softrobots.checks import LARGEST, FloatArray, finite_array, finite_number, positive_integer
 from softrobots.errors import ParameterError
 
 _RANGES = {
     "contraction": (1.0 / LARGEST, 1.0, "in (0, 1]: contracted over original length"),
     "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), "in [0, pi/2) rad"),
 }
+_MOST_SAMPLES = 1_000_000
 _ROUNDING = 1e-12  # of the length: by how much a table may end too early
 
 
@@ -113,3 +114,26 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         where = f" at the position {float(positions[wrong[0]])!r} m"
         raise ParameterError(name, float(values[wrong[0]]), requirement + where)
     return Profile(name, length, None, positions, values)
+
+
+def sample_positions(samples: Any, length: float) -> FloatArray:
+    """Return the positions of samples along the tube, shape (n,) [m].
+
+    Args:
+        samples: How many, equally spaced with both ends, or the positions [m].
+        length: Length of the tube [m].
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    if not isinstance(samples, tuple | list | np.ndarray):
+        count = positive_integer("samples", samples, _MOST_SAMPLES)
+        if count < 2:
+            raise ParameterError("samples", samples, "at least 2, or positions [m]")
+        return np.linspace(0.0, length, count)
+    positions = finite_array("samples", samples, (None,), "m")
+    if not 0 < len(positions) <= _MOST_SAMPLES or np.any(np.diff(positions) <= 0.0):
+        raise ParameterError("samples", samples, f"increasing positions, from 1 to {_MOST_SAMPLES} of them [m]")
+    if positions[0] < 0.0 or positions[-1] > length:
+        raise ParameterError("samples", samples, f"positions from 0 to the length {length!r} m")
+    return positions

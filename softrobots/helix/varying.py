@@ -1,4 +1,4 @@
-r"""A tube whose actuator changes along it: contraction `lambda(s)` and angle `theta(s)`, the future work of [Blumenschein 2018].
+r"""A tube whose actuator changes along it: contraction `lambda(s)` and angle `theta(s)`; future work of [Blumenschein 2018].
 
 `s` is the position on the axis of the uninflated tube. The frames have z along the centre line and x towards the actuator, as
 those of a helix (`frames`). Per length of the uninflated tube they move along z by `v` and turn by `omega`:
@@ -7,10 +7,11 @@ those of a helix (`frames`). Per length of the uninflated tube they move along z
    \omega = \left(0,\; v\,\kappa_c,\; \sigma\,\frac{4\lambda\sin\theta}{D\,|1 + \zeta|}\right), \qquad
    \zeta = \lambda e^{2 i\theta}
 
-which are the formulas of the constant actuator, taken at each place (ours). With them the outer line keeps its length, the actuator
-contracts to `lambda` and the two lines enclose the angle `2 theta` at each place, exactly, for any `lambda(s)` and `theta(s)`: the
-constraints (6), (7) and (11) of the paper. The assumption is that nothing else acts between neighbouring places: sections stay
-circles normal to the centre line, as they do where the actuator changes slowly, i.e. little over one diameter of the tube.
+which are the formulas of the constant actuator, taken at each place (ours). With them the outer line keeps its length, the
+actuator contracts to `lambda` and the two lines enclose the angle `2 theta` at each place, exactly, for any `lambda(s)` and
+`theta(s)`: the constraints (6), (7) and (11) of the paper. The assumption is that nothing else acts between neighbouring
+places: sections stay circles normal to the centre line, as where the actuator changes slowly, i.e. little over one diameter
+of the tube.
 """
 
 from __future__ import annotations
@@ -23,15 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, choice, finite_array, finite_number, positive_integer, positive_number, read_only
+from softrobots.checks import FloatArray, choice, finite_array, finite_number, positive_number, read_only
 from softrobots.errors import MissingDependency, ParameterError
 from softrobots.helix.paths import actuator_curvature_torsion
-from softrobots.helix.profiles import Profile, checked_profile
+from softrobots.helix.profiles import Profile, checked_profile, sample_positions
 from softrobots.helix.shapes import PATHS, turning_sign
 
 _MOST_ROTATION = 1e5  # rad along the tube, some 16000 turns: half a minute of integration
 _EVALUATIONS, _EVALUATIONS_PER_RAD = 500_000, 50  # several times what smooth tubes need
-_MOST_SAMPLES = 1_000_000
 _TIGHTEST, _LOOSEST = 1e-13, 1e-3
 
 
@@ -59,7 +59,7 @@ class BentTube:
     length: float
     """Length of the uninflated tube [m]."""
     handedness: str
-    """ "right" or "left"."""
+    """Which way the actuator winds: "right" or "left"."""
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -106,9 +106,9 @@ def bent_tube(
 
     Contraction and angle are each a number, a function that takes a position [m] and returns a number, or a pair
     (positions, values): straight between them, and a jump where a position comes twice. The integrator starts anew at the
-    positions of tables and at breakpoints. Through functions it goes in steps of at most the diameter, or 1/10000 of the tube if
-    that is more, so that it does not step over what they do. The tube starts at the origin along z, with the actuator on the
-    side of x. A straight tube (contraction 1, angle 0) or piece is as good as any. That turns do not collide is not checked.
+    positions of tables and at breakpoints. Through functions its steps are at most the diameter, or 1/10000 of the tube if that
+    is more, so that it does not step over what they do. The tube starts at the origin along z, with the actuator on the side
+    of x. A straight tube (contraction 1, angle 0) or piece is as good as any. That turns do not collide is not checked.
 
     Args:
         contraction: Contracted over original length of the actuator `lambda`, in (0, 1] [-].
@@ -116,9 +116,9 @@ def bent_tube(
         diameter: Diameter `D` of the tube, positive [m].
         length: Length of the uninflated tube, positive [m].
         handedness: "right" or "left".
-        samples: How many samples, equally spaced with both ends, at least 2; or their positions, increasing, in [0, length] [m].
-        tolerance: Local error of the integrator, of lengths as a share of that of the tube and of rotations [rad]; from 1e-13 to
-            1e-3. The error at the tip is larger by about the number of radians that the tube turns.
+        samples: How many samples, equally spaced with both ends, at least 2; or their increasing positions in [0, length] [m].
+        tolerance: Error of one step of the integrator, in lengths as a share of the tube's and in rotations [rad], from 1e-13
+            to 1e-3.
         breakpoints: Positions where a function jumps or has a kink, increasing, within the tube [m].
 
     Returns:
@@ -136,7 +136,7 @@ def bent_tube(
     if not _TIGHTEST <= accuracy <= _LOOSEST:
         raise ParameterError("tolerance", tolerance, f"from {_TIGHTEST:g} to {_LOOSEST:g}")
     shares, angles = checked_profile("contraction", contraction, extent), checked_profile("angle", angle, extent)
-    positions = _sample_positions(samples, extent)
+    positions = sample_positions(samples, extent)
     cuts = finite_array("breakpoints", breakpoints, (None,), "m")
     if np.any(cuts <= 0.0) or np.any(cuts >= extent) or np.any(np.diff(cuts) <= 0.0):
         raise ParameterError("breakpoints", breakpoints, f"increasing, inside the tube, 0 to {extent!r} m")
@@ -198,7 +198,7 @@ class _Piece:
 
         def derivative(position: float, state: FloatArray) -> list[float]:
             w, x, y, z = state[:4].tolist()
-            along, bending, twist = self.rates(min(max(position, self.start), self.end))
+            along, bending, twist = self.rates(min(max(float(position), self.start), self.end))
             share = along / scale
             step = share / (w * w + x * x + y * y + z * z)
             return [
@@ -213,21 +213,6 @@ class _Piece:
             ]
 
         return derivative
-
-
-def _sample_positions(samples: Any, length: float) -> FloatArray:
-    """Positions of the samples."""
-    if not isinstance(samples, tuple | list | np.ndarray):
-        count = positive_integer("samples", samples, _MOST_SAMPLES)
-        if count < 2:
-            raise ParameterError("samples", samples, "at least 2, or positions [m]")
-        return np.linspace(0.0, length, count)
-    positions = finite_array("samples", samples, (None,), "m")
-    if not 0 < len(positions) <= _MOST_SAMPLES or np.any(np.diff(positions) <= 0.0):
-        raise ParameterError("samples", samples, f"increasing positions, from 1 to {_MOST_SAMPLES} of them [m]")
-    if positions[0] < 0.0 or positions[-1] > length:
-        raise ParameterError("samples", samples, f"positions from 0 to the length {length!r} m")
-    return positions
 
 
 def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter: float) -> tuple[float, float]:
@@ -273,7 +258,7 @@ def _integrate(
             nonlocal spent
             spent += 1
             if spent > budget:
-                raise stuck(position, f"more than {budget} evaluations")
+                raise stuck(float(position), f"more than {budget} evaluations")
             return change(position, now)
 
         times = here if len(here) and here[-1] == piece.end else np.append(here, piece.end)

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from softrobots.strain_chain import LARGEST_BENDING, in_range
 
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""
+
+_SECTION_TURN = math.radians(40.0)  # of a section of a designed tube
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +122,33 @@ class HelixTube:
         self._check_sections()
         if not self.allow_self_contact and self.shape is not None:
             helix.check_self_contact(self.shape, self.turns)
+
+    @classmethod
+    def from_design(cls, design: helix.HelixDesign, **fields: Any) -> HelixTube:
+        """The tube of a design, with sections (and hinges) of about 40 degrees unless said otherwise.
+
+        Args:
+            design: What `helix.design_grasp` or `helix.design_antenna` returns, or a `HelixDesign` of one's own.
+            fields: The other fields.
+
+        Returns:
+            The tube.
+
+        Raises:
+            ParameterError: If `design` is something else, gives a field that is given too, or a value is out of range.
+            SelfIntersection: If the tube would run into itself and `allow_self_contact` is not given.
+        """
+        if not isinstance(design, helix.HelixDesign):
+            raise ParameterError("design", design, "a HelixDesign")
+        given: dict[str, Any] = {name: getattr(design, name) for name in ("contraction", "angle", "diameter", "handedness")}
+        given["length"] = design.tube_length
+        twice = sorted(given.keys() & fields.keys())
+        if twice:
+            raise ParameterError(twice[0], fields[twice[0]], "left out: the design gives it")
+        curvature, torsion = helix.actuator_curvature_torsion(design.contraction, design.angle, design.diameter)
+        turning = math.hypot(curvature, torsion) * design.centre_length
+        count = max(4, math.ceil(turning / _SECTION_TURN))
+        return cls(**({"elastic_sections": count, "hinges": count} | given | fields))
 
     @property
     def radius(self) -> float:

@@ -1,0 +1,204 @@
+"""Design an inflated tube that becomes a helix: actuator, template, robot description, sag and growth.
+
+Give the actuator (--contraction, --angle), or what the helix is for: an antenna (--antenna), or an object to wrap (--grasp).
+Prints a table, and writes into a new folder: the design (JSON), the robot as URDF (sections and lumped), a template of the unrolled
+tube to print to scale (SVG) with its positions (CSV), the loaded shape (NPZ, PNG, HTML scene) and the growth as an animated page.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+import sys
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import softrobots as sr
+from softrobots import body_plots, helix, plots
+from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large
+from softrobots.files import free_folder, make_folder
+from softrobots.loads import Load
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    what = made.add_mutually_exclusive_group()
+    wish = ("RADIUS", "RISE", "TURNS")
+    told = "helix of a centre line of this radius [m], rise per turn [m] and number of turns"
+    what.add_argument("--antenna", type=float, nargs=3, metavar=wish, help=told)
+    told = "helix around an object of this radius [m], with this rise per turn [m] and number of turns"
+    what.add_argument("--grasp", type=float, nargs=3, metavar=wish, help=told)
+    what.add_argument("--design", type=Path, metavar="FILE", help="a design.json of an earlier run")
+    made.add_argument("--nearest", action="store_true", help="take the nearest helix that can be made if the wish cannot")
+    made.add_argument("--contraction", type=float, help="contracted over original length of the actuator, in (0, 1] (0.66)")
+    made.add_argument("--angle", type=float, metavar="DEG", help="of the actuator to the axis of the tube [degrees] (5)")
+    made.add_argument("--length", type=float, help="of the uninflated tube [m] (1.5)")
+    made.add_argument("--diameter", type=float, help="of the tube [m] (0.0331)")
+    made.add_argument("--squeeze", type=float, help="how much thinner than the object --grasp is made [m] (0)")
+    made.add_argument("--handedness", choices=helix.HANDEDNESS, help="which way the helix winds (right)")
+    made.add_argument("--pressure", type=float, default=10e3, help="gauge pressure [Pa] (%(default)g)")
+    made.add_argument("--upright", choices=("tube", "axis"), default="axis", help="what stands along z (%(default)s)")
+    made.add_argument("--sections", type=int, metavar="N", help="sections, and hinges, of the chains (about 40 degrees each)")
+    add_load(made)
+    made.add_argument("--spacing", type=float, default=0.02, help="of the pinches along the actuator [m] (%(default)s)")
+    made.add_argument("--method", choices=helix.METHODS, default="pinch", help="how the actuator is made (%(default)s)")
+    made.add_argument(
+        "--output", type=Path, metavar="FOLDER", help="new or empty folder of the results (output/helix_tube_<time>)"
+    )
+    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
+    made.add_argument("--meshcat", action="store_true", help="serve the growth on loopback until Ctrl-C")
+    return made
+
+
+def run(arguments: argparse.Namespace) -> Path:
+    """Do the whole job and return the folder of the results."""
+    gravity = gravity_of(arguments)
+    if not arguments.no_plots:
+        plots.require_matplotlib()  # tells at once what is missing
+    design = _design(arguments)
+    count = {} if arguments.sections is None else {"elastic_sections": arguments.sections, "hinges": arguments.sections}
+    tube = sr.HelixTube.from_design(design, pressure=arguments.pressure, upright=arguments.upright, **count)
+    refuse_too_large(tube, "--sections", tube.elastic_sections)
+    pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method)
+    model = sr.load_model(tube)
+    Load.of(model, arguments.force, gravity=gravity)
+    folder = free_folder(arguments.output or Path("output") / f"helix_tube_{datetime.now():%Y%m%d_%H%M%S}")
+    loaded = sr.solve_equilibrium(model, (), arguments.force, gravity=gravity)
+    summary = summarise(tube, design, pattern, loaded)
+    figure = None if arguments.no_plots else body_plots.shape(loaded)
+    with sr.view(model, loaded) as viewer:
+        make_folder(folder)
+        viewer.write_html(folder / "scene.html", title="Helical tube under load")
+        viewer.animate_growth(tube)
+        viewer.write_html(folder / "growth.html", title="Growth of the helical tube")
+        sr.save_result(loaded, folder / "equilibrium.npz")
+        design.save(folder / "design.json")
+        pattern.write_svg(folder / "template.svg")
+        pattern.write_csv(folder / "template.csv")
+        for chain in ("sections", "lumped"):
+            name = "helix_tube.urdf" if chain == "sections" else "helix_tube_lumped.urdf"
+            (folder / name).write_text(dataclasses.replace(tube, chain=chain).urdf(), encoding="utf-8")
+        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        if figure is not None:
+            figure.savefig(folder / "shape.png")
+        print(table(summary))
+        print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+        if arguments.meshcat:
+            print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
+            viewer.wait()
+    return folder
+
+
+def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
+    """The design that the options ask for; options that would have no effect are refused."""
+    wished = arguments.antenna or arguments.grasp
+    source = "--design" if arguments.design else "--antenna" if arguments.antenna else "--grasp" if wished else None
+    idle = {"squeeze": arguments.grasp is None, "contraction": source is not None, "angle": source is not None}
+    idle |= {"length": source is not None, "diameter": source == "--design", "handedness": source == "--design"}
+    for name, has_no_effect in idle.items():
+        if has_no_effect and getattr(arguments, name) is not None:
+            told = f"left out with {source}" if source and name != "squeeze" else "left out without --grasp"
+            raise sr.ParameterError(f"--{name}", getattr(arguments, name), told)
+    if arguments.nearest and not wished:
+        raise sr.ParameterError("--nearest", True, "given with --antenna or --grasp")
+    if arguments.design is not None:
+        return helix.HelixDesign.load(arguments.design)
+    default = sr.HelixTube()
+    diameter = default.diameter if arguments.diameter is None else arguments.diameter
+    handedness = arguments.handedness or default.handedness
+    given: dict[str, Any] = {"handedness": handedness, "on_contact": "nearest" if arguments.nearest else "error"}
+    if arguments.antenna is not None:
+        return helix.design_antenna(*arguments.antenna, diameter, **given)
+    if arguments.grasp is not None:
+        radius, rise, turns = arguments.grasp
+        return helix.design_grasp(radius, rise, diameter, turns, squeeze=arguments.squeeze or 0.0, **given)
+    contraction = default.contraction if arguments.contraction is None else arguments.contraction
+    angle = default.angle if arguments.angle is None else math.radians(arguments.angle)
+    length = default.length if arguments.length is None else arguments.length
+    turns = float(helix.turns(helix.forward(contraction, angle, diameter), angle, length))
+    return helix.HelixDesign(contraction, angle, diameter, turns, handedness)
+
+
+def summarise(tube: sr.HelixTube, design: helix.HelixDesign, pattern: helix.Pattern, loaded: sr.Equilibrium) -> dict[str, Any]:
+    """Collect the numbers of the table."""
+    model, shape = loaded.model, design.shape
+    unloaded = sr.solve_equilibrium(model, ()).tip_position
+    wrinkling = model.spring_groups[0].wrinkling_moment
+    error = helix.shape_error(pattern)
+    return {
+        "contraction": design.contraction,
+        "angle_deg": math.degrees(design.angle),
+        "diameter_m": design.diameter,
+        "tube_length_m": design.tube_length,
+        "handedness": design.handedness,
+        "outer_radius_m": float(shape.outer_radius),
+        "inner_radius_m": float(shape.inner_radius),
+        "centre_radius_m": float(shape.centre_radius),
+        "turn_height_m": float(shape.turn_height),
+        "turns": design.turns,
+        "height_m": float(helix.height(shape, design.angle, design.tube_length)),
+        "self_contact": design.contact.describe(),
+        "actuator_tension_N": float(helix.actuator_tension(design.contraction, design.angle, design.diameter, tube.pressure)),
+        "material_twist_deg_per_m": math.degrees(
+            float(helix.material_twist(design.contraction, design.angle, design.diameter, design.handedness))
+        ),
+        "pinches": pattern.count,
+        "pattern_error_m": error.largest_aligned,
+        "weight_N": float(sum(body.mass for body in model.pinocchio.inertias[1:])) * 9.81,
+        "tip_m": loaded.tip_position.tolist(),
+        "sag_m": float(np.linalg.norm(loaded.tip_position - unloaded)),
+        "largest_moment_N_m": float(loaded.link_moments.max()),
+        "wrinkling_moment_N_m": wrinkling,
+        "residual_N_m": loaded.residual,
+        "stable": loaded.stable,
+        "wrinkled": loaded.wrinkled,
+    }
+
+
+def table(summary: dict[str, Any]) -> str:
+    """Format the numbers for a person."""
+
+    def mm(name: str) -> str:
+        return f"{1e3 * summary[name]:.1f} mm"
+
+    rows = [
+        ("actuator", f"contraction {summary['contraction']:.4f} at {summary['angle_deg']:.3f} degrees"),
+        ("tube", f"{mm('diameter_m')} wide, {mm('tube_length_m')} long before it is inflated"),
+        (
+            "helix",
+            f"{summary['handedness']}-handed, {summary['turns']:.2f} turns of {mm('turn_height_m')}, {mm('height_m')} in all",
+        ),
+        ("radius", f"{mm('inner_radius_m')} inside, {mm('centre_radius_m')} centre line, {mm('outer_radius_m')} outside"),
+        ("self-contact", summary["self_contact"]),
+        ("actuator pulls", f"{summary['actuator_tension_N']:.2f} N"),
+        ("wall twists", f"{summary['material_twist_deg_per_m']:.1f} degrees per metre of tube"),
+        ("template", f"{summary['pinches']} pinches; their helix is off the smooth one by up to {mm('pattern_error_m')}"),
+        ("weight", f"{summary['weight_N']:.3f} N, without the base"),
+        ("tip under load", "  ".join(f"{value + 0.0:.6f}" for value in summary["tip_m"]) + " m"),
+        ("load moves it by", mm("sag_m")),
+        (
+            "largest moment",
+            f"{summary['largest_moment_N_m']:.4f} N m of {summary['wrinkling_moment_N_m']:.4f} N m at the first wrinkle",
+        ),
+        ("certified stable", f"{'yes' if summary['stable'] else 'NO'}   (residual {summary['residual_N_m']:.1e} N m)"),
+    ]
+    lines = ["", *(f"{name:<18}{text}" for name, text in rows)]
+    if summary["wrinkled"]:
+        lines.append("WARNING: the tube wrinkles under this load; its linear stiffness no longer holds.")
+    return "\n".join(lines)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run from the command line; bad input ends with status 2."""
+    arguments = parser().parse_args(argv)
+    return exit_status(lambda: run(arguments))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,291 @@
+"""A designed helix: the actuator, the tube, what follows from them, what was asked for, and its file."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.checks import choice, finite_number, non_negative_number, positive_number
+from softrobots.errors import FileFormatError, ParameterError
+from softrobots.files import as_path, new_file, write_atomically
+from softrobots.helix.contact import SelfContact, self_contact
+from softrobots.helix.nearest import Limits, within
+from softrobots.helix.shapes import HANDEDNESS, HelixShape, forward
+from softrobots.helix.tube import centre_length, length_for_turns
+
+LIMIT_ROUNDING = 1e-9
+"""How far contraction [-] and angle [rad] may pass a limit by rounding."""
+
+_FORMAT = 1
+_SAVED = ("contraction", "angle", "diameter", "turns", "handedness", "contraction_limits", "angle_limits")
+_LARGEST_FILE = 1_000_000  # bytes
+_AGREEMENT = 1e-9  # relative: a saved length or radius against the one computed again
+
+
+class Wish(NamedTuple):
+    """What was asked for."""
+
+    purpose: str
+    """"grasp" or "antenna"."""
+    path: str
+    """Path whose radius was asked for: "inner" for a grasp, "centre" for an antenna."""
+    radius: float
+    """Radius of that path [m]."""
+    turn_height: float
+    """Rise of a turn [m]."""
+    squeeze: float = 0.0
+    """Radius of the object less `radius` [m]: how much thinner a grasp is made than what it holds."""
+
+
+class Deviation(NamedTuple):
+    """How far a design is from the wish."""
+
+    radius: float
+    """Radius of the path that was asked for, less the wish [m]."""
+    turn_height: float
+    """Rise of a turn, less the wish [m]."""
+    distance: float
+    """Both together, as `softrobots.helix.nearest` measures them: the relative change while it is small [-]."""
+
+
+class DesignWarning(UserWarning):
+    """A design that cannot be made, which the caller asked for all the same.
+
+    Attributes:
+        design: The `HelixDesign`; its `faults` and `contact` tell what is wrong.
+    """
+
+    def __init__(self, message: str, *, design: HelixDesign) -> None:
+        """Say what is wrong, and keep the design."""
+        super().__init__(message)
+        self.design = design
+
+
+@dataclass(frozen=True, eq=False)
+class HelixDesign:
+    """An actuator, a tube, the helix that they make, and how it differs from what was asked for.
+
+    Raises:
+        ParameterError: If a number is out of range, there is no such handedness, or there is a wish although the helix has no
+            positive radius or rise.
+        StraightTube: If the actuator leaves the tube straight.
+    """
+
+    contraction: float
+    """Contracted over original length of the actuator `lambda`, in (0, 1] [-]."""
+    angle: float
+    """Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad]."""
+    diameter: float
+    """Diameter `D` of the tube [m]."""
+    turns: float
+    """Turns of the helix [-]."""
+    handedness: str = "right"
+    """"right" or "left"."""
+    wish: Wish | None = None
+    """What was asked for; None if the actuator itself was."""
+    contraction_limits: Limits | None = None
+    """Smallest and largest contraction that can be made, or None [-]."""
+    angle_limits: Limits | None = None
+    """Smallest and largest angle that can be made, or None [rad]."""
+    shape: HelixShape = field(init=False)
+    """The helix."""
+    tube_length: float = field(init=False)
+    """Length `Lt` of the uninflated tube [m]."""
+    contact: SelfContact = field(init=False)
+    """Where the tube comes nearest to itself."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers and compute what follows from them."""
+        numbers = {
+            "contraction": positive_number("contraction", self.contraction, "-"),
+            "angle": non_negative_number("angle", self.angle, "rad"),
+            "diameter": positive_number("diameter", self.diameter, "m"),
+            "turns": positive_number("turns", self.turns, "-"),
+        }
+        for name, number in numbers.items():
+            object.__setattr__(self, name, number)
+        choice("handedness", self.handedness, HANDEDNESS)
+        object.__setattr__(self, "wish", _checked_wish(self.wish))
+        object.__setattr__(self, "contraction_limits", checked_limits("contraction_limits", self.contraction_limits, "-"))
+        object.__setattr__(self, "angle_limits", checked_limits("angle_limits", self.angle_limits, "rad"))
+        shape = forward(self.contraction, self.angle, self.diameter)
+        if self.wish is not None and not (shape.radius(self.wish.path) > 0.0 and shape.pitch > 0.0):
+            raise ParameterError("wish", self.wish, f"None for a helix without radius or rise to compare it with: {shape}")
+        object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "tube_length", float(length_for_turns(shape, self.angle, self.turns)))
+        object.__setattr__(self, "contact", self_contact(shape, self.turns))
+
+    @property
+    def height(self) -> float:
+        """Rise of the whole helix along its axis [m]."""
+        return self.turns * float(self.shape.turn_height)
+
+    @property
+    def centre_length(self) -> float:
+        """Length of the centre line of the actuated tube [m]."""
+        return float(centre_length(self.contraction, self.angle, self.tube_length))
+
+    @property
+    def deviation(self) -> Deviation | None:
+        """How far the design is from the wish; None without a wish."""
+        if self.wish is None:
+            return None
+        radius, rise = float(self.shape.radius(self.wish.path)), float(self.shape.turn_height)
+        distance = math.hypot(math.log(radius / self.wish.radius), math.log(rise / self.wish.turn_height))
+        return Deviation(radius - self.wish.radius, rise - self.wish.turn_height, distance)
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Why the design cannot be made, one sentence each; empty if it can."""
+        found = [str(self.contact)] if bool(self.contact.touches) else []
+        return (*found, *_limits_passed(self))
+
+    @property
+    def realisable(self) -> bool:
+        """Whether the tube is free of contact and the actuator within its limits."""
+        return not self.faults
+
+    def summary(self) -> str:
+        """The design in words, one fact a line; lengths in millimetres, angles in degrees."""
+        shape, degrees = self.shape, math.degrees(self.angle)
+        lines = [
+            f"Actuator: contraction {self.contraction:.4f}, angle {degrees:.3f} degrees, {self.handedness}-handed",
+            f"Tube: diameter {_mm(self.diameter)}, length {_mm(self.tube_length)} uninflated",
+            f"Helix: {self.turns:.3f} turns, rise {_mm(shape.turn_height)} a turn, {_mm(self.height)} in all",
+            f"Radii: outer {_mm(shape.outer_radius)}, centre {_mm(shape.centre_radius)}, inner {_mm(shape.inner_radius)}",
+            f"Centre line: {_mm(self.centre_length)} long",
+            f"Contact: {self.contact}",
+        ]
+        if self.wish is not None and self.deviation is not None:
+            wish, deviation = self.wish, self.deviation
+            squeeze = f", {_mm(wish.squeeze)} less than the object" if wish.squeeze else ""
+            lines += [
+                f"Wish ({wish.purpose}): {wish.path} radius {_mm(wish.radius)}{squeeze}, rise {_mm(wish.turn_height)} a turn",
+                f"Off the wish: radius {deviation.radius * 1e3:+.3f} mm, rise {deviation.turn_height * 1e3:+.3f} mm a turn, "
+                f"{100.0 * deviation.distance:.3f} % together",
+            ]
+        lines += [f"CANNOT BE MADE: {fault}" for fault in self.faults]
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        """Return `summary()`."""
+        return self.summary()
+
+    def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> Path:
+        """Save the design as JSON: numbers in SI units and radians, full precision.
+
+        Args:
+            path: File to write.
+            overwrite: Replace an existing file.
+
+        Returns:
+            The path of the file.
+
+        Raises:
+            ParameterError: If the path is none.
+            OutputExists: If the file exists and `overwrite` is false.
+            OutputError: If the file cannot be written.
+        """
+        target = new_file(path, overwrite=overwrite)
+        document = {
+            "softrobots_helix_design": _FORMAT,
+            **{name: getattr(self, name) for name in _SAVED},
+            "wish": None if self.wish is None else self.wish._asdict(),
+            "computed": _computed(self),
+        }
+        text = json.dumps(document, indent=2, allow_nan=False) + "\n"
+        write_atomically(target, lambda file: file.write(text.encode()))
+        return target
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> HelixDesign:
+        """Load a design saved by `save`; what follows from its numbers is computed again and compared.
+
+        Args:
+            path: The JSON file.
+
+        Returns:
+            The design.
+
+        Raises:
+            ParameterError: If the path is none.
+            FileFormatError: If the file cannot be read, is not one of ours, or does not hold what it claims.
+        """
+        file = as_path("path", path)
+        try:
+            if file.stat().st_size > _LARGEST_FILE:
+                raise ValueError(f"it has {file.stat().st_size} bytes; at most {_LARGEST_FILE} are read")
+            document = json.loads(file.read_text(encoding="utf-8"))
+            if document["softrobots_helix_design"] != _FORMAT:
+                raise ValueError(f"it is in format {document['softrobots_helix_design']!r}; known: {_FORMAT}")
+            wish = document["wish"] and Wish(**document["wish"])
+            design = cls(**{name: document[name] for name in _SAVED}, wish=wish)
+            for name, number in _computed(design).items():
+                claimed, rounding = document["computed"][name], _AGREEMENT * design.diameter
+                if not math.isclose(number, claimed, rel_tol=_AGREEMENT, abs_tol=rounding):
+                    raise ValueError(f"its {name} is {claimed}, but its other numbers make {number}")
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+            reason = f"it has no {error}" if isinstance(error, KeyError) else error
+            raise FileFormatError(f"cannot read a helix design from {file}: {reason}") from error
+        return design
+
+
+def _computed(design: HelixDesign) -> dict[str, float]:
+    """What follows from the numbers of a design, for the reader of its file."""
+    return {
+        "tube_length": design.tube_length,
+        "outer_radius": float(design.shape.outer_radius),
+        "inner_radius": float(design.shape.inner_radius),
+        "pitch": float(design.shape.pitch),
+    }
+
+
+def _limits_passed(design: HelixDesign) -> list[str]:
+    """One sentence for each limit that the actuator passes."""
+    found = []
+    for name, unit, limits in (("contraction", "", design.contraction_limits), ("angle", " rad", design.angle_limits)):
+        value = getattr(design, name)
+        if limits is not None and not within(np.asarray(value), limits, LIMIT_ROUNDING):
+            found.append(f"the {name} is {value:.4g}{unit}, which must be in [{limits[0]:.4g}, {limits[1]:.4g}]{unit}")
+    return found
+
+
+def checked_limits(name: str, limits: Any, unit: str) -> Limits | None:
+    """Return a pair of limits that is in order and in range, or None.
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    if limits is None:
+        return None
+    contraction = name == "contraction_limits"
+    requirement = "a pair (low, high) " + ("in (0, 1]" if contraction else "in [0, pi/2)") + ", low not above high"
+    if not isinstance(limits, tuple | list | np.ndarray) or len(limits) != 2:
+        raise ParameterError(name, limits, requirement)
+    low, high = (finite_number(name, value, unit) for value in limits)
+    fits = 0.0 < low <= high <= 1.0 if contraction else 0.0 <= low <= high < 0.5 * math.pi
+    if not fits:
+        raise ParameterError(name, limits, requirement)
+    return low, high
+
+
+def _checked_wish(wish: Any) -> Wish | None:
+    """A wish whose numbers are finite and positive, or None."""
+    if wish is None:
+        return None
+    if not isinstance(wish, Wish):
+        raise ParameterError("wish", wish, "a Wish, or None")
+    purpose = choice("wish.purpose", wish.purpose, ("grasp", "antenna"))
+    path = choice("wish.path", wish.path, ("inner" if purpose == "grasp" else "centre",))
+    radius, rise = positive_number("wish.radius", wish.radius, "m"), positive_number("wish.turn_height", wish.turn_height, "m")
+    return Wish(purpose, path, radius, rise, non_negative_number("wish.squeeze", wish.squeeze, "m"))
+
+
+def _mm(length: Any) -> str:
+    return f"{float(length) * 1e3:.2f} mm"
