@@ -1,8 +1,9 @@
 """Design an inflated tube that becomes a helix: actuator, template, robot description, sag and growth.
 
 Give the actuator (--contraction, --angle), or what the helix is for: an antenna (--antenna), or an object to wrap (--grasp).
-Prints a table, and writes into a new folder: the design (JSON), the robot as URDF (sections and lumped), a template of the unrolled
-tube to print to scale (SVG) with its positions (CSV), the loaded shape (NPZ, PNG, HTML scene) and the growth as an animated page.
+Prints a table, and writes into a new folder: the design (JSON), the robot as URDF (sections and lumped), a template of the
+unrolled tube to print to scale (SVG) with its positions (CSV), the loaded shape (NPZ, PNG, HTML scene) and the growth as an
+animated page (HTML).
 """
 
 from __future__ import annotations
@@ -113,11 +114,12 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
     diameter = default.diameter if arguments.diameter is None else arguments.diameter
     handedness = arguments.handedness or default.handedness
     given: dict[str, Any] = {"handedness": handedness, "on_contact": "nearest" if arguments.nearest else "error"}
-    if arguments.antenna is not None:
-        return helix.design_antenna(*arguments.antenna, diameter, **given)
-    if arguments.grasp is not None:
-        radius, rise, turns = arguments.grasp
-        return helix.design_grasp(radius, rise, diameter, turns, squeeze=arguments.squeeze or 0.0, **given)
+    if wished:
+        radius, rise, turns = wished
+        given |= {"turns": turns, "diameter": diameter}
+        if arguments.antenna:
+            return helix.design_antenna(radius, rise, **given)
+        return helix.design_grasp(radius, rise, squeeze=arguments.squeeze or 0.0, **given)
     contraction = default.contraction if arguments.contraction is None else arguments.contraction
     angle = default.angle if arguments.angle is None else math.radians(arguments.angle)
     length = default.length if arguments.length is None else arguments.length

@@ -43,9 +43,11 @@ def shape(equilibrium: Equilibrium) -> Any:
         return None if text in labelled else labelled.add(text) or text  # type: ignore[func-returns-value]
 
     model = equilibrium.model
-    unloaded = body_at(model, equilibrium.q_motors, model.rest) if model.muscle_input == "lengths" and model.muscles else ()
+    held = model.muscle_input == "lengths" or not model.muscles
+    unloaded = body_at(model, equilibrium.q_motors, model.rest) if held else ()
+    told = "without load, same muscle lengths" if model.muscles else "without load"
     for segment in unloaded:
-        axes.plot(*segment.backbone.T, color="0.5", lw=1.5, ls=":", label=label("without load, same muscle lengths"))
+        axes.plot(*segment.backbone.T, color="0.5", lw=1.5, ls=":", label=label(told))
     for segment in segments:
         axes.plot(*segment.backbone.T, color="0.15", lw=3.0, label=label("backbone"))
         for name, points in segment.muscles.items():
@@ -54,7 +56,9 @@ def shape(equilibrium: Equilibrium) -> Any:
             axes.plot(*points.T, color=_PUSH if pushes else _PULL, lw=1.6, ls="--" if pushes else "-", label=label(text))
         for name, points in segment.lines.items():
             axes.plot(*points.T, color=_PULL, lw=1.6, label=label(name))
-        for pose in segment.poses[:: max(1, len(segment.poses) // 6)]:
+        turned = float(np.arccos(np.clip(np.sum(segment.poses[1:, :3, 2] * segment.poses[:-1, :3, 2], axis=1), -1, 1)).sum())
+        rings = 6 if turned < np.pi else round(turned / 0.7)
+        for pose in segment.poses[:: max(1, len(segment.poses) // rings)]:
             axes.plot(*_circle(pose, segment.radius).T, color="0.7", lw=0.8)
         axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label=label("end of a segment"))
     force_arrow(axes, equilibrium)

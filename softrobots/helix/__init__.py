@@ -11,7 +11,10 @@ from softrobots.helix.contact import (
     self_contact,
     simple_contraction_limit,
 )
+from softrobots.helix.design import ON_UNREALISABLE, design_antenna, design_grasp
+from softrobots.helix.fabrication import METHODS, REMAINDERS, contraction_from_stoppers, gap_for, pinch_pattern
 from softrobots.helix.grasping import PAPER_CYLINDER, GraspForce, GraspTest, grasp_force
+from softrobots.helix.helix_design import DesignWarning, Deviation, HelixDesign, Wish
 from softrobots.helix.paths import (
     actuator_curvature_torsion,
     binormals,
@@ -23,6 +26,8 @@ from softrobots.helix.paths import (
     transform_base_to_axis,
     turn_angle,
 )
+from softrobots.helix.pattern import Pattern, SheetPoints
+from softrobots.helix.pattern_error import DiscreteCentreLine, ShapeError, discrete_centre_line, shape_error
 from softrobots.helix.shapes import HANDEDNESS, PATHS, Actuator, HelixShape, forward, inverse, measure
 from softrobots.helix.tube import actuator_tension, centre_length, height, length_for_turns, material_twist, turns, volume
 from softrobots.helix.varying import BentTube, bent_tube
@@ -30,29 +35,45 @@ from softrobots.helix.varying import BentTube, bent_tube
 __all__ = [
     "HANDEDNESS",
     "INTERPOLATIONS",
+    "METHODS",
     "ON_CONTACT",
+    "ON_UNREALISABLE",
     "PAPER_CYLINDER",
     "PATHS",
+    "REMAINDERS",
     "Actuator",
     "ActuatorTable",
     "BentTube",
+    "DesignWarning",
+    "Deviation",
+    "DiscreteCentreLine",
     "GraspForce",
     "GraspTest",
+    "HelixDesign",
     "HelixShape",
+    "Pattern",
     "SelfContact",
     "SelfContactWarning",
+    "ShapeError",
     "ShapeRow",
     "ShapeTable",
+    "SheetPoints",
+    "Wish",
     "actuator_curvature_torsion",
     "actuator_tension",
     "bent_tube",
     "binormals",
     "centre_length",
     "check_self_contact",
+    "contraction_from_stoppers",
     "contraction_limit",
     "curvature_torsion",
+    "design_antenna",
+    "design_grasp",
+    "discrete_centre_line",
     "forward",
     "frames",
+    "gap_for",
     "grasp_force",
     "height",
     "inverse",
@@ -61,8 +82,10 @@ __all__ = [
     "measure",
     "normals",
     "paper_grid",
+    "pinch_pattern",
     "points",
     "self_contact",
+    "shape_error",
     "shape_table",
     "simple_contraction_limit",
     "tangents",

@@ -21,7 +21,8 @@ from softrobots.helix.shapes import HelixShape, forward, turning_sign
 from softrobots.helix.template import Window, csv_text, svg_text
 from softrobots.helix.tube import turns
 
-_ROUNDING = 1e-9  # of a page
+_ROUNDING = 1e-9  # of a page, or of the line
+_THINNEST, _THICKEST, _LONGEST = 1e-3, 10.0, 200.0  # tubes that are drawn [m]
 _MOST_PAGES = 500
 
 
@@ -128,15 +129,18 @@ class Pattern:
         """Where points of the actuator line lie on the unrolled tube; see the module.
 
         Args:
-            arc: Arc lengths along the line, any shape [m]; beyond the ends it is continued.
+            arc: Arc lengths along the line, from 0 to `line_length`, any shape [m].
 
         Returns:
             The points, of that shape.
 
         Raises:
-            ParameterError: If a number is not finite.
+            ParameterError: If a number is not finite or not on the line.
         """
-        return located(finite_array("arc", arc, None, "m"), self.angle, self.diameter, self.handedness, self.start_azimuth)
+        arcs, rounding = finite_array("arc", arc, None, "m"), _ROUNDING * self.line_length
+        if np.any(arcs < -rounding) or np.any(arcs > self.line_length + rounding):
+            raise ParameterError("arc", arc, f"from 0 to the length of the line, {self.line_length} m")
+        return located(arcs, self.angle, self.diameter, self.handedness, self.start_azimuth)
 
     def write_svg(self, path: str | os.PathLike[str], overwrite: bool = False) -> Path:
         """Draw the unrolled tube to scale, on one sheet: see `softrobots.helix.template`.
@@ -149,10 +153,11 @@ class Pattern:
             The path of the file.
 
         Raises:
-            ParameterError: If the path is none.
+            ParameterError: If the path is none, or the tube is thinner than 1 mm, thicker than 10 m or longer than 200 m.
             OutputExists: If the file exists and `overwrite` is false.
             OutputError: If the file cannot be written.
         """
+        self._check_drawable()
         return _written(path, svg_text(self, Window(0.0, 1e3 * self.tube_length)), overwrite)
 
     def write_svg_pages(
@@ -170,15 +175,19 @@ class Pattern:
             The paths of the files.
 
         Raises:
-            ParameterError: If the path is none, a length is out of range, or there would be more than 500 pages.
+            ParameterError: If the path is none, a length is out of range, there would be more than 500 pages, or the tube is
+                as in `write_svg`.
             OutputExists: If one of the files exists and `overwrite` is false; then none is written.
             OutputError: If a file cannot be written.
         """
         page, common = 1e3 * positive_number("page_length", page_length, "m"), 1e3 * positive_number("overlap", overlap, "m")
+        self._check_drawable()
         length = 1e3 * self.tube_length
         if common > 0.5 * page:
             raise ParameterError("overlap", overlap, f"at most half the page length {page_length} m")
         step, base = page - common, as_path("path", path)
+        if not base.name:
+            raise ParameterError("path", path, "a file name, to which page numbers are added")
         if length > step * _MOST_PAGES:
             raise ParameterError(
                 "page_length", page_length, f"such that {_MOST_PAGES} pages are enough for {self.tube_length} m"
@@ -213,6 +222,13 @@ class Pattern:
             OutputError: If the file cannot be written.
         """
         return _written(path, csv_text(self), overwrite)
+
+    def _check_drawable(self) -> None:
+        """Refuse a tube that is no tube on a bench."""
+        if not _THINNEST <= self.diameter <= _THICKEST:
+            raise ParameterError("diameter", self.diameter, f"from {_THINNEST} to {_THICKEST} m for a drawing")
+        if self.tube_length > _LONGEST:
+            raise ParameterError("tube_length", self.tube_length, f"at most {_LONGEST} m for a drawing")
 
 
 def checked_pattern(pattern: Any) -> Pattern:

@@ -28,8 +28,9 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.checks import FloatArray, positive_integer, read_only
-from softrobots.helix.paths import actuator_curvature_torsion, frames, points, transform_base_to_axis, turn_angle
+from softrobots.helix.paths import actuator_curvature_torsion
 from softrobots.helix.pattern import Pattern, checked_pattern
+from softrobots.helix.shapes import length_ratio, turning_sign
 from softrobots.screws import Screw
 
 _MOST_POINTS = 500_000
@@ -172,16 +173,20 @@ def _motions(curvature: float, torsion: float, lengths: FloatArray) -> FloatArra
 
 
 def _outer_in_base(plan: Pattern) -> FloatArray:
-    """Frame of the outer path at the base, in the frame of the base of the smooth helix."""
-    base = transform_base_to_axis(plan.shape, plan.handedness)
-    return np.asarray(np.linalg.solve(base, frames(plan.shape, 0.0, "outer", plan.handedness)))
+    """Frame of the outer path at the base, in that of the centre line of the smooth helix: `arg(1 + zeta)` about x."""
+    share, twice = plan.contraction, 2.0 * plan.angle
+    turned = turning_sign(plan.handedness) * np.arctan2(share * np.sin(twice), 1.0 + share * np.cos(twice))
+    made = np.eye(4)
+    made[1:3, 1:3] = [[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]]
+    made[0, 3] = -0.5 * plan.diameter
+    return made
 
 
 def _smooth(plan: Pattern, arc: FloatArray) -> FloatArray:
     """Points of the smooth centre line in the frame of its base, by arc length of the actuator line."""
-    base = transform_base_to_axis(plan.shape, plan.handedness)
-    found = points(plan.shape, turn_angle(plan.shape, arc, "outer"), "centre", plan.handedness)
-    return np.asarray((found - base[:3, 3]) @ base[:3, :3])
+    contraction, angle = np.asarray(plan.contraction), np.asarray(plan.angle)
+    curvature, torsion = actuator_curvature_torsion(contraction, angle, plan.diameter, "centre", plan.handedness)
+    return _motions(float(curvature), float(torsion), 0.5 * length_ratio(contraction, angle) * arc)[:, :3, 3]
 
 
 def _aligned(moved: FloatArray, wanted: FloatArray, weights: FloatArray) -> FloatArray:

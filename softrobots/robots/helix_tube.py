@@ -20,6 +20,9 @@ from softrobots.strain_chain import LARGEST_BENDING, in_range
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""
 
+MOST_SECTIONS = 1000
+"""Sections or hinges that a chain may have."""
+
 _SECTION_TURN = math.radians(40.0)  # of a section of a designed tube
 
 
@@ -36,7 +39,8 @@ class HelixTube:
     The frames follow the actuator around the tube (`helix.material_twist` tells how the wall turns against them).
 
     Raises:
-        ParameterError: If a value is out of range, or there are too few sections; the message names the field.
+        ParameterError: If a value is out of range, or there are too few sections; the message names the field. Sections are too
+            few where one would bend by more than 170 degrees or twist by half a turn; hinges are not checked.
         SelfIntersection: If the tube would run into itself and `allow_self_contact` is false.
     """
 
@@ -114,7 +118,7 @@ class HelixTube:
         for name, options in choices:
             choice(name, getattr(self, name), options)
         for name in ("elastic_sections", "hinges"):
-            object.__setattr__(self, name, positive_integer(name, getattr(self, name), 1000))
+            object.__setattr__(self, name, positive_integer(name, getattr(self, name), MOST_SECTIONS))
         for name in ("torsion", "extension", "allow_self_contact"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(name, getattr(self, name), "True or False")
@@ -199,7 +203,7 @@ class HelixTube:
         return self.n_sections * (6 if self.chain == "sections" else 2 + self.torsion + self.extension)
 
     def grown(self, length: float) -> HelixTube:
-        """The same tube grown to another length, with sections as long as before, or a little longer or shorter.
+        """The same tube grown to another length, with sections as long as before or a little shorter.
 
         Args:
             length: Length of the uninflated tube that has come out [m], positive.
@@ -208,11 +212,15 @@ class HelixTube:
             The tube; its `urdf()` is the robot of that length.
 
         Raises:
-            ParameterError: If the length is not positive.
+            ParameterError: If the length is not positive, or asks for more than 1000 sections.
             SelfIntersection: If the longer tube would run into itself.
         """
         share = positive_number("length", length, "m") / self.length
-        each = {name: max(1, round(getattr(self, name) * share)) for name in ("elastic_sections", "hinges")}
+        each = {name: max(1, math.ceil(getattr(self, name) * share - 1e-9)) for name in ("elastic_sections", "hinges")}
+        used = "elastic_sections" if self.chain == "sections" else "hinges"
+        if each[used] > MOST_SECTIONS:
+            raise ParameterError("length", length, f"so short that {MOST_SECTIONS} sections are enough, not {each[used]}")
+        each = {name: min(count, MOST_SECTIONS) for name, count in each.items()}
         return dataclasses.replace(self, length=length, **each)
 
     def xacro_arguments(self) -> dict[str, str]:
@@ -236,8 +244,10 @@ class HelixTube:
         whole = (self.strains - [0.0, 0.0, 0.0, 1.0]) * self.centre_length
         turning = max(whole[1] / LARGEST_BENDING, abs(whole[2]) / math.pi)
         count, fewest = self.elastic_sections, max(1, math.ceil(turning))
-        while fewest <= 1000 and not in_range(whole / fewest, self.centre_length / fewest):
+        while fewest <= MOST_SECTIONS and not in_range(whole / fewest, self.centre_length / fewest):
             fewest += 1
+        if fewest > MOST_SECTIONS:
+            raise ParameterError("length", self.length, f"so short that {MOST_SECTIONS} sections are enough for its turns")
         if count < fewest:
             raise ParameterError("elastic_sections", count, f"at least {fewest} for this helix, rather more")
 
