@@ -1,7 +1,7 @@
 """Figures of helical actuation, after Figures 5, 7 and 9 of [Blumenschein 2018]. Needs matplotlib (extra `plot`).
 
-Every function returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Lines differ in style or marker too, so
-that they can be told apart in grey.
+Every function returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Lines differ in style or marker too,
+so that they can be told apart in grey.
 """
 
 from __future__ import annotations
@@ -76,24 +76,22 @@ def radius_and_pitch(angles: Any, diameter: float) -> Any:
     tilts, size = _row("angles", angles, "rad"), positive_number("diameter", diameter, "m")
     if len(tilts) > len(_STYLES) or np.any(tilts <= 0.0) or np.any(tilts > 0.25 * np.pi):
         raise ParameterError("angles", angles, f"up to {len(_STYLES)} angles above 0 and at most pi/4 rad")
-    figure = new_figure((11.5, 5.6))
-    radius, pitch = figure.subplots(1, 2)
-    close = pitch.inset_axes((0.09, 0.40, 0.55, 0.54))
+    figure = new_figure((14.0, 5.2))
+    radius, pitch, close = figure.subplots(1, 3)
     below = 100 * size / (2.0 * np.pi)
     for axes in (pitch, close):
         axes.axhline(below, color="0.35", lw=1.0)
     for number, tilt in enumerate(tilts):
         _against_contraction((radius, pitch, close), float(tilt), size, number)
     limits = helix.contraction_limit(tilts)
-    close.set(xlim=(max(0.0, limits.min() - 0.1), min(1.0, limits.max() + 0.12)), ylim=(0.0, 3.0 * below))
-    close.set_title("near self-contact", fontsize=9)
-    close.tick_params(labelsize=8)
-    close.grid(alpha=0.3)
-    pitch.indicate_inset_zoom(close, edgecolor="0.4", alpha=0.8)
-    for axes, name in ((radius, r"outer radius $R_o$ [cm]"), (pitch, r"normalised pitch $b$ [cm/rad]")):
+    for axes, name in ((radius, "outer radius $R_o$ [cm]"), (pitch, "normalised pitch $b$ [cm/rad]"), (close, "$b$ [cm/rad]")):
         axes.set(xlabel=r"contraction $\lambda$ [-]", ylabel=name, xlim=(0.0, 1.0))
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
+    close.set(xlim=(max(0.0, limits.min() - 0.1), min(1.0, limits.max() + 0.1)), ylim=(0.0, 3.0 * below))
+    close.locator_params(axis="x", nbins=6)
+    for axes, name in ((radius, "Outer radius"), (pitch, "Pitch"), (close, "Pitch near self-contact")):
+        axes.set_title(name, fontsize=11)
     _name_lines(figure, pitch)
     figure.suptitle(f"Shape of a tube {100 * size:.3g} cm thick against the contraction of its actuator")
     return figure
@@ -127,7 +125,7 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     for number, depth in enumerate(depths):
         found, colour = _grasp(test, pressures, depth), COLOURS[number]
         style = {"color": colour, "marker": _MARKERS[number], "ms": 7, "clip_on": False}
-        left.plot(pressures / 1e3, found.contact, ls=_THIN_STYLE, lw=1.6, color=colour)
+        left.plot(pressures / 1e3, found.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
         told = f"force, deflected by {1e3 * depth:.3g} mm"
         left.plot(pressures / 1e3, found.force, lw=2.2, ls=_STYLES[number % 3], markevery=(number, 3), label=told, **style)
         right.plot([1e3 * depth], [found.force[-1]], ls="none", zorder=4, **style)
@@ -137,7 +135,7 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     right.plot(1e3 * range_of, bounds.contact, color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b): the wall flattens")
     found = _grasp(test, pressures, 0.0)
     left.plot(pressures / 1e3, found.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
-    left.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), by colour: the wall flattens")
+    left.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), open marks: the wall flattens")
     left.set(xlabel="gauge pressure [kPa]", ylabel="grasp force [N]", xlim=(0.0, most / 1e3))
     right.set(xlabel=f"deflection of the inner radius at {most / 1e3:.3g} kPa [mm]", xlim=(0.0, 1e3 * deepest))
     for axes in (left, right):
@@ -159,7 +157,7 @@ def _against_contraction(all_axes: tuple[Any, Any, Any], tilt: float, diameter: 
         def at(contraction: Any, name: str = name) -> Any:
             return 100 * np.atleast_1d(getattr(helix.forward(contraction, tilt, diameter), name))
 
-        label = rf"$\theta$ = {np.degrees(tilt):.4g}°"
+        label = rf"$\theta$ = {np.degrees(tilt):.4g}°: turns touch below $\lambda$ = {limit:.4f} (simple rule: {rule:.4f})"
         axes.plot(free, at(free), color=colour, ls=_STYLES[number], lw=2.2, label=label)
         axes.plot(beyond, at(beyond), color=colour, ls=_THIN_STYLE, lw=1.2)
         ends = {"color": colour, "marker": "o", "ms": 7, "ls": "none", "clip_on": axes is all_axes[2]}
@@ -168,9 +166,6 @@ def _against_contraction(all_axes: tuple[Any, Any, Any], tilt: float, diameter: 
         axes.plot([limit], at(limit), marker="D", mfc="white", ms=7, **marks)
         if axes is not all_axes[0]:
             axes.plot([rule], at(rule), marker="x", ms=6, mew=1.5, **marks)
-    place = (limit, 100 * diameter / (2.0 * np.pi))
-    told = {"fontsize": 7.5, "va": "top", "bbox": {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}}
-    all_axes[2].annotate(f"{limit:.4f}\n({rule:.4f})", place, (7, -7), textcoords="offset points", **told)
 
 
 def _name_lines(figure: Any, axes: Any) -> None:
@@ -182,8 +177,8 @@ def _name_lines(figure: Any, axes: Any) -> None:
         r"start, $\lambda$ = 1, and end, $\lambda$ = 0": {"marker": "o", "ms": 7, "ls": "none"},
         "the tube would run into itself": {"ls": _THIN_STYLE, "lw": 1.2},
         r"a turn rises by a diameter, $2\pi b = D$": {"lw": 1.0, "color": "0.35"},
-        "neighbouring turns just touch: exact limit": {"marker": "D", "mfc": "white", "ms": 7, "ls": "none"},
-        r"(limit by the simple rule, $2\pi b \geq D$)": {"marker": "x", "ms": 6, "mew": 1.5, "ls": "none"},
+        "neighbouring turns just touch, exact": {"marker": "D", "mfc": "white", "ms": 7, "ls": "none"},
+        r"limit by the simple rule, $2\pi b \geq D$": {"marker": "x", "ms": 6, "mew": 1.5, "ls": "none"},
     }
     black: dict[str, Any] = {"color": "black"}
     lines = [Line2D([], [], **(black | style)) for style in told.values()]

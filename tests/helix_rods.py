@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import mpmath as mp
@@ -138,7 +139,7 @@ def tip_compliance(rod: HelixRod) -> np.ndarray:
     """Castigliano at no load: tip displacement and rotation per force and moment on the tip, shape (6, 6), by quadrature."""
     pieces = np.linspace(0.0, rod.length, 2 + int(rod.length * np.hypot(rod.curvature, rod.torsion)))
     total = np.zeros((6, 6))
-    for low, high in zip(pieces[:-1], pieces[1:], strict=True):
+    for low, high in pairwise(pieces):
         points, weights = gauss(low, high)
         carried = load_carried(rod, points)
         total += np.einsum("n,nai,a,naj->ij", weights, carried, rod.softness, carried)

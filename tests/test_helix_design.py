@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import minimize_scalar
 
 from softrobots import helix
 from softrobots.errors import FileFormatError, OutputExists, ParameterError, SelfIntersection
@@ -41,8 +42,8 @@ def actuator(centre_radius: np.ndarray, pitch: np.ndarray, diameter: float) -> t
 def margin(centre_radius: np.ndarray, pitch: np.ndarray, diameter: float, turns: float, samples: int = 3000) -> np.ndarray:
     """How far tubes are from contact, over the diameter; by brute force along the turn angle.
 
-    Contact of turns counts from where the distance has stopped growing; before that it is bending, which may not be sharper than
-    the radius of the tube.
+    Contact of turns counts from where the distance has stopped growing; before that it is bending, which may not be sharper
+    than the radius of the tube.
     """
     radius, rise = np.atleast_1d(centre_radius)[:, None], np.atleast_1d(pitch)[:, None]
     angle = np.linspace(0.0, TURN * min(turns, 1.2), samples)
@@ -83,7 +84,9 @@ def test_a_squeezed_object_has_a_helix_thinner_by_the_squeeze(squeeze: float):
 
 
 @settings(max_examples=60)
-@given(st.floats(0.3, 0.99), st.floats(0.02, 0.7), st.floats(0.005, 0.5), st.floats(0.3, 8.0), st.sampled_from(["right", "left"]))
+@given(
+    st.floats(0.3, 0.99), st.floats(0.02, 0.7), st.floats(0.005, 0.5), st.floats(0.3, 8.0), st.sampled_from(["right", "left"])
+)
 def test_designing_the_antenna_of_an_actuator_gives_that_actuator(
     contraction: float, angle: float, diameter: float, turns: float, handedness: str
 ):
@@ -236,6 +239,26 @@ def test_the_nearest_one_is_nearest_along_the_border_too(side: float):
     assert float(design.contact.turn_clearance) == pytest.approx(0.0, abs=1e-12 * D)
 
 
+@pytest.mark.parametrize(("radius", "rise"), [(0.060, 0.080), (0.090, 0.600)])
+def test_with_one_contraction_the_nearest_is_the_best_angle(radius: float, rise: float):
+    design = helix.design_antenna(
+        radius, rise, diameter=D, turns=2.0, on_contact="nearest", contraction_limits=(0.66, 0.66), angle_limits=(0.02, 1.5)
+    )
+
+    def cost(angle: float) -> float:
+        centre = complex_helix(0.66, angle, D)[1]
+        return math.hypot(math.log(centre.real / radius), math.log(TURN * centre.imag / rise))
+
+    best = minimize_scalar(cost, bounds=(0.02, 0.3), method="bounded", options={"xatol": 1e-10})
+    centre = complex_helix(0.66, float(best.x), D)[1]
+    assert margin(np.array(centre.real), np.array(centre.imag), D, 2.0)[0] > 0.01  # contact plays no part here
+    assert design.contraction == 0.66
+    # The cost is flat at its minimum, so that the angle is known to the square root of its rounding.
+    assert design.angle == pytest.approx(float(best.x), rel=1e-6)
+    assert design.deviation is not None
+    assert design.deviation.distance == pytest.approx(cost(float(best.x)), rel=1e-12)
+
+
 def test_where_both_limits_leave_one_helix_it_is_the_nearest():
     design = helix.design_antenna(
         0.02, 0.02, diameter=D, turns=3.0, on_contact="nearest", contraction_limits=(0.66, 0.66), angle_limits=(0.1, 0.1)
@@ -251,7 +274,7 @@ def test_where_both_limits_leave_one_helix_it_is_the_nearest():
     ],
 )
 def test_limits_that_leave_nothing_are_an_error(limits: dict[str, Any]):
-    with pytest.raises(ParameterError, match="limits"):
+    with pytest.raises(ParameterError, match="room for the object"):
         helix.design_grasp(0.02, 0.02, diameter=D, turns=3.0, on_contact="nearest", **limits)
 
 
@@ -261,7 +284,13 @@ def test_limits_that_leave_nothing_are_an_error(limits: dict[str, Any]):
 def test_the_summary_tells_the_numbers_of_the_tube_and_the_change_of_the_wish():
     design = helix.design_grasp(0.020, 0.020, diameter=D, turns=3.0, squeeze=0.002, on_contact="nearest", handedness="left")
     text = str(design)
-    for words in ("left-handed", "33.10 mm", f"{design.tube_length * 1e3:.2f} mm", "3.000 turns", "2.00 mm less than the object"):
+    for words in (
+        "left-handed",
+        "33.10 mm",
+        f"{design.tube_length * 1e3:.2f} mm",
+        "3.000 turns",
+        "2.00 mm less than the object",
+    ):
         assert words in text
     assert design.deviation is not None
     assert f"rise {design.deviation.turn_height * 1e3:+.3f} mm a turn" in text
@@ -355,6 +384,8 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path):
         ({"object_radius": float("nan")}, "object_radius"),
         ({"turn_height": -0.08}, "turn_height"),
         ({"turn_height": 0.0}, "turn_height"),
+        ({"turn_height": 1e6}, "turn_height"),  # a straight tube for all that a float can tell
+        ({"object_radius": 1e-9}, "radius"),
         ({"diameter": 0.0}, "diameter"),
         ({"turns": -1.0}, "turns"),
         ({"turns": math.inf}, "turns"),
@@ -388,7 +419,12 @@ def test_a_bad_antenna_is_refused(radius: Any, field: str):
 
 @pytest.mark.parametrize(
     "wish",
-    ["grasp", ("grasp", "inner", 0.02, 0.08, 0.0), Wish("grasp", "inner", 0.02, 0.08, -0.1), Wish("grasp", "inner", math.nan, 0.08)],
+    [
+        "grasp",
+        ("grasp", "inner", 0.02, 0.08, 0.0),
+        Wish("grasp", "inner", 0.02, 0.08, -0.1),
+        Wish("grasp", "inner", math.nan, 0.08),
+    ],
 )
 def test_a_bad_wish_of_a_design_is_refused(wish: Any):
     with pytest.raises(ParameterError, match="wish"):

@@ -21,6 +21,8 @@ from softrobots.helix.shapes import HelixShape, inverse
 ON_UNREALISABLE = ("error", "nearest", "warn")
 """What a design function does about a wish that cannot be made."""
 
+_EXTREME = 1e6  # beyond this many diameters, or below that part of one, rounding takes the helix
+
 
 def design_grasp(
     object_radius: float,
@@ -117,6 +119,9 @@ def _design(
     shares = checked_limits("contraction_limits", contraction_limits, "-")
     angles = checked_limits("angle_limits", angle_limits, "rad")
     tube, count = positive_number("diameter", diameter, "m"), positive_number("turns", turns, "-")
+    for name, length in (("radius", wish.radius), ("turn_height", wish.turn_height)):
+        if not tube / _EXTREME <= length <= tube * _EXTREME:
+            raise ParameterError(name, length, f"within a factor of {_EXTREME:g} of the diameter {tube} m")
     wanted = WantedHelix(wish.path, wish.radius, wish.turn_height, tube, count)
 
     def of(shape: HelixShape, *, clipped: bool) -> HelixDesign:

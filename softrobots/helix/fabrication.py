@@ -120,7 +120,8 @@ def pinch_pattern(
             the tube or so narrow that there are more than 20000 pinches, or tape is spoken of where there is none.
     """
     contraction, angle, diameter, length, hand = _checked(actuator, handedness)
-    period, azimuth = positive_number("spacing", spacing, "m"), finite_number("start_azimuth", start_azimuth, "rad") % (2.0 * math.pi)
+    period = positive_number("spacing", spacing, "m")
+    azimuth = finite_number("start_azimuth", start_azimuth, "rad") % (2.0 * math.pi)
     choice("method", method, METHODS)
     choice("remainder", remainder, REMAINDERS)
     line = length / math.cos(angle)

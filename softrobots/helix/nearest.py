@@ -103,9 +103,10 @@ def nearest_realisable(wanted: WantedHelix, contraction_limits: Limits | None, a
                 radius, pitch = curve(np.array([parameter]))
                 best = (value, float(radius[0]), float(pitch[0]))
     if math.isinf(best[0]):
-        limits = f"contraction in {contraction_limits}, angle in {angle_limits} rad"
+        name = "angle_limits" if contraction_limits is None else "contraction_limits"
+        limits = f"{contraction_limits} and angles in {angle_limits}" if angle_limits else f"{contraction_limits}"
         room = " and has room for the object inside" if wanted.path == "inner" else ""
-        raise ParameterError("limits", limits, "such that some helix within them is free of contact" + room)
+        raise ParameterError(name, limits, "such that some helix within the limits is free of contact" + room)
     return _helix(np.asarray(best[1]), np.asarray(best[2]), wanted.diameter)
 
 

@@ -1,0 +1,156 @@
+"""Plots and tables of helices: shapes by contraction and actuator angle, what can be built, and grasp forces.
+
+Without options it covers the tests of [Blumenschein 2018]: tubes of 3.31 cm, actuator angles of 2.5, 5 and 10 degrees,
+contractions of 0.9 to 0.5, and a grasped cylinder of 4.0 cm. Writes pictures after its Figures 5, 7 and 9 and tables (CSV) into
+a new folder, and prints the tables. Grasp forces are those of our model (see softrobots.helix.grasping), not measurements.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import sys
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import softrobots as sr
+from softrobots import helix, helix_plots, plots
+from softrobots.checks import positive_number
+from softrobots.command_line import exit_status
+from softrobots.files import free_folder, make_folder, new_file, write_atomically
+from softrobots.helix import atlas
+
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
+PICTURES = ("helix_grid", "helix_shapes", "helix_grasp")
+"""Names of the pictures; the guide shows the first two."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    test = helix.PAPER_CYLINDER
+    angles = [float(f"{degrees:.12g}") for degrees in np.degrees(atlas.PAPER_ANGLES)]
+
+    def numbers(option: str, default: Sequence[float], told: str) -> None:
+        shown = " ".join(f"{number:g}" for number in default)
+        made.add_argument(option, type=float, nargs="+", metavar="X", default=list(default), help=f"{told} ({shown})")
+
+    numbers("--angles", angles, "of the actuator to the axis of the tube, up to three [degrees]")
+    numbers("--contractions", atlas.PAPER_CONTRACTIONS[::-1], "contracted over original length of the actuator, in (0, 1]")
+    made.add_argument("--diameter", type=float, default=atlas.PAPER_DIAMETER, help="of the tube [m] (%(default)s)")
+    made.add_argument("--length", type=float, default=1.0, help="of the uninflated tubes that are drawn [m] (%(default)s)")
+    numbers("--deflections", test.deflections, "radius of the grasped object less the natural inner radius of the helix [m]")
+    made.add_argument("--pressure", type=float, default=10e3, help="largest gauge pressure of the grasp [Pa] (%(default)g)")
+    made.add_argument("--object-radius", type=float, default=test.object_radius, help="of the grasped object [m] (%(default)s)")
+    made.add_argument("--rise", type=float, default=test.turn_height, help="of the grasp per turn [m] (%(default)s)")
+    made.add_argument("--turns", type=float, default=test.turns, help="of the grasp (%(default)s)")
+    made.add_argument("--output", type=Path, metavar="FOLDER", help="new or empty folder (output/helix_atlas_<time>)")
+    made.add_argument("--no-plots", action="store_true", help="do without the pictures, which need matplotlib")
+    told = "only write the two pictures of the guide into this folder (docs/images), replacing them"
+    made.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FOLDER", help=told)
+    return made
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Do the whole job."""
+    if not arguments.no_plots:
+        plots.require_matplotlib()  # tells at once what is missing
+    if arguments.docs is not None and (arguments.output is not None or arguments.no_plots):
+        raise sr.ParameterError("--docs", arguments.docs, "given without --output and --no-plots")
+    angles, pressure = np.radians(arguments.angles), positive_number("pressure", arguments.pressure, "Pa")
+    test = helix.GraspTest(
+        arguments.object_radius, arguments.rise, arguments.turns, tuple(arguments.deflections), arguments.diameter
+    )
+    output = arguments.output or Path("output") / f"helix_atlas_{datetime.now():%Y%m%d_%H%M%S}"
+    folder = arguments.docs or free_folder(output)
+    shapes = shape_table(arguments.contractions, angles, arguments.diameter)
+    limits = limit_table(angles)
+    forces = force_table(test, pressure)
+    figures: list[Any] = []
+    if not arguments.no_plots:  # the quick ones first, so that what is wrong is told at once
+        lines, grasp = helix_plots.radius_and_pitch(angles, arguments.diameter), helix_plots.grasp(test, pressure)
+        figures = [helix_plots.grid(arguments.contractions, angles, arguments.diameter, arguments.length), lines, grasp]
+    make_folder(folder)
+    if arguments.docs is not None:
+        for name, figure in zip(PICTURES[:2], figures, strict=False):
+            print(save(figure, folder / f"{name}.png", overwrite=True))
+        return
+    for name, figure in zip(PICTURES, figures, strict=False):
+        save(figure, folder / f"{name}.png")
+    shapes.write_csv(folder / "shapes.csv")
+    write_csv(folder / "contraction_limits.csv", LIMIT_COLUMNS, limits)
+    write_csv(folder / "grasp_forces.csv", FORCE_COLUMNS, forces)
+    print(f"\nShapes\n\n{shapes.to_markdown()}")
+    print("Smallest contraction without self-contact, of tubes of any diameter\n")
+    print(
+        table(("angle [deg]", "exact", "2 pi b >= D"), ((f"{np.degrees(a):.4g}", f"{e:.4f}", f"{s:.4f}") for a, e, s in limits))
+    )
+    print(f"Grasp force of our model, not data of the paper, at {pressure / 1e3:g} kPa (linear in the pressure)\n")
+    names = ("deflection [mm]", "unwrapping (a) [N]", "contact (b) [N]", "force [N]")
+    rows = [[f"{1e3 * d:.3g}", f"{a:.2f}", f"{b:.2f}", f"{f:.2f}"] for p, d, a, b, f in forces if p == pressure]
+    print(table(names, rows))
+    print(f"written to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+
+
+def shape_table(contractions: Sequence[float], angles: Any, diameter: float) -> helix.ShapeTable:
+    """Helices of the grid; of the paper's, also the one in two sizes."""
+    same_angles = np.array_equal(np.round(angles, 12), np.round(atlas.PAPER_ANGLES, 12))
+    if same_angles and diameter == atlas.PAPER_DIAMETER and sorted(contractions) == sorted(atlas.PAPER_CONTRACTIONS):
+        return helix.paper_grid()
+    return helix.shape_table(contractions, np.asarray(angles)[:, None], diameter)
+
+
+LIMIT_COLUMNS = ("angle [rad]", "contraction_limit [-]", "simple_contraction_limit [-]")
+FORCE_COLUMNS = ("pressure [Pa]", "deflection [m]", "unwrapping [N]", "contact [N]", "force [N]")
+
+
+def limit_table(angles: Any) -> list[tuple[float, ...]]:
+    """Angle, exact limit and that of the simple rule."""
+    columns = (angles, helix.contraction_limit(angles), helix.simple_contraction_limit(angles))
+    return list(zip(*(np.asarray(column).tolist() for column in columns), strict=True))
+
+
+def force_table(test: helix.GraspTest, pressure: float) -> list[tuple[float, ...]]:
+    """Pressure, deflection, both bounds and the force, for five pressures up to the largest."""
+    found = helix.grasp_force(
+        (np.arange(6) / 5.0 * pressure)[:, None], object_radius=test.object_radius, deflection=test.deflections,
+        turn_height=test.turn_height, turns=test.turns, diameter=test.diameter,
+    )  # fmt: skip
+    columns = (found.pressure, found.deflection, found.unwrapping, found.contact, found.force)
+    return list(zip(*(column.ravel().tolist() for column in columns), strict=True))
+
+
+def table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [names, ["---"] * len(names), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
+
+
+def write_csv(path: Path, names: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
+    """Write numbers with full precision."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(names)
+    writer.writerows([repr(number) for number in row] for row in rows)
+    write_atomically(new_file(path, overwrite=False), lambda file: file.write(text.getvalue().encode()))
+
+
+def save(figure: Any, path: Path, *, overwrite: bool = False) -> Path:
+    """Write a picture."""
+    write_atomically(new_file(path, overwrite=overwrite), lambda file: figure.savefig(file, format="png"))
+    return path
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run from the command line; bad input ends with status 2."""
+    arguments = parser().parse_args(argv)
+    return exit_status(lambda: run(arguments))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
