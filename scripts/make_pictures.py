@@ -12,31 +12,43 @@ from softrobots.browser import take_picture
 from softrobots.command_line import exit_status
 
 
-def loaded_inflatable_arm() -> tuple[sr.SoftModel, sr.Trajectory]:
+def loaded_inflatable_arm() -> sr.Viewer:
     """The default path of `ik_trajectory.py`, shown near its end."""
     model = sr.load_model(sr.InflatableArm())
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
-    return model, sr.follow_trajectory(model, path.positions, (0, 10, -15), times=path.times, elbow="up", progress=True)
+    return sr.view(
+        model, sr.follow_trajectory(model, path.positions, (0, 10, -15), times=path.times, elbow="up", progress=True)
+    )
 
 
-def loaded_pcc_arm() -> tuple[sr.SoftModel, sr.Equilibrium]:
+def loaded_pcc_arm() -> sr.Viewer:
     """The arm of pneumatic muscles, bent and pulled."""
     model = sr.load_model(sr.PccArm())
-    return model, sr.solve_equilibrium(model, (0.47, 0.53, 0.55, 0.50, 0.55, 0.53), (6, 4, -3), gravity=sr.EARTH_GRAVITY)
+    lengths = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
+    return sr.view(model, sr.solve_equilibrium(model, lengths, (6, 4, -3), gravity=sr.EARTH_GRAVITY))
 
 
-def sagging_helix_tube() -> tuple[sr.SoftModel, sr.Equilibrium]:
-    """The helical tube under its own weight, the axis of the helix upright."""
-    model = sr.load_model(sr.HelixTube(length=2.0, elastic_sections=32, upright="axis"))
-    return model, sr.solve_equilibrium(model, (), gravity=sr.EARTH_GRAVITY)
+def sagging_helix_tube() -> sr.Viewer:
+    """A helical tube of three and a half turns that hangs out sideways under its own weight, near wrinkling at its base."""
+    model = sr.load_model(sr.HelixTube(length=2.0, elastic_sections=32, pressure=6e3))
+    return sr.view(model, sr.solve_equilibrium(model, (), gravity=sr.EARTH_GRAVITY))
+
+
+def growing_helix_tube() -> sr.Viewer:
+    """The same tube with the axis of the helix upright, as it grows."""
+    tube = sr.HelixTube(length=2.0, elastic_sections=32, upright="axis")
+    viewer = sr.view(sr.load_model(tube))
+    viewer.animate_growth(tube)
+    return viewer
 
 
 PICTURES = {
-    "inflatable_arm": (loaded_inflatable_arm, "Inflatable arm, 18 N on the tip"),
-    "pcc_arm": (loaded_pcc_arm, "PCC arm, held muscle lengths, own weight and 8 N on the tip"),
-    "helix_tube": (sagging_helix_tube, "Helical tube under its own weight"),
+    "inflatable_arm": (loaded_inflatable_arm, "Inflatable arm, 18 N on the tip", 0.85),
+    "pcc_arm": (loaded_pcc_arm, "PCC arm, held muscle lengths, own weight and 8 N on the tip", 0.0),
+    "helix_tube": (sagging_helix_tube, "Helical tube under its own weight", 0.0),
+    "helix_growth": (growing_helix_tube, "Growth of the helical tube", 0.45),
 }
-"""What each picture shows, and its title."""
+"""What each picture shows, its title, and the share of its animation at which it is taken."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -47,10 +59,10 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
 
     def photograph() -> None:
-        for name, (make, title) in PICTURES.items():
-            with tempfile.TemporaryDirectory() as folder_name, sr.view(*make()) as viewer:
+        for name, (make, title, share) in PICTURES.items():
+            with tempfile.TemporaryDirectory() as folder_name, make() as viewer:
                 page = viewer.write_html(Path(folder_name) / "scene.html", title=title)
-                print(take_picture(page, arguments.output / f"{name}.png", width=1000, height=560, share=0.85))
+                print(take_picture(page, arguments.output / f"{name}.png", width=1000, height=560, share=share))
 
     return exit_status(photograph)
 

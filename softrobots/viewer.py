@@ -63,7 +63,8 @@ class Viewer:
             self._size = _extent(model)
             self._arrows = ArrowDrawing(self._root["load"], self._size)
             self._ghost = _ghost(model)
-            self._loaded = False
+            self._loaded, self._chain_shown = False, True
+            self._section_names = tuple(section.name for section in model.structure.section_table)
             self._traced = False
             self._segments = bool(model.structure.section_table)
             self._levels: dict[int, int] = {}
@@ -110,6 +111,7 @@ class Viewer:
             ViewerError: If the viewer is closed.
         """
         self._check(equilibrium)
+        self._show_chain(True)
         self._place(equilibrium.q, self._model.configuration(equilibrium.q_motors))
         self._body.draw(body(equilibrium), _tensions(equilibrium))
         for link in range(len(self._model.spring_groups)):
@@ -125,6 +127,7 @@ class Viewer:
         """
         q = finite_array("q", q, (self._model.pinocchio.nq,))
         self._check_open()
+        self._show_chain(True)
         self._place(q, q)
         self._body.clear()
         for link in range(len(self._model.spring_groups)):
@@ -212,6 +215,7 @@ class Viewer:
         frames = growth_frames(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
         self.show_configuration(self._model.configuration((), self._model.rest))
         self._ghost = "the whole tube"
+        self._show_chain(False)  # the links of sections that have not come out would stick out of the tip
         whole = body_at(self._model, frames[-1].q_motors, self._model.rest)
         middle = np.concatenate([segment.backbone for segment in whole])
         self.look_at(middle.max(axis=0) + middle.min(axis=0))
@@ -252,8 +256,7 @@ class Viewer:
         """Colour and meaning of what is drawn."""
         entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, self._ghost)]
         if self._segments and not self._model.spring_groups:
-            names = tuple(section.name for section in self._model.structure.section_table)
-            chain = [shape.colour for shape in self._scene.shapes if shape.name.startswith(names)]
+            chain = [shape.colour for shape in self._scene.shapes if shape.name.startswith(self._section_names)]
             entries += [(colour, "equivalent rigid chain") for colour in chain[:1]]
         entries += [(colour, text) for text, colour in self._body.entries.items()]
         entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
@@ -338,6 +341,15 @@ class Viewer:
                 node[f"level_{level}"].set_transform(turn)
                 node[f"level_{level}"].set_property("visible", level == 0)
             self._levels[shape.inflated_link] = 0
+
+    def _show_chain(self, shown: bool) -> None:
+        """Show or hide the links of the chain that sections move."""
+        if shown == self._chain_shown:
+            return
+        for shape in self._scene.shapes:
+            if shape.name.startswith(self._section_names):
+                self._root[f"deformed/{shape.name}"].set_property("visible", shown)
+        self._chain_shown = shown
 
     def _colour(self, link: int, level: int) -> None:
         if self._levels.get(link, level) == level:

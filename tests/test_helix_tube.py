@@ -57,7 +57,7 @@ HELICES: dict[str, dict[str, Any]] = {
 }
 FORMS: dict[str, dict[str, Any]] = {
     "sections": {"elastic_sections": 6},
-    "corrected": {"chain": "lumped", "hinges": 6},
+    "corrected": {"chain": "lumped", "hinges": 5},
     "midpoint": {"chain": "lumped", "hinges": 4, "hinge_rule": "midpoint", "torsion": False, "extension": False},
 }
 TURNED = {"handedness": "left", "upright": "axis"}
@@ -94,7 +94,7 @@ def centre_length(robot: HelixTube) -> Any:
 
 
 def places(robot: HelixTube) -> dict[str, Any]:
-    """How far along the centre line each frame stands: at ends of sections; hinges at middles, the outer ones 1/24 further out."""
+    """How far along the centre line each frame stands: at ends of sections, hinges at middles, the outer ones 1/24 further."""
     whole = centre_length(robot)
     count = robot.elastic_sections if robot.chain == "sections" else robot.hinges
     with mp.workdps(50):
@@ -338,7 +338,7 @@ def test_any_tube_is_on_its_helix_has_its_mass_and_obeys_the_rules_of_portable_u
 # --- Mass
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 9])
+@pytest.mark.parametrize("count", [1, 2, 5])
 @pytest.mark.parametrize(
     "form",
     [
@@ -450,6 +450,7 @@ def test_a_grown_tube_stands_on_the_same_helix(form: str, length: float) -> None
     robot = tube("paper", form)
     grown = robot.grown(length)
     assert grown.length == length
+    assert grown.n_sections == math.ceil(robot.n_sections * length / robot.length)
     unchanged = {f.name for f in dataclasses.fields(robot)} - {"length", "elastic_sections", "hinges"}
     assert all(getattr(grown, name) == getattr(robot, name) for name in unchanged)
     model = sr.load_model(grown.urdf())
@@ -465,7 +466,7 @@ def test_sections_of_a_grown_tube_are_not_longer_than_before() -> None:
     """So the chain that carried the tube carries it at every length; and there is no section more than that takes."""
     for count in (6, 7, 11, 24):  # six are the fewest for this tube
         robot = HelixTube(elastic_sections=count, hinges=count)
-        for share in np.linspace(0.01, 2.0, 150):
+        for share in np.linspace(0.01, 2.0, 40):
             grown = robot.grown(share * 1.5)
             assert grown.length / grown.elastic_sections <= 1.5 / count * (1 + 1e-9)
             assert grown.elastic_sections == grown.hinges

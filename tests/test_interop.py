@@ -15,6 +15,7 @@ import pytest
 import softrobots as sr
 from softrobots.kinematics import frame_placement
 from softrobots.paths import urdf_folder
+from softrobots.robots import Robot
 from tests.conftest import missing
 
 FILE = urdf_folder() / "inflatable_arm.urdf"
@@ -115,14 +116,18 @@ def test_pybullet(tool: Callable[[str], ModuleType], arm: sr.SoftModel, configur
         pybullet.disconnect(client)
 
 
-# --- The two chains of the PCC arm: every joint by itself, as other tools see it
+# --- The chains of the PCC arm and of the helical tube: every joint by itself, as other tools see it
 
-PCC_FILES = [urdf_folder() / "pcc_arm.urdf", urdf_folder() / "pcc_arm_lumped.urdf"]
-PCC_FRAMES = ("segment_1", "tip")
+TUBE_MASS = 920.0 * np.pi * 0.0331 * 1e-4 * 1.5  # wall of the helical tube
+MASSES = {"pcc_arm": (2.0, 1.048 * 0.6), "pcc_arm_lumped": (2.0, 1.048 * 0.6)}
+MASSES |= {"helix_tube": (0.5, TUBE_MASS), "helix_tube_lumped": (0.5, TUBE_MASS)}
+"""Mass of the base and of what moves [kg]."""
+SECTION_FILES = [urdf_folder() / f"{name}.urdf" for name in MASSES]
+SECTION_FRAMES = ("section_1_2", "segment_1", "tip")
 
 
 def poses_anywhere(file: Path) -> tuple[dict[str, bool], float, list[tuple[dict[str, float], dict[str, np.ndarray]]]]:
-    """Joints (and whether they slide), moving mass, and Pinocchio's poses at five draws of joint values within the limits.
+    """Joints (and whether they slide), mass with the base, and Pinocchio's poses at five draws of joint values within the limits.
 
     Pinocchio alone: nothing of softrobots stands between.
     """
@@ -133,14 +138,14 @@ def poses_anywhere(file: Path) -> tuple[dict[str, bool], float, list[tuple[dict[
     for _ in range(5):
         q = rng.uniform(0.4 * model.lowerPositionLimit, 0.4 * model.upperPositionLimit)
         pin.framesForwardKinematics(model, data, q)
-        poses = {frame: data.oMf[model.getFrameId(frame)].homogeneous.copy() for frame in PCC_FRAMES}
+        poses = {frame: data.oMf[model.getFrameId(frame)].homogeneous.copy() for frame in SECTION_FRAMES}
         cases.append((dict(zip(names, q.tolist(), strict=True)), poses))
     sliding = {name: model.joints[model.getJointId(name)].shortname().startswith("JointModelP") for name in names}
-    return sliding, 1.048 * 0.6, cases
+    return sliding, sum(MASSES[file.stem]), cases
 
 
-@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
-def test_pcc_arm_in_yourdfpy(file: Path) -> None:
+@pytest.mark.parametrize("file", SECTION_FILES, ids=lambda file: file.stem)
+def test_robot_of_sections_in_yourdfpy(file: Path) -> None:
     import yourdfpy
 
     joints, _, cases = poses_anywhere(file)
@@ -152,14 +157,14 @@ def test_pcc_arm_in_yourdfpy(file: Path) -> None:
             assert np.allclose(robot.get_transform(frame, "world"), pose, atol=1e-9)
 
 
-@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
-def test_pcc_arm_in_mujoco(tool: Callable[[str], ModuleType], file: Path) -> None:
+@pytest.mark.parametrize("file", SECTION_FILES, ids=lambda file: file.stem)
+def test_robot_of_sections_in_mujoco(tool: Callable[[str], ModuleType], file: Path) -> None:
     mujoco = tool("mujoco")
     joints, mass, cases = poses_anywhere(file)
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     assert model.nq == len(joints)
-    assert model.body_mass.sum() == pytest.approx(2.0 + mass, rel=1e-12)
+    assert model.body_mass.sum() == pytest.approx(mass, rel=1e-12)
     for values, poses in cases:
         for name, value in values.items():
             data.qpos[model.joint(name).qposadr[0]] = value
@@ -169,8 +174,8 @@ def test_pcc_arm_in_mujoco(tool: Callable[[str], ModuleType], file: Path) -> Non
             assert np.allclose(data.body(frame).xmat.reshape(3, 3), pose[:3, :3], atol=1e-9)
 
 
-@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
-def test_pcc_arm_in_drake(tool: Callable[[str], ModuleType], file: Path) -> None:
+@pytest.mark.parametrize("file", SECTION_FILES, ids=lambda file: file.stem)
+def test_robot_of_sections_in_drake(tool: Callable[[str], ModuleType], file: Path) -> None:
     tool("pydrake")
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
@@ -181,7 +186,7 @@ def test_pcc_arm_in_drake(tool: Callable[[str], ModuleType], file: Path) -> None
     plant.Finalize()
     context = plant.CreateDefaultContext()
     assert plant.num_positions() == len(joints)
-    assert plant.CalcTotalMass(context) == pytest.approx(2.0 + mass, rel=1e-12)
+    assert plant.CalcTotalMass(context) == pytest.approx(mass, rel=1e-12)
     for values, poses in cases:
         for name, value in values.items():
             joint = plant.GetJointByName(name)
@@ -191,8 +196,8 @@ def test_pcc_arm_in_drake(tool: Callable[[str], ModuleType], file: Path) -> None
             assert np.allclose(found, pose, atol=1e-9)
 
 
-@pytest.mark.parametrize("file", PCC_FILES, ids=lambda file: file.stem)
-def test_pcc_arm_in_pybullet(tool: Callable[[str], ModuleType], file: Path) -> None:
+@pytest.mark.parametrize("file", SECTION_FILES, ids=lambda file: file.stem)
+def test_robot_of_sections_in_pybullet(tool: Callable[[str], ModuleType], file: Path) -> None:
     """Single precision inside: 1e-5."""
     if sys.version_info >= (3, 12):
         pytest.skip("pybullet has no wheels above Python 3.11")
@@ -214,29 +219,22 @@ def test_pcc_arm_in_pybullet(tool: Callable[[str], ModuleType], file: Path) -> N
                 assert np.allclose(state[4], pose[:3, 3], atol=1e-5)
                 assert np.allclose(turn, pose[:3, :3], atol=1e-5)
         masses = [pybullet.getDynamicsInfo(robot, place, physicsClientId=client)[0] for place in links.values()]
-        assert sum(masses) == pytest.approx(2.0 + mass, rel=1e-6)
+        assert sum(masses) == pytest.approx(mass, rel=1e-6)
     finally:
         pybullet.disconnect(client)
 
 
-@pytest.mark.parametrize(
-    "parameters", [{}, {"torsion": False, "extension": False}, {"radius": 0.02, "hinge_rule": "midpoint"}], ids=str
-)
-def test_mujoco_agrees_with_the_equilibrium_of_a_lumped_arm(tool: Callable[[str], ModuleType], parameters: dict) -> None:
-    """Without muscles, under its weight and a tip force, with the stiffness set by hand: MuJoCo's static torques vanish.
+def assert_mujoco_balances(mujoco: ModuleType, robot: Robot, force: np.ndarray, gravity: np.ndarray) -> sr.Equilibrium:
+    """Under its weight and a tip force, with the stiffness set by hand: MuJoCo's static torques vanish at our answer.
 
     1e-8 N m: the solver stops at 1e-10 of some newton metres, MuJoCo's bias forces round at 1e-15 of each of 56 joints.
     """
-    mujoco = tool("mujoco")
-    robot = sr.robots.PccArm(muscle_azimuths=(), chain="lumped", hinges=7, **parameters)
     ours = sr.load_model(robot)
-    force = np.array([3.0, -4.5, 1.3])
-    found = sr.solve_equilibrium(ours, [], force, gravity=sr.EARTH_GRAVITY)
-    assert np.hypot(*found.tip_position[:2]) > 0.3  # bent in earnest
+    found = sr.solve_equilibrium(ours, [], force, gravity=gravity)
     model = mujoco.MjModel.from_xml_string(robot.urdf())
     data = mujoco.MjData(model)
     assert {model.joint(i).name for i in range(model.njnt)} == set(ours.spring_joints)
-    model.opt.gravity[:] = sr.EARTH_GRAVITY
+    model.opt.gravity[:] = gravity
     for name, value in zip(ours.spring_joints, found.q_springs, strict=True):
         joint = model.joint(name)
         model.jnt_stiffness[joint.id], model.qpos_spring[joint.qposadr[0]] = ours.spring_table[name]
@@ -248,6 +246,17 @@ def test_mujoco_agrees_with_the_equilibrium_of_a_lumped_arm(tool: Callable[[str]
     assert np.abs(balance).max() < 1e-8
     assert np.allclose(data.body("tip").xpos, found.tip_position, atol=1e-12)
     assert data.ncon == 0
+    return found
+
+
+@pytest.mark.parametrize(
+    "parameters", [{}, {"torsion": False, "extension": False}, {"radius": 0.02, "hinge_rule": "midpoint"}], ids=str
+)
+def test_mujoco_agrees_with_the_equilibrium_of_a_lumped_arm(tool: Callable[[str], ModuleType], parameters: dict) -> None:
+    """Without muscles."""
+    robot = sr.robots.PccArm(muscle_azimuths=(), chain="lumped", hinges=7, **parameters)
+    found = assert_mujoco_balances(tool("mujoco"), robot, np.array([3.0, -4.5, 1.3]), np.array(sr.EARTH_GRAVITY))
+    assert np.hypot(*found.tip_position[:2]) > 0.3  # bent in earnest
 
 
 def test_a_third_party_robot_with_springs_said_by_the_caller() -> None:

@@ -168,7 +168,7 @@ class HelixDesign:
             lines += [
                 f"Wish ({wish.purpose}): {wish.path} radius {_mm(wish.radius)}{squeeze}, rise {_mm(wish.turn_height)} a turn",
                 f"Off the wish: radius {deviation.radius * 1e3:+.3f} mm, rise {deviation.turn_height * 1e3:+.3f} mm a turn, "
-                f"{100.0 * deviation.distance:.3f} % together",
+                f"distance {deviation.distance:.4g}",
             ]
         lines += [f"CANNOT BE MADE: {fault}" for fault in self.faults]
         return "\n".join(lines)
