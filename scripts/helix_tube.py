@@ -80,8 +80,8 @@ def run(arguments: argparse.Namespace) -> Path:
         viewer.write_html(folder / "growth.html", title="Growth of the helical tube")
         sr.save_result(loaded, folder / "equilibrium.npz")
         design.save(folder / "design.json")
-        pattern.write_svg(folder / "template.svg")
-        pattern.write_csv(folder / "template.csv")
+        helix.write_template(pattern, folder / "template.svg")
+        helix.write_template_table(pattern, folder / "template.csv")
         for chain in ("sections", "lumped"):
             name = "helix_tube.urdf" if chain == "sections" else "helix_tube_lumped.urdf"
             (folder / name).write_text(dataclasses.replace(tube, chain=chain).urdf(), encoding="utf-8")

@@ -7,6 +7,7 @@ import itertools
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from softrobots import helix
 from softrobots.errors import OutputExists, ParameterError
-from softrobots.helix import Pattern, pinch_pattern
+from softrobots.helix import Pattern, pinch_pattern, write_template, write_template_pages, write_template_table
 
 D = 0.0331  # the paper's tube
 REFERENCE = (0.66, math.radians(5.0), D, 1.2)
@@ -173,7 +174,7 @@ def by_id(root: ET.Element, name: str) -> ET.Element:
 def test_one_unit_of_the_drawing_is_a_millimetre_and_the_sheet_and_the_ruler_measure_right(
     method: str, hand: str, tmp_path: Path
 ):
-    root = read(pinch_pattern(REFERENCE, 0.02, method, handedness=hand).write_svg(tmp_path / "tube.svg"))
+    root = read(write_template(pinch_pattern(REFERENCE, 0.02, method, handedness=hand), tmp_path / "tube.svg"))
     width, height = root.attrib["width"], root.attrib["height"]
     assert width.endswith("mm")
     assert height.endswith("mm")
@@ -202,7 +203,7 @@ def test_the_drawn_actuator_line_has_the_angle_of_the_actuator_and_wraps_at_the_
     hand: str, slope: float, degrees: float, length: float, tmp_path: Path
 ):
     plan = pinch_pattern((0.66, math.radians(degrees), D, length), 0.01, handedness=hand, start_azimuth=0.5)
-    root = read(plan.write_svg(tmp_path / "tube.svg"))
+    root = read(write_template(plan, tmp_path / "tube.svg"))
     pieces = [ends(line) for line in found(root, "actuator-line")]
     total = 0.0
     for start, end in pieces:
@@ -226,7 +227,7 @@ def test_drawn_marks_are_square_to_the_line_and_their_distances_have_the_ratio_o
 ):
     angle = math.radians(10.0)
     plan = pinch_pattern((contraction, angle, D, 0.9), 0.02, handedness=hand)
-    root = read(plan.write_svg(tmp_path / "tube.svg"))
+    root = read(write_template(plan, tmp_path / "tube.svg"))
     groups = found(root, "pinch")
     assert len(groups) == plan.count == int(0.9 / math.cos(angle) / 0.02)
     direction = np.array([math.cos(angle), math.sin(angle) * (1.0 if hand == "right" else -1.0)])
@@ -259,7 +260,7 @@ def test_drawn_marks_are_square_to_the_line_and_their_distances_have_the_ratio_o
 
 
 def test_what_crosses_the_seam_is_drawn_on_both_sides(tmp_path: Path):
-    root = read(pinch_pattern(REFERENCE, 0.02).write_svg(tmp_path / "tube.svg"))
+    root = read(write_template(pinch_pattern(REFERENCE, 0.02), tmp_path / "tube.svg"))
     around = 1e3 * math.pi * D
     shapes: dict[str, list[np.ndarray]] = {}
     for group in root.iter():
@@ -283,7 +284,7 @@ def test_what_crosses_the_seam_is_drawn_on_both_sides(tmp_path: Path):
 def test_drawn_stoppers_and_gaps_follow_each_other_without_a_break(tmp_path: Path):
     angle = math.radians(9.0)
     plan = pinch_pattern((0.7, angle, D, 0.5), 0.03, "stoppers")
-    root = read(plan.write_svg(tmp_path / "tube.svg"))
+    root = read(write_template(plan, tmp_path / "tube.svg"))
     direction = np.array([math.cos(angle), math.sin(angle)])
     lengths = {}
     for kind, count in (("stopper", plan.count + 1), ("gap", plan.count)):
@@ -299,7 +300,7 @@ def test_drawn_stoppers_and_gaps_follow_each_other_without_a_break(tmp_path: Pat
 
 def test_drawn_tape_covers_the_pinch_and_its_length_when_closed_is_the_tape(tmp_path: Path):
     plan = pinch_pattern(REFERENCE, 0.02, "tape", tape_length=0.010, tape_width=0.006)
-    root = read(plan.write_svg(tmp_path / "tube.svg"))
+    root = read(write_template(plan, tmp_path / "tube.svg"))
     direction = np.array([math.cos(REFERENCE[1]), math.sin(REFERENCE[1])])
     tapes, pinches = found(root, "tape"), found(root, "pinch")
     assert len(tapes) == len(pinches) == plan.count
@@ -313,7 +314,7 @@ def test_drawn_tape_covers_the_pinch_and_its_length_when_closed_is_the_tape(tmp_
 
 def test_the_drawing_says_the_numbers_and_its_words_stay_on_the_page(tmp_path: Path):
     for number, method in enumerate(METHODS):
-        root = read(pinch_pattern((0.66, 0.1, D, 0.1), 0.01, method).write_svg(tmp_path / f"{number}.svg"))
+        root = read(write_template(pinch_pattern((0.66, 0.1, D, 0.1), 0.01, method), tmp_path / f"{number}.svg"))
         words = [element for element in root.iter(SVG + "text")]
         text = " ".join(element.text or "" for element in words)
         shape = helix.forward(0.66, 0.1, D)
@@ -335,7 +336,7 @@ def test_the_drawing_says_the_numbers_and_its_words_stay_on_the_page(tmp_path: P
 
 @pytest.mark.parametrize("spacing", [0.0005, 0.003, 0.02])
 def test_numbers_beside_the_pinches_keep_apart(spacing: float, tmp_path: Path):
-    root = read(pinch_pattern((0.8, 0.1, D, 0.3), spacing).write_svg(tmp_path / "tube.svg"))
+    root = read(write_template(pinch_pattern((0.8, 0.1, D, 0.3), spacing), tmp_path / "tube.svg"))
     labels = found(root, "number")
     places = np.array([[float(label.attrib["x"]), float(label.attrib["y"])] for label in labels])
     assert len(labels) >= 10
@@ -350,7 +351,7 @@ def test_numbers_beside_the_pinches_keep_apart(spacing: float, tmp_path: Path):
 @pytest.mark.parametrize(("page", "overlap"), [(0.25, 0.02), (0.4, 0.1), (2.0, 0.02)])
 def test_pages_cover_the_tube_and_meet_at_the_joins(page: float, overlap: float, tmp_path: Path):
     plan = pinch_pattern(REFERENCE, 0.02)
-    paths = plan.write_svg_pages(tmp_path / "tube.svg", page, overlap)
+    paths = write_template_pages(plan, tmp_path / "tube.svg", page, overlap)
     assert len(paths) == max(1, math.ceil((1.2 - overlap) / (page - overlap)))
     assert [path.name for path in paths] == [f"tube-{n}.svg" for n in range(1, len(paths) + 1)]
     covered, joins, numbers = 0.0, [], set()
@@ -376,8 +377,8 @@ def test_pages_cover_the_tube_and_meet_at_the_joins(page: float, overlap: float,
 
 def test_a_page_shows_the_same_marks_as_the_whole_sheet(tmp_path: Path):
     plan = pinch_pattern(REFERENCE, 0.02, handedness="left")
-    whole = read(plan.write_svg(tmp_path / "whole.svg"))
-    page = read(plan.write_svg_pages(tmp_path / "tube.svg")[2])
+    whole = read(write_template(plan, tmp_path / "whole.svg"))
+    page = read(write_template_pages(plan, tmp_path / "tube.svg")[2])
     shared = found(page, "pinch")
     assert len(shared) > 10
     for group in shared:
@@ -390,7 +391,7 @@ def test_a_page_shows_the_same_marks_as_the_whole_sheet(tmp_path: Path):
 @pytest.mark.parametrize("method", METHODS)
 def test_the_table_comes_back_as_the_pattern(method: str, tmp_path: Path):
     plan = pinch_pattern(REFERENCE, 0.02, method, remainder="both", handedness="left")
-    with plan.write_csv(tmp_path / "tube.csv").open(newline="") as file:
+    with write_template_table(plan, tmp_path / "tube.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     kind = "gap" if method == "stoppers" else "pinch"
     taken = [row for row in rows if row["kind"] == kind]
@@ -661,7 +662,7 @@ def test_a_shape_error_of_nothing_is_refused(call: Callable[..., Any], arguments
 )
 def test_bad_pages_are_refused_before_anything_is_written(arguments: dict[str, Any], field: str, tmp_path: Path):
     with pytest.raises(ParameterError) as caught:
-        pinch_pattern(REFERENCE, 0.02).write_svg_pages(**({"path": tmp_path / "tube.svg"} | arguments))
+        write_template_pages(pinch_pattern(REFERENCE, 0.02), **({"path": tmp_path / "tube.svg"} | arguments))
     assert caught.value.field == field
     assert not list(tmp_path.iterdir())
 
@@ -669,21 +670,22 @@ def test_bad_pages_are_refused_before_anything_is_written(arguments: dict[str, A
 @pytest.mark.parametrize(("size", "length"), [(1e-4, 0.01), (20.0, 100.0), (1.0, 300.0)])
 def test_a_tube_that_no_bench_holds_is_not_drawn(size: float, length: float, tmp_path: Path):
     plan = pinch_pattern((0.66, 0.1, size, length), size)
-    for draw in (plan.write_svg, plan.write_svg_pages):
+    for draw in (partial(write_template, plan), partial(write_template_pages, plan)):
         with pytest.raises(ParameterError):
             draw(tmp_path / "tube.svg")
 
 
 def test_nothing_is_overwritten_unless_told(tmp_path: Path):
     plan = pinch_pattern(REFERENCE, 0.02)
-    for write, name in ((plan.write_svg, "a.svg"), (plan.write_csv, "a.csv"), (plan.write_svg_pages, "p.svg")):
+    files = ((write_template, "a.svg"), (write_template_table, "a.csv"), (write_template_pages, "p.svg"))
+    for write, name in ((partial(function, plan), name) for function, name in files):
         write(tmp_path / name)
         with pytest.raises(OutputExists):
             write(tmp_path / name)
         write(tmp_path / name, overwrite=True)
     (tmp_path / "q-3.svg").write_text("mine")
     with pytest.raises(OutputExists):
-        plan.write_svg_pages(tmp_path / "q.svg")
+        write_template_pages(plan, tmp_path / "q.svg")
     assert [path.name for path in tmp_path.glob("q*")] == ["q-3.svg"]  # not one page was written
 
 

@@ -127,7 +127,7 @@ SECTION_FRAMES = ("section_1_2", "segment_1", "tip")
 
 
 def poses_anywhere(file: Path) -> tuple[dict[str, bool], float, list[tuple[dict[str, float], dict[str, np.ndarray]]]]:
-    """Joints (and whether they slide), mass with the base, and Pinocchio's poses at five draws of joint values within the limits.
+    """Joints (and whether they slide), mass with the base, and Pinocchio's poses at five draws within the joint limits.
 
     Pinocchio alone: nothing of softrobots stands between.
     """
@@ -198,7 +198,7 @@ def test_robot_of_sections_in_drake(tool: Callable[[str], ModuleType], file: Pat
 
 @pytest.mark.parametrize("file", SECTION_FILES, ids=lambda file: file.stem)
 def test_robot_of_sections_in_pybullet(tool: Callable[[str], ModuleType], file: Path) -> None:
-    """Single precision inside: 1e-5."""
+    """Single precision inside: 1e-5. It holds 127 joints at most, fixed ones counted."""
     if sys.version_info >= (3, 12):
         pytest.skip("pybullet has no wheels above Python 3.11")
     pybullet = tool("pybullet")

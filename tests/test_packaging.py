@@ -97,11 +97,13 @@ def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
         "stumpff",
         "screws",
         "strain_chain",
+        "growth",
+        "files",
     ]
     files = [
         PACKAGE / f"{name}.py" for name in (*names, "coordinates", "joint_loads", "muscles", "muscle_lengths", "actuators")
     ]
-    for folder in ("inflated_beam", "constant_curvature", "robots"):
+    for folder in ("inflated_beam", "constant_curvature", "helix", "robots"):
         files += (PACKAGE / folder).glob("*.py")
     assert len(files) > 20
     for file in files:

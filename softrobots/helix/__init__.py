@@ -29,6 +29,7 @@ from softrobots.helix.paths import (
 from softrobots.helix.pattern import Pattern, SheetPoints
 from softrobots.helix.pattern_error import DiscreteCentreLine, ShapeError, discrete_centre_line, shape_error
 from softrobots.helix.shapes import HANDEDNESS, PATHS, Actuator, HelixShape, forward, inverse, measure
+from softrobots.helix.template_files import write_template, write_template_pages, write_template_table
 from softrobots.helix.tube import actuator_tension, centre_length, height, length_for_turns, material_twist, turns, volume
 from softrobots.helix.varying import BentTube, bent_tube
 
@@ -93,4 +94,7 @@ __all__ = [
     "turn_angle",
     "turns",
     "volume",
+    "write_template",
+    "write_template_pages",
+    "write_template_table",
 ]

@@ -13,16 +13,14 @@ import itertools
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from softrobots.helix.pattern import Pattern
 from softrobots.helix.shapes import turning_sign
 from softrobots.helix.svg import SMALL, TEXT, Point, group, mm, polygon, polyline, rectangle, segment, text
 from softrobots.helix.template_notes import WIDTH, ruler_and_legend, title_block
-
-if TYPE_CHECKING:  # it draws itself with these functions
-    from softrobots.helix.pattern import Pattern
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 18.0, 12.0, 42.0, 54.0  # around the sheet
 _FILLS = {
@@ -53,7 +51,7 @@ class Window(NamedTuple):
 
 
 def csv_text(plan: Pattern) -> str:
-    """Table of what to mark along the line: see `Pattern.write_csv`."""
+    """Table of what to mark along the line: see `write_template_table`."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(_COLUMN_NAMES)
@@ -67,7 +65,7 @@ def csv_text(plan: Pattern) -> str:
 
 
 def svg_text(plan: Pattern, window: Window) -> str:
-    """Drawing of one page: see `Pattern.write_svg`."""
+    """Drawing of one page: see `write_template`."""
     around, shown = 1e3 * plan.sheet_width, window.end - window.start
     width, height = _LEFT + max(shown, WIDTH) + _RIGHT, _TOP + around + _BOTTOM
     root = ET.Element("svg", {"xmlns": "http://www.w3.org/2000/svg", "version": "1.1"})

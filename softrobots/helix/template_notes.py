@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from softrobots.helix.pattern import Pattern
 from softrobots.helix.svg import group, segment, text
-
-if TYPE_CHECKING:  # it draws itself with these functions
-    from softrobots.helix.pattern import Pattern
 
 WIDTH = 252.0
 """Room that the words need [mm]."""
