@@ -132,9 +132,9 @@ def test_a_wrench_along_its_axis_bends_a_chain_of_sections_into_the_exact_helix(
 
 @pytest.mark.parametrize("rule", ["corrected", "midpoint"])
 def test_a_wrench_along_its_axis_bends_lumped_chains_into_the_helix_in_second_order(rule: str) -> None:
-    """The body that is drawn ends where the chain does, to second order too. 1.7: room for the next order."""
+    """The body that is drawn ends where the chain does, to second order too; from 12 hinges on. 1.8: room."""
     errors, gaps = [], []
-    for count in (6, 12, 24):
+    for count in (12, 24):
         arm, one = model(count, chain="lumped", hinge_rule=rule), rod(tube(count))
         love = axial_wrench(one, 0.9 * one.curvature, 1.3 * one.torsion)
         curvature, torsion, stretch = love.strains
@@ -144,9 +144,9 @@ def test_a_wrench_along_its_axis_bends_lumped_chains_into_the_helix_in_second_or
         (segment,) = body(found, 3)
         assert np.allclose(segment.poses[0], np.eye(4), atol=1e-13)
         gaps.append(np.linalg.norm(segment.backbone[-1] - found.tip_position))
-    assert orders(errors).min() > 1.7
-    assert orders(gaps).min() > 1.7
-    assert errors[-1][0] < 5e-4
+    assert orders(errors).min() > 1.8
+    assert orders(gaps).min() > 1.8
+    assert errors[-1][0] < 1e-4
 
 
 @pytest.mark.parametrize(("share", "wrinkled"), [(0.999, False), (1.001, True)])
@@ -209,7 +209,7 @@ def test_compliance_converges_to_castiglianos_in_second_order(fields: dict, hand
     """Sections miss what varies within one: of a moment that turns by d over a section, d^2 / 12 of its square. 0.9 turns:
     d = 5.6 / n; of all entries the largest at most that."""
     exact, errors = tip_compliance(rod(tube(6, handedness=handedness))), []
-    for count in (4, 8, 16):
+    for count in (8, 16):
         arm = model(count, handedness=handedness, **fields)
         found = sr.compliance(arm, sr.solve_equilibrium(arm, ()))
         errors.append(np.abs(found - exact).max() / np.abs(exact).max())
