@@ -123,7 +123,7 @@ MASSES = {"pcc_arm": (2.0, 1.048 * 0.6), "pcc_arm_lumped": (2.0, 1.048 * 0.6)}
 MASSES |= {"helix_tube": (0.5, TUBE_MASS), "helix_tube_lumped": (0.5, TUBE_MASS)}
 """Mass of the base and of what moves [kg]."""
 SECTION_FILES = [urdf_folder() / f"{name}.urdf" for name in MASSES]
-SECTION_FRAMES = ("section_1_2", "segment_1", "tip")
+SECTION_FRAMES = ("segment_1", "tip")
 
 
 def poses_anywhere(file: Path) -> tuple[dict[str, bool], float, list[tuple[dict[str, float], dict[str, np.ndarray]]]]:
@@ -196,9 +196,9 @@ def test_robot_of_sections_in_drake(tool: Callable[[str], ModuleType], file: Pat
             assert np.allclose(found, pose, atol=1e-9)
 
 
-@pytest.mark.parametrize("file", SECTION_FILES, ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", [f for f in SECTION_FILES if f.stem != "helix_tube"], ids=lambda file: file.stem)
 def test_robot_of_sections_in_pybullet(tool: Callable[[str], ModuleType], file: Path) -> None:
-    """Single precision inside: 1e-5. It holds 127 joints at most, fixed ones counted."""
+    """Single precision inside: 1e-5. It takes fewer than 128 joints, fixed ones counted; helix_tube has 147."""
     if sys.version_info >= (3, 12):
         pytest.skip("pybullet has no wheels above Python 3.11")
     pybullet = tool("pybullet")
