@@ -25,6 +25,9 @@ from softrobots.command_line import add_load, exit_status, gravity_of, refuse_to
 from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
 
+PIECES = {"pinch": "pinches", "tape": "tapes", "stoppers": "gaps"}
+"""What the template counts, by method."""
+
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
@@ -47,7 +50,12 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--upright", choices=("tube", "axis"), default="axis", help="what stands along z (%(default)s)")
     made.add_argument("--sections", type=int, metavar="N", help="sections, and hinges, of the chains (about 40 degrees each)")
     add_load(made)
-    made.add_argument("--spacing", type=float, default=0.02, help="of the pinches along the actuator [m] (%(default)s)")
+    made.add_argument(
+        "--spacing",
+        type=float,
+        default=0.02,
+        help="of the pinches along the actuator, changed a little so that whole ones fit [m] (%(default)s)",
+    )
     made.add_argument("--method", choices=helix.METHODS, default="pinch", help="how the actuator is made (%(default)s)")
     made.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder of the results (output/helix_tube_<time>)"
@@ -66,7 +74,7 @@ def run(arguments: argparse.Namespace) -> Path:
     count = {} if arguments.sections is None else {"elastic_sections": arguments.sections, "hinges": arguments.sections}
     tube = sr.HelixTube.from_design(design, pressure=arguments.pressure, upright=arguments.upright, **count)
     refuse_too_large(tube, "--sections", tube.elastic_sections)
-    pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method)
+    pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method, remainder="respace")
     model = sr.load_model(tube)
     Load.of(model, arguments.force, gravity=gravity)
     folder = free_folder(arguments.output or Path("output") / f"helix_tube_{datetime.now():%Y%m%d_%H%M%S}")
@@ -110,6 +118,8 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
         raise sr.ParameterError("--nearest", True, "given with --antenna or --grasp")
     if arguments.design is not None:
         return helix.HelixDesign.load(arguments.design)
+    if arguments.angle is not None and not 0.0 <= arguments.angle < 90.0:
+        raise sr.ParameterError("--angle", arguments.angle, "in [0, 90) degrees")
     default = sr.HelixTube()
     diameter = default.diameter if arguments.diameter is None else arguments.diameter
     handedness = arguments.handedness or default.handedness
@@ -117,9 +127,13 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
     if wished:
         radius, rise, turns = wished
         given |= {"turns": turns, "diameter": diameter}
-        if arguments.antenna:
-            return helix.design_antenna(radius, rise, **given)
-        return helix.design_grasp(radius, rise, squeeze=arguments.squeeze or 0.0, **given)
+        try:
+            if arguments.antenna:
+                return helix.design_antenna(radius, rise, **given)
+            return helix.design_grasp(radius, rise, squeeze=arguments.squeeze or 0.0, **given)
+        except sr.SelfIntersection as error:
+            told = str(error).replace("on_contact='nearest'", "--nearest")
+            raise sr.SelfIntersection(told, contact=error.contact) from error
     contraction = default.contraction if arguments.contraction is None else arguments.contraction
     angle = default.angle if arguments.angle is None else math.radians(arguments.angle)
     length = default.length if arguments.length is None else arguments.length
@@ -151,6 +165,7 @@ def summarise(tube: sr.HelixTube, design: helix.HelixDesign, pattern: helix.Patt
             float(helix.material_twist(design.contraction, design.angle, design.diameter, design.handedness))
         ),
         "pinches": pattern.count,
+        "method": pattern.method,
         "pattern_error_m": error.largest_aligned,
         "weight_N": float(sum(body.mass for body in model.pinocchio.inertias[1:])) * 9.81,
         "tip_m": loaded.tip_position.tolist(),
@@ -169,6 +184,7 @@ def table(summary: dict[str, Any]) -> str:
     def mm(name: str) -> str:
         return f"{1e3 * summary[name]:.1f} mm"
 
+    pieces = f"{summary['pinches']} {PIECES[summary['method']]}"
     rows = [
         ("actuator", f"contraction {summary['contraction']:.4f} at {summary['angle_deg']:.3f} degrees"),
         ("tube", f"{mm('diameter_m')} wide, {mm('tube_length_m')} long before it is inflated"),
@@ -180,7 +196,10 @@ def table(summary: dict[str, Any]) -> str:
         ("self-contact", summary["self_contact"]),
         ("actuator pulls", f"{summary['actuator_tension_N']:.2f} N"),
         ("wall twists", f"{summary['material_twist_deg_per_m']:.1f} degrees per metre of tube"),
-        ("template", f"{summary['pinches']} pinches; their helix is off the smooth one by up to {mm('pattern_error_m')}"),
+        (
+            "template",
+            f"{pieces}; their helix is off the smooth one by up to {mm('pattern_error_m')}",
+        ),
         ("weight", f"{summary['weight_N']:.3f} N, without the base"),
         ("tip under load", "  ".join(f"{value + 0.0:.6f}" for value in summary["tip_m"]) + " m"),
         ("load moves it by", mm("sag_m")),

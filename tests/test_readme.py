@@ -28,6 +28,14 @@ def test_the_python_example_prints_what_the_readme_says() -> None:
     assert len(code.strip().splitlines()) <= 12
 
 
+def test_the_example_of_the_helical_tube_runs() -> None:
+    (code,) = (block for block in blocks("py") if "helix." in block)
+    names = {"sr": sr}
+    exec(compile(code, "README.md", "exec"), names)
+    assert names["sag"].stable
+    assert names["design"].realisable
+
+
 def test_the_first_screen_holds_sentence_picture_commands_and_code() -> None:
     marks = ("Soft robots as", "images/inflatable_arm.png", "scripts/ik_trajectory.py\n```", "-m pytest\n```", "```python")
     order = [README.index(mark) for mark in marks]

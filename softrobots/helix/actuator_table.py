@@ -105,7 +105,7 @@ class ActuatorTable:
         except ParameterError as error:  # numbers too large or too small, rows too near
             raise FileFormatError(f"{file}: {error}") from error
 
-    def write_csv(self, path: str | os.PathLike[str], overwrite: bool = False) -> Path:
+    def write_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the table as CSV, one line a row, full precision.
 
         Args:

@@ -122,9 +122,13 @@ def grasp_force(
     pressures, radii, depths, heights, counts, sizes = (np.array(np.broadcast_to(values, shape)) for values in given)
     if np.any(depths < 0.0) or np.any(depths > np.minimum(0.5 * sizes, radii)):
         most = np.minimum(0.5 * sizes, radii)
-        raise ParameterError("deflection", deflection, f"from 0 to {most} m, the radius of the tube or that of the object")
+        raise ParameterError(
+            "deflection", deflection, f"from 0 to {most.min():.6g} m, the radius of the tube or that of the object"
+        )
     if np.any((heights < sizes) & (counts > 1.0)):
-        raise ParameterError("turn_height", turn_height, f"at least the diameter of the tube {sizes} m, or the turns collide")
+        raise ParameterError(
+            "turn_height", turn_height, f"at least the diameter of the tube {sizes.max():.6g} m, or the turns collide"
+        )
     pitch = heights / (2.0 * np.pi)
     inner, centre = np.hypot(radii, pitch), np.hypot(radii + 0.5 * sizes, pitch)  # path length per turn angle
     area = 0.25 * np.pi * sizes**2

@@ -177,7 +177,7 @@ class HelixDesign:
         """Return `summary()`."""
         return self.summary()
 
-    def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> Path:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Save the design as JSON: numbers in SI units and radians, full precision.
 
         Args:
@@ -265,7 +265,7 @@ def checked_limits(name: str, limits: Any, unit: str) -> Limits | None:
     if limits is None:
         return None
     contraction = name == "contraction_limits"
-    requirement = "a pair (low, high) " + ("in (0, 1]" if contraction else "in [0, pi/2)") + ", low not above high"
+    requirement = "a pair (low, high) " + ("in (0, 1]" if contraction else "in [0, pi/2) rad") + ", low not above high"
     if not isinstance(limits, tuple | list | np.ndarray) or len(limits) != 2:
         raise ParameterError(name, limits, requirement)
     low, high = (finite_number(name, value, unit) for value in limits)

@@ -14,7 +14,7 @@ from softrobots.errors import ParameterError
 
 _RANGES = {
     "contraction": (1.0 / LARGEST, 1.0, "in (0, 1]: contracted over original length"),
-    "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), "in [0, pi/2) rad"),
+    "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), "in [0, pi/2) rad (5 degrees are 0.0873 rad)"),
 }
 _MOST_SAMPLES = 1_000_000
 _ROUNDING = 1e-12  # of the length: by how much a table may end too early

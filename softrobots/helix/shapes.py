@@ -226,11 +226,22 @@ def checked_actuator(contraction: Any, angle: Any, diameter: Any) -> Actuator:
     shares, angles = positive_array("contraction", contraction, "-"), finite_array("angle", angle, None, "rad")
     if np.any(shares > 1.0):
         raise ParameterError("contraction", contraction, "in (0, 1]: contracted over original length")
-    if np.any(angles < 0.0) or np.any(angles >= 0.5 * np.pi):
-        raise ParameterError("angle", angle, "in [0, pi/2) rad; say handedness where it matters")
+    checked_angle(angle, angles)
     sizes = positive_array("diameter", diameter, "m")
     common_shape("diameter", shares.shape, angles.shape, sizes.shape)
     return Actuator(shares, angles, sizes)
+
+
+def checked_angle(angle: Any, angles: FloatArray) -> None:
+    """Refuse an angle that is none of an actuator, and say what its unit is.
+
+    Raises:
+        ParameterError: If one of `angles` [rad], given as `angle`, is not in [0, pi/2).
+    """
+    if np.any(angles < 0.0):
+        raise ParameterError("angle", angle, "in [0, pi/2) rad; say handedness where it matters")
+    if np.any(angles >= 0.5 * np.pi):
+        raise ParameterError("angle", angle, "in [0, pi/2) rad (5 degrees are 0.0873 rad)")
 
 
 def turning_sign(handedness: str) -> float:

@@ -17,7 +17,7 @@ _THINNEST, _THICKEST, _LONGEST = 1e-3, 10.0, 200.0  # tubes that are drawn [m]
 _MOST_PAGES = 500
 
 
-def write_template(pattern: Pattern, path: str | os.PathLike[str], overwrite: bool = False) -> Path:
+def write_template(pattern: Pattern, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Draw the unrolled tube to scale, on one sheet: see `softrobots.helix.template`.
 
     Args:
@@ -43,6 +43,7 @@ def write_template_pages(
     path: str | os.PathLike[str],
     page_length: float = 0.25,
     overlap: float = 0.02,
+    *,
     overwrite: bool = False,
 ) -> tuple[Path, ...]:
     """Draw the unrolled tube to scale, on pages that are glued together; neighbours overlap and share a join line.
@@ -87,7 +88,7 @@ def write_template_pages(
     return tuple(targets)
 
 
-def write_template_table(pattern: Pattern, path: str | os.PathLike[str], overwrite: bool = False) -> Path:
+def write_template_table(pattern: Pattern, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """List what to mark along the actuator line, in millimetres.
 
     Columns: `number`; `kind` ("pinch", "tape", "gap" or "stopper"); `start_mm`, `end_mm`, `length_mm` along the line of the

@@ -16,7 +16,7 @@ import numpy as np
 
 from softrobots.checks import FloatArray, common_shape, finite_array, positive_array
 from softrobots.errors import ParameterError
-from softrobots.helix.shapes import HelixShape, checked_actuator, checked_shape, length_ratio, turning_sign
+from softrobots.helix.shapes import HelixShape, checked_actuator, checked_angle, checked_shape, length_ratio, turning_sign
 
 
 def turns(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
@@ -35,8 +35,7 @@ def turns(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
     """
     shape = checked_shape(shape)
     angles, lengths = finite_array("angle", angle, None, "rad"), positive_array("length", length, "m")
-    if np.any(angles < 0.0) or np.any(angles >= 0.5 * np.pi):
-        raise ParameterError("angle", angle, "in [0, pi/2) rad")
+    checked_angle(angle, angles)
     common_shape("length", shape.shape, angles.shape, lengths.shape)
     return np.asarray(lengths / (2.0 * np.pi * np.cos(angles) * np.hypot(shape.outer_radius, shape.pitch)))
 

@@ -105,7 +105,7 @@ class HelixTube:
         if self.contraction > 1.0:
             raise ParameterError("contraction", self.contraction, "in (0, 1]")
         if self.angle >= 0.5 * math.pi:
-            raise ParameterError("angle", self.angle, "in [0, pi/2) rad")
+            raise ParameterError("angle", self.angle, "in [0, pi/2) rad (5 degrees are 0.0873 rad)")
         if self.wall_thickness > 0.05 * self.diameter:
             raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius, {self.radius} m")
         if not -1.0 < self.poisson_ratio <= 0.5:
