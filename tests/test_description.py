@@ -18,12 +18,12 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots.description import declared_arguments, expand, parse_xml
 from softrobots.paths import urdf_folder, xacro_folder
-from softrobots.robots import PccArm
+from softrobots.robots import HelixTube, PccArm
 from softrobots.urdf_tags import NAMESPACE, read_tags
 from tests.oracles import tube_points
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO
-KINDS = (sr.InflatableArm, PccArm)
+KINDS = (sr.InflatableArm, PccArm, HelixTube)
 ODD = {"link_lengths": (0.5, 0.4, 0.3), "hinge_offset": (0.03, 0.05, 0.02), "stiffness": (250.0, 120.0, 80.0), "rest_up": 0.1}
 ODD_PCC = {
     "segment_lengths": (0.5, 0.4, 0.3),
@@ -34,6 +34,23 @@ ODD_PCC = {
     "elastic_sections": 2,
 }
 ODD_LUMPED = {"chain": "lumped", "hinges": 3, "hinge_rule": "midpoint", "torsion": False, "radius": (0.05, 0.03)}
+ODD_TUBE = {
+    "length": 0.8,
+    "diameter": 0.05,
+    "contraction": 0.9,
+    "angle": 0.3,
+    "handedness": "left",
+    "upright": "axis",
+    "pressure": 0.0,
+    "poisson_ratio": -0.2,
+    "actuator_density": 0.02,
+    "bending_stiffness": 0.4,
+    "axial_stiffness": 900.0,
+    "rgba": (1.0, 0.5, 0.25, 0.4),
+    "elastic_sections": 5,
+    "allow_self_contact": True,
+}
+LUMPED_TUBE = {"chain": "lumped", "hinges": 3, "hinge_rule": "midpoint", "extension": False, "torsional_stiffness": 0.2}
 
 
 def without_banner(text: str) -> str:
@@ -56,6 +73,9 @@ def test_committed_urdf_is_what_xacro_generates(name: str) -> None:
         (PccArm, ODD_PCC),
         (PccArm, ODD_LUMPED),
         (PccArm, {"chain": "lumped"}),
+        (HelixTube, {}),
+        (HelixTube, ODD_TUBE),
+        (HelixTube, LUMPED_TUBE),
     ],
 )
 def test_xacro_command_alone_gives_the_same_urdf(kind: type, parameters: dict) -> None:
@@ -68,10 +88,14 @@ def test_xacro_command_alone_gives_the_same_urdf(kind: type, parameters: dict) -
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_defaults_of_dataclass_and_xacro_agree(kind: type) -> None:
-    """Numbers and lists are read as Python reads them, truth values are true and false, words stand for themselves."""
+    """Numbers and lists are read as Python reads them, truth values are true and false, words stand for themselves.
+
+    None is empty. What is allowed of a design is no part of its description.
+    """
     declared = declared_arguments(xacro_folder() / kind.XACRO)
     fields = {field.name: field.default for field in dataclasses.fields(kind)}
-    assert list(declared) == list(fields)
+    fields.pop("allow_self_contact", None)
+    assert list(declared) == list(fields) == list(kind().xacro_arguments())
     for name, default in fields.items():
         text = declared[name]
         if name == "rgba":
@@ -80,6 +104,8 @@ def test_defaults_of_dataclass_and_xacro_agree(kind: type) -> None:
             assert text == {True: "true", False: "false"}[default], name
         elif isinstance(default, str):
             assert text == default, name
+        elif default is None:
+            assert text == "", name
         else:
             value = ast.literal_eval(text)
             assert np.array_equal(value, default), name
@@ -89,7 +115,7 @@ def test_defaults_of_dataclass_and_xacro_agree(kind: type) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_argument_says_meaning_unit_and_source(kind: type) -> None:
     lines = (xacro_folder() / kind.XACRO).read_text(encoding="utf-8").splitlines()
-    assert sum("<xacro:arg " in line for line in lines) == len(dataclasses.fields(kind))
+    assert sum("<xacro:arg " in line for line in lines) == len(kind().xacro_arguments())
     for number, line in enumerate(lines):
         if "<xacro:arg " in line:
             comment = lines[number - 1]

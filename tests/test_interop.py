@@ -196,9 +196,9 @@ def test_robot_of_sections_in_drake(tool: Callable[[str], ModuleType], file: Pat
             assert np.allclose(found, pose, atol=1e-9)
 
 
-@pytest.mark.parametrize("file", [f for f in SECTION_FILES if f.stem != "helix_tube"], ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", SECTION_FILES, ids=lambda file: file.stem)
 def test_robot_of_sections_in_pybullet(tool: Callable[[str], ModuleType], file: Path) -> None:
-    """Single precision inside: 1e-5. It takes fewer than 128 joints, fixed ones counted; helix_tube has 147."""
+    """Single precision inside: 1e-5. It takes fewer than 128 joints, fixed ones counted."""
     if sys.version_info >= (3, 12):
         pytest.skip("pybullet has no wheels above Python 3.11")
     pybullet = tool("pybullet")

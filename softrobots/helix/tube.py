@@ -33,11 +33,9 @@ def turns(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    shape = checked_shape(shape)
-    angles, lengths = finite_array("angle", angle, None, "rad"), positive_array("length", length, "m")
-    checked_angle(angle, angles)
-    common_shape("length", shape.shape, angles.shape, lengths.shape)
-    return np.asarray(lengths / (2.0 * np.pi * np.cos(angles) * np.hypot(shape.outer_radius, shape.pitch)))
+    lengths, each = positive_array("length", length, "m"), _length_of_turn(shape, angle)
+    common_shape("length", each.shape, lengths.shape)
+    return np.asarray(lengths / each)
 
 
 def height(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
@@ -45,13 +43,13 @@ def height(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
     return np.asarray(turns(shape, angle, length) * shape.turn_height)
 
 
-def length_for_turns(shape: HelixShape, angle: Any, count: Any) -> FloatArray:
+def length_for_turns(shape: HelixShape, angle: Any, turns: Any) -> FloatArray:
     """Length of the uninflated tube that makes so many turns [m]: the inverse of `turns`.
 
     Args:
         shape: The helix, shape (...).
         angle: Angle `theta` of the actuator to the axis of the uninflated tube, in [0, pi/2) [rad].
-        count: Turns, positive [-].
+        turns: Turns, positive [-].
 
     Returns:
         Length, the common shape [m].
@@ -59,9 +57,17 @@ def length_for_turns(shape: HelixShape, angle: Any, count: Any) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    counts, per_metre = positive_array("count", count, "-"), turns(shape, angle, 1.0)
-    common_shape("count", counts.shape, per_metre.shape)
-    return np.asarray(counts / per_metre)
+    counts, each = positive_array("turns", turns, "-"), _length_of_turn(shape, angle)
+    common_shape("turns", counts.shape, each.shape)
+    return np.asarray(counts * each)
+
+
+def _length_of_turn(shape: Any, angle: Any) -> FloatArray:
+    """Length of uninflated tube that makes one turn [m]."""
+    shape, angles = checked_shape(shape), finite_array("angle", angle, None, "rad")
+    checked_angle(angle, angles)
+    common_shape("angle", shape.shape, angles.shape)
+    return np.asarray(2.0 * np.pi * np.cos(angles) * np.hypot(shape.outer_radius, shape.pitch))
 
 
 def centre_length(contraction: Any, angle: Any, length: Any) -> FloatArray:

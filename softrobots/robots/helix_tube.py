@@ -76,8 +76,8 @@ class HelixTube:
     """Axial stiffness EA as measured [N]; None: of the wall, `E 2 pi r t`."""
     chain: str = "sections"
     """Form of the equivalent rigid chain: "sections" or "lumped"."""
-    elastic_sections: int = 24
-    """Sections of constant strain, for chain="sections"."""
+    elastic_sections: int = 20
+    """Sections of constant strain, for chain="sections"; more than 20 make too many joints for PyBullet."""
     hinges: int = 24
     """Pairs of orthogonal springs, for chain="lumped"."""
     hinge_rule: str = "corrected"

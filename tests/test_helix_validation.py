@@ -1,0 +1,130 @@
+"""The script that validates the geometry of the helical tube: what it counts, writes, refuses, and that it can fail."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import json
+import re
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from tests.conftest import CHECKOUT
+from tests.helix_rods import actuator_frames
+from tests.test_scripts import run_script
+
+
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("helix_validation", CHECKOUT / "scripts" / "helix_validation.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_it_validates_the_shipped_files_and_random_tubes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert run_script("helix_validation", ["--no-grid", "--cases", "1", "--output", str(tmp_path)]) == 0
+    result = json.loads((tmp_path / "helix_validation.json").read_text(encoding="utf-8"))
+    assert result["passed"]
+    lines = {(line["set"], line["chain"]): line for line in result["table"]}
+    assert list(lines) == [
+        ("committed file", "sections"), ("committed file", "lumped"),
+        ("random", "sections"), ("random", "lumped"), ("random", "lumped, midpoint"),
+    ]  # fmt: skip
+    for line in lines.values():
+        assert 0.0 < line["largest_distance_m"] < 1e-12
+        assert 0.0 < line["largest_angle_rad"] < 1e-12
+    assert lines["committed file", "sections"]["boundaries"] == 26  # 24 sections, segment_1 and tip
+    assert lines["random", "lumped"]["tubes"] == 1
+    rows = list(csv.DictReader((tmp_path / "helix_validation.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == 2 + 3
+    assert max(float(row["largest_distance_m"]) for row in rows) == max(line["largest_distance_m"] for line in lines.values())
+    assert (tmp_path / "images" / "helix_validation.png").stat().st_size > 20_000
+    out, err = capsys.readouterr()
+    assert "| committed file | lumped | 1 | 26 |" in out
+    assert out.rstrip().endswith("passed")
+    assert "5/5" in err  # a progress bar
+
+
+def test_it_fails_where_an_error_exceeds_the_tolerance(capsys: pytest.CaptureFixture) -> None:
+    assert run_script("helix_validation", ["--no-grid", "--cases", "0", "--tolerance", "1e-17"]) == 1
+    assert "FAILED: an error exceeds the tolerance" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("moved", "turned"), [((3e-9, 0.0, 0.0), 0.0), ((0.0, 0.0, 0.0), 2e-9)])
+def test_it_sees_a_frame_that_is_off(moved: tuple, turned: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = script()
+    (case, _), exact = module.committed(), module.chain_frames
+
+    def bent(model: sr.SoftModel, names: list) -> np.ndarray:
+        frames = exact(model, names)
+        frames[5, :3, 3] += moved
+        turn = np.array([[1.0, -turned, 0.0], [turned, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        frames[5, :3, :3] = frames[5, :3, :3] @ turn
+        return frames
+
+    monkeypatch.setattr(module, "chain_frames", bent)
+    row = module.measure(case)
+    assert row.distance == pytest.approx(3e-9 if turned == 0.0 else 0.0, rel=1e-5, abs=1e-14)
+    assert row.angle == pytest.approx(turned, rel=1e-5, abs=1e-13)
+
+
+def test_its_closed_form_is_the_helix_and_its_grid_is_the_papers() -> None:
+    """Theory 3 in 50 digits; angles 2.5, 5 and 10 degrees, contractions 0.5 to 0.9, the paper's diameter and 2.5 times it."""
+    cases = list(script().grid())
+    assert len(cases) == 2 * 120
+    assert {round(np.degrees(case.tube.angle), 9) for case in cases} == {2.5, 5.0, 10.0}
+    assert {case.tube.contraction for case in cases} == {0.5, 0.6, 0.7, 0.8, 0.9}
+    assert {case.tube.diameter for case in cases} == {0.0331, 0.08275}
+    assert {(case.tube.handedness, round(case.tube.turns, 9), case.tube.upright) for case in cases} > {
+        ("right", 1.0, "tube"), ("left", 4.0, "axis"),
+    }  # fmt: skip
+    for case in cases[::37]:
+        tube, places = case.tube, np.array(list(script().boundaries(case.tube).values()))
+        sign = 1 if tube.handedness == "right" else -1
+        given = (tube.contraction, tube.angle, tube.diameter, sign)
+        exact = actuator_frames(*given, places, from_base=tube.upright == "tube")
+        assert np.allclose(script().analytic(tube, places), exact, atol=1e-13, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--cases", "-1"], "--cases"),
+        (["--seed", "-1"], "--seed"),
+        (["--tolerance", "0"], "--tolerance"),
+        (["--tolerance", "nan"], "--tolerance"),
+        (["--tolerance", "inf"], "--tolerance"),
+    ],
+)
+def test_bad_input_is_refused_and_leaves_nothing(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    folder = tmp_path / "out"
+    assert run_script("helix_validation", [*arguments, "--output", str(folder)]) == 2
+    out, err = capsys.readouterr()
+    assert re.search(f"error: .*{message}", err)
+    assert out == ""
+    assert not folder.exists()
+
+
+def test_nothing_is_overwritten_unless_asked(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    held = tmp_path / "helix_validation.csv"
+    held.write_text("mine", encoding="utf-8")
+    arguments = ["--no-grid", "--cases", "0", "--no-plots", "--output", str(tmp_path)]
+    assert run_script("helix_validation", arguments) == 2
+    assert "exists; choose another name" in capsys.readouterr().err
+    assert held.read_text(encoding="utf-8") == "mine"
+    assert run_script("helix_validation", [*arguments, "--overwrite"]) == 0
+    assert held.read_text(encoding="utf-8").startswith("set,chain,handedness")
+    assert not (tmp_path / "images").exists()
+
+
+def test_help_tells_what_it_does(capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run_script("helix_validation", ["--help"])
+    assert ended.value.code == 0
+    assert "--tolerance" in capsys.readouterr().out
