@@ -2,8 +2,8 @@
 
 Give the actuator (--contraction, --angle), or what the helix is for: an antenna (--antenna), or an object to wrap (--grasp).
 Prints a table, and writes into a new folder: the design (JSON), the robot as URDF (sections and lumped), a template of the
-unrolled tube to print to scale (SVG) with its positions (CSV), the loaded shape (NPZ, PNG, HTML scene) and the growth as an
-animated page (HTML).
+unrolled tube to print to scale (SVG, whole and on pages) with its positions (CSV), the loaded shape of the lumped robot (NPZ,
+PNG, HTML scene) and the growth as an animated page (HTML).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tqdm import tqdm
 
 import softrobots as sr
 from softrobots import body_plots, helix, plots
@@ -50,6 +51,8 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--upright", choices=("tube", "axis"), default="axis", help="what stands along z (%(default)s)")
     made.add_argument("--sections", type=int, metavar="N", help="sections, and hinges, of the chains (about 40 degrees each)")
     add_load(made)
+    told = "force along the tube, e.g. of wind [N/m]"
+    made.add_argument("--wind", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
     made.add_argument(
         "--spacing",
         type=float,
@@ -75,32 +78,48 @@ def run(arguments: argparse.Namespace) -> Path:
     tube = sr.HelixTube.from_design(design, pressure=arguments.pressure, upright=arguments.upright, **count)
     refuse_too_large(tube, "--sections", tube.elastic_sections)
     pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method, remainder="respace")
-    model = sr.load_model(tube)
-    Load.of(model, arguments.force, gravity=gravity)
+    # Hinges sag right with far fewer joints than sections, which are too stiff where the tube turns much along one.
+    robots = {"helix_tube": tube, "helix_tube_lumped": dataclasses.replace(tube, chain="lumped")}
+    model = sr.load_model(robots["helix_tube_lumped"])
+    wind = None if arguments.wind is None else sr.distributed_force(model, arguments.wind)
+    Load.of(model, arguments.force, wrench=wind, gravity=gravity)
     folder = free_folder(arguments.output or Path("output") / f"helix_tube_{datetime.now():%Y%m%d_%H%M%S}")
-    loaded = sr.solve_equilibrium(model, (), arguments.force, gravity=gravity)
-    summary = summarise(tube, design, pattern, loaded)
-    figure = None if arguments.no_plots else body_plots.shape(loaded)
-    with sr.view(model, loaded) as viewer:
+    with tqdm(total=5, desc="helix", unit="step") as bar:
+
+        def step(text: str) -> None:
+            bar.update()
+            bar.set_postfix_str(text)
+
+        loaded = sr.solve_equilibrium(model, (), arguments.force, wrench=wind, gravity=gravity)
+        summary = summarise(tube, design, pattern, loaded)
+        step("pictures")
+        figure = None if arguments.no_plots else body_plots.shape(loaded)
         make_folder(folder)
-        viewer.write_html(folder / "scene.html", title="Helical tube under load")
-        viewer.animate_growth(tube)
-        viewer.write_html(folder / "growth.html", title="Growth of the helical tube")
+        with sr.view(model, loaded) as viewer:
+            viewer.write_html(folder / "scene.html", title="Helical tube under load")
+        if figure is not None:
+            figure.savefig(folder / "shape.png")
+        step("files")
         sr.save_result(loaded, folder / "equilibrium.npz")
         design.save(folder / "design.json")
         helix.write_template(pattern, folder / "template.svg")
+        helix.write_template_pages(pattern, folder / "template_pages" / "page.svg")
         helix.write_template_table(pattern, folder / "template.csv")
-        for chain in ("sections", "lumped"):
-            name = "helix_tube.urdf" if chain == "sections" else "helix_tube_lumped.urdf"
-            (folder / name).write_text(dataclasses.replace(tube, chain=chain).urdf(), encoding="utf-8")
+        for name, robot in robots.items():
+            (folder / f"{name}.urdf").write_text(robot.urdf(), encoding="utf-8")
         (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        if figure is not None:
-            figure.savefig(folder / "shape.png")
-        print(table(summary))
-        print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
-        if arguments.meshcat:
-            print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
-            viewer.wait()
+        step("growth")
+        with sr.view(sr.load_model(tube)) as viewer:
+            viewer.animate_growth(tube)
+            step("growth")
+            viewer.write_html(folder / "growth.html", title="Growth of the helical tube")
+            step("done")
+            bar.close()
+            print(table(summary))
+            print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+            if arguments.meshcat:
+                print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
+                viewer.wait()
     return folder
 
 
@@ -167,7 +186,7 @@ def summarise(tube: sr.HelixTube, design: helix.HelixDesign, pattern: helix.Patt
         "pinches": pattern.count,
         "method": pattern.method,
         "pattern_error_m": error.largest_aligned,
-        "weight_N": float(sum(body.mass for body in model.pinocchio.inertias[1:])) * 9.81,
+        "weight_N": 9.81 * tube.mass,
         "tip_m": loaded.tip_position.tolist(),
         "sag_m": float(np.linalg.norm(loaded.tip_position - unloaded)),
         "largest_moment_N_m": float(loaded.link_moments.max()),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray, finite_number, positive_number
+from softrobots.checks import FloatArray, finite_number, non_negative_number, positive_number
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import ParameterError
 from softrobots.growth import SHORTEST, grown_coordinates
@@ -17,6 +17,7 @@ FRAME_RATE = 30
 """Frames a second."""
 
 _MOST_BODIES = 60  # shapes of a continuous body that an animation goes through
+_MOST_FRAMES = 2**31 - 1  # of any animation; numbers of frames are integers of a browser
 
 
 class Frame(NamedTuple):
@@ -30,6 +31,8 @@ class Frame(NamedTuple):
     """Elastic coordinates."""
     equilibrium: Equilibrium | None
     """The nearest waypoint; None without load."""
+    grown: float = 1.0
+    """Share of the tube that has come out."""
 
 
 def waypoint_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
@@ -64,7 +67,8 @@ def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) ->
     Args:
         tube: The tube.
         seconds: Time of the animation [s].
-        front: Length behind the tip over which the helix forms [m]; it is formed to the end while the whole tube is shown.
+        front: Length behind the tip over which the helix forms [m]; while the whole tube is shown it forms to the end, as
+            fast as the tube grew, or faster to be done in the last frame.
         hold: Share of the time, at the end, for the whole tube, in [0, 1).
 
     Returns:
@@ -75,18 +79,21 @@ def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) ->
     """
     if not 0.0 <= finite_number("hold", hold) < 1.0:
         raise ParameterError("hold", hold, "in [0, 1)")
+    front = non_negative_number("front", front, "m")
     numbers, total = _spread(positive_number("duration", seconds, "s"))
     shares = np.clip(numbers / total / (1.0 - hold), 0.0, 1.0)
-    # When the tube is whole, the last stretch is formed too, over as much time as the tip took along it.
-    formed = np.clip((numbers / total / (1.0 - hold) - 1.0) * tube.length, 0.0, front)
+    # When the tube is whole, the last stretch is formed too, over as much time as the tip took along it, or as there is.
+    speed = max(tube.length / (1.0 - hold), front / hold if hold > 0.0 else 0.0)
+    formed = np.clip((numbers / total - (1.0 - hold)) * speed, 0.0, front)
+    formed[-1] = front if hold > 0.0 else 0.0
     motors: FloatArray = np.zeros(0)
     return [
-        Frame(number, motors, grown_coordinates(tube, max(share, SHORTEST) * tube.length, front - done).ravel(), None)
+        Frame(number, motors, grown_coordinates(tube, max(share, SHORTEST) * tube.length, front - done).ravel(), None, share)
         for number, share, done in zip(numbers.tolist(), shares.tolist(), formed.tolist(), strict=True)
     ]
 
 
 def _spread(seconds: float) -> tuple[FloatArray, int]:
     """Numbers of frames evenly over a time, and that of the last one."""
-    total = max(round(seconds * FRAME_RATE), 1)
+    total = max(round(min(seconds * FRAME_RATE, _MOST_FRAMES)), 1)
     return np.unique(np.rint(np.linspace(0, total, min(_MOST_BODIES, total + 1))).astype(int)), total

@@ -57,7 +57,7 @@ def shape(equilibrium: Equilibrium) -> Any:
         for name, points in segment.lines.items():
             axes.plot(*points.T, color=_PULL, lw=1.6, label=label(name))
         turned = float(np.arccos(np.clip(np.sum(segment.poses[1:, :3, 2] * segment.poses[:-1, :3, 2], axis=1), -1, 1)).sum())
-        rings = 6 if turned < np.pi else round(turned / 0.7)
+        rings = max(6, round(turned / 0.7))
         for pose in segment.poses[:: max(1, len(segment.poses) // rings)]:
             axes.plot(*_circle(pose, segment.radius).T, color="0.7", lw=0.8)
         axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label=label("end of a segment"))

@@ -81,11 +81,15 @@ class Equilibrium:
     def link_moments(self) -> FloatArray:
         """Moment at each inflated link, both springs combined (Euclidean norm), shape (n_links,) [N m].
 
-        Empty if the model names no inflated links.
+        Empty if the model names no inflated links. A section carries the moment of its middle; what is told of it is the
+        largest along it, with the moment linear between the middles of the sections of a segment, and beyond them.
         """
-        return read_only(
-            np.array([np.linalg.norm(self.spring_torques[list(group.springs)]) for group in self.model.spring_groups])
-        )
+        groups = self.model.spring_groups
+        moments = np.array([np.linalg.norm(self.spring_torques[list(group.springs)]) for group in groups])
+        for segment in {group.segment for group in groups} - {None}:
+            rows = [row for row, group in enumerate(groups) if group.segment == segment]
+            moments[rows] = _largest_along(moments[rows])
+        return read_only(moments)
 
     @cached_property
     def muscle_lengths(self) -> FloatArray:
@@ -251,6 +255,15 @@ def check_same_model(model: SoftModel, equilibrium: Any) -> None:
         raise ParameterError("equilibrium", equilibrium, "an Equilibrium of the model")
     if equilibrium.model != model:
         raise ParameterError("equilibrium", equilibrium.model, f"an equilibrium of the model given, {model!r}")
+
+
+def _largest_along(moments: FloatArray) -> FloatArray:
+    """Largest moment along each section of a segment, shape (n,), from the moments in their middles, base to tip."""
+    if len(moments) < 2:
+        return moments
+    between = 0.5 * (moments[1:] + moments[:-1])
+    ends = np.concatenate([[1.5 * moments[0] - 0.5 * moments[1]], between, [1.5 * moments[-1] - 0.5 * moments[-2]]])
+    return np.asarray(np.maximum(np.maximum(ends[1:], ends[:-1]), moments))
 
 
 def _within(values: FloatArray, limits: FloatArray) -> bool:

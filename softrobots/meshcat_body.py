@@ -54,15 +54,15 @@ class BodyDrawing:
         animation: Any,
         frames: Mapping[int, tuple[Sequence[SegmentBody], dict[str, float]]],
         *,
-        everting: float | None = None,
+        everting: Mapping[int, float] | None = None,
     ) -> None:
         """Draw one body a frame and let an animation show them in turn: meshcat can switch visibility, but bend nothing.
 
         Args:
             animation: A meshcat animation.
             frames: Body and tensions by number of frame.
-            everting: For a tube that grows at its tip, its length when it is whole [m]: the tip is drawn round, and the wall
-                that has not come out as a dark string inside.
+            everting: For a tube that grows at its tip, the share that has come out by number of frame: the tip is drawn round,
+                and the wall that has not come out as a dark string inside.
         """
         self.clear()
         numbers = sorted(frames)
@@ -76,7 +76,7 @@ class BodyDrawing:
             else:
                 short = [segment.thinned(0.1 * segment.radius) for segment in segments]
                 self._draw(node, short, tensions, 14)
-                self._draw_eversion(node, short[-1], everting)
+                self._draw_eversion(node, short[-1], everting[number])
             # All tracks last as long as the animation: meshcat starts a shorter one anew when it is sought beyond its end.
             for when in sorted({numbers[0], number, numbers[min(place + 1, len(numbers) - 1)], numbers[-1]}):
                 shown = when == number
@@ -91,28 +91,27 @@ class BodyDrawing:
                 pushes = tensions.get(name, 0.0) < 0.0
                 colour = PUSH_COLOUR if pushes else PULL_COLOUR
                 self.entries["muscle that pushes" if pushes else "muscle that pulls"] = colour
-                self._draw_line(at[name], segment, name, colour)
+                self._draw_line(at["lines"][name], segment, name, colour)
             for name in segment.lines:
                 self.entries[name] = PULL_COLOUR
-                self._draw_line(at[name], segment, name, PULL_COLOUR)
+                self._draw_line(at["lines"][name], segment, name, PULL_COLOUR)
 
     def _draw_line(self, node: Any, segment: SegmentBody, name: str, colour: tuple[float, ...]) -> None:
         node.set_object(_mesh(*segment.muscle_surface(name, _MUSCLE_RADIUS * segment.radius)), material((*colour, 1.0)))
 
-    def _draw_eversion(self, node: Any, segment: SegmentBody, length: float) -> None:
+    def _draw_eversion(self, node: Any, segment: SegmentBody, share: float) -> None:
         """The round tip, and the wall that comes forward inside at twice the speed of the tip, with marks on it."""
         node["dome"].set_object(_mesh(*segment.dome()), material(TUBE_COLOUR))
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(segment.backbone, axis=0), axis=1))])
-        grown = float(along[-1])
-        if grown > 0.98 * length:
+        if share >= 1.0:
             return
         self.entries["wall that has not come out"] = TAIL_COLOUR
         points = segment.backbone
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        grown = float(along[-1])
         tail = tube(segment.poses[:, :3, :3], points, _TAIL * segment.radius, 8)
         node["tail"].set_object(_mesh(*tail), material(TAIL_COLOUR))
-        spacing = length / _MARKS
         for mark in range(1, _MARKS + 1):
-            place = 2.0 * grown - mark * spacing
+            place = (2.0 - mark / _MARKS / max(share, 1e-6)) * grown
             if 0.0 < place < grown:
                 at = int(np.searchsorted(along, place))
                 rows = [max(at - 1, 0), min(at, len(points) - 1)]

@@ -38,6 +38,8 @@ class SpringGroup:
     """Tube radius [m]."""
     pressure: float
     """Gauge pressure [Pa]."""
+    segment: int | None = None
+    """Number of the segment, if the group is one of its sections."""
 
     @property
     def wrinkling_moment(self) -> float:
@@ -68,8 +70,11 @@ class SoftModel:
         bodies = [(name, number) for name, number in frames if pinocchio_model.frames[number].type == pin.FrameType.BODY]
         self._frame_ids = dict(frames) | dict(bodies)  # a link goes before a joint of the same name
         self._tip = tip
+        segments = self._structure.segment_of
         self._groups = tuple(
-            SpringGroup(tuple(names.index(name) for name in link.springs), link.radius, link.pressure)
+            SpringGroup(
+                tuple(names.index(name) for name in link.springs), link.radius, link.pressure, segments.get(link.springs[0])
+            )
             for link in inflated_links
             if all(name in names for name in link.springs)
         )

@@ -116,6 +116,12 @@ class Structure:
         self.actuators = self._actuators()
         """Motors and muscles."""
 
+    @property
+    def segment_of(self) -> dict[str, int]:
+        """Number of the segment by coordinate of a section, or by joint of a lumped one."""
+        made = {f"{row.name}_{strain}": row.segment for row in self.section_table for strain in STRAINS}
+        return made | {joint: row.segment for row in self.section_table for joint in row.joint_names}
+
     def indices(self, names: Sequence[str]) -> Any:
         """Places of joints in Pinocchio's velocity vector."""
         made = np.array([self._pin.joints[self._pin.getJointId(name)].idx_v for name in names], dtype=np.intp)

@@ -133,7 +133,7 @@ class Viewer:
         for link in range(len(self._model.spring_groups)):
             self._colour(link, 0)
         self._arrows.clear()
-        self._loaded = False
+        self._ghost, self._loaded = _ghost(self._model), False
 
     def trace(self, points: Any) -> None:
         """Draw a path as dots.
@@ -223,7 +223,7 @@ class Viewer:
         for frame in frames:
             self._add_frame(animation, frame)
         bodies = {f.number: (body_at(self._model, f.q_motors, f.q_springs, 3), _tensions(None)) for f in frames}
-        self._body.animate(animation, bodies, everting=tube.centre_length)
+        self._body.animate(animation, bodies, everting={frame.number: frame.grown for frame in frames})
         self._page.set_animation(animation, play=True, repetitions=1000)
 
     def look_at(self, tip: FloatArray) -> None:

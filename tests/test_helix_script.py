@@ -19,13 +19,14 @@ def test_an_actuator_becomes_design_template_robots_and_scenes(tmp_path: Path, c
     assert run_script("helix_tube", [*told, "--output", str(folder)]) == 0
     names = {path.name for path in folder.iterdir()}
     expected = {"design.json", "equilibrium.npz", "growth.html", "helix_tube.urdf", "helix_tube_lumped.urdf", "scene.html"}
-    assert names == expected | {"shape.png", "summary.json", "template.csv", "template.svg"}
+    assert names == expected | {"shape.png", "summary.json", "template.csv", "template.svg", "template_pages"}
     printed = capsys.readouterr().out
     summary = json.loads((folder / "summary.json").read_text())
     # theory.md's reference: 5 degrees, 0.66, 33.1 mm
     assert summary["outer_radius_m"] == pytest.approx(0.0854078008, abs=1e-10)
     assert summary["inner_radius_m"] == pytest.approx(0.0523078008, abs=1e-10)
     assert summary["turn_height_m"] == pytest.approx(2 * np.pi * 0.0279647090, abs=1e-9)
+    assert summary["weight_N"] == pytest.approx(920 * np.pi * 0.0331 * 1e-4 * 0.8 * 9.81, rel=1e-12)
     assert summary["wrinkling_moment_N_m"] == pytest.approx(np.pi**2 / 4 * 20e3 * 0.01655**3, rel=1e-12)
     assert "certified stable  yes" in printed
     # Both robots load, and hang like the saved answer: exactly, and to second order.
@@ -37,6 +38,7 @@ def test_an_actuator_becomes_design_template_robots_and_scenes(tmp_path: Path, c
         unloaded[name] = sr.solve_equilibrium(model, ()).tip_position
         tip = sr.solve_equilibrium(model, (), gravity=sr.EARTH_GRAVITY).tip_position
         assert np.linalg.norm(tip - saved.tip_position) < 0.1 * summary["sag_m"]
+    assert len(list((folder / "template_pages").iterdir())) == 4  # 0.8 m in pages of 0.25 m that share 0.02 m
     assert np.allclose(*unloaded.values(), rtol=0.0, atol=1e-12)
     assert summary["sag_m"] == pytest.approx(np.linalg.norm(saved.tip_position - unloaded["helix_tube"]), rel=1e-9)
     assert sr.helix.HelixDesign.load(folder / "design.json").tube_length == pytest.approx(0.8, rel=1e-12)

@@ -20,9 +20,13 @@ from softrobots.strain_chain import LARGEST_BENDING, in_range
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""
 
+MAX_JOINTS = 300
+"""Joints of a designed tube; Pinocchio's workspace is refused above."""
+
 MOST_SECTIONS = 1000
 """Sections or hinges that a chain may have."""
 
+_LARGEST_RADIUS = 1e6  # of a helix whose axis stands in the origin, over the length of the tube
 _SECTION_TURN = math.radians(40.0)  # of a section of a designed tube
 
 
@@ -77,7 +81,8 @@ class HelixTube:
     chain: str = "sections"
     """Form of the equivalent rigid chain: "sections" or "lumped"."""
     elastic_sections: int = 20
-    """Sections of constant strain, for chain="sections"; more than 20 make too many joints for PyBullet."""
+    """Sections of constant strain, for chain="sections"; more than 20 make too many joints for PyBullet. They are too stiff by
+    up to a twelfth of the squared angle that one of them turns, 6 % here: for sag take hinges, which err far less."""
     hinges: int = 24
     """Pairs of orthogonal springs, for chain="lumped"."""
     hinge_rule: str = "corrected"
@@ -123,13 +128,15 @@ class HelixTube:
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(name, getattr(self, name), "True or False")
         object.__setattr__(self, "rgba", colours(self.rgba, 1, "tubes"))
+        if self.upright == "axis" and self.shape is not None and self.shape.centre_radius > _LARGEST_RADIUS * self.length:
+            raise ParameterError("upright", self.upright, '"tube" for a helix so wide that the tube hardly bends')
         self._check_sections()
         if not self.allow_self_contact and self.shape is not None:
             helix.check_self_contact(self.shape, self.turns)
 
     @classmethod
     def from_design(cls, design: helix.HelixDesign, **fields: Any) -> HelixTube:
-        """The tube of a design, with sections (and hinges) of about 40 degrees unless said otherwise.
+        """The tube of a design, with sections (and hinges) of about 40 degrees unless said otherwise, but at most 300 joints.
 
         Args:
             design: What `helix.design_grasp` or `helix.design_antenna` returns, or a `HelixDesign` of one's own.
@@ -152,7 +159,8 @@ class HelixTube:
         curvature, torsion = helix.actuator_curvature_torsion(design.contraction, design.angle, design.diameter)
         turning = math.hypot(curvature, torsion) * design.centre_length
         count = max(4, math.ceil(turning / _SECTION_TURN))
-        return cls(**({"elastic_sections": count, "hinges": count} | given | fields))
+        counts = {"elastic_sections": min(count, MAX_JOINTS // 6), "hinges": min(count, MAX_JOINTS // 4)}
+        return cls(**(counts | given | fields))
 
     @property
     def radius(self) -> float:
@@ -183,6 +191,12 @@ class HelixTube:
     def centre_length(self) -> float:
         """Length of the centre line of the actuated tube, which the chain has [m]."""
         return float(helix.centre_length(self.contraction, self.angle, self.length))
+
+    @property
+    def mass(self) -> float:
+        """Mass of wall and actuator, without the base [kg]."""
+        wall = self.density * math.pi * self.diameter * self.wall_thickness
+        return (wall + self.actuator_density) * self.length
 
     @property
     def strains(self) -> FloatArray:

@@ -47,7 +47,9 @@ def at_least(name: str, values: tuple[float, ...], low: float, strict: bool, uni
         ParameterError: If there is one.
     """
     if min(values) < low or (strict and min(values) == low):
-        raise ParameterError(name, values, f"{'above' if strict else 'at least'} {low} [{unit}]")
+        raise ParameterError(
+            name, values if len(values) > 1 else values[0], f"{'above' if strict else 'at least'} {low} [{unit}]"
+        )
 
 
 Bounds = Mapping[str, tuple[str, float, bool]]
