@@ -8,8 +8,6 @@ a new folder, and prints the tables. Grasp forces are those of our model (see so
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import sys
 from collections.abc import Iterable, Sequence
 from datetime import datetime
@@ -22,7 +20,7 @@ import softrobots as sr
 from softrobots import helix, helix_plots, plots
 from softrobots.checks import positive_number
 from softrobots.command_line import exit_status
-from softrobots.files import free_folder, make_folder, new_file, write_atomically
+from softrobots.files import csv_text, free_folder, make_folder, new_file, write_atomically, write_text
 from softrobots.helix import atlas
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
@@ -83,8 +81,8 @@ def run(arguments: argparse.Namespace) -> None:
     for name, figure in zip(PICTURES, figures, strict=False):
         save(figure, folder / f"{name}.png")
     shapes.write_csv(folder / "shapes.csv")
-    write_csv(folder / "contraction_limits.csv", LIMIT_COLUMNS, limits)
-    write_csv(folder / "grasp_forces.csv", FORCE_COLUMNS, forces)
+    write_text(folder / "contraction_limits.csv", csv_text(LIMIT_COLUMNS, limits), overwrite=False)
+    write_text(folder / "grasp_forces.csv", csv_text(FORCE_COLUMNS, forces), overwrite=False)
     print(f"\nShapes\n\n{shapes.to_markdown()}")
     print("Smallest contraction without self-contact, of tubes of any diameter\n")
     print(
@@ -129,15 +127,6 @@ def table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table in Markdown."""
     lines = [names, ["---"] * len(names), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
-
-
-def write_csv(path: Path, names: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
-    """Write numbers with full precision."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(names)
-    writer.writerows([repr(number) for number in row] for row in rows)
-    write_atomically(new_file(path, overwrite=False), lambda file: file.write(text.getvalue().encode()))
 
 
 def save(figure: Any, path: Path, *, overwrite: bool = False) -> Path:

@@ -142,7 +142,7 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
     default = sr.HelixTube()
     diameter = default.diameter if arguments.diameter is None else arguments.diameter
     handedness = arguments.handedness or default.handedness
-    given: dict[str, Any] = {"handedness": handedness, "on_contact": "nearest" if arguments.nearest else "error"}
+    given: dict[str, Any] = {"handedness": handedness, "on_unrealisable": "nearest" if arguments.nearest else "error"}
     if wished:
         radius, rise, turns = wished
         given |= {"turns": turns, "diameter": diameter}

@@ -67,6 +67,18 @@ def positive_array(name: str, value: Any, unit: str) -> FloatArray:
     return array
 
 
+def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
+    """Return `value` as an array of numbers, zero or above, any shape.
+
+    Raises:
+        ParameterError: If a number is not finite or below zero.
+    """
+    array = finite_array(name, value, None, unit)
+    if np.any(array < 0.0):
+        raise ParameterError(name, value, f"zero or positive [{unit}]")
+    return array
+
+
 def common_shape(name: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
     """Return the shape that arrays of these shapes broadcast to.
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any
 
@@ -109,3 +111,25 @@ def write_atomically(target: Path, write: Callable[[IO[bytes]], object]) -> None
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+
+
+def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> Path:
+    """Write a text file in UTF-8 and return its path.
+
+    Raises:
+        ParameterError: If the path is none.
+        OutputExists: If the file exists and `overwrite` is false, or is a folder.
+        OutputError: If the file cannot be written.
+    """
+    target = new_file(path, overwrite=overwrite)
+    write_atomically(target, lambda file: file.write(text.encode("utf-8")))
+    return target
+
+
+def csv_text(names: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return a table as CSV: a line of names, then one a row; floats with all their digits."""
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream)
+    writer.writerow(names)
+    writer.writerows(rows)  # writes repr() of a float
+    return stream.getvalue()

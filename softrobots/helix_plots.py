@@ -43,7 +43,8 @@ def grid(contractions: Any, angles: Any, diameter: float, length: float, handedn
         The figure.
 
     Raises:
-        ParameterError: If an argument is out of range, or there are more than `MOST_HELICES` helices.
+        ParameterError: If an argument is out of range, there are more than `MOST_HELICES` helices, or one has more
+            windings than can be drawn (tubes of 100 diameters beyond 80 degrees).
         StraightTube: At contraction 1 and angle 0, where no helix exists.
         MissingDependency: If matplotlib is not installed.
     """

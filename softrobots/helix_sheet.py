@@ -15,11 +15,14 @@ import numpy as np
 from softrobots import helix
 from softrobots.body import tube
 from softrobots.checks import FloatArray
+from softrobots.errors import ParameterError
 from softrobots.plots import new_figure
 
 _SIDES = 24
 _WALL, _WALL_IN_CONTACT = (0.86, 0.87, 0.89), (0.97, 0.80, 0.42)
 _ACTUATOR, _OPPOSITE = (0.0, 0.33, 0.60), (0.93, 0.55, 0.38)
+_MOST_RINGS = 4000
+_COARSEST = 0.3  # turn from ring to ring: a side of the tube [rad]
 _ELEVATION = math.radians(25.0)
 _TO_LIGHT = np.array([-0.40, -0.62, 0.68])
 _PAGE = (9.0, 8.4)  # inches that rows and columns of helices share
@@ -65,7 +68,7 @@ def draw(share: float, tilt: float, diameter: float, length: float, handedness: 
         The triangles that are seen, and what stands below.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If an argument is out of range, or the tube has more windings than can be drawn.
         StraightTube: At contraction 1 and angle 0, where no helix exists.
     """
     shape = helix.forward(share, tilt, diameter)
@@ -73,7 +76,13 @@ def draw(share: float, tilt: float, diameter: float, length: float, handedness: 
     touches = bool(helix.self_contact(shape, turns).touches)
     bend, twist = helix.curvature_torsion(shape)
     centre = float(helix.centre_length(share, tilt, length))
-    rings = min(4000, 2 + math.ceil(max(centre / (0.15 * diameter), centre * math.hypot(float(bend), float(twist)) / 0.12)))
+    turning = centre * math.hypot(float(bend), float(twist))
+    if turning > _MOST_RINGS * _COARSEST:
+        most = _MOST_RINGS * _COARSEST / turning * length
+        raise ParameterError(
+            "length", length, f"at most {most:.3g} m at an angle of {tilt:.4g} rad: more windings cannot be drawn"
+        )
+    rings = min(_MOST_RINGS, 2 + math.ceil(max(centre / (0.15 * diameter), turning / 0.12)))
     # The middle of the tube is in front.
     poses = helix.frames(shape, np.linspace(-np.pi * turns, np.pi * turns, rings), "centre", handedness)
     quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -6,13 +6,11 @@ file whose coordinates are not in the balance that it claims is refused.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from softrobots.checks import finite_array, increasing, read_only
 from softrobots.elastostatics import elastic_state, largest_residual
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import FileFormatError, ParameterError
-from softrobots.files import as_path, new_file, write_atomically
+from softrobots.files import as_path, csv_text, new_file, write_atomically, write_text
 from softrobots.inverse_kinematics import IkSolution, checked_orientation
 from softrobots.load_estimation import LoadEstimate, estimate_at
 from softrobots.loader import load_model
@@ -114,7 +112,6 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
     """
     if not isinstance(trajectory, Trajectory):
         raise ParameterError("trajectory", trajectory, "a Trajectory")
-    target = new_file(path, overwrite=overwrite)
     model, moments = trajectory.model, trajectory.link_moments
     names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error"]
     names += [f"joint_{name}" if name in names else name for name in (*model.motor_joints, *model.spring_joints)]
@@ -124,16 +121,7 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
         names += [f"moment_{i + 1}" for i in range(moments.shape[1])]
         columns.append(moments)
 
-    def write(file: IO[bytes]) -> None:
-        text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-        writer = csv.writer(text)
-        writer.writerow(names)
-        writer.writerows([repr(value) for value in row] for row in np.hstack(columns).tolist())
-        text.flush()
-        text.detach()
-
-    write_atomically(target, write)
-    return target
+    return write_text(path, csv_text(names, np.hstack(columns).tolist()), overwrite=overwrite)
 
 
 def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:

@@ -324,6 +324,7 @@ NAN = float("nan")
         (lambda: helix_plots.grid([0.5], ANGLES, 0.0, 1.0), "diameter"),
         (lambda: helix_plots.grid([0.5], ANGLES, D, 0.0), "length"),
         (lambda: helix_plots.grid([0.5], ANGLES, D, 101 * D), "length"),
+        (lambda: helix_plots.grid([0.99], [1.55], D, 100 * D), "length"),  # 4850 windings
         (lambda: helix_plots.grid([0.5], ANGLES, D, 1.0, "up"), "handedness"),
         (lambda: helix_plots.radius_and_pitch([], D), "angles"),
         (lambda: helix_plots.radius_and_pitch([0.0, 0.1], D), "angles"),

@@ -135,7 +135,7 @@ def test_a_wish_that_folds_the_tube_is_refused():
 
 def test_a_wish_can_be_followed_all_the_same_with_a_warning_that_carries_it():
     with pytest.warns(DesignWarning, match="runs into itself") as caught:
-        design = helix.design_grasp(0.020, 0.020, **TIGHT, on_contact="warn")
+        design = helix.design_grasp(0.020, 0.020, **TIGHT, on_unrealisable="warn")
     assert isinstance(caught[0].message, DesignWarning)
     assert caught[0].message.design is design
     assert caught[0].filename == __file__  # the warning points at the caller
@@ -158,13 +158,13 @@ def test_a_limit_that_is_passed_is_named(limits: dict[str, Any], field: str):
         helix.design_grasp(0.020, 0.080, diameter=D, turns=1.5, **limits)
     assert caught.value.field == field
     with pytest.warns(DesignWarning, match="must be in"):
-        design = helix.design_grasp(0.020, 0.080, diameter=D, turns=1.5, **limits, on_contact="warn")
+        design = helix.design_grasp(0.020, 0.080, diameter=D, turns=1.5, **limits, on_unrealisable="warn")
     assert len(design.faults) == 1
 
 
 @pytest.mark.parametrize("mode", ["error", "nearest", "warn"])
 def test_a_wish_that_can_be_made_is_what_every_mode_returns(mode: str):
-    design = helix.design_grasp(0.020, 0.080, diameter=D, turns=1.5, on_contact=mode, contraction_limits=(0.3, 0.9))
+    design = helix.design_grasp(0.020, 0.080, diameter=D, turns=1.5, on_unrealisable=mode, contraction_limits=(0.3, 0.9))
     assert float(design.shape.inner_radius) == pytest.approx(0.020, rel=1e-13)
 
 
@@ -195,7 +195,7 @@ def test_the_nearest_helix_is_on_the_border_and_no_realisable_one_is_nearer(
     purpose: str, radius: float, rise: float, turns: float, limits: dict[str, Any], rng: np.random.Generator
 ):
     make = helix.design_grasp if purpose == "grasp" else helix.design_antenna
-    design = make(radius, rise, diameter=D, turns=turns, on_contact="nearest", **limits)
+    design = make(radius, rise, diameter=D, turns=turns, on_unrealisable="nearest", **limits)
     low, high = limits.get("contraction_limits", (0.0, 1.0))
     flat, steep = limits.get("angle_limits", (0.0, 0.5 * math.pi))
     wish, deviation = design.wish, design.deviation
@@ -229,7 +229,7 @@ def test_the_nearest_helix_is_on_the_border_and_no_realisable_one_is_nearer(
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_nearest_one_is_nearest_along_the_border_too(side: float):
     # Where turns touch, the border is a curve of angles; contraction_limit is an independent closed form of it.
-    design = helix.design_antenna(0.020, 0.020, diameter=D, turns=3.0, on_contact="nearest")
+    design = helix.design_antenna(0.020, 0.020, diameter=D, turns=3.0, on_unrealisable="nearest")
     assert design.wish is not None
     assert design.deviation is not None
     for step in (1e-4, 1e-3, 1e-2):
@@ -242,7 +242,13 @@ def test_the_nearest_one_is_nearest_along_the_border_too(side: float):
 @pytest.mark.parametrize(("radius", "rise"), [(0.060, 0.080), (0.090, 0.600)])
 def test_with_one_contraction_the_nearest_is_the_best_angle(radius: float, rise: float):
     design = helix.design_antenna(
-        radius, rise, diameter=D, turns=2.0, on_contact="nearest", contraction_limits=(0.66, 0.66), angle_limits=(0.02, 1.5)
+        radius,
+        rise,
+        diameter=D,
+        turns=2.0,
+        on_unrealisable="nearest",
+        contraction_limits=(0.66, 0.66),
+        angle_limits=(0.02, 1.5),
     )
 
     def cost(angle: float) -> float:
@@ -261,7 +267,7 @@ def test_with_one_contraction_the_nearest_is_the_best_angle(radius: float, rise:
 
 def test_where_both_limits_leave_one_helix_it_is_the_nearest():
     design = helix.design_antenna(
-        0.02, 0.02, diameter=D, turns=3.0, on_contact="nearest", contraction_limits=(0.66, 0.66), angle_limits=(0.1, 0.1)
+        0.02, 0.02, diameter=D, turns=3.0, on_unrealisable="nearest", contraction_limits=(0.66, 0.66), angle_limits=(0.1, 0.1)
     )
     assert (design.contraction, design.angle) == (0.66, 0.1)
 
@@ -275,14 +281,16 @@ def test_where_both_limits_leave_one_helix_it_is_the_nearest():
 )
 def test_limits_that_leave_nothing_are_an_error(limits: dict[str, Any]):
     with pytest.raises(ParameterError, match="room for the object"):
-        helix.design_grasp(0.02, 0.02, diameter=D, turns=3.0, on_contact="nearest", **limits)
+        helix.design_grasp(0.02, 0.02, diameter=D, turns=3.0, on_unrealisable="nearest", **limits)
 
 
 # --- Words and files
 
 
 def test_the_summary_tells_the_numbers_of_the_tube_and_the_change_of_the_wish():
-    design = helix.design_grasp(0.020, 0.020, diameter=D, turns=3.0, squeeze=0.002, on_contact="nearest", handedness="left")
+    design = helix.design_grasp(
+        0.020, 0.020, diameter=D, turns=3.0, squeeze=0.002, on_unrealisable="nearest", handedness="left"
+    )
     text = str(design)
     for words in (
         "left-handed",
@@ -302,7 +310,7 @@ def test_the_summary_tells_the_numbers_of_the_tube_and_the_change_of_the_wish():
     "design",
     [
         helix.design_grasp(0.020, 0.080, diameter=D, turns=1.5, squeeze=0.001, handedness="left"),
-        helix.design_antenna(0.02, 0.02, diameter=D, turns=3.0, on_contact="nearest", contraction_limits=(0.3, 0.9)),
+        helix.design_antenna(0.02, 0.02, diameter=D, turns=3.0, on_unrealisable="nearest", contraction_limits=(0.3, 0.9)),
         HelixDesign(0.66, 0.1, D, 2, angle_limits=(0.2, 0.3)),
     ],
 )
@@ -329,6 +337,7 @@ def saved(path: Path) -> dict[str, Any]:
         ({"contraction": 1.5}, "contraction"),
         ({"contraction": 0.5}, "tube_length"),  # no longer what was computed from it
         ({"computed": {"tube_length": 0.4}}, "tube_length"),
+        ({"computed": {"tube_length": 10**400}}, "too large"),
         ({"computed": {}}, "tube_length"),
         ({"angle": float("nan")}, "angle"),
         ({"angle": "0.1"}, "angle"),
@@ -392,7 +401,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path):
         ({"squeeze": -0.001}, "squeeze"),
         ({"squeeze": 0.020}, "squeeze"),
         ({"handedness": "both"}, "handedness"),
-        ({"on_contact": "ignore"}, "on_contact"),
+        ({"on_unrealisable": "ignore"}, "on_unrealisable"),
         ({"contraction_limits": (0.9, 0.5)}, "contraction_limits"),
         ({"contraction_limits": (0.0, 0.5)}, "contraction_limits"),
         ({"contraction_limits": (0.5, 1.1)}, "contraction_limits"),

@@ -611,6 +611,7 @@ def test_the_helix_of_the_periods_is_that_on_which_their_ends_lie():
         ({"method": "glue"}, "method"),
         ({"remainder": "start"}, "remainder"),
         ({"handedness": "up"}, "handedness"),
+        ({"handedness": ""}, "handedness"),
         ({"start_azimuth": math.nan}, "start_azimuth"),
         ({"tape_length": 0.01}, "tape_length"),
         ({"tape_width": 0.01}, "tape_width"),

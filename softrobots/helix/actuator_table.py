@@ -13,14 +13,14 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
-from softrobots.checks import LARGEST, FloatArray, choice, finite_array, positive_array, read_only
+from softrobots.checks import LARGEST, FloatArray, choice, finite_array, read_only
 from softrobots.errors import FileFormatError, MissingDependency, ParameterError
-from softrobots.files import as_path, new_file, write_atomically
-from softrobots.helix.shapes import HelixShape, forward
+from softrobots.files import as_path, csv_text, write_text
+from softrobots.helix.shapes import HelixShape, checked_contraction, forward
 
 INTERPOLATIONS = ("linear", "pchip")
 """Straight between the rows, or SciPy's monotone cubic, which has a continuous slope."""
@@ -54,11 +54,9 @@ class ActuatorTable:
             raise ParameterError("pressure", self.pressure, "at least two rows [Pa]")
         if np.any(np.diff(pressures) < 1.0 / LARGEST):
             raise ParameterError("pressure", self.pressure, f"increasing, by at least {1.0 / LARGEST:g} Pa a row")
-        shares = positive_array("contraction", self.contraction, "-")
+        shares = checked_contraction(self.contraction)
         if shares.shape != pressures.shape:
             raise ParameterError("contraction", self.contraction, f"of the shape {pressures.shape} of the pressures")
-        if np.any(shares > 1.0):
-            raise ParameterError("contraction", self.contraction, "in (0, 1]: contracted over original length")
         steps = np.diff(shares)
         if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
             raise ParameterError("contraction", self.contraction, "strictly rising or strictly falling with the pressure")
@@ -120,15 +118,8 @@ class ActuatorTable:
             OutputExists: If the file exists and `overwrite` is false.
             OutputError: If the file cannot be written.
         """
-        target = new_file(path, overwrite=overwrite)
         rows = zip(self.pressure.tolist(), self.contraction.tolist(), strict=True)
-        text = "\n".join([",".join(_COLUMNS), *(f"{pressure!r},{share!r}" for pressure, share in rows), ""])
-
-        def write(file: IO[bytes]) -> None:
-            file.write(text.encode("ascii"))
-
-        write_atomically(target, write)
-        return target
+        return write_text(path, csv_text(_COLUMNS, rows), overwrite=overwrite)
 
     @property
     def pressure_limits(self) -> tuple[float, float]:

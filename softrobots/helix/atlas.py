@@ -6,16 +6,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
-from softrobots.files import new_file, write_atomically
+from softrobots.checks import read_only
+from softrobots.files import csv_text, write_text
 from softrobots.helix.contact import self_contact
 from softrobots.helix.shapes import Actuator, checked_actuator, forward
 
@@ -28,7 +27,9 @@ PAPER_CONTRACTIONS = (0.5, 0.6, 0.7, 0.8, 0.9)
 PAPER_DIAMETER = 0.0331
 """Diameter of the tube in the paper's tests [m]."""
 
-PAPER_SCALED = Actuator(np.array(0.66), np.array(PAPER_ANGLES[1]), PAPER_DIAMETER * np.array([1.0, 2.5]))
+PAPER_SCALED = Actuator(
+    *(read_only(np.array(values)) for values in (0.66, PAPER_ANGLES[1], (PAPER_DIAMETER, 2.5 * PAPER_DIAMETER)))
+)
 """The helix that the paper builds in two sizes."""
 
 
@@ -93,18 +94,9 @@ class ShapeTable:
             OutputExists: If the file exists and `overwrite` is false.
             OutputError: If it cannot be written.
         """
-        target = new_file(path, overwrite=overwrite)
-
-        def write(file: IO[bytes]) -> None:
-            text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-            writer = csv.writer(text)
-            writer.writerow(f"{name} [{unit}]" if unit else name for name, unit in _COLUMNS.items())
-            writer.writerows([_cell(value) for value in row.values()] for row in self.as_rows())
-            text.flush()
-            text.detach()
-
-        write_atomically(target, write)
-        return target
+        names = [f"{name} [{unit}]" if unit else name for name, unit in _COLUMNS.items()]
+        rows = ([_cell(value) for value in row.values()] for row in self.as_rows())
+        return write_text(path, csv_text(names, rows), overwrite=overwrite)
 
 
 _UNITS = ("rad", "-", "m", "m", "m", "m/rad", "m", "", "")

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from softrobots.checks import FloatArray, choice, common_shape, positive_array, read_only
 from softrobots.errors import ParameterError, SelfIntersection
 from softrobots.helix.paths import curvature_torsion
-from softrobots.helix.shapes import HelixShape, checked_actuator, checked_shape
+from softrobots.helix.shapes import HelixShape, checked_angle, checked_shape
 
 BoolArray = NDArray[np.bool_]
 
@@ -219,7 +219,8 @@ def contraction_limit(angle: Any, diameter: Any = 1.0) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    _, angles, sizes = checked_actuator(1.0, angle, diameter)
+    angles, sizes = checked_angle(angle), positive_array("diameter", diameter, "m")
+    shape = common_shape("diameter", angles.shape, sizes.shape)
 
     def beyond(short: FloatArray) -> FloatArray:
         """Angle of the actuator on the curve, less the one that is sought."""
@@ -231,7 +232,7 @@ def contraction_limit(angle: Any, diameter: Any = 1.0) -> FloatArray:
     turns_touch = np.hypot(1.0 - width, steep) / np.hypot(1.0 + width, steep)
     turns_touch = np.where(angles < _STEEPEST_ANGLE, turns_touch, 0.0)
     limit = np.maximum(turns_touch, -np.cos(2.0 * angles))
-    return np.array(np.broadcast_to(limit, np.broadcast_shapes(limit.shape, sizes.shape)))
+    return np.array(np.broadcast_to(limit, shape))
 
 
 def simple_contraction_limit(angle: Any) -> FloatArray:
@@ -252,7 +253,7 @@ def simple_contraction_limit(angle: Any) -> FloatArray:
     Raises:
         ParameterError: If the angle is out of range.
     """
-    angles = checked_actuator(1.0, angle, 1.0).angle
+    angles = checked_angle(angle)
     above = np.maximum(2.0 * np.sin(angles) * (np.pi * np.cos(angles) - np.sin(angles)), 0.0)  # q - 1
     return np.asarray(1.0 / (1.0 + above + np.sqrt(above * (above + 2.0))))
 
@@ -277,9 +278,8 @@ def _checked_turns(turns: Any) -> FloatArray:
     """Turns as an array: positive, or infinite."""
     try:
         endless = np.isposinf(np.asarray(turns))
-    except (TypeError, ValueError) as error:
+        if not np.any(endless):
+            return positive_array("turns", turns, "-")
+        return positive_array("turns", np.where(endless, 2.0, turns), "-")  # a second turn is all that neighbours need
+    except (TypeError, ValueError) as error:  # ParameterError too: of what came, not of what is made of it
         raise ParameterError("turns", turns, "positive numbers, or infinite for an endless tube [-]") from error
-    if not np.any(endless):
-        return positive_array("turns", turns, "-")
-    counts = positive_array("turns", np.where(endless, 1.0, turns), "-")
-    return np.asarray(np.where(endless, 2.0, counts))  # a second turn is all that neighbours need

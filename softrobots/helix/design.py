@@ -32,7 +32,7 @@ def design_grasp(
     turns: float,
     squeeze: float = 0.0,
     handedness: str = "right",
-    on_contact: str = "error",
+    on_unrealisable: str = "error",
     contraction_limits: Limits | None = None,
     angle_limits: Limits | None = None,
 ) -> HelixDesign:
@@ -46,9 +46,9 @@ def design_grasp(
         squeeze: How much smaller the natural inner radius is made than the object, from 0 to below its radius [m]. A squeezed
             object is held (`grasp_force`), one that is just wrapped is not.
         handedness: "right" or "left".
-        on_contact: What to do if the tube would run into itself or a limit is passed: "error" to raise, "nearest" to take the
-            nearest helix that can be made (see `softrobots.helix.nearest`), "warn" to return the wish with its `faults` and
-            `contact`, and issue a `DesignWarning`.
+        on_unrealisable: What to do if the tube would run into itself or a limit is passed: one of `ON_UNREALISABLE`. "error" to
+            raise, "nearest" to take the nearest helix that can be made (see `softrobots.helix.nearest`), "warn" to return the
+            wish with its `faults` and `contact`, and issue a `DesignWarning`.
         contraction_limits: Smallest and largest contraction that can be made, within (0, 1]; None for no limit [-].
         angle_limits: Smallest and largest angle that can be made, within [0, pi/2); None for no limit [rad].
 
@@ -56,9 +56,9 @@ def design_grasp(
         The design.
 
     Raises:
-        ParameterError: If an argument is out of range; if a limit is passed and `on_contact` is "error"; or if nothing within
-            the limits can be made.
-        SelfIntersection: If the tube would run into itself and `on_contact` is "error".
+        ParameterError: If an argument is out of range; if a limit is passed and `on_unrealisable` is "error"; or if nothing
+            within the limits can be made.
+        SelfIntersection: If the tube would run into itself and `on_unrealisable` is "error".
         StraightTube: If the helix is straight within rounding.
     """
     thickness = positive_number("object_radius", object_radius, "m")
@@ -66,7 +66,7 @@ def design_grasp(
     if pressed >= thickness:
         raise ParameterError("squeeze", squeeze, f"less than the radius of the object, {thickness} m")
     wish = Wish("grasp", "inner", thickness - pressed, positive_number("turn_height", turn_height, "m"), pressed)
-    return _design(wish, diameter, turns, handedness, on_contact, contraction_limits, angle_limits)
+    return _design(wish, diameter, turns, handedness, on_unrealisable, contraction_limits, angle_limits)
 
 
 def design_antenna(
@@ -76,7 +76,7 @@ def design_antenna(
     diameter: float,
     turns: float,
     handedness: str = "right",
-    on_contact: str = "error",
+    on_unrealisable: str = "error",
     contraction_limits: Limits | None = None,
     angle_limits: Limits | None = None,
 ) -> HelixDesign:
@@ -88,7 +88,7 @@ def design_antenna(
         diameter: Diameter of the tube, positive [m].
         turns: Turns, positive [-].
         handedness: "right" or "left".
-        on_contact: As in `design_grasp`.
+        on_unrealisable: As in `design_grasp`.
         contraction_limits: As in `design_grasp` [-].
         angle_limits: As in `design_grasp` [rad].
 
@@ -102,7 +102,7 @@ def design_antenna(
     """
     size = positive_number("radius", radius, "m")
     wish = Wish("antenna", "centre", size, positive_number("turn_height", turn_height, "m"))
-    return _design(wish, diameter, turns, handedness, on_contact, contraction_limits, angle_limits)
+    return _design(wish, diameter, turns, handedness, on_unrealisable, contraction_limits, angle_limits)
 
 
 def _design(
@@ -110,12 +110,12 @@ def _design(
     diameter: float,
     turns: float,
     handedness: str,
-    on_contact: str,
+    on_unrealisable: str,
     contraction_limits: Limits | None,
     angle_limits: Limits | None,
 ) -> HelixDesign:
     """The design of a wish, or of what is nearest to it."""
-    choice("on_contact", on_contact, ON_UNREALISABLE)
+    choice("on_unrealisable", on_unrealisable, ON_UNREALISABLE)
     shares = checked_limits("contraction_limits", contraction_limits, "-")
     angles = checked_limits("angle_limits", angle_limits, "rad")
     tube, count = positive_number("diameter", diameter, "m"), positive_number("turns", turns, "-")
@@ -134,12 +134,12 @@ def _design(
     design = of(wanted.shape, clipped=False)
     if design.realisable:
         return design
-    if on_contact == "nearest":
+    if on_unrealisable == "nearest":
         return of(nearest_realisable(wanted, shares, angles), clipped=True)
-    if on_contact == "warn":
+    if on_unrealisable == "warn":
         warnings.warn(DesignWarning("; ".join(design.faults), design=design), stacklevel=3)
         return design
-    advice = "on_contact='nearest' gives the nearest helix that can be made"
+    advice = "on_unrealisable='nearest' gives the nearest helix that can be made"
     if bool(design.contact.touches):
         raise SelfIntersection(f"{'; '.join(design.faults)}; {advice}", contact=design.contact)
     name = "angle_limits" if within(np.asarray(design.contraction), shares, LIMIT_ROUNDING) else "contraction_limits"

@@ -24,15 +24,15 @@ from softrobots.checks import (
     FloatArray,
     choice,
     common_shape,
-    finite_array,
     finite_number,
+    non_negative_array,
     positive_array,
     positive_number,
 )
 from softrobots.errors import ParameterError
 from softrobots.helix.helix_design import HelixDesign
 from softrobots.helix.pattern import Pattern, located
-from softrobots.helix.shapes import HANDEDNESS, checked_actuator
+from softrobots.helix.shapes import HANDEDNESS, checked_actuator, checked_contraction
 
 METHODS = ("pinch", "tape", "stoppers")
 """Fold the wall away; fold it and hold it by a piece of tape; or string stoppers with gaps that close."""
@@ -62,9 +62,7 @@ def contraction_from_stoppers(stopper: Any, gap: Any) -> FloatArray:
     Raises:
         ParameterError: If a length is out of range or the shapes do not broadcast.
     """
-    stoppers, gaps = positive_array("stopper", stopper, "m"), finite_array("gap", gap, None, "m")
-    if np.any(gaps < 0.0):
-        raise ParameterError("gap", gap, "zero or positive [m]")
+    stoppers, gaps = positive_array("stopper", stopper, "m"), non_negative_array("gap", gap, "m")
     common_shape("gap", stoppers.shape, gaps.shape)
     return np.asarray(stoppers / (stoppers + gaps))
 
@@ -82,7 +80,7 @@ def gap_for(contraction: Any, stopper: Any) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    shares, stoppers = checked_actuator(contraction, 0.0, 1.0).contraction, positive_array("stopper", stopper, "m")
+    shares, stoppers = checked_contraction(contraction), positive_array("stopper", stopper, "m")
     common_shape("stopper", shares.shape, stoppers.shape)
     return np.asarray(stoppers * (1.0 - shares) / shares)
 
@@ -170,7 +168,7 @@ def _checked(actuator: Any, handedness: str | None) -> tuple[float, float, float
     if angle > _STEEPEST:
         raise ParameterError("angle", angle, f"at most {_STEEPEST:.4f} rad (89 degrees) for a sheet that can be drawn")
     positive_number("length", length, "m")
-    return contraction, angle, diameter, length, choice("handedness", handedness or default, HANDEDNESS)
+    return contraction, angle, diameter, length, choice("handedness", default if handedness is None else handedness, HANDEDNESS)
 
 
 def _checked_tape(

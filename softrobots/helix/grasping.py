@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray, common_shape, finite_array, positive_array, read_only
+from softrobots.checks import FloatArray, common_shape, finite_array, non_negative_array, positive_array, read_only
 from softrobots.errors import ParameterError
 
 
@@ -110,12 +110,8 @@ def grasp_force(
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    pressures, depths = finite_array("pressure", pressure, None, "Pa"), finite_array("deflection", deflection, None, "m")
-    if np.any(pressures < 0.0):
-        raise ParameterError("pressure", pressure, "zero or positive [Pa]")
-    radii, heights = positive_array("object_radius", object_radius, "m"), finite_array("turn_height", turn_height, None, "m")
-    if np.any(heights < 0.0):
-        raise ParameterError("turn_height", turn_height, "zero or positive [m]")
+    pressures, depths = non_negative_array("pressure", pressure, "Pa"), finite_array("deflection", deflection, None, "m")
+    radii, heights = positive_array("object_radius", object_radius, "m"), non_negative_array("turn_height", turn_height, "m")
     counts, sizes = positive_array("turns", turns, "-"), positive_array("diameter", diameter, "m")
     given = (pressures, radii, depths, heights, counts, sizes)
     shape = common_shape("diameter", *(values.shape for values in given))

@@ -13,9 +13,9 @@ import numpy as np
 
 from softrobots.checks import choice, finite_number, non_negative_number, positive_number
 from softrobots.errors import FileFormatError, ParameterError
-from softrobots.files import as_path, new_file, write_atomically
+from softrobots.files import as_path, write_text
 from softrobots.helix.contact import SelfContact, self_contact
-from softrobots.helix.nearest import Limits, within
+from softrobots.helix.nearest import Limits, distance, within
 from softrobots.helix.shapes import HANDEDNESS, HelixShape, forward
 from softrobots.helix.tube import centre_length, length_for_turns
 
@@ -137,8 +137,8 @@ class HelixDesign:
         if self.wish is None:
             return None
         radius, rise = float(self.shape.radius(self.wish.path)), float(self.shape.turn_height)
-        distance = math.hypot(math.log(radius / self.wish.radius), math.log(rise / self.wish.turn_height))
-        return Deviation(radius - self.wish.radius, rise - self.wish.turn_height, distance)
+        apart = float(distance(radius / self.wish.radius, rise / self.wish.turn_height))
+        return Deviation(radius - self.wish.radius, rise - self.wish.turn_height, apart)
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -156,17 +156,18 @@ class HelixDesign:
         shape, degrees = self.shape, math.degrees(self.angle)
         lines = [
             f"Actuator: contraction {self.contraction:.4f}, angle {degrees:.3f} degrees, {self.handedness}-handed",
-            f"Tube: diameter {_mm(self.diameter)}, length {_mm(self.tube_length)} uninflated",
-            f"Helix: {self.turns:.3f} turns, rise {_mm(shape.turn_height)} a turn, {_mm(self.height)} in all",
-            f"Radii: outer {_mm(shape.outer_radius)}, centre {_mm(shape.centre_radius)}, inner {_mm(shape.inner_radius)}",
-            f"Centre line: {_mm(self.centre_length)} long",
+            f"Tube: diameter {in_mm(self.diameter)}, length {in_mm(self.tube_length)} uninflated",
+            f"Helix: {self.turns:.3f} turns, rise {in_mm(shape.turn_height)} a turn, {in_mm(self.height)} in all",
+            f"Radii: outer {in_mm(shape.outer_radius)}, centre {in_mm(shape.centre_radius)}, inner {in_mm(shape.inner_radius)}",
+            f"Centre line: {in_mm(self.centre_length)} long",
             f"Contact: {self.contact}",
         ]
         if self.wish is not None and self.deviation is not None:
             wish, deviation = self.wish, self.deviation
-            squeeze = f", {_mm(wish.squeeze)} less than the object" if wish.squeeze else ""
+            squeeze = f", {in_mm(wish.squeeze)} less than the object" if wish.squeeze else ""
             lines += [
-                f"Wish ({wish.purpose}): {wish.path} radius {_mm(wish.radius)}{squeeze}, rise {_mm(wish.turn_height)} a turn",
+                f"Wish ({wish.purpose}): {wish.path} radius {in_mm(wish.radius)}{squeeze}, "
+                f"rise {in_mm(wish.turn_height)} a turn",
                 f"Off the wish: radius {deviation.radius * 1e3:+.3f} mm, rise {deviation.turn_height * 1e3:+.3f} mm a turn, "
                 f"distance {deviation.distance:.4g}",
             ]
@@ -192,16 +193,13 @@ class HelixDesign:
             OutputExists: If the file exists and `overwrite` is false.
             OutputError: If the file cannot be written.
         """
-        target = new_file(path, overwrite=overwrite)
         document = {
             "softrobots_helix_design": _FORMAT,
             **{name: getattr(self, name) for name in _SAVED},
             "wish": None if self.wish is None else self.wish._asdict(),
             "computed": _computed(self),
         }
-        text = json.dumps(document, indent=2, allow_nan=False) + "\n"
-        write_atomically(target, lambda file: file.write(text.encode()))
-        return target
+        return write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n", overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> HelixDesign:
@@ -230,7 +228,7 @@ class HelixDesign:
                 claimed, rounding = document["computed"][name], _AGREEMENT * design.diameter
                 if not math.isclose(number, claimed, rel_tol=_AGREEMENT, abs_tol=rounding):
                     raise ValueError(f"its {name} is {claimed}, but its other numbers make {number}")
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
             reason = f"it has no {error}" if isinstance(error, KeyError) else error
             raise FileFormatError(f"cannot read a helix design from {file}: {reason}") from error
         return design
@@ -287,5 +285,6 @@ def _checked_wish(wish: Any) -> Wish | None:
     return Wish(purpose, path, radius, rise, non_negative_number("wish.squeeze", wish.squeeze, "m"))
 
 
-def _mm(length: Any) -> str:
+def in_mm(length: Any) -> str:
+    """A length [m] in words."""
     return f"{float(length) * 1e3:.2f} mm"

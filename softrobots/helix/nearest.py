@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -69,7 +69,7 @@ class WantedHelix(NamedTuple):
     def distance(self, centre_radius: FloatArray, pitch: FloatArray) -> FloatArray:
         """Distance `m` of helices whose radius and pitch are positive; see the module."""
         radius = centre_radius - (0.5 * self.diameter if self.path == "inner" else 0.0)
-        return np.hypot(np.log(radius / self.radius), np.log(_TURN * pitch / self.turn_height))
+        return distance(radius / self.radius, _TURN * pitch / self.turn_height)
 
 
 def nearest_realisable(wanted: WantedHelix, contraction_limits: Limits | None, angle_limits: Limits | None) -> HelixShape:
@@ -108,6 +108,11 @@ def nearest_realisable(wanted: WantedHelix, contraction_limits: Limits | None, a
         room = " and has room for the object inside" if wanted.path == "inner" else ""
         raise ParameterError(name, limits, "such that some helix within the limits is free of contact" + room)
     return _helix(np.asarray(best[1]), np.asarray(best[2]), wanted.diameter)
+
+
+def distance(radius_ratio: Any, height_ratio: Any) -> FloatArray:
+    """Distance `m` of two helices from the ratios of their radii and turn heights, positive; see the module."""
+    return np.asarray(np.hypot(np.log(radius_ratio), np.log(height_ratio)))
 
 
 def within(value: FloatArray, limits: Limits | None, rounding: float = _ROUNDING) -> BoolArray:

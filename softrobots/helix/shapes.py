@@ -223,25 +223,35 @@ def checked_actuator(contraction: Any, angle: Any, diameter: Any) -> Actuator:
         ParameterError: If the contraction is not in (0, 1], the angle not in [0, pi/2), the diameter not positive, or the
             shapes do not broadcast.
     """
-    shares, angles = positive_array("contraction", contraction, "-"), finite_array("angle", angle, None, "rad")
-    if np.any(shares > 1.0):
-        raise ParameterError("contraction", contraction, "in (0, 1]: contracted over original length")
-    checked_angle(angle, angles)
-    sizes = positive_array("diameter", diameter, "m")
+    shares, angles, sizes = checked_contraction(contraction), checked_angle(angle), positive_array("diameter", diameter, "m")
     common_shape("diameter", shares.shape, angles.shape, sizes.shape)
     return Actuator(shares, angles, sizes)
 
 
-def checked_angle(angle: Any, angles: FloatArray) -> None:
-    """Refuse an angle that is none of an actuator, and say what its unit is.
+def checked_contraction(contraction: Any) -> FloatArray:
+    """Return contractions as an array.
 
     Raises:
-        ParameterError: If one of `angles` [rad], given as `angle`, is not in [0, pi/2).
+        ParameterError: If one is not in (0, 1].
     """
+    shares = positive_array("contraction", contraction, "-")
+    if np.any(shares > 1.0):
+        raise ParameterError("contraction", contraction, "in (0, 1]: contracted over original length")
+    return shares
+
+
+def checked_angle(angle: Any) -> FloatArray:
+    """Return angles of an actuator to the axis of the tube as an array.
+
+    Raises:
+        ParameterError: If one is not in [0, pi/2).
+    """
+    angles = finite_array("angle", angle, None, "rad")
     if np.any(angles < 0.0):
         raise ParameterError("angle", angle, "in [0, pi/2) rad; say handedness where it matters")
     if np.any(angles >= 0.5 * np.pi):
         raise ParameterError("angle", angle, "in [0, pi/2) rad (5 degrees are 0.0873 rad)")
+    return angles
 
 
 def turning_sign(handedness: str) -> float:

@@ -7,8 +7,6 @@ the flat tube, the actuator line, and what to pinch, tape or stop. Inside the gr
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 import math
 import xml.etree.ElementTree as ET
@@ -17,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from softrobots.files import csv_text
 from softrobots.helix.pattern import Pattern
 from softrobots.helix.shapes import turning_sign
 from softrobots.helix.svg import SMALL, TEXT, Point, group, mm, polygon, polyline, rectangle, segment, text
@@ -50,18 +49,16 @@ class Window(NamedTuple):
     """Where the page is joined to its neighbours, along the tube [mm]."""
 
 
-def csv_text(plan: Pattern) -> str:
-    """Table of what to mark along the line: see `write_template_table`."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(_COLUMN_NAMES)
+def table_text(plan: Pattern) -> str:
+    """Table of what to mark along the line as CSV: see `write_template_table`."""
+    table = []
     for number, kind, start, end in _rows(plan):
         cells: list[object] = [number, kind, *(f"{1e3 * length:.6f}" for length in (start, end, end - start))]
         points = plan.locate(np.array([start, end]))
         for x, y, wrap in zip(points.x, points.y, points.wrap, strict=True):
             cells += [f"{1e3 * x:.6f}", f"{1e3 * y:.6f}", int(wrap)]
-        writer.writerow(cells)
-    return stream.getvalue()
+        table.append(cells)
+    return csv_text(_COLUMN_NAMES, table)
 
 
 def svg_text(plan: Pattern, window: Window) -> str:

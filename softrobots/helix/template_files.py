@@ -8,9 +8,9 @@ from pathlib import Path
 
 from softrobots.checks import positive_number
 from softrobots.errors import ParameterError
-from softrobots.files import as_path, new_file, write_atomically
+from softrobots.files import as_path, new_file, write_text
 from softrobots.helix.pattern import Pattern, checked_pattern
-from softrobots.helix.template import Window, csv_text, svg_text
+from softrobots.helix.template import Window, svg_text, table_text
 
 _ROUNDING = 1e-9  # of a page
 _THINNEST, _THICKEST, _LONGEST = 1e-3, 10.0, 200.0  # tubes that are drawn [m]
@@ -35,7 +35,7 @@ def write_template(pattern: Pattern, path: str | os.PathLike[str], *, overwrite:
         OutputError: If the file cannot be written.
     """
     _check_drawable(checked_pattern(pattern))
-    return _written(path, svg_text(pattern, Window(0.0, 1e3 * pattern.tube_length)), overwrite)
+    return write_text(path, svg_text(pattern, Window(0.0, 1e3 * pattern.tube_length)), overwrite=overwrite)
 
 
 def write_template_pages(
@@ -84,7 +84,7 @@ def write_template_pages(
     joins = [step * n + 0.5 * common for n in range(1, count)]  # in the middle of what two pages share
     for n, target in enumerate(targets):
         window = Window(step * n, min(step * n + page, length), n + 1, count, tuple(joins[max(n - 1, 0) : n + 1]))
-        _written(target, svg_text(pattern, window), overwrite)
+        write_text(target, svg_text(pattern, window), overwrite=overwrite)
     return tuple(targets)
 
 
@@ -107,7 +107,7 @@ def write_template_table(pattern: Pattern, path: str | os.PathLike[str], *, over
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
-    return _written(path, csv_text(checked_pattern(pattern)), overwrite)
+    return write_text(path, table_text(checked_pattern(pattern)), overwrite=overwrite)
 
 
 def _check_drawable(pattern: Pattern) -> None:
@@ -116,10 +116,3 @@ def _check_drawable(pattern: Pattern) -> None:
         raise ParameterError("diameter", pattern.diameter, f"from {_THINNEST} to {_THICKEST} m for a drawing")
     if pattern.tube_length > _LONGEST:
         raise ParameterError("tube_length", pattern.tube_length, f"at most {_LONGEST} m for a drawing")
-
-
-def _written(path: str | os.PathLike[str], text: str, overwrite: bool) -> Path:
-    """Write a text file."""
-    target = new_file(path, overwrite=overwrite)
-    write_atomically(target, lambda file: file.write(text.encode()))
-    return target

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from typing import Any
 
 import numpy as np
 
+from softrobots.helix.helix_design import in_mm
 from softrobots.helix.pattern import Pattern
 from softrobots.helix.svg import group, segment, text
 
@@ -27,22 +27,22 @@ def title_block(root: ET.Element, plan: Pattern, left: float, page: str) -> None
     shape, (taken, several) = plan.shape, ("gap", "gaps") if plan.method == "stoppers" else ("pinched", "pinches")
     columns = (
         (
-            f"Tube diameter D {_words(plan.diameter)}",
-            f"Tube length {_words(plan.tube_length)}, uninflated",
-            f"Sheet {_words(plan.tube_length)} x {_words(plan.sheet_width)}",
+            f"Tube diameter D {in_mm(plan.diameter)}",
+            f"Tube length {in_mm(plan.tube_length)}, uninflated",
+            f"Sheet {in_mm(plan.tube_length)} x {in_mm(plan.sheet_width)}",
             f"Helix: {plan.handedness}-handed",
         ),
         (
             f"Actuator line at {math.degrees(plan.angle):.3f} degrees to the axis of the tube",
-            f"Line {_words(plan.line_length)}, plain {_words(plan.plain_start)} at base, {_words(plan.plain_end)} at tip",
-            f"{plan.count} {several}, spacing {_words(plan.spacing)} along the line",
-            f"Each period: {_words(plan.remaining_length)} stays, {_words(plan.pinch_length)} {taken}",
+            f"Line {in_mm(plan.line_length)}, plain {in_mm(plan.plain_start)} at base, {in_mm(plan.plain_end)} at tip",
+            f"{plan.count} {several}, spacing {in_mm(plan.spacing)} along the line",
+            f"Each period: {in_mm(plan.remaining_length)} stays, {in_mm(plan.pinch_length)} {taken}",
         ),
         (
             f"Contraction {plan.contraction:.4f}; {plan.resulting_contraction:.4f} with plain ends",
-            f"Outer radius Ro {_words(shape.outer_radius)}",
-            f"Inner radius Ri {_words(shape.inner_radius)}",
-            f"Turn height {_words(shape.turn_height)}, {plan.turns:.3f} turns",
+            f"Outer radius Ro {in_mm(shape.outer_radius)}",
+            f"Inner radius Ri {in_mm(shape.inner_radius)}",
+            f"Turn height {in_mm(shape.turn_height)}, {plan.turns:.3f} turns",
         ),
     )
     for x, lines in zip(_COLUMNS, columns, strict=True):
@@ -75,8 +75,8 @@ def _instructions(plan: Pattern, paged: bool) -> tuple[tuple[str, ...], ...]:
         "the lines A lie on one edge of the flat tube (both are the same line), B on the other. Mark the tube through it.",
     )
     if plan.method == "stoppers":
-        first, last = (_words(length) for length in (plan.stoppers @ np.array([-1.0, 1.0]))[[0, -1]])
-        length = _words(plan.remaining_length)
+        first, last = (in_mm(length) for length in (plan.stoppers @ np.array([-1.0, 1.0]))[[0, -1]])
+        length = in_mm(plan.remaining_length)
         fix = (
             f"Fix a stopper on each blue bar along the red line: {length} long, the first {first}, the last {last}.",
             "Leave the dashed gaps (numbered) free. Lay the string through all stoppers and fasten it to the last one.",
@@ -85,12 +85,7 @@ def _instructions(plan: Pattern, paged: bool) -> tuple[tuple[str, ...], ...]:
     fold = "Each numbered pair of marks is one pinch: fold the grey wall between them away, square to the red line,"
     hold = "lay the marks on each other and fix the fold. It needs to hold at the red line; let it run out to both sides."
     if plan.tape_length is not None and plan.tape_width is not None:
-        piece = f"{_words(plan.tape_length)} long and {_words(plan.tape_width)} wide"
+        piece = f"{in_mm(plan.tape_length)} long and {in_mm(plan.tape_width)} wide"
         hold = f"and lay the marks on each other. Hold each fold by a tape {piece}, half on either side (yellow beside grey)."
     grow = "Inflate, or let the tube grow. It curls towards the red line, which becomes the inner path of the helix."
     return wrap, (fold, hold), (grow,)
-
-
-def _words(length: Any) -> str:
-    """A length [m] in words."""
-    return f"{1e3 * float(length):.2f} mm"

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, common_shape, finite_array, positive_array
-from softrobots.errors import ParameterError
+from softrobots.checks import FloatArray, common_shape, non_negative_array, positive_array
 from softrobots.helix.shapes import HelixShape, checked_actuator, checked_angle, checked_shape, length_ratio, turning_sign
 
 
@@ -64,8 +63,7 @@ def length_for_turns(shape: HelixShape, angle: Any, turns: Any) -> FloatArray:
 
 def _length_of_turn(shape: Any, angle: Any) -> FloatArray:
     """Length of uninflated tube that makes one turn [m]."""
-    shape, angles = checked_shape(shape), finite_array("angle", angle, None, "rad")
-    checked_angle(angle, angles)
+    shape, angles = checked_shape(shape), checked_angle(angle)
     common_shape("angle", shape.shape, angles.shape)
     return np.asarray(2.0 * np.pi * np.cos(angles) * np.hypot(shape.outer_radius, shape.pitch))
 
@@ -162,9 +160,7 @@ def actuator_tension(contraction: Any, angle: Any, diameter: Any, pressure: Any)
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
     shares, angles, sizes = checked_actuator(contraction, angle, diameter)
-    pressures = finite_array("pressure", pressure, None, "Pa")
-    if np.any(pressures < 0.0):
-        raise ParameterError("pressure", pressure, "zero or positive [Pa]")
+    pressures = non_negative_array("pressure", pressure, "Pa")
     common_shape("pressure", shares.shape, angles.shape, sizes.shape, pressures.shape)
     area = 0.25 * np.pi * sizes**2
     rate = 2.0 * np.cos(angles) ** 2 - (1.0 - shares)  # lambda + cos(2 theta), exact at lambda = 1

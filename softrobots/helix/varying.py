@@ -269,23 +269,15 @@ def _integrate(
         states.append(found.y.T[: len(here)])
         state = found.y[:, -1]
         state[:4] /= np.linalg.norm(state[:4])
-    made = np.vstack(states)
-    made[:, :4] /= np.linalg.norm(made[:, :4], axis=1, keepdims=True)
-    return made
+    return np.vstack(states)
 
 
 def _poses(states: FloatArray, scale: float) -> FloatArray:
     """Frames from states, shape (n, 4, 4)."""
-    w, x, y, z = states[:, :4].T
+    from scipy.spatial.transform import Rotation
+
     made = np.zeros((len(states), 4, 4))
-    rows = (
-        (w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-        (2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)),
-        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z),
-    )
-    for row, entries in enumerate(rows):
-        for column, entry in enumerate(entries):
-            made[:, row, column] = entry
+    made[:, :3, :3] = Rotation.from_quat(np.roll(states[:, :4], -1, axis=1)).as_matrix()  # the real part last
     made[:, :3, 3] = scale * states[:, 4:7]
     made[:, 3, 3] = 1.0
     return made
