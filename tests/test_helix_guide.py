@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 
+import softrobots as sr
 from softrobots import helix
 from tests.conftest import CHECKOUT
 
@@ -64,3 +66,13 @@ def test_the_angle_from_which_the_tube_folds_is_current() -> None:
         theta = math.radians(angle)
         limit = float(helix.contraction_limit(theta, DIAMETER))
         assert (abs(limit + math.cos(2.0 * theta)) < 1e-9) == folds
+
+
+def test_the_table_of_sags_is_current() -> None:
+    table = rows("chain")
+    assert [row[0] for row in table] == ["sections", "lumped"]
+    for chain, *sags in table:
+        for count, sag in zip((10, 20), sags, strict=True):
+            model = sr.load_model(sr.HelixTube(chain=chain, elastic_sections=count, hinges=count))
+            tips = [sr.solve_equilibrium(model, (), gravity=gravity).tip_position for gravity in (None, sr.EARTH_GRAVITY)]
+            assert sag == f"{1e3 * np.linalg.norm(tips[1] - tips[0]):.2f} mm"

@@ -68,6 +68,7 @@ CASES = [
     pytest.param(helix, form, turned, id=f"{helix}-{form}-{'left, axis' if turned else 'right, tube'}")
     for row, helix in enumerate(HELICES)
     for column, form in enumerate(FORMS)
+    if form != "midpoint" or row % 3 == 0
     # Where there is no axis, or one many kilometres away, nothing can stand upright in 16 digits. One of both elsewhere.
     for turned in ((False,) if helix in AWAY else (False, True) if helix == "paper" else ((row + column) % 2 == 1,))
 ]
