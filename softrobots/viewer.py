@@ -20,20 +20,19 @@ from softrobots.files import new_file, write_atomically
 from softrobots.kinematics import backbone, frame_placement
 from softrobots.meshcat_arrows import ArrowDrawing
 from softrobots.meshcat_body import BodyDrawing
+from softrobots.meshcat_chain import ChainDrawing
 from softrobots.meshcat_server import connect, end_server, start_server
 from softrobots.meshcat_shapes import (
     FORCE_COLOUR,
     PATH_COLOUR,
     RIGID_COLOUR,
     floor_lines,
-    material,
-    meshcat_geometry,
     with_legend,
     wrinkling_rows,
 )
 from softrobots.model import SoftModel, check_model
 from softrobots.robots import HelixTube
-from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
+from softrobots.scene import Scene, wrinkling_level
 from softrobots.trajectory import Trajectory
 
 
@@ -55,7 +54,7 @@ class Viewer:
             ViewerError: If the server does not start or the robot has shapes that cannot be drawn.
         """
         self._model = check_model(model)
-        self._scene = Scene(model)
+        scene = Scene(model)
         self._server, zmq_url, self._url = start_server()
         try:
             self._page = connect(zmq_url, self._url)
@@ -63,14 +62,11 @@ class Viewer:
             self._size = _extent(model)
             self._arrows = ArrowDrawing(self._root["load"], self._size)
             self._ghost = _ghost(model)
-            self._loaded, self._chain_shown = False, True
-            self._section_names = tuple(section.name for section in model.structure.section_table)
-            self._traced = False
+            self._loaded = self._traced = False
             self._segments = bool(model.structure.section_table)
-            self._levels: dict[int, int] = {}
+            self._chain = ChainDrawing(self._root, model, scene)
             self._body = BodyDrawing(self._root["body"])
             self._prepare()
-            self._draw_shapes()
             self.show_configuration(model.configuration(model.relaxed_motors))
             self._body.draw(body_at(model, model.relaxed_motors, model.rest), {})
         except BaseException:
@@ -111,11 +107,10 @@ class Viewer:
             ViewerError: If the viewer is closed.
         """
         self._check(equilibrium)
-        self._show_chain(True)
-        self._place(equilibrium.q, self._model.configuration(equilibrium.q_motors))
+        self._chain.show_sections(True)
+        self._chain.place(equilibrium.q, self._model.configuration(equilibrium.q_motors))
+        self._chain.colour(_levels(equilibrium) or [])
         self._body.draw(body(equilibrium), _tensions(equilibrium))
-        for link in range(len(self._model.spring_groups)):
-            self._colour(link, wrinkling_level(equilibrium, link))
         self._arrows.draw(equilibrium)
         self._ghost, self._loaded = _ghost(self._model), True
 
@@ -127,11 +122,10 @@ class Viewer:
         """
         q = finite_array("q", q, (self._model.pinocchio.nq,))
         self._check_open()
-        self._show_chain(True)
-        self._place(q, q)
+        self._chain.show_sections(True)
+        self._chain.place(q, q)
+        self._chain.colour([0] * len(self._model.spring_groups))
         self._body.clear()
-        for link in range(len(self._model.spring_groups)):
-            self._colour(link, 0)
         self._arrows.clear()
         self._ghost, self._loaded = _ghost(self._model), False
 
@@ -215,7 +209,7 @@ class Viewer:
         frames = growth_frames(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
         self.show_configuration(self._model.configuration((), self._model.rest))
         self._ghost = "the whole tube"
-        self._show_chain(False)  # the links of sections that have not come out would stick out of the tip
+        self._chain.show_sections(False)  # the links of sections that have not come out would stick out of the tip
         whole = body_at(self._model, frames[-1].q_motors, self._model.rest)
         middle = np.concatenate([segment.backbone for segment in whole])
         self.look_at(middle.max(axis=0) + middle.min(axis=0))
@@ -256,8 +250,7 @@ class Viewer:
         """Colour and meaning of what is drawn."""
         entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, self._ghost)]
         if self._segments and not self._model.spring_groups:
-            chain = [shape.colour for shape in self._scene.shapes if shape.name.startswith(self._section_names)]
-            entries += [(colour, "equivalent rigid chain") for colour in chain[:1]]
+            entries += [(colour, "equivalent rigid chain") for colour in self._chain.section_colours[:1]]
         entries += [(colour, text) for text, colour in self._body.entries.items()]
         entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
         return entries + (list(wrinkling_rows()) if self._model.spring_groups and self._loaded else [])
@@ -302,11 +295,6 @@ class Viewer:
         if self._server.poll() is not None:
             raise ViewerError("the viewer is closed, or its server has ended; open a new one")
 
-    def _place(self, deformed: FloatArray, rigid: FloatArray) -> None:
-        for group, q in (("deformed", deformed), ("rigid", rigid)):
-            for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
-                self._root[f"{group}/{shape.name}"].set_transform(transform)
-
     def _prepare(self) -> None:
         """White background, floor, and the camera; meshcat's camera looks at the origin, so the scene moves."""
         import meshcat.geometry as geometry
@@ -324,59 +312,12 @@ class Viewer:
         lines = geometry.PointsGeometry(ends.T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
 
-    def _draw_shapes(self) -> None:
-
-        for shape in self._scene.shapes:
-            drawn, turn = meshcat_geometry(shape.geometry)
-            self._root[f"rigid/{shape.name}/body"].set_object(drawn, material(RIGID_COLOUR))
-            self._root[f"rigid/{shape.name}/body"].set_transform(turn)
-            node = self._root[f"deformed/{shape.name}"]
-            if shape.inflated_link is None:
-                node["body"].set_object(drawn, material(shape.colour))
-                node["body"].set_transform(turn)
-                continue
-            # One copy a colour, one of them visible: an animation can switch visibility, and nothing else of a material.
-            for level, (_, rgb) in enumerate(WRINKLING_COLOURS):
-                node[f"level_{level}"].set_object(drawn, material((*rgb, shape.colour[3])))
-                node[f"level_{level}"].set_transform(turn)
-                node[f"level_{level}"].set_property("visible", level == 0)
-            self._levels[shape.inflated_link] = 0
-
-    def _show_chain(self, shown: bool) -> None:
-        """Show or hide the links of the chain that sections move."""
-        if shown == self._chain_shown:
-            return
-        for shape in self._scene.shapes:
-            if shape.name.startswith(self._section_names):
-                self._root[f"deformed/{shape.name}"].set_property("visible", shown)
-        self._chain_shown = shown
-
-    def _colour(self, link: int, level: int) -> None:
-        if self._levels.get(link, level) == level:
-            return
-        for shape in self._scene.shapes:
-            if shape.inflated_link == link:
-                self._root[f"deformed/{shape.name}/level_{self._levels[link]}"].set_property("visible", False)
-                self._root[f"deformed/{shape.name}/level_{level}"].set_property("visible", True)
-        self._levels[link] = level
-
     def _add_frame(self, animation: Any, frame: Frame) -> None:
-        equilibrium, number = frame.equilibrium, frame.number
         deformed = self._model.embed(self._model.coordinates.at(frame.q_motors, frame.q_springs).joints)
         rigid = self._model.embed(self._model.coordinates.at(frame.q_motors, self._model.rest).joints)
-        for group, q in (("deformed", deformed), ("rigid", rigid)):
-            for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True):
-                animation.at_frame(self._root[f"{group}/{shape.name}"], number).set_transform(transform)
-        if equilibrium is None:
-            return
-        self._arrows.add_frame(animation, number, equilibrium, deformed)
-        for shape in self._scene.shapes:
-            if shape.inflated_link is None:
-                continue
-            shown = wrinkling_level(equilibrium, shape.inflated_link)
-            for level in range(len(WRINKLING_COLOURS)):
-                node = self._root[f"deformed/{shape.name}/level_{level}"]
-                animation.at_frame(node, number).set_property("visible", "boolean", level == shown)
+        self._chain.add_frame(animation, frame.number, deformed, rigid, _levels(frame.equilibrium))
+        if frame.equilibrium is not None:
+            self._arrows.add_frame(animation, frame.number, frame.equilibrium, deformed)
 
 
 def view(model: SoftModel, result: Equilibrium | Trajectory | None = None) -> Viewer:
@@ -424,3 +365,10 @@ def _tensions(equilibrium: Equilibrium | None) -> dict[str, float]:
         return {}
     names = (muscle.name for muscle in equilibrium.model.muscles)
     return dict(zip(names, equilibrium.muscle_forces.tolist(), strict=True))
+
+
+def _levels(equilibrium: Equilibrium | None) -> list[int] | None:
+    """Level of wrinkling of each inflated link; None without load."""
+    if equilibrium is None:
+        return None
+    return [wrinkling_level(equilibrium, link) for link in range(len(equilibrium.model.spring_groups))]
