@@ -56,10 +56,12 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     folder = Path(__file__).resolve().parent.parent / "docs" / "images"
     parser.add_argument("--output", type=Path, default=folder, metavar="FOLDER", help="folder of the pictures (docs/images)")
+    parser.add_argument("--only", nargs="+", choices=tuple(PICTURES), default=tuple(PICTURES), help="pictures to make (all)")
     arguments = parser.parse_args(argv)
 
     def photograph() -> None:
-        for name, (make, title, share) in PICTURES.items():
+        for name in arguments.only:
+            make, title, share = PICTURES[name]
             with tempfile.TemporaryDirectory() as folder_name, make() as viewer:
                 page = viewer.write_html(Path(folder_name) / "scene.html", title=title)
                 print(take_picture(page, arguments.output / f"{name}.png", width=1000, height=560, share=share))

@@ -134,13 +134,6 @@ def test_the_page_shows_the_tube_growing(browser: object, tmp_path: Path) -> Non
     assert yellow[1] > 2.0 * yellow[0]
 
 
-def test_a_saved_page_of_the_default_tube_can_be_mailed(tmp_path: Path) -> None:
-    tube = sr.HelixTube()
-    with view(sr.load_model(tube)) as viewer:
-        viewer.animate_growth(tube)
-        assert viewer.write_html(tmp_path / "a.html").stat().st_size < 10e6
-
-
 def test_growth_is_shown_of_the_tube_of_the_model_only(tube: sr.HelixTube, model: sr.SoftModel) -> None:
     with view(model) as viewer:
         for wrong in (tube.grown(0.5), sr.PccArm(), None):

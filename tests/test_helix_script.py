@@ -56,14 +56,13 @@ def test_an_antenna_has_the_wanted_radius_rise_and_turns(tmp_path: Path) -> None
     assert summary["height_m"] == pytest.approx(0.27, rel=1e-12)
     # Without load the tip is on a left-handed helix: from (R, 0, 0), a turn and a half clockwise and up.
     assert np.allclose(summary["tip_m"], (-0.07, 0.0, 0.27), rtol=0.0, atol=1e-12)
-    again = tmp_path / "again"  # a saved design gives the same tube
-    told = ["--design", str(folder / "design.json"), "--no-plots", "--sections", "6"]
-    assert run_script("helix_tube", [*told, "--output", str(again)]) == 0
-    assert (again / "helix_tube.urdf").read_bytes() == (folder / "helix_tube.urdf").read_bytes()
+    design = sr.helix.HelixDesign.load(folder / "design.json")  # the saved design gives the same tube
+    tube = sr.HelixTube.from_design(design, elastic_sections=6, hinges=6, upright="axis")
+    assert (folder / "helix_tube.urdf").read_text(encoding="utf-8") == tube.urdf()
 
 
 def test_a_wish_that_cannot_be_made_is_refused_or_moved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    wish = ["--antenna", "0.07", "0.01", "2", "--no-plots", "--sections", "8", "--output", str(tmp_path / "out")]
+    wish = ["--antenna", "0.07", "0.01", "1.2", "--no-plots", "--sections", "4", "--output", str(tmp_path / "out")]
     assert run_script("helix_tube", wish) == 2
     assert "runs into itself" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -83,6 +82,7 @@ def test_a_wish_that_cannot_be_made_is_refused_or_moved(tmp_path: Path, capsys: 
         (["--antenna", "0.07", "0.18", "3", "--contraction", "0.7"], "--contraction"),
         (["--antenna", "0.07", "0.18", "3", "--length", "1"], "--length"),
         (["--design", "nowhere.json"], "nowhere.json"),
+        (["--design", "nowhere.json", "--diameter", "0.04"], "--diameter"),
         (["--nearest"], "--nearest"),
         (["--sections", "51"], "--sections"),
         (["--sections", "1"], "elastic_sections"),
