@@ -5,20 +5,19 @@ Three sets of tubes, each as sections of constant strain and as lumped hinges: t
 URDF, read by Pinocchio, and put at zero. The frames at the ends of the sections (lumped: at the hinges) and at the tip are
 compared with the closed form of softrobots.helix, in position and orientation.
 
-Prints a Markdown table; ends with status 1 if an error exceeds the tolerance. With --output the table is also written as JSON,
-every tube as a line of a CSV file, and a picture.
+Prints a Markdown table, and writes it as JSON, every tube as a line of a CSV file, and a picture into a new folder; about two
+minutes. Ends with status 1 if an error exceeds the tolerance.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import itertools
 import json
 import math
 import sys
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +28,7 @@ import softrobots as sr
 from softrobots import helix, plots
 from softrobots.body import body_at
 from softrobots.command_line import exit_status
-from softrobots.files import new_file, write_atomically
+from softrobots.files import csv_text, free_folder, make_folder, new_file, write_atomically, write_text
 from softrobots.kinematics import frame_placement
 from softrobots.paths import urdf_folder
 from softrobots.robots import HelixTube
@@ -48,7 +47,8 @@ FORMS = {
 """Forms of the chain."""
 FILES = ("helix_tube", "helix_tube_lumped")
 """The committed URDF files."""
-NAMES = ("helix_validation.json", "helix_validation.csv", "images/helix_validation.png")
+NAMES = ("helix_validation.json", "helix_validation.csv", "helix_validation.png")
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
 
 
 class Case(NamedTuple):
@@ -85,8 +85,10 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--no-grid", action="store_true", help="leave out the grid of 120 actuators")
     told = "largest error that passes, in metres and in radians (%(default)g)"
     made.add_argument("--tolerance", type=float, default=1e-12, help=told)
-    made.add_argument("--output", type=Path, metavar="FOLDER", help=f"folder for {', '.join(NAMES)} (none)")
-    made.add_argument("--overwrite", action="store_true", help="replace those files if they are there")
+    told = "new or empty folder of the results (output/helix_validation_<time>)"
+    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
+    told = "write the picture into this folder (docs/images) too, replacing it"
+    made.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FOLDER", help=told)
     made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
     return made
 
@@ -203,20 +205,16 @@ def table(lines: list[dict[str, Any]]) -> str:
     return "\n".join(made)
 
 
-def csv_text(rows: list[Row]) -> str:
+def csv_of(rows: list[Row]) -> str:
     """Every tube as a line."""
-    with io.StringIO(newline="") as text:
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(
-            ["set", "chain", "handedness", "upright", "contraction", "angle_deg", "diameter_m", "length_m", "turns", "sections"]
-            + ["boundaries", "largest_distance_m", "largest_angle_rad"]
-        )
-        for row in rows:
-            tube = row.case.tube
-            described = [row.case.group, row.case.form, tube.handedness, tube.upright, tube.contraction]
-            sizes = [math.degrees(tube.angle), tube.diameter, tube.length, tube.turns, tube.n_sections]
-            writer.writerow([*described, *sizes, row.boundaries, row.distance, row.angle])
-        return text.getvalue()
+    names = ["set", "chain", "handedness", "upright", "contraction", "angle_deg", "diameter_m", "length_m", "turns", "sections"]
+    lines = []
+    for row in rows:
+        tube = row.case.tube
+        described = [row.case.group, row.case.form, tube.handedness, tube.upright, tube.contraction]
+        sizes = [math.degrees(tube.angle), tube.diameter, tube.length, tube.turns, tube.n_sections]
+        lines.append([*described, *sizes, row.boundaries, row.distance, row.angle])
+    return csv_text([*names, "boundaries", "largest_distance_m", "largest_angle_rad"], lines)
 
 
 def figure(rows: list[Row], tolerance: float) -> Any:
@@ -293,25 +291,27 @@ def run(arguments: argparse.Namespace) -> bool:
             raise sr.ParameterError(option, value, "zero or more")
     if not 0.0 < arguments.tolerance < math.inf:
         raise sr.ParameterError("--tolerance", arguments.tolerance, "positive")
-    names = NAMES[:2] if arguments.no_plots else NAMES
-    files = []
-    if arguments.output is not None:
-        if not arguments.no_plots:
-            plots.require_matplotlib()  # tells at once what is missing
-        files = [new_file(arguments.output / name, overwrite=arguments.overwrite) for name in names]
+    if arguments.docs is not None and arguments.no_plots:
+        raise sr.ParameterError("--docs", arguments.docs, "given without --no-plots")
+    if not arguments.no_plots:
+        plots.require_matplotlib()  # tells at once what is missing
+    folder = free_folder(arguments.output or Path("output") / f"helix_validation_{datetime.now():%Y%m%d_%H%M%S}")
     cases = [*committed(), *([] if arguments.no_grid else grid()), *drawn(arguments.cases, arguments.seed)]
     rows = [measure(case) for case in tqdm(cases, desc="tubes", unit="tube")]
     lines = summary(rows)
     passed = all(max(row.distance, row.angle) <= arguments.tolerance for row in rows)
     print(f"\nDistance of the boundaries of the chains from the analytic helix; tolerance {arguments.tolerance:g} m and rad")
     print(f"\n{table(lines)}\n\n{'passed' if passed else 'FAILED: an error exceeds the tolerance'}")
-    if files:
-        told = {"seed": arguments.seed, "tolerance": arguments.tolerance, "passed": passed, "table": lines}
-        write_atomically(files[0], lambda file: file.write((json.dumps(told, indent=2) + "\n").encode()))
-        write_atomically(files[1], lambda file: file.write(csv_text(rows).encode()))
-        if not arguments.no_plots:
-            drawing = figure(rows, arguments.tolerance)
-            write_atomically(files[2], lambda file: drawing.savefig(file, format="png"))
+    make_folder(folder)
+    told = {"seed": arguments.seed, "tolerance": arguments.tolerance, "passed": passed, "table": lines}
+    files = [write_text(folder / NAMES[0], json.dumps(told, indent=2) + "\n", overwrite=False)]
+    files.append(write_text(folder / NAMES[1], csv_of(rows), overwrite=False))
+    if not arguments.no_plots:
+        drawing = figure(rows, arguments.tolerance)
+        for place, overwrite in ((folder, False), *([(arguments.docs, True)] if arguments.docs else [])):
+            files.append(new_file(place / NAMES[2], overwrite=overwrite))
+            write_atomically(files[-1], lambda file: drawing.savefig(file, format="png"))
+    print(f"\nwritten: {', '.join(map(str, files))}")
     return passed
 
 

@@ -26,7 +26,12 @@ def script() -> ModuleType:
 
 
 def test_it_validates_the_shipped_files_and_random_tubes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    assert run_script("helix_validation", ["--no-grid", "--cases", "1", "--output", str(tmp_path)]) == 0
+    assert (
+        run_script(
+            "helix_validation", ["--no-grid", "--cases", "1", "--output", str(tmp_path), "--docs", str(tmp_path / "docs")]
+        )
+        == 0
+    )
     result = json.loads((tmp_path / "helix_validation.json").read_text(encoding="utf-8"))
     assert result["passed"]
     lines = {(line["set"], line["chain"]): line for line in result["table"]}
@@ -43,15 +48,18 @@ def test_it_validates_the_shipped_files_and_random_tubes(tmp_path: Path, capsys:
     rows = list(csv.DictReader((tmp_path / "helix_validation.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 2 + 3
     assert max(float(row["largest_distance_m"]) for row in rows) == max(line["largest_distance_m"] for line in lines.values())
-    assert (tmp_path / "images" / "helix_validation.png").stat().st_size > 20_000
+    pictures = [(folder / "helix_validation.png").read_bytes() for folder in (tmp_path, tmp_path / "docs")]
+    assert pictures[0] == pictures[1]
+    assert len(pictures[0]) > 20_000
     out, err = capsys.readouterr()
     assert f"| committed file | lumped | 1 | {counts[1]} |" in out
-    assert out.rstrip().endswith("passed")
+    assert "\npassed\n" in out
     assert "5/5" in err  # a progress bar
 
 
-def test_it_fails_where_an_error_exceeds_the_tolerance(capsys: pytest.CaptureFixture) -> None:
-    assert run_script("helix_validation", ["--no-grid", "--cases", "0", "--tolerance", "1e-17"]) == 1
+def test_it_fails_where_an_error_exceeds_the_tolerance(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    told = ["--no-grid", "--cases", "0", "--no-plots", "--output", str(tmp_path)]
+    assert run_script("helix_validation", [*told, "--tolerance", "1e-17"]) == 1
     assert "FAILED: an error exceeds the tolerance" in capsys.readouterr().out
 
 
@@ -99,6 +107,7 @@ def test_its_closed_form_is_the_helix_and_its_grid_is_the_papers() -> None:
         (["--tolerance", "0"], "--tolerance"),
         (["--tolerance", "nan"], "--tolerance"),
         (["--tolerance", "inf"], "--tolerance"),
+        (["--docs", "--no-plots"], "--docs"),
     ],
 )
 def test_bad_input_is_refused_and_leaves_nothing(
@@ -112,16 +121,11 @@ def test_bad_input_is_refused_and_leaves_nothing(
     assert not folder.exists()
 
 
-def test_nothing_is_overwritten_unless_asked(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    held = tmp_path / "helix_validation.csv"
-    held.write_text("mine", encoding="utf-8")
-    arguments = ["--no-grid", "--cases", "0", "--no-plots", "--output", str(tmp_path)]
-    assert run_script("helix_validation", arguments) == 2
-    assert "exists; choose another name" in capsys.readouterr().err
-    assert held.read_text(encoding="utf-8") == "mine"
-    assert run_script("helix_validation", [*arguments, "--overwrite"]) == 0
-    assert held.read_text(encoding="utf-8").startswith("set,chain,handedness")
-    assert not (tmp_path / "images").exists()
+def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    (tmp_path / "mine.csv").write_text("mine", encoding="utf-8")
+    assert run_script("helix_validation", ["--no-grid", "--cases", "0", "--no-plots", "--output", str(tmp_path)]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.csv"]
 
 
 def test_help_tells_what_it_does(capsys: pytest.CaptureFixture) -> None:
