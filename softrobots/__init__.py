@@ -21,6 +21,7 @@ from softrobots.errors import (
     TargetUnreachable,
     ViewerError,
 )
+from softrobots.growth import grown_coordinates
 from softrobots.inverse_kinematics import IkSolution, solve_ik
 from softrobots.load_estimation import LoadEstimate, estimate_load
 from softrobots.loader import load_model
@@ -77,6 +78,7 @@ __all__ = [
     "elastostatic_jacobian",
     "estimate_load",
     "follow_trajectory",
+    "grown_coordinates",
     "helix",
     "inflated_beam",
     "load_model",

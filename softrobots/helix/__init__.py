@@ -1,4 +1,4 @@
-"""Helical actuation of an inflated tube in closed form; [Blumenschein 2018]. Needs NumPy alone."""
+"""Helical actuation of an inflated tube in closed form; [Blumenschein 2018]. NumPy alone; `bent_tube` needs SciPy too."""
 
 from softrobots.helix.actuator_table import INTERPOLATIONS, ActuatorTable
 from softrobots.helix.atlas import ShapeRow, ShapeTable, paper_grid, shape_table
