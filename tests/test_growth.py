@@ -14,6 +14,7 @@ import softrobots as sr
 from softrobots.animation_frames import growth_frames
 from softrobots.body import body_at
 from softrobots.growth import SHORTEST, grown_coordinates
+from softrobots.scene import Scene
 from softrobots.viewer import view
 from tests.test_viewer import browser, picture_of  # noqa: F401 - a fixture
 
@@ -49,17 +50,18 @@ def helix_frame(tube: sr.HelixTube, length: float) -> np.ndarray:
     return expm(length * twist)
 
 
-@pytest.mark.parametrize("share", [SHORTEST, 0.01, 0.2, 0.5, 0.777, 1.0])
 @pytest.mark.parametrize("handedness", ["right", "left"])
-def test_every_grown_length_ends_on_the_same_helix(share: float, handedness: str) -> None:
+def test_every_grown_length_ends_on_the_same_helix(handedness: str) -> None:
     tube = sr.HelixTube(elastic_sections=12, length=1.0, handedness=handedness)
-    model, grown = sr.load_model(tube), grown_coordinates(tube, share * tube.length)
-    lengths = np.cumsum(grown[:, 3] + tube.centre_length / 12)
-    zeta = tube.contraction * np.exp(2j * tube.angle)
-    # The centre line of a tube of length L is L |1 + zeta| / (2 cos theta) long.
-    assert lengths[-1] == pytest.approx(share * tube.length * abs(1 + zeta) / (2 * np.cos(tube.angle)), rel=1e-12)
-    expected = np.array([helix_frame(tube, length) for length in lengths])
-    assert np.allclose(frames_of(model, grown), expected, rtol=0.0, atol=1e-12)  # rounding of 12 products
+    model = sr.load_model(tube)
+    for share in (SHORTEST, 0.01, 0.2, 0.5, 0.777, 1.0):
+        grown = grown_coordinates(tube, share * tube.length)
+        lengths = np.cumsum(grown[:, 3] + tube.centre_length / 12)
+        zeta = tube.contraction * np.exp(2j * tube.angle)
+        # The centre line of a tube of length L is L |1 + zeta| / (2 cos theta) long.
+        assert lengths[-1] == pytest.approx(share * tube.length * abs(1 + zeta) / (2 * np.cos(tube.angle)), rel=1e-12)
+        expected = np.array([helix_frame(tube, length) for length in lengths])
+        assert np.allclose(frames_of(model, grown), expected, rtol=0.0, atol=1e-12)  # rounding of 12 products
 
 
 def test_wall_that_is_out_stays_where_it_is(tube: sr.HelixTube, model: sr.SoftModel) -> None:
@@ -118,6 +120,40 @@ def test_frames_of_the_growth_begin_short_and_end_at_rest(tube: sr.HelixTube, mo
     for hold in (-0.1, 1.0):
         with pytest.raises(sr.ParameterError, match="hold"):
             growth_frames(tube, 4.0, 0.1, hold)
+    for front in (-1.0, "a", [1.0], np.nan):
+        with pytest.raises(sr.ParameterError, match="front"):
+            growth_frames(tube, 4.0, front, 0.25)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("length", "front"), [(0.03, 0.1), (0.2, 0.1), (1.0, 5.0)])
+def test_the_helix_is_formed_in_the_last_frame_however_long_the_front(length: float, front: float) -> None:
+    tube = sr.HelixTube(length=length, elastic_sections=12)
+    last = growth_frames(tube, 4.0, front, 0.25)[-1]
+    strains = last.q_springs.reshape(-1, 4) / (tube.centre_length / 12)
+    assert np.allclose(strains[:, 1:3], tube.strains[1:3], rtol=1e-12)
+    assert last.grown == 1.0
+
+
+def test_the_page_says_what_it_shows_after_the_growth(tube: sr.HelixTube, model: sr.SoftModel) -> None:
+    with view(model) as viewer:
+        viewer.animate_growth(tube)
+        assert "the whole tube" in viewer.html()
+        viewer.show(sr.solve_equilibrium(model, (), gravity=sr.EARTH_GRAVITY))
+        page = viewer.html()
+        assert "wrinkling moment left" in page
+        assert "the whole tube" not in page
+        viewer.show_configuration(model.configuration((), model.rest))
+        assert "wrinkling moment left" not in viewer.html()
+
+
+@pytest.mark.parametrize("chain", ["sections", "lumped"])
+@pytest.mark.parametrize("names", ["{0}_bend_y {0}_bend_x", "{0}_twist"])
+def test_the_viewer_colours_a_section_whatever_its_group_names(chain: str, names: str) -> None:
+    text = sr.HelixTube(chain=chain, elastic_sections=6, hinges=6).urdf()
+    for section in (f"section_1_{number}" for number in range(1, 7)):
+        text = text.replace(f'springs="{section}_bend_x {section}_bend_y"', f'springs="{names.format(section)}"')
+    shapes = Scene(sr.load_model(text)).shapes
+    assert {shape.inflated_link for shape in shapes if shape.name.startswith("section_1_")} >= set(range(6))
 
 
 def test_the_page_shows_the_tube_growing(browser: object, tmp_path: Path) -> None:  # noqa: F811

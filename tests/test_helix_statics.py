@@ -357,3 +357,25 @@ def test_mujoco_agrees_with_the_equilibrium_of_a_lumped_tube(tool: Callable[[str
     found = assert_mujoco_balances(tool("mujoco"), robot, np.array([0.3, -0.45, 0.13]), np.array(GRAVITY))
     at_rest = frame_placement(found.model, found.model.configuration([]), "tip").translation
     assert np.linalg.norm(found.tip_position - at_rest) > 0.03  # bent in earnest
+
+
+@pytest.mark.parametrize("chain", ["sections", "lumped"])
+def test_what_is_told_of_a_section_is_its_largest_moment(chain: str) -> None:
+    """A straight cantilever under a small tip force F carries F (L - s): F (L - i h) where section i starts, also at the base."""
+    straight = {"contraction": 1.0, "angle": 0.0, "length": 0.5}
+    robot = HelixTube(**straight, chain=chain, elastic_sections=8, hinges=8, hinge_rule="midpoint")
+    found = sr.solve_equilibrium(sr.load_model(robot), (), (1e-3, 0.0, 0.0))
+    expected = 1e-3 * 0.5 * (1.0 - np.arange(8) / 8)
+    # It bends by F L^2 / 2EI = 4e-4 rad: its lever is shorter by less than 1e-6.
+    assert np.allclose(found.link_moments, expected, rtol=1e-5)
+
+
+def test_the_base_of_a_tube_wrinkles_before_the_middle_of_its_first_section() -> None:
+    robot = HelixTube(contraction=1.0, angle=0.0, length=0.5, elastic_sections=4)
+    model = sr.load_model(robot)
+    limit = np.pi**2 / 4 * 10e3 * (0.0331 / 2) ** 3  # [Troise 2021] (3)
+    force = 1.05 * limit / 0.5
+    found = sr.solve_equilibrium(model, (), (force, 0.0, 0.0))
+    middle = np.linalg.norm(found.spring_torques[:2])
+    assert middle < limit  # 7/8 of the lever
+    assert found.wrinkled

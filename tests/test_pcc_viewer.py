@@ -43,7 +43,7 @@ def test_page_shows_pulling_and_pushing_muscles(browser: object, pcc: sr.SoftMod
 
 
 def test_animation_bends_the_tube(browser: object, pcc: sr.SoftModel, tmp_path: Path) -> None:  # noqa: F811
-    path = sr.straight_line((0.3, 0.2, 0.85), (-0.3, 0.3, 0.8), 1.0, 4)
+    path = sr.straight_line((0.3, 0.2, 0.85), (-0.3, 0.3, 0.8), 0.3, 4)  # ten frames: a light page
     trajectory = sr.follow_trajectory(pcc, path.positions, (0, 0, -3), times=path.times)
     with view(pcc, trajectory) as viewer:
         address = viewer.write_html(tmp_path / "a.html").as_uri()
