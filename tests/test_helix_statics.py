@@ -361,7 +361,7 @@ def test_mujoco_agrees_with_the_equilibrium_of_a_lumped_tube(tool: Callable[[str
 
 @pytest.mark.parametrize("chain", ["sections", "lumped"])
 def test_what_is_told_of_a_section_is_its_largest_moment(chain: str) -> None:
-    """A straight cantilever under a small tip force F carries F (L - s): F (L - i h) where section i starts, also at the base."""
+    """A straight cantilever under a small tip force F carries F (L - s): F (L - i h) where section i starts, the base too."""
     straight = {"contraction": 1.0, "angle": 0.0, "length": 0.5}
     robot = HelixTube(**straight, chain=chain, elastic_sections=8, hinges=8, hinge_rule="midpoint")
     found = sr.solve_equilibrium(sr.load_model(robot), (), (1e-3, 0.0, 0.0))
