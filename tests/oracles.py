@@ -86,7 +86,9 @@ def paper_closed_loop(
 
     def settle(q: np.ndarray, y: np.ndarray) -> np.ndarray:
         for _ in range(100):
-            y = flexible_jacobian(angles(q, y))[:3, [2, 3, 5, 6]].T @ force / 172.71
+            before, y = y, flexible_jacobian(angles(q, y))[:3, [2, 3, 5, 6]].T @ force / 172.71
+            if np.abs(y - before).max() < 1e-15:
+                break
         return y
 
     springs = settle(motors, np.zeros(4))

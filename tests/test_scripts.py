@@ -114,7 +114,9 @@ def test_ik_trajectory_refuses_a_folder_that_is_not_empty(tmp_path: Path, capsys
         assert "mine.txt is a file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["ik_trajectory", "generate_urdf", "solver_rates", "make_pictures"])
+@pytest.mark.parametrize(
+    "name", ["ik_trajectory", "generate_urdf", "solver_rates", "make_pictures", "helix_tube", "helix_atlas"]
+)
 def test_every_script_explains_itself(name: str, capsys: pytest.CaptureFixture) -> None:
     with pytest.raises(SystemExit) as ended:
         run_script(name, ["--help"])

@@ -78,8 +78,8 @@ def test_the_papers_method_is_the_one_written_on_the_dh_table(arm: sr.SoftModel)
     three = paper_closed_loop(start, path.positions, path.times, force, 50.0, rows=3)
     assert np.abs(found.tip_positions - three).max() < 1e-8  # springs settle to 1e-10 of 22 N m at each of 200 steps
     for gain in (5.0, 50.0):
-        six = paper_closed_loop(start, path.positions, path.times, force, gain, rows=6)
-        assert np.linalg.norm(six - path.positions, axis=1).max() > 0.5
+        six = paper_closed_loop(start, path.positions[:100], path.times[:100], force, gain, rows=6)
+        assert np.linalg.norm(six - path.positions[:100], axis=1).max() > 0.5
 
 
 def test_moments_pressure_and_margin(arm: sr.SoftModel) -> None:
