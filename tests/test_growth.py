@@ -136,7 +136,7 @@ def test_the_helix_is_formed_in_the_last_frame_however_long_the_front(length: fl
 
 def test_the_page_says_what_it_shows_after_the_growth(tube: sr.HelixTube, model: sr.SoftModel) -> None:
     with view(model) as viewer:
-        viewer.animate_growth(tube)
+        viewer.animate_growth(tube, duration=0.2)
         assert "the whole tube" in viewer.html()
         viewer.show(sr.solve_equilibrium(model, (), gravity=sr.EARTH_GRAVITY))
         page = viewer.html()
