@@ -151,7 +151,7 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
                 return helix.design_antenna(radius, rise, **given)
             return helix.design_grasp(radius, rise, squeeze=arguments.squeeze or 0.0, **given)
         except sr.SelfIntersection as error:
-            told = str(error).replace("on_contact='nearest'", "--nearest")
+            told = f"{error.contact}; --nearest takes the nearest helix that can be made"
             raise sr.SelfIntersection(told, contact=error.contact) from error
     contraction = default.contraction if arguments.contraction is None else arguments.contraction
     angle = default.angle if arguments.angle is None else math.radians(arguments.angle)
@@ -177,7 +177,7 @@ def summarise(tube: sr.HelixTube, design: helix.HelixDesign, pattern: helix.Patt
         "centre_radius_m": float(shape.centre_radius),
         "turn_height_m": float(shape.turn_height),
         "turns": design.turns,
-        "height_m": float(helix.height(shape, design.angle, design.tube_length)),
+        "height_m": design.height,
         "self_contact": design.contact.describe(),
         "actuator_tension_N": float(helix.actuator_tension(design.contraction, design.angle, design.diameter, tube.pressure)),
         "material_twist_deg_per_m": math.degrees(
@@ -215,10 +215,7 @@ def table(summary: dict[str, Any]) -> str:
         ("self-contact", summary["self_contact"]),
         ("actuator pulls", f"{summary['actuator_tension_N']:.2f} N"),
         ("wall twists", f"{summary['material_twist_deg_per_m']:.1f} degrees per metre of tube"),
-        (
-            "template",
-            f"{pieces}; their helix is off the smooth one by up to {mm('pattern_error_m')}",
-        ),
+        ("template", f"{pieces}; their helix is off the smooth one by up to {mm('pattern_error_m')}"),
         ("weight", f"{summary['weight_N']:.3f} N, without the base"),
         ("tip under load", "  ".join(f"{value + 0.0:.6f}" for value in summary["tip_m"]) + " m"),
         ("load moves it by", mm("sag_m")),

@@ -56,8 +56,8 @@ class SegmentBody:
             if run >= spacing:
                 kept.append(number)
                 run = 0.0
-        if kept[-1] != len(steps):
-            kept[-1:] = [kept[-1], len(steps)] if kept[-1] == 0 else [len(steps)]
+        if kept[-1] != len(steps):  # the last frame takes the place of the one before it, unless that is the first
+            kept[max(len(kept) - 1, 1) :] = [len(steps)]
         chosen = {name: points[kept] for name, points in self.muscles.items()}
         return SegmentBody(self.number, self.poses[kept], self.radius, chosen, {n: p[kept] for n, p in self.lines.items()})
 

@@ -70,10 +70,13 @@ class SoftModel:
         bodies = [(name, number) for name, number in frames if pinocchio_model.frames[number].type == pin.FrameType.BODY]
         self._frame_ids = dict(frames) | dict(bodies)  # a link goes before a joint of the same name
         self._tip = tip
-        segments = self._structure.segment_of
+        sections = self._structure.section_of
         self._groups = tuple(
             SpringGroup(
-                tuple(names.index(name) for name in link.springs), link.radius, link.pressure, segments.get(link.springs[0])
+                tuple(names.index(name) for name in link.springs),
+                link.radius,
+                link.pressure,
+                sections[link.springs[0]].segment if link.springs[0] in sections else None,
             )
             for link in inflated_links
             if all(name in names for name in link.springs)

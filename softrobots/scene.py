@@ -13,7 +13,6 @@ from softrobots.checks import FloatArray
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import ViewerError
 from softrobots.model import SoftModel
-from softrobots.strain_chain import STRAINS
 
 WRINKLING_COLOURS = (
     (0.8, (1.00, 0.96, 0.66)),
@@ -77,13 +76,11 @@ class Scene:
         """Inflated link of every shape: what hangs on its last spring, and the tube of its radius just before its first."""
         pin_model, objects = self._model.pinocchio, self._geometry.geometryObjects
         links: list[int | None] = [None] * len(objects)
-        structure = self._model.structure
-        sections = {f"{row.name}_{strain}": row.joint_names for row in structure.section_table for strain in STRAINS}
-        sections |= {joint: row.joint_names for row in structure.section_table for joint in row.joint_names}
+        sections = self._model.structure.section_of
         for number, group in enumerate(self._model.spring_groups):
             names = [self._model.spring_joints[place] for place in group.springs]
             if all(name in sections for name in names):  # the pieces of its sections
-                joints = {pin_model.getJointId(joint) for name in names for joint in sections[name]}
+                joints = {pin_model.getJointId(joint) for name in names for joint in sections[name].joint_names}
                 for place, shape in enumerate(objects):
                     if shape.parentJoint in joints:
                         links[place] = number

@@ -117,10 +117,10 @@ class Structure:
         """Motors and muscles."""
 
     @property
-    def segment_of(self) -> dict[str, int]:
-        """Number of the segment by coordinate of a section, or by joint of a lumped one."""
-        made = {f"{row.name}_{strain}": row.segment for row in self.section_table for strain in STRAINS}
-        return made | {joint: row.segment for row in self.section_table for joint in row.joint_names}
+    def section_of(self) -> dict[str, SectionRow]:
+        """The section by each of its coordinates and joints."""
+        made = {f"{row.name}_{strain}": row for row in self.section_table for strain in STRAINS}
+        return made | {joint: row for row in self.section_table for joint in row.joint_names}
 
     def indices(self, names: Sequence[str]) -> Any:
         """Places of joints in Pinocchio's velocity vector."""

@@ -64,7 +64,10 @@ def test_an_antenna_has_the_wanted_radius_rise_and_turns(tmp_path: Path) -> None
 def test_a_wish_that_cannot_be_made_is_refused_or_moved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wish = ["--antenna", "0.07", "0.01", "1.2", "--no-plots", "--sections", "4", "--output", str(tmp_path / "out")]
     assert run_script("helix_tube", wish) == 2
-    assert "runs into itself" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "runs into itself" in err
+    assert "--nearest takes" in err
+    assert "on_unrealisable" not in err
     assert not (tmp_path / "out").exists()
     assert run_script("helix_tube", [*wish, "--nearest"]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

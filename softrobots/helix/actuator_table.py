@@ -12,6 +12,7 @@ import io
 import math
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,7 @@ class ActuatorTable:
         object.__setattr__(self, "pressure", read_only(pressures))
         object.__setattr__(self, "contraction", read_only(shares))
         if choice("interpolation", self.interpolation, INTERPOLATIONS) == "pchip":
-            self._cubic()
+            _ = self._cubic  # tells at once if SciPy is missing
 
     @classmethod
     def read_csv(cls, path: str | os.PathLike[str], interpolation: str = "linear") -> ActuatorTable:
@@ -145,7 +146,7 @@ class ActuatorTable:
         """
         pressures = _within("pressure", pressure, self.pressure_limits, "Pa")
         if self.interpolation == "pchip":
-            shares = self._cubic()(pressures)
+            shares = self._cubic(pressures)
         else:
             shares = np.interp(pressures, self.pressure, self.contraction)
         return np.asarray(np.clip(shares, *self.contraction_limits))  # rounding must not lead out of the table
@@ -167,7 +168,7 @@ class ActuatorTable:
         known = (self.pressure, self.contraction) if rising else (self.pressure[::-1], self.contraction[::-1])
         if self.interpolation == "linear":
             return np.asarray(np.clip(np.interp(shares, known[1], known[0]), *self.pressure_limits))
-        cubic = self._cubic()
+        cubic = self._cubic
         above = np.clip(np.searchsorted(known[1], shares), 1, len(known[1]) - 1)
         low, high = known[0][above - 1], known[0][above]  # where the contraction is too small, and where it is not
         for _ in range(_HALVINGS):
@@ -190,7 +191,7 @@ class ActuatorTable:
         """
         pressures = _within("pressure", pressure, self.pressure_limits, "Pa")
         if self.interpolation == "pchip":
-            return np.asarray(self._cubic()(pressures, 1))
+            return np.asarray(self._cubic(pressures, 1))
         place = np.clip(np.searchsorted(self.pressure, pressures, side="right"), 1, len(self.pressure) - 1)
         return np.asarray((np.diff(self.contraction) / np.diff(self.pressure))[place - 1])
 
@@ -211,6 +212,7 @@ class ActuatorTable:
         """
         return forward(self.contraction_at(pressure), angle, diameter)
 
+    @cached_property
     def _cubic(self) -> Any:
         """SciPy's monotone cubic through the rows."""
         try:

@@ -11,10 +11,11 @@ import numpy as np
 
 from softrobots.checks import LARGEST, FloatArray, finite_array, finite_number, positive_integer
 from softrobots.errors import ParameterError
+from softrobots.helix.shapes import ANGLE_RANGE, CONTRACTION_RANGE
 
 _RANGES = {
-    "contraction": (1.0 / LARGEST, 1.0, "in (0, 1]: contracted over original length"),
-    "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), "in [0, pi/2) rad (5 degrees are 0.0873 rad)"),
+    "contraction": (1.0 / LARGEST, 1.0, CONTRACTION_RANGE),
+    "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), ANGLE_RANGE),
 }
 _MOST_SAMPLES = 1_000_000
 _ROUNDING = 1e-12  # of the length: by how much a table may end too early

@@ -32,6 +32,12 @@ PATHS = ("inner", "centre", "outer")
 HANDEDNESS = ("right", "left")
 """Which way the helix winds; a right-handed one goes up as it turns anticlockwise seen from above."""
 
+CONTRACTION_RANGE = "in (0, 1]: contracted over original length"
+"""What a contraction must be, for errors."""
+
+ANGLE_RANGE = "in [0, pi/2) rad (5 degrees are 0.0873 rad)"
+"""What the angle of an actuator must be, for errors."""
+
 _ROUNDING = 1e-12  # of the diameter: what rounding may take from a radius
 _SMALLEST = LARGEST**-3  # [m]: forward gives no path below it, and its curvatures stay finite
 
@@ -236,7 +242,7 @@ def checked_contraction(contraction: Any) -> FloatArray:
     """
     shares = positive_array("contraction", contraction, "-")
     if np.any(shares > 1.0):
-        raise ParameterError("contraction", contraction, "in (0, 1]: contracted over original length")
+        raise ParameterError("contraction", contraction, CONTRACTION_RANGE)
     return shares
 
 
@@ -250,7 +256,7 @@ def checked_angle(angle: Any) -> FloatArray:
     if np.any(angles < 0.0):
         raise ParameterError("angle", angle, "in [0, pi/2) rad; say handedness where it matters")
     if np.any(angles >= 0.5 * np.pi):
-        raise ParameterError("angle", angle, "in [0, pi/2) rad (5 degrees are 0.0873 rad)")
+        raise ParameterError("angle", angle, ANGLE_RANGE)
     return angles
 
 

@@ -103,7 +103,7 @@ def write_template_table(pattern: Pattern, path: str | os.PathLike[str], *, over
         The path of the file.
 
     Raises:
-        ParameterError: If `pattern` is no `Pattern`, the path is none.
+        ParameterError: If `pattern` is no `Pattern`, or the path is none.
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """

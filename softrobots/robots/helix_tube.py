@@ -13,6 +13,7 @@ import numpy as np
 from softrobots import helix
 from softrobots.checks import FloatArray, choice, positive_integer, positive_number
 from softrobots.errors import ParameterError, StraightTube
+from softrobots.helix.shapes import checked_actuator
 from softrobots.robots.parameters import Bounds, check_fields, colours, expanded, xacro_arguments
 from softrobots.robots.pcc_arm import CHAINS, HINGE_RULES
 from softrobots.strain_chain import LARGEST_BENDING, in_range
@@ -107,10 +108,7 @@ class HelixTube:
     def __post_init__(self) -> None:
         """Check every field."""
         check_fields(self, {}, _SINGLE, 1, "tubes")
-        if self.contraction > 1.0:
-            raise ParameterError("contraction", self.contraction, "in (0, 1]")
-        if self.angle >= 0.5 * math.pi:
-            raise ParameterError("angle", self.angle, "in [0, pi/2) rad (5 degrees are 0.0873 rad)")
+        checked_actuator(self.contraction, self.angle, self.diameter)
         if self.wall_thickness > 0.05 * self.diameter:
             raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius, {self.radius} m")
         if not -1.0 < self.poisson_ratio <= 0.5:
