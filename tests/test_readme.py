@@ -37,7 +37,7 @@ def test_the_example_of_the_helical_tube_runs() -> None:
 
 
 def test_the_first_screen_holds_sentence_picture_commands_and_code() -> None:
-    marks = ("Soft robots as", "images/inflatable_arm.png", "scripts/ik_trajectory.py\n```", "-m pytest\n```", "```python")
+    marks = ("Soft robots as", "images/inflatable_arm.png", "scripts/ik_trajectory.py\n```", "-m pytest -n auto\n```", "```python")
     order = [README.index(mark) for mark in marks]
     assert order == sorted(order)
     assert README[: order[-1]].count("\n") < 30
