@@ -37,7 +37,8 @@ def test_the_example_of_the_helical_tube_runs() -> None:
 
 
 def test_the_first_screen_holds_sentence_picture_commands_and_code() -> None:
-    marks = ("Soft robots as", "images/inflatable_arm.png", "scripts/ik_trajectory.py\n```", "-m pytest -n auto\n```", "```python")
+    commands = ("scripts/ik_trajectory.py\n```", "-m pytest -n auto\n```")
+    marks = ("Soft robots as", "images/inflatable_arm.png", *commands, "```python")
     order = [README.index(mark) for mark in marks]
     assert order == sorted(order)
     assert README[: order[-1]].count("\n") < 30
