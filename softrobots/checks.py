@@ -146,6 +146,19 @@ def positive_integer(name: str, value: Any, most: int | None = None) -> int:
     return int(value)
 
 
+def unit_vector(name: str, value: Any) -> FloatArray:
+    """Return the direction of `value`, shape (3,), as a vector of length 1.
+
+    Raises:
+        ParameterError: If the shape differs, a number is not finite, or all are zero.
+    """
+    vector = finite_array(name, value, (3,))
+    length = float(np.linalg.norm(vector))
+    if length == 0.0:
+        raise ParameterError(name, value, "different from zero")
+    return np.asarray(vector / length)
+
+
 def choice(name: str, value: Any, options: Sequence[str]) -> str:
     """Return `value` if it is one of `options`.
 

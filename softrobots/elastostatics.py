@@ -120,7 +120,7 @@ def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
     law = model.springs
     residual = law.torque(q_springs) - reduced.elastic
     tangent = -reduced.derivative
-    tangent.flat[:: tangent.shape[0] + 1] += law.tangent(q_springs)
+    law.add_tangent(tangent, q_springs)
     energy = law.energy(q_springs) + joints.potential + reduced.potential
     scale = joints.scale + reduced.scale * model.reach
     return ElasticState(q_springs, q, point, reduced, scale, residual, tangent, energy, math.sqrt(float(residual @ residual)))

@@ -18,6 +18,7 @@ from softrobots.kinematics import frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
 
+_NEAR_PLATEAU = 0.99  # share of the largest moment at which a link explains why there is no equilibrium
 _LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are computed from the shape
 
 
@@ -41,7 +42,7 @@ class Equilibrium:
     q: FloatArray
     """Pinocchio's configuration, shape (nq,)."""
     spring_torques: FloatArray
-    """Torque of each spring, `k (q - rest)`, shape (n_springs,) [N m or N]."""
+    """Torque of each spring, `k (q - rest)` if it is linear, shape (n_springs,) [N m or N]."""
     motor_torques: FloatArray
     """Load on each motor, `J_m^T w - g_m`, shape (n_motors,) [N m or N]."""
     tangent_stiffness: FloatArray
@@ -110,10 +111,17 @@ class Equilibrium:
         lengths = np.array([section.length for section in structure.section_table]).reshape(-1, 1)
         return read_only(structure.section_coordinates(self.q_motors, self.q_springs) / lengths + (0.0, 0.0, 0.0, 1.0))
 
+    @cached_property
+    def saturated(self) -> tuple[bool, ...]:
+        """Which inflated links are on the plateau of their moment; none of those with linear springs."""
+        beyond = self.model.springs.saturated(self.q_springs)
+        return tuple(not beyond.isdisjoint(group.springs) for group in self.model.spring_groups)
+
     @property
     def wrinkled(self) -> bool:
-        """Whether a link carries its wrinkling moment or more, so that linear springs no longer hold."""
-        return any(m >= group.wrinkling_moment for m, group in zip(self.link_moments, self.model.spring_groups, strict=True))
+        """Whether a link carries its wrinkling moment or more, or is on its plateau: linear springs no longer hold."""
+        moments = zip(self.link_moments, self.model.spring_groups, strict=True)
+        return any(moment >= group.wrinkling_moment for moment, group in moments) or any(self.saturated)
 
     @property
     def within_limits(self) -> bool:
@@ -210,6 +218,13 @@ def _hint(best: Equilibrium) -> str:
         )
     if best.method == "fixed_point":
         return "; method='newton' converges for larger loads"
+    for moment, group in zip(best.link_moments, best.model.spring_groups, strict=True):
+        if group.max_moment is not None and moment >= _NEAR_PLATEAU * group.max_moment:
+            springs = ", ".join(best.model.spring_joints[place] for place in group.springs)
+            return (
+                f"; the link of {springs} is on the plateau of its moment, {group.max_moment:g} N m, and cannot carry a dead "
+                f"moment beyond it; solve_imposed_displacement goes on where the displacement is given"
+            )
     if not best.conservative:
         return "; under a world-fixed moment the load is grown from zero, and stops where its path turns back"
     return ""

@@ -49,14 +49,15 @@ class NameNotFound(SoftRobotsError, LookupError):
         available: The names that exist.
     """
 
-    def __init__(self, kind: str, name: str, available: Iterable[str]) -> None:
-        """Say that no `kind` is called `name`, and which ones there are."""
+    def __init__(self, kind: str, name: str, available: Iterable[str], *, lines: Iterable[str] = ()) -> None:
+        """Say that no `kind` is called `name`, and which ones there are: by name, or in `lines` that tell more of each."""
         self.kind = kind
         self.name = name
         self.available = tuple(available)
         near = difflib.get_close_matches(str(name), self.available, n=1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
-        super().__init__(f"no {kind} is called {name!r}{hint}; available: {', '.join(self.available) or 'none'}")
+        listed = "".join(f"\n  {line}" for line in lines) or f" {', '.join(self.available) or 'none'}"
+        super().__init__(f"no {kind} is called {name!r}{hint}; available:{listed}")
 
     def __str__(self) -> str:
         """Return the message itself (LookupError's children may quote it)."""
@@ -98,7 +99,10 @@ class NotConverged(SoftRobotsError, RuntimeError):
 
 
 class EquilibriumNotFound(NotConverged):
-    """No static equilibrium was reached; `best` is an `Equilibrium` above the tolerance."""
+    """No static equilibrium was reached.
+
+    `best` is an `Equilibrium` above the tolerance, or the `ImposedDisplacement` as far as the displacement could be followed.
+    """
 
 
 class LoadNotFound(NotConverged):

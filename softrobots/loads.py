@@ -115,6 +115,14 @@ class Load:
         """The wrenches with the matrices that the statics needs of them."""
         return tuple(LoadTerm.of(frame, wrench) for frame, wrench in self.wrenches.items())
 
+    def same_as(self, other: Load) -> bool:
+        """Whether another load has the same wrenches and gravity."""
+        return self is other or (
+            self.gravity == other.gravity
+            and self.wrenches.keys() == other.wrenches.keys()
+            and all(np.array_equal(wrench, other.wrenches[name]) for name, wrench in self.wrenches.items())
+        )
+
     def scaled(self, factor: float) -> Load:
         """Return the load with every wrench and gravity multiplied by `factor`."""
         gravity = None if self.gravity is None else tuple(factor * g for g in self.gravity)

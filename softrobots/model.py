@@ -15,10 +15,10 @@ import pinocchio as pin
 
 from softrobots import inflated_beam
 from softrobots.actuators import Actuators
-from softrobots.checks import FloatArray, finite_array, read_only
+from softrobots.checks import LARGEST, FloatArray, finite_array, read_only
 from softrobots.coordinates import Coordinates
 from softrobots.errors import DescriptionError, NameNotFound, ParameterError
-from softrobots.springs import LinearSprings
+from softrobots.springs import LinearSprings, SpringLaw, spring_law
 from softrobots.structure import Parts, Structure
 from softrobots.urdf_tags import InflatedLinkTag, MuscleTag
 
@@ -40,6 +40,8 @@ class SpringGroup:
     """Gauge pressure [Pa]."""
     segment: int | None = None
     """Number of the segment, if the group is one of its sections."""
+    max_moment: float | None = None
+    """Largest moment, beyond wrinkling [N m]; None: the springs are linear."""
 
     @property
     def wrinkling_moment(self) -> float:
@@ -65,7 +67,8 @@ class SoftModel:
         self._urdf = urdf
         self._structure = Structure(pinocchio_model, parts)
         names, stiffness, rest, turning = self._structure.law
-        self._springs = LinearSprings(read_only(stiffness), read_only(rest))
+        linear = LinearSprings(read_only(stiffness), read_only(rest))
+        self._springs = spring_law(linear, names, self._structure.spring_joints, inflated_links)
         frames = [(frame.name, number) for number, frame in enumerate(pinocchio_model.frames)]
         bodies = [(name, number) for name, number in frames if pinocchio_model.frames[number].type == pin.FrameType.BODY]
         self._frame_ids = dict(frames) | dict(bodies)  # a link goes before a joint of the same name
@@ -77,6 +80,7 @@ class SoftModel:
                 link.radius,
                 link.pressure,
                 sections[link.springs[0]].segment if link.springs[0] in sections else None,
+                link.max_moment,
             )
             for link in inflated_links
             if all(name in names for name in link.springs)
@@ -159,13 +163,13 @@ class SoftModel:
         return self._structure.law.names
 
     @property
-    def springs(self) -> LinearSprings:
-        """The spring law."""
+    def springs(self) -> SpringLaw:
+        """The spring law: `LinearSprings`, or `SaturatingSprings` if a link has a largest moment."""
         return self._springs
 
     @property
     def stiffness(self) -> FloatArray:
-        """Stiffness of the elastic coordinates, shape (n_springs,) [N m/rad or N/m], read-only."""
+        """Stiffness of the elastic coordinates near rest, shape (n_springs,) [N m/rad or N/m], read-only."""
         return self._springs.stiffness
 
     @property
@@ -201,7 +205,10 @@ class SoftModel:
 
     @property
     def reach(self) -> float:
-        """Sum of the link lengths from base to tip, and of the travel of sliding joints [m], the scale of residuals."""
+        """Sum of the link lengths from base to tip, and of the travel of sliding joints [m], the scale of residuals.
+
+        A slide without limits counts as 1 m.
+        """
         return self._reach
 
     @property
@@ -346,7 +353,8 @@ class SoftModel:
             length += float(np.linalg.norm(self._pin.jointPlacements[joint].translation))
             kind = self._pin.joints[joint]
             if kind.shortname().startswith("JointModelP") and kind.idx_v not in strained:
-                length += float(self._pin.upperPositionLimit[kind.idx_q] - self._pin.lowerPositionLimit[kind.idx_q])
+                travel = float(self._pin.upperPositionLimit[kind.idx_q] - self._pin.lowerPositionLimit[kind.idx_q])
+                length += travel if travel < LARGEST else 1.0
             joint = self._pin.parents[joint]
         return max(length, 1e-6)
 

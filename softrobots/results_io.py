@@ -14,21 +14,23 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import finite_array, increasing, read_only
+from softrobots.checks import finite_array, finite_number, increasing, read_only
 from softrobots.elastostatics import elastic_state, largest_residual
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import FileFormatError, ParameterError
 from softrobots.files import as_path, csv_text, new_file, write_atomically, write_text
+from softrobots.imposed_displacement import ImposedDisplacement, imposed_at
 from softrobots.inverse_kinematics import IkSolution, checked_orientation
 from softrobots.load_estimation import LoadEstimate, estimate_at
 from softrobots.loader import load_model
 from softrobots.loads import Load
 from softrobots.model import SoftModel
+from softrobots.probes import Probe
 from softrobots.tip_search import Goal
 from softrobots.trajectory import Trajectory
 from softrobots.workspace import Workspace, workspace_at
 
-Result = Equilibrium | IkSolution | LoadEstimate | Trajectory | Workspace
+Result = Equilibrium | IkSolution | ImposedDisplacement | LoadEstimate | Trajectory | Workspace
 """What can be saved."""
 
 _FORMAT = 1
@@ -40,7 +42,7 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
     The file appears whole or not at all: it is written beside its place and moved there.
 
     Args:
-        result: An equilibrium, load estimate, IK solution, trajectory or workspace.
+        result: An equilibrium, imposed displacement, load estimate, IK solution, trajectory or workspace.
         path: File to write; `.npz` is added if it has no ending.
         overwrite: Replace an existing file.
 
@@ -54,7 +56,9 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
     """
     kind = next((name for name, (cls, _, _) in _KINDS.items() if isinstance(result, cls)), None)
     if kind is None:
-        raise ParameterError("result", result, "an Equilibrium, IkSolution, LoadEstimate, Trajectory or Workspace")
+        raise ParameterError(
+            "result", result, "an Equilibrium, IkSolution, ImposedDisplacement, LoadEstimate, Trajectory or Workspace"
+        )
     path = as_path("path", path)
     named = path if path.suffix or path.is_dir() else path.with_suffix(".npz")
     target = new_file(named, overwrite=overwrite)
@@ -150,6 +154,8 @@ def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
 
 def _pack_rows(equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
     first = equilibria[0]
+    if any(not e.load.same_as(first.load) for e in equilibria):
+        raise ParameterError("result", first.model, "equilibria under one load; these have several")
     return _pack_model(first.model, first.load) | {
         "q_motors": np.array([e.q_motors for e in equilibria]),
         "q_springs": np.array([e.q_springs for e in equilibria]),
@@ -215,6 +221,45 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
     )
 
 
+def _pack_imposed(result: ImposedDisplacement) -> dict[str, Any]:
+    probe = result.probe
+    return (
+        _pack_rows((result.equilibrium,))
+        | _pack_model(result.model, result.load)
+        | {
+            "frame": np.array(probe.frame),
+            "point": probe.point,
+            "direction": probe.direction,
+            "origin": probe.origin,
+            **({} if probe.normal is None else {"normal": probe.normal}),
+            "displacement": np.array(result.displacement),
+            "reaction": np.array(result.reaction),
+        }
+    )
+
+
+def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
+    model, load = _unpack_model(fields)
+    point, direction, origin = (read_only(finite_array(name, fields[name], (3,))) for name in ("point", "direction", "origin"))
+    normal = read_only(finite_array("normal", fields["normal"], (3,))) if "normal" in fields else None
+    made = imposed_at(
+        model,
+        model.checked_motors(fields["q_motors"][0]),
+        load,
+        Probe(str(fields["frame"]), point, direction, origin, normal),
+        q_springs=finite_array("q_springs", fields["q_springs"][0], (model.n_springs,), "rad"),
+        reaction=finite_number("reaction", fields["reaction"], "N"),
+        displacement=finite_number("displacement", fields["displacement"], "m"),
+        iterations=int(fields["iterations"][0]),
+    )
+    claimed = 1.001 * float(fields["residual"][0]) + 1e-2 * made.equilibrium.tolerance
+    if not (made.residual <= claimed and made.gap <= 1e-11 * model.reach):
+        raise FileFormatError(
+            f"its residual is {made.residual:.3g} N m, and the probe is {made.gap:.3g} m from where it claims to be"
+        )
+    return replace(made, equilibrium=replace(made.equilibrium, tolerance=float(fields["tolerance"][0])))
+
+
 def _pack_estimate(estimate: LoadEstimate) -> dict[str, Any]:
     return _pack_rows((estimate.equilibrium,)) | {
         "force": estimate.force,
@@ -268,6 +313,7 @@ def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
 _KINDS: dict[str, tuple[type, Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Result]]] = {
     "equilibrium": (Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
     "ik_solution": (IkSolution, _pack_solution, _unpack_solution),
+    "imposed_displacement": (ImposedDisplacement, _pack_imposed, _unpack_imposed),
     "load_estimate": (LoadEstimate, _pack_estimate, _unpack_estimate),
     "trajectory": (Trajectory, _pack_trajectory, _unpack_trajectory),
     "workspace": (Workspace, _pack_workspace, _unpack_workspace),

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.blas_threads import one_blas_thread
-from softrobots.checks import FloatArray, finite_array, positive_number
+from softrobots.checks import FloatArray, positive_number, unit_vector
 from softrobots.elastostatics import ElasticState, newton, scaled, settled
 from softrobots.errors import NoCriticalLoad, ParameterError
 from softrobots.kinematics import frame_jacobian
@@ -21,6 +21,8 @@ _TOLERANCE = 1e-12
 _SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
 _LARGEST_MOVE = 0.1  # [rad] of a spring between two points of the path
 _NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the one at zero force, may vanish in the next step
+_KNEE = 1e-6  # relative distance of the springs from the beginning of a plateau that counts as none
+_KNEE_STEP = 1e-4  # of the force, relative to the force reached: shorter steps may cross the beginning of a plateau
 _STIFF = 1e-9  # eigenvalues above this, relative to the springs' own stiffness, count for the prediction
 
 
@@ -37,7 +39,8 @@ def critical_load(
 
     Follows the equilibrium from zero force, without leaving its path, until the smallest eigenvalue of the tangent
     stiffness crosses zero (a pitchfork, as of an axially pushed straight arm) or the path turns back (a limit point). A push
-    that is oblique, however little, may bend the robot smoothly where the exact one buckles it, and then has no limit.
+    that is oblique, however little, may bend the robot smoothly where the exact one buckles it, and then has no limit, unless a
+    link with a largest moment collapses: where it reaches its plateau, or later.
 
     Args:
         model: The robot.
@@ -58,10 +61,7 @@ def critical_load(
     """
     check_model(model)
     motors = model.checked_motors(q_motors)
-    unit = finite_array("direction", direction, (3,))
-    length = float(np.linalg.norm(unit))
-    if length == 0.0:
-        raise ParameterError("direction", direction, "different from zero")
+    unit = unit_vector("direction", direction)
     if model.n_springs == 0:
         raise ParameterError("model", model, "a robot with springs")
     if max_force is None:
@@ -69,7 +69,7 @@ def critical_load(
     else:
         largest = positive_number("max_force", max_force, "N")
     constant = Load.of(model, frame=frame, gravity=gravity)
-    push = np.concatenate([unit / length, np.zeros(3)])
+    push = np.concatenate([unit, np.zeros(3)])
     at = model.tip if frame is None else frame
 
     def follow(magnitude: float, last: _Point) -> _Point | None:
@@ -89,17 +89,18 @@ def critical_load(
             if here.force >= largest:
                 break
             there = follow(min(here.force + step, largest), here)
-            if there is None or (here.softest > nearly_zero and there.softest < 0.5 * here.softest):
+            knee = step < _KNEE_STEP * max(here.force, first_step) and there is not None and _knee_between(model, here, there)
+            if there is None or (not knee and here.softest > nearly_zero and there.softest < 0.5 * here.softest):
                 step *= 0.5  # too far to tell this path from a neighbour
                 if step < _SHORTEST_STEP * max(here.force, first_step):
-                    if here.softest <= 10.0 * nearly_zero:
+                    if here.softest <= 10.0 * nearly_zero or _at_knee(model, here):
                         return here.force  # the path turns back here: a limit point
                     break
             elif there.softest <= 0.0:
                 return _bisect(follow, here, there.force)
             else:
                 here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
-    reached = f"{here.force:.6g} N along {(unit / length).tolist()}"
+    reached = f"{here.force:.6g} N along {unit.tolist()}"
     told = f"the equilibrium stays stable up to {reached}"
     if here.force < largest:
         told += f"; its path could not be followed further (up to {largest:.6g} N was wanted)"
@@ -124,6 +125,18 @@ def _point(model: SoftModel, state: ElasticState, force: float, push: FloatArray
     pull = vectors.T @ (softness * (push @ springs))
     slope = softness * (vectors @ (pull / np.where(np.abs(values) > _STIFF, values, np.inf)))
     return _Point(force, state, float(values[0]), slope)
+
+
+def _knee_between(model: SoftModel, here: _Point, there: _Point) -> bool:
+    """Whether a link goes onto its plateau between two points: there the tangent jumps."""
+    return model.springs.saturated(here.state.q_springs) != model.springs.saturated(there.state.q_springs)
+
+
+def _at_knee(model: SoftModel, here: _Point) -> bool:
+    """Whether a link is at the beginning of its plateau."""
+    bent = here.state.q_springs - model.rest
+    before, beyond = (model.springs.saturated(model.rest + share * bent) for share in (1.0 - _KNEE, 1.0 + _KNEE))
+    return before != beyond
 
 
 def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high: float) -> float:

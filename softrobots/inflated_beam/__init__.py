@@ -8,6 +8,7 @@ from softrobots.inflated_beam.beam import (
     wrinkling_moment,
     young_modulus_from_stiffness,
 )
+from softrobots.inflated_beam.bending_test import BendingTest
 from softrobots.inflated_beam.characterisation import (
     MEAN_STIFFNESS,
     TABLE_3,
@@ -23,6 +24,7 @@ __all__ = [
     "MEAN_STIFFNESS",
     "SHEAR_COEFFICIENT",
     "TABLE_3",
+    "BendingTest",
     "Characterisation",
     "CharacterisationRow",
     "deflection",

@@ -38,6 +38,8 @@ class InflatableArm:
     """Angle at which the upward spring is relaxed [rad], within +-pi/2."""
     pressure: PerPart = 50e3
     """Gauge pressure in a link; sets the wrinkling moment [Pa]. Troise 2021, section 4."""
+    max_moment: PerPart | None = None
+    """Largest moment of a link, in any direction, beyond wrinkling [N m]; None: springs are linear. Troise 2021, section 4."""
     density: PerPart = 1300.0
     """Density of the wall [kg/m^3]. Assumed (PVC-coated fabric)."""
     cap_mass: PerPart = 0.1
@@ -61,7 +63,8 @@ class InflatableArm:
     def __post_init__(self) -> None:
         """Check every field and spread single numbers over the links."""
         count = check_lengths(self, "link_lengths", "link")
-        check_fields(self, _PER_LINK, _SINGLE, count, "links")
+        given = {} if self.max_moment is None else {"max_moment": ("N m", 0.0, True)}
+        check_fields(self, {**_PER_LINK, **given}, _SINGLE, count, "links")
         lengths = self._each("link_lengths")
         for offset, length in zip(self._each("hinge_offset"), lengths, strict=True):
             if offset >= length:

@@ -1,0 +1,300 @@
+"""Springs with a plateau: the law itself, its way through the description, and the statics that rest on it."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import softrobots as sr
+from softrobots import inflated_beam
+from softrobots.description import expand
+from softrobots.paths import xacro_folder
+from softrobots.scene import WRINKLING_COLOURS, wrinkling_level
+from softrobots.springs import LinearSprings, SaturatingLink, SaturatingSprings
+
+K, M = 187.30, 9.45  # [Troise 2021] Table 3 at 20 kPa
+ARM = 0.57  # [m], hinge to tip of one link
+KNEE = M / K
+
+LAW = SaturatingSprings(
+    LinearSprings(np.array([K, K, 80.0, 120.0, 120.0]), np.array([0.0, 0.02, 0.3, -0.1, 0.05])),
+    (SaturatingLink((0, 1), K, M), SaturatingLink((3, 4), 120.0, 4.0)),
+)
+"""Two saturating links with rest angles and a linear spring between them."""
+
+
+def tangent_of(law: SaturatingSprings, y: np.ndarray) -> np.ndarray:
+    matrix = np.zeros((len(y), len(y)))
+    law.add_tangent(matrix, y)
+    return matrix
+
+
+@pytest.fixture(scope="module")
+def limp() -> sr.SoftModel:
+    """The paper's arm with a plateau in both links, and links that differ."""
+    return sr.load_model(sr.InflatableArm(max_moment=(21.76, 15.0)))
+
+
+@pytest.fixture(scope="module")
+def one() -> sr.SoftModel:
+    """One link at 20 kPa."""
+    return sr.load_model(sr.InflatableArm(link_lengths=(0.6,), stiffness=K, max_moment=M, pressure=20e3))
+
+
+# the law
+
+
+@given(st.lists(st.floats(-0.4, 0.4), min_size=5, max_size=5))
+def test_torque_and_tangent_are_derivatives_of_the_energy(values: list[float]) -> None:
+    """Central differences: errors are step^2 times the next derivative, and rounding over the step; ~1e-7 N m and N m/rad.
+
+    Next to a knee the tangent jumps: angles within two steps of one are moved away.
+    """
+    y, step = np.array(values), 1e-6
+    for link in LAW.links:
+        places = list(link.places)
+        bend = y[places] - LAW.rest[places]
+        if abs(np.linalg.norm(bend) - link.max_moment / link.stiffness) < 1e-4:
+            y[places] += 1e-3
+    rows = step * np.eye(5)
+    torque = [(LAW.energy(y + row) - LAW.energy(y - row)) / (2 * step) for row in rows]
+    tangent = [(LAW.torque(y + row) - LAW.torque(y - row)) / (2 * step) for row in rows]
+    assert np.allclose(LAW.torque(y), torque, rtol=1e-7, atol=1e-7)
+    # On the plateau the tangent is M / bend across, at most k; its change over a step is relative to the bend.
+    assert np.allclose(tangent_of(LAW, y), tangent, rtol=1e-6, atol=1e-5)
+    assert np.array_equal(tangent_of(LAW, y), tangent_of(LAW, y).T)
+
+
+@given(st.floats(0.0, 0.5), st.floats(-np.pi, np.pi), st.floats(-np.pi, np.pi))
+def test_the_law_is_the_same_in_all_directions(bend: float, direction: float, turn: float) -> None:
+    law = SaturatingSprings(LinearSprings(np.full(2, K), np.zeros(2)), (SaturatingLink((0, 1), K, M),))
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    y = bend * np.array([np.cos(direction), np.sin(direction)])
+    if abs(K * bend - M) < 1e-9:  # rounding decides there on which side of the knee the tangent is taken
+        return
+    assert law.energy(rotation @ y) == pytest.approx(law.energy(y), rel=1e-12, abs=1e-15)
+    assert np.allclose(law.torque(rotation @ y), rotation @ law.torque(y), rtol=0.0, atol=1e-12)
+    assert np.allclose(tangent_of(law, rotation @ y), rotation @ tangent_of(law, y) @ rotation.T, rtol=0.0, atol=1e-10)
+
+
+def test_one_spring_bent_alone_follows_the_moment_angle_law_of_the_paper() -> None:
+    law = SaturatingSprings(LinearSprings(np.full(2, K), np.zeros(2)), (SaturatingLink((0, 1), K, M),))
+    angles = np.linspace(-0.3, 0.3, 61)
+    expected = inflated_beam.moment(angles, stiffness=K, max_moment=M)
+    for place in (0, 1):
+        torques = np.array([law.torque(angle * np.eye(2)[place]) for angle in angles])
+        assert np.allclose(torques[:, place], expected, rtol=1e-15, atol=0.0)
+        assert not torques[:, 1 - place].any()
+
+
+def test_below_the_knee_everything_is_that_of_linear_springs_to_the_last_bit(limp: sr.SoftModel, arm: sr.SoftModel) -> None:
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        motors, force = random.uniform(-1.5, 1.5, 3), random.uniform(-6.0, 6.0, 3)
+        soft, linear = (sr.solve_equilibrium(model, motors, force, gravity=sr.EARTH_GRAVITY) for model in (limp, arm))
+        assert linear.link_moments.max() < 15.0
+        for name in ("q_springs", "spring_torques", "motor_torques", "tangent_stiffness", "residual", "iterations"):
+            assert np.array_equal(getattr(soft, name), getattr(linear, name)), name
+        assert soft.saturated == (False, False)
+
+
+# the description
+
+
+def test_the_plateau_travels_in_the_urdf(limp: sr.SoftModel, tmp_path: Path) -> None:
+    robot = sr.InflatableArm(max_moment=(21.76, 15.0))
+    assert limp == sr.load_model(robot.urdf())
+    assert [group.max_moment for group in limp.spring_groups] == [21.76, 15.0]
+    assert limp != sr.load_model(sr.InflatableArm())
+    twin = pickle.loads(pickle.dumps(limp))
+    assert twin.springs.links == limp.springs.links
+    loaded = sr.solve_equilibrium(limp, (0.1, 0.2, 0.3), (0.0, 20.0, -30.0))
+    assert any(loaded.saturated)
+    again = sr.load_result(sr.save_result(loaded, tmp_path / "limp.npz"))
+    assert np.array_equal(again.spring_torques, loaded.spring_torques)
+    assert again.saturated == loaded.saturated
+
+
+def test_one_number_holds_for_all_links_and_none_is_linear() -> None:
+    assert sr.InflatableArm(max_moment=9.45).max_moment == (9.45, 9.45)
+    linear = sr.load_model(sr.InflatableArm())
+    assert "max_moment" not in linear.urdf
+    assert isinstance(linear.springs, LinearSprings)
+    assert linear.springs.saturated(np.full(4, 3.0)) == frozenset()
+    by_number = sr.load_model(sr.InflatableArm(max_moment=9.45))
+    assert by_number == sr.load_model(sr.InflatableArm(max_moment=(9.45, 9.45)))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "9", (9.45,), (1.0, 2.0, 3.0), (9.45, None)])
+def test_a_largest_moment_that_is_none_is_refused(value: object) -> None:
+    with pytest.raises(sr.ParameterError, match="max_moment"):
+        sr.InflatableArm(max_moment=value)
+
+
+@pytest.mark.parametrize("text", ["0", "[9.45,-1]", "nan", "[1,2,3]"])
+def test_xacro_refuses_it_too(text: str) -> None:
+    with pytest.raises(sr.DescriptionError, match="max_moment"):
+        expand(xacro_folder() / sr.InflatableArm.XACRO, {"max_moment": text})
+
+
+@pytest.mark.parametrize("text", ["0.0", "-3", "inf", "stiff"])
+def test_a_bad_attribute_is_refused(text: str, limp: sr.SoftModel) -> None:
+    with pytest.raises(sr.DescriptionError, match=r"max_moment.*is required"):
+        sr.load_model(limp.urdf.replace('max_moment="15.0"', f'max_moment="{text}"'))
+
+
+def test_springs_of_a_link_with_a_plateau_must_be_alike(limp: sr.SoftModel) -> None:
+    springs = dict(limp.spring_table)
+    with pytest.raises(sr.DescriptionError, match=r"same stiffness, not 172\.71, 100\.0"):
+        sr.load_model(limp.urdf, springs=springs | {"spring_2_up": (100.0, 0.0)})
+    del springs["spring_2_up"]
+    with pytest.raises(sr.DescriptionError, match=r"spring_2_side spring_2_up has max_moment 15\.0.*spring_1_side"):
+        sr.load_model(limp.urdf, springs=springs)
+    del springs["spring_2_side"]  # a link that the caller makes rigid has no plateau
+    half = sr.load_model(limp.urdf, springs=springs, motors=limp.motor_joints)
+    assert [link.max_moment for link in half.springs.links] == [21.76]
+    assert isinstance(sr.load_model(limp.urdf, springs={}).springs, LinearSprings)
+
+
+def test_sections_and_hinges_that_muscles_hold_have_no_plateau() -> None:
+    tube = sr.HelixTube().urdf()
+    assert "inflated_link" in tube
+    with pytest.raises(sr.DescriptionError, match="must be joints with a spring each, that no muscle length holds"):
+        sr.load_model(tube.replace("<softrobots:inflated_link ", '<softrobots:inflated_link max_moment="1.0" '))
+    lumped = sr.PccArm(chain="lumped", hinges=2, segment_lengths=(0.5,))
+    names = sr.load_model(lumped, muscles="forces").spring_joints[:2]
+    tag = f'<softrobots:inflated_link springs="{" ".join(names)}" radius="0.03" pressure="1e4" max_moment="0.2"/></robot>'
+    text = lumped.urdf().replace("</robot>", tag)
+    assert sr.load_model(text, muscles="forces").springs.links[0].max_moment == 0.2
+    with pytest.raises(sr.DescriptionError, match="no muscle length holds"):
+        sr.load_model(text)
+
+
+# the statics
+
+
+@pytest.mark.parametrize("force", [17.0, 20.0, 50.0, 200.0])
+def test_a_dead_force_beyond_the_plateau_turns_the_link_out_of_its_way(one: sr.SoftModel, force: float) -> None:
+    """Balance of one link on the plateau: `F a cos(theta) = M`, stable, because the arm of the force shrinks."""
+    found = sr.solve_equilibrium(one, (0.0, 0.0), (0.0, 0.0, force))
+    theta = np.arccos(M / (force * ARM))
+    assert np.allclose(found.q_springs, [0.0, theta], rtol=0.0, atol=1e-9)
+    assert found.stable
+    assert found.saturated == (True,)
+    assert found.link_moments[0] == pytest.approx(M, rel=1e-14)
+    assert found.tangent_stiffness[1, 1] == pytest.approx(force * ARM * np.sin(theta), rel=1e-9)
+    assert found.tangent_stiffness[0, 0] > 0.0
+
+
+def test_a_dead_moment_beyond_the_plateau_has_no_equilibrium(one: sr.SoftModel) -> None:
+    held = sr.solve_equilibrium(one, (0.0, 0.0), wrench=(0.0, 0.0, 0.0, 0.0, -0.99 * M, 0.0))
+    assert held.q_springs[1] == pytest.approx(0.99 * KNEE, rel=1e-12)
+    with pytest.raises(sr.EquilibriumNotFound, match=r"spring_1_side, spring_1_up is on the plateau of its moment, 9\.45 N m"):
+        sr.solve_equilibrium(one, (0.0, 0.0), wrench=(0.0, 0.0, 0.0, 0.0, -1.01 * M, 0.0))
+
+
+def test_newton_settles_wherever_the_load_is(limp: sr.SoftModel) -> None:
+    """The energy of dead forces grows with every angle: a minimum exists, and descent finds one that is certified."""
+    random = np.random.default_rng(11)
+    plateaus = 0
+    for _ in range(60):
+        force = random.normal(size=3)
+        force *= random.uniform(20.0, 120.0) / np.linalg.norm(force)
+        found = sr.solve_equilibrium(limp, random.uniform(-2.0, 2.0, 3), force)
+        assert found.stable
+        assert np.all(found.link_moments <= np.array([21.76, 15.0]) * (1.0 + 1e-14))
+        plateaus += any(found.saturated)
+    assert plateaus > 30
+
+
+def test_a_link_on_its_plateau_counts_as_wrinkled_even_below_the_theoretical_moment() -> None:
+    """A link that goes limp at 5 N m, a quarter of `M_w` at 50 kPa."""
+    model = sr.load_model(sr.InflatableArm(max_moment=5.0))
+    loaded = sr.solve_equilibrium(model, (0.0, 0.0, 0.0), (0.0, 0.0, -6.0))
+    assert loaded.saturated == (True, False)
+    assert loaded.link_moments[0] < 0.25 * model.spring_groups[0].wrinkling_moment
+    assert loaded.wrinkled
+    assert wrinkling_level(loaded, 0) == len(WRINKLING_COLOURS) - 1 > wrinkling_level(loaded, 1)
+    light = sr.solve_equilibrium(model, (0.0, 0.0, 0.0), (0.0, 0.0, -3.0))
+    assert not light.wrinkled
+
+
+def test_the_recursion_of_the_paper_converges_below_the_plateau_and_says_so_beyond(one: sr.SoftModel) -> None:
+    below = sr.solve_equilibrium(one, (0.0, 0.0), (0.0, 0.0, 12.0), method="fixed_point")
+    assert np.allclose(below.q_springs, sr.solve_equilibrium(one, (0.0, 0.0), (0.0, 0.0, 12.0)).q_springs, rtol=0, atol=1e-10)
+    with pytest.raises(sr.EquilibriumNotFound, match="method='newton'"):
+        sr.solve_equilibrium(one, (0.0, 0.0), (0.0, 0.0, 20.0), method="fixed_point")
+
+
+def test_derivatives_of_the_tip_hold_on_the_plateau(limp: sr.SoftModel) -> None:
+    """Compliance and elastostatic Jacobian by central differences (1e-5 steps: errors about 1e-8 of the second derivative)."""
+    motors, force, step = np.array([0.2, 0.4, -0.5]), np.array([3.0, 25.0, -40.0]), 1e-5
+    loaded = sr.solve_equilibrium(limp, motors, force)
+    assert loaded.saturated == (True, False)
+
+    def tip(q: np.ndarray, f: np.ndarray) -> np.ndarray:
+        return sr.solve_equilibrium(limp, q, f, q_springs0=loaded.q_springs, tolerance=1e-13).tip_position
+
+    by_force = np.array([(tip(motors, force + row) - tip(motors, force - row)) / (2e-3) for row in 1e-3 * np.eye(3)]).T
+    by_motors = np.array([(tip(motors + row, force) - tip(motors - row, force)) / (2 * step) for row in step * np.eye(3)]).T
+    assert np.allclose(sr.compliance(limp, loaded)[:3, :3], by_force, rtol=0.0, atol=1e-7)
+    assert np.allclose(sr.elastostatic_jacobian(limp, loaded), by_motors, rtol=0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("force", [(3.0, 10.0, -15.0), (3.0, 25.0, -30.0)])
+def test_load_estimation_finds_the_force_before_and_on_the_plateau(limp: sr.SoftModel, force: tuple[float, ...]) -> None:
+    motors = (0.3, 0.6, -0.9)
+    loaded = sr.solve_equilibrium(limp, motors, force)
+    assert any(loaded.saturated) == (force[1] > 20.0)
+    found = sr.estimate_load(limp, motors, loaded.motor_torques)
+    assert np.allclose(found.force, force, rtol=0.0, atol=1e-6)
+    assert np.allclose(found.equilibrium.q_springs, loaded.q_springs, rtol=0.0, atol=1e-8)
+
+
+# buckling
+
+
+def test_a_straight_arm_buckles_at_the_same_load(limp: sr.SoftModel, arm: sr.SoftModel) -> None:
+    """At the bifurcation no spring is bent: the plateau plays no part."""
+    assert sr.critical_load(limp, (0, 0, 0), (-1, 0, 0)) == pytest.approx(
+        sr.critical_load(arm, (0, 0, 0), (-1, 0, 0)), rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("aside", [0.01, 0.1, 0.5])
+def test_an_oblique_push_collapses_the_link_at_its_knee(one: sr.SoftModel, aside: float) -> None:
+    """At the knee `F a (u_z cos + -u_x sin) = M`; beyond it less force is needed: the largest force is there."""
+    direction = np.array([-1.0, 0.0, aside])
+    unit = direction / np.linalg.norm(direction)
+    expected = M / (ARM * (unit[2] * np.cos(KNEE) - unit[0] * np.sin(KNEE)))
+    assert sr.critical_load(one, (0.0, 0.0), direction) == pytest.approx(expected, rel=1e-8)
+
+
+def test_two_links_collapse_where_displacement_control_finds_the_largest_force(limp: sr.SoftModel) -> None:
+    """An oblique push of the arm, followed by the displacement of its tip across the push.
+
+    The largest of 400 points of a curve with a corner lies below the corner by less than its slope times half a step.
+    """
+    direction = np.array([-1.0, 0.0, 0.2]) / np.hypot(1.0, 0.2)
+    critical = sr.critical_load(limp, (0.0, 0.0, 0.0), direction)
+    ways = np.linspace(0.02, 0.25, 400)
+    held, forces = None, []
+    for way in ways:
+        held = sr.solve_imposed_displacement(limp, (0.0, 0.0, 0.0), way, direction=direction, start=held)
+        forces.append(held.reaction)
+    assert 0 < int(np.argmax(forces)) < 399
+    assert max(forces) <= critical * (1.0 + 1e-9)
+    assert max(forces) == pytest.approx(critical, abs=float(np.abs(np.diff(forces)).max()))
+
+
+def test_a_transverse_push_never_loses_stability(one: sr.SoftModel) -> None:
+    """Beyond the knee the link turns with the force: stable, if soft, and followed to the largest force wanted."""
+    with pytest.raises(sr.NoCriticalLoad) as caught:
+        sr.critical_load(one, (0.0, 0.0), (0.0, 0.0, 1.0), max_force=100.0)
+    assert caught.value.max_force == 100.0
+    assert "could not be followed" not in str(caught.value)
