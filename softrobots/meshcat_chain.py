@@ -12,7 +12,7 @@ from softrobots.scene import WRINKLING_COLOURS, Scene
 
 
 class ChainDrawing:
-    """The links of a robot under one node of a meshcat page, twice: `deformed` and `rigid`."""
+    """The links of a robot under one node of a meshcat page: `deformed`, and a second time `rigid` where springs move them."""
 
     def __init__(self, root: Any, model: SoftModel, scene: Scene) -> None:
         """Draw every shape under `root`, inflated links once in each colour of wrinkling."""
@@ -23,8 +23,9 @@ class ChainDrawing:
         self._section_shapes = [shape for shape in scene.shapes if shape.name.startswith(names)]
         for shape in scene.shapes:
             drawn, turn = meshcat_geometry(shape.geometry)
-            root[f"rigid/{shape.name}/body"].set_object(drawn, material(RIGID_COLOUR))
-            root[f"rigid/{shape.name}/body"].set_transform(turn)
+            if shape.elastic:
+                root[f"rigid/{shape.name}/body"].set_object(drawn, material(RIGID_COLOUR))
+                root[f"rigid/{shape.name}/body"].set_transform(turn)
             node = root[f"deformed/{shape.name}"]
             if shape.inflated_link is None:
                 node["body"].set_object(drawn, material(shape.colour))
@@ -36,6 +37,11 @@ class ChainDrawing:
                 node[f"level_{level}"].set_transform(turn)
                 node[f"level_{level}"].set_property("visible", level == 0)
             self._levels[shape.inflated_link] = 0
+
+    @property
+    def has_rigid(self) -> bool:
+        """Whether the rigid chain is drawn: whether springs move anything that can be seen."""
+        return any(shape.elastic for shape in self._scene.shapes)
 
     @property
     def section_colours(self) -> list[tuple[float, ...]]:
@@ -87,4 +93,5 @@ class ChainDrawing:
             (f"{group}/{shape.name}", transform)
             for group, q in (("deformed", deformed), ("rigid", rigid))
             for shape, transform in zip(self._scene.shapes, self._scene.transforms(q), strict=True)
+            if shape.elastic or group == "deformed"
         ]

@@ -10,6 +10,7 @@ import numpy as np
 
 from softrobots.checks import FloatArray
 from softrobots.errors import ViewerError
+from softrobots.mesh_triangles import Triangles
 from softrobots.scene import WRINKLING_COLOURS
 
 RIGID_COLOUR = (0.40, 0.50, 0.62, 0.20)
@@ -21,7 +22,7 @@ FORCE_COLOUR = 0x009E73
 
 
 def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:
-    """Meshcat's form of a coal shape, and the turn from its axes to coal's (meshcat's cylinders stand along y)."""
+    """Meshcat's form of a shape of a scene, and the turn from its axes to coal's (meshcat's cylinders stand along y)."""
     import coal
     import meshcat.geometry as geometry
 
@@ -32,9 +33,8 @@ def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:
         return geometry.Sphere(shape.radius), np.eye(4)
     if isinstance(shape, coal.Box):
         return geometry.Box((2.0 * shape.halfSide).tolist()), np.eye(4)
-    if isinstance(shape, coal.BVHModelBase):
-        triangles = [shape.tri_indices(i) for i in range(shape.num_tris)]
-        return geometry.TriangularMeshGeometry(shape.vertices(), np.array([[t[0], t[1], t[2]] for t in triangles])), np.eye(4)
+    if isinstance(shape, Triangles):
+        return geometry.TriangularMeshGeometry(shape.corners, shape.faces), np.eye(4)
     raise ViewerError(f"a {type(shape).__name__} cannot be drawn; boxes, cylinders, spheres and meshes can")
 
 
@@ -57,10 +57,10 @@ def _css(colour: tuple[float, ...] | int) -> str:
     return f"rgba({red},{green},{blue},{opacity:g})"
 
 
-def floor_lines(reach: float) -> FloatArray:
-    """Ends of floor lines along x, a sixth of the reach apart, shape (2 n, 3) [m]."""
+def floor_lines(reach: float, height: float) -> FloatArray:
+    """Ends of floor lines along x at a height [m], a sixth of the reach apart, shape (2 n, 3) [m]."""
     offsets = np.linspace(-1.0, 1.0, 13) * reach
-    ends = [(x, y, -0.15 * reach) for y in offsets for x in (-reach, reach)]
+    ends = [(x, y, height) for y in offsets for x in (-reach, reach)]
     return np.array(ends)
 
 

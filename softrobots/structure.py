@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.actuators import Actuators
-from softrobots.checks import FloatArray, read_only
+from softrobots.checks import LARGEST, FloatArray, read_only
 from softrobots.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, Sections, rest_coordinates
 from softrobots.muscle_lengths import MuscleLengths
 from softrobots.muscles import ElasticLaw, MuscleForces, Segments, muscle_matrix
@@ -129,7 +129,7 @@ class Structure:
         return made
 
     def joint_limits(self, names: Sequence[str]) -> FloatArray:
-        """Lower and upper limits of joints, shape (n, 2) [rad or m]; infinite for continuous ones."""
+        """Lower and upper limits of joints, shape (n, 2) [rad or m]; infinite for continuous ones and beyond `LARGEST`."""
         limits = np.zeros((len(names), 2))
         for row, name in enumerate(names):
             joint = self._pin.joints[self._pin.getJointId(name)]
@@ -138,6 +138,7 @@ class Structure:
                 if joint.nq == 2
                 else (self._pin.lowerPositionLimit[joint.idx_q], self._pin.upperPositionLimit[joint.idx_q])
             )
+        limits[limits <= -LARGEST], limits[limits >= LARGEST] = -np.inf, np.inf  # URDF has no slide without limits
         return read_only(limits)
 
     def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:

@@ -40,6 +40,8 @@ class InflatedLinkTag:
     """Tube radius [m]."""
     pressure: float
     """Gauge pressure [Pa]."""
+    max_moment: float | None = None
+    """Largest moment of the link, beyond wrinkling [N m]; None: its springs are linear."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,8 @@ class RobotTags:
     """Lines, in the order of the file."""
     mimics: tuple[str, ...]
     """Names of the joints that mimic another joint."""
+    tip: str | None = None
+    """Name of the link that is the tip unless the caller says another; None if the file does not tell."""
 
 
 def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
@@ -177,6 +181,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         muscles=tuple(_muscle(element, source) for element in _ours(root, "muscle")),
         lines=tuple(_line(element, source) for element in _ours(root, "line")),
         mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
+        tip=_tip(root, source),
     )
     _check_together(tags, source)
     return tags
@@ -214,7 +219,8 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
             f"springs that exist are required: {', '.join(springs) or 'none'}"
         )
     where = f"the inflated_link of {' '.join(names)} in {source}"
-    made = InflatedLinkTag(names, _number(element, "radius", where), _number(element, "pressure", where))
+    most = _positive(element, "max_moment", where) if "max_moment" in element.attrib else None
+    made = InflatedLinkTag(names, _number(element, "radius", where), _number(element, "pressure", where), most)
     if made.radius <= 0.0 or made.pressure < 0.0:
         raise DescriptionError(f"{where} has radius {made.radius} and pressure {made.pressure}; required > 0 and >= 0")
     return made
@@ -280,6 +286,16 @@ def _line(element: ElementTree.Element, source: str) -> LineTag:
     name = element.get("name", "")
     where = f"the line {name!r} of {source}"
     return LineTag(name, _segment(element, where), _number(element, "azimuth", where), _positive(element, "distance", where))
+
+
+def _tip(root: ElementTree.Element, source: str) -> str | None:
+    named = [element.get("link", "") for element in _ours(root, "tip")]
+    links = [link.get("name", "") for link in root.findall("link")]
+    if len(named) > 1 or any(name not in links for name in named):
+        raise DescriptionError(
+            f"{source} names the tips {', '.join(map(repr, named))}; one link is required: {', '.join(links) or 'none'}"
+        )
+    return named[0] if named else None
 
 
 def _check_together(tags: RobotTags, source: str) -> None:

@@ -59,14 +59,15 @@ class Viewer:
         try:
             self._page = connect(zmq_url, self._url)
             self._root = self._page["softrobots"]
-            self._size = _extent(model)
+            self._start, self._size = _extent(model)
             self._arrows = ArrowDrawing(self._root["load"], self._size)
             self._ghost = _ghost(model)
             self._loaded = self._traced = False
             self._segments = bool(model.structure.section_table)
             self._chain = ChainDrawing(self._root, model, scene)
             self._body = BodyDrawing(self._root["body"])
-            self._prepare()
+            ground = scene.ground()
+            self._prepare(-0.15 * self._size if ground is None else ground)
             self.show_configuration(model.configuration(model.relaxed_motors))
             self._body.draw(body_at(model, model.relaxed_motors, model.rest), {})
         except BaseException:
@@ -223,14 +224,34 @@ class Viewer:
     def look_at(self, tip: FloatArray) -> None:
         """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
 
+        The base is the world's origin, unless the chain starts farther from it than it is long.
+
         Args:
             tip: Where the tip is, or is on average, shape (3,) [m].
         """
+        along, middle = tip - self._start, 0.5 * (self._start + tip)
+        azimuth = np.arctan2(along[1], along[0]) - np.deg2rad(78.0)
+        away = 0.94 * self._size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
+        self.look_from(middle + away, middle)
+
+    def look_from(self, eye: Any, centre: Any) -> None:
+        """Put the camera somewhere.
+
+        Args:
+            eye: Where the camera is, shape (3,) [m], world axes.
+            centre: What it looks at, shape (3,) [m], world axes; not where it is.
+
+        Raises:
+            ParameterError: If a shape differs, a number is not finite, or both are the same point.
+        """
+        middle = finite_array("centre", centre, (3,), "m")
+        away = finite_array("eye", eye, (3,), "m") - middle
+        if not away.any():
+            raise ParameterError("eye", eye, "another point than the centre")
         shift = np.eye(4)
-        shift[:3, 3] = -0.5 * tip
+        shift[:3, 3] = -middle
         self._root.set_transform(shift)
-        azimuth = np.arctan2(tip[1], tip[0]) - np.deg2rad(78.0)
-        x, y, z = 0.94 * self._size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
+        x, y, z = away.tolist()
         # meshcat's camera has y up: (x, z, -y) of the scene.
         self._page["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
 
@@ -248,7 +269,7 @@ class Viewer:
 
     def _legend(self) -> list[tuple[tuple[float, ...] | int, str]]:
         """Colour and meaning of what is drawn."""
-        entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, self._ghost)]
+        entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, self._ghost)] * self._chain.has_rigid
         if self._segments and not self._model.spring_groups:
             entries += [(colour, "equivalent rigid chain") for colour in self._chain.section_colours[:1]]
         entries += [(colour, text) for text, colour in self._body.entries.items()]
@@ -295,8 +316,8 @@ class Viewer:
         if self._server.poll() is not None:
             raise ViewerError("the viewer is closed, or its server has ended; open a new one")
 
-    def _prepare(self) -> None:
-        """White background, floor, and the camera; meshcat's camera looks at the origin, so the scene moves."""
+    def _prepare(self, ground: float) -> None:
+        """White background, floor at a height [m], and the camera; meshcat's camera looks at the origin, so the scene moves."""
         import meshcat.geometry as geometry
 
         size = self._size
@@ -306,9 +327,10 @@ class Viewer:
         self._page["/Grid"].set_property("visible", False)
         q = self._model.configuration(self._model.relaxed_motors)
         tip = np.array(frame_placement(self._model, q, self._model.tip).translation)
-        upright = np.hypot(tip[0], tip[1]) < 0.1 * size
+        upright = np.hypot(*(tip - self._start)[:2]) < 0.1 * size
         self.look_at(tip + [0.3 * size if upright else -0.1 * size, 0.0, 0.0 if upright else 0.2 * size])
-        ends = np.concatenate([floor_lines(size), floor_lines(size)[:, [1, 0, 2]]])
+        along = floor_lines(size, ground)
+        ends = np.concatenate([along, along[:, [1, 0, 2]]])
         lines = geometry.PointsGeometry(ends.T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
 
@@ -347,10 +369,14 @@ def view(model: SoftModel, result: Equilibrium | Trajectory | None = None) -> Vi
     return viewer
 
 
-def _extent(model: SoftModel) -> float:
-    """Largest distance of the chain from its base at rest [m]: the scale of the picture. Of a straight robot its reach."""
+def _extent(model: SoftModel) -> tuple[FloatArray, float]:
+    """Where the camera takes the base to be, shape (3,) [m], and the largest distance of the chain from its start at rest [m].
+
+    The distance is the scale of the picture; of a straight robot it is its reach.
+    """
     points = backbone(model, model.configuration(model.relaxed_motors))
-    return max(float(np.linalg.norm(points - points[0], axis=1).max()), 0.05 * model.reach)
+    size = max(float(np.linalg.norm(points - points[0], axis=1).max()), 0.05 * model.reach)
+    return points[0] if float(np.linalg.norm(points[0])) > size else np.zeros(3), size
 
 
 def _ghost(model: SoftModel) -> str:
