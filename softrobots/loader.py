@@ -1,4 +1,4 @@
-"""Loading a robot into a `SoftModel`: ours, or anybody's URDF with springs said by the caller."""
+"""Loading a robot into a `SoftModel`: ours, or anybody's URDF, MJCF or SDF, with springs of the file or said by the caller."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from softrobots.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.model import SoftModel
 from softrobots.muscles import MUSCLE_INPUTS
 from softrobots.robots import Robot
+from softrobots.sources import read_source
 from softrobots.strain_chain import joint_positions
 from softrobots.structure import Parts
 from softrobots.urdf_tags import RobotTags, SectionTag, SpringTag, read_tags
@@ -29,31 +30,38 @@ def load_model(
     tip: str | None = None,
     muscles: str = "lengths",
 ) -> SoftModel:
-    """Load a robot: ours, or anybody's URDF with springs said by the caller.
+    """Load a robot: ours, or anybody's URDF, MJCF or SDF.
+
+    The root tag tells the kind. MJCF (`stiffness`, `springref`; needs MuJoCo) and SDF (`spring_stiffness`,
+    `spring_reference`; needs Drake) are translated: `urdf` of the model is the translation, coordinates are those of the file
+    (`qpos`, joint angle). See `softrobots.readers.mjcf.read_mjcf` and `softrobots.readers.sdf.read_sdf` for names, and for
+    what is refused because it bears on the statics and we do not have it. The gravity of a file is not ours: without
+    `gravity=` the robot is weightless.
 
     Args:
-        source: A robot of this package, a path (`Path` or text), or URDF text (starting with `<`).
+        source: A robot of this package, a path (`Path` or text), or the text of a description (starting with `<`).
         springs: For files without springs of their own: `{joint: stiffness}` or `{joint: (stiffness, rest)}`
             [N m/rad or N/m; rad or m]. Given, it replaces the springs in the file. `{}` says that the robot is rigid.
         motors: Names of the motor joints; movable joints that are neither motor, spring nor part of a section are then locked
             at zero. By default every movable joint without a spring is a motor.
-        tip: Name of the tip frame; by default `tip`, or the only link at the end of the tree.
+        tip: Name of the tip frame; by default the one that the file names, `tip`, or the only link at the end of the tree.
         muscles: What is given of the muscles, if the robot has any: their "lengths" [m] or the "forces" they pull with [N].
 
     Returns:
         The model.
 
     Raises:
-        DescriptionError: If the file cannot be read or is no URDF, has no springs and none are given, has joints other than
-            revolute, continuous and prismatic, has a spring on a fixed joint, would have a motor that mimics another joint,
-            has a section whose joints are not the chain that its tag describes, has muscles that do not fix the shape of their
-            segment, or has no single end.
+        DescriptionError: If the file cannot be read, is of another kind or has what we do not have, has no springs and none
+            are given, has joints other than revolute, continuous and prismatic, has a spring on a fixed joint, would have a
+            motor that mimics another joint, has a section whose joints are not the chain that its tag describes, has muscles
+            that do not fix the shape of their segment, or has no single end.
+        MissingDependency: If it is MJCF or SDF, and MuJoCo or Drake is not installed (extra `interop`).
         NameNotFound: If a named joint or frame does not exist.
         ParameterError: If a stiffness is not positive, a rest coordinate is not finite, a joint is named twice or belongs to a
             section, or `muscles` is none of the choices.
     """
     choice("muscles", muscles, MUSCLE_INPUTS)
-    urdf, label = _read_source(source)
+    urdf, label = read_source(source)
     tags = read_tags(urdf, label)
     try:
         model = pin.buildModelFromXML(urdf)
@@ -94,24 +102,8 @@ def load_model(
         urdf=urdf,
         parts=Parts(spring_tags, motor_names, tags.sections, lumped, tags.muscles, tags.lines, muscles),
         inflated_links=tags.inflated_links,
-        tip=_tip(model, tip, label),
+        tip=_tip(model, tags.tip if tip is None else tip, label),
     )
-
-
-def _read_source(source: Any) -> tuple[str, str]:
-    """Return URDF text and a label for errors."""
-    if not isinstance(source, type) and callable(getattr(source, "urdf", None)):
-        return str(source.urdf()), type(source).__name__
-    if isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
-        return source.lstrip("\ufeff \t\r\n"), "the URDF text"
-    if not isinstance(source, str | Path):
-        raise ParameterError("source", source, "a robot, a path, or URDF text")
-    try:
-        return Path(source).read_text(encoding="utf-8-sig"), str(source)
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise DescriptionError(
-            f"cannot read {str(source)[:200]!r}: {error}; a path of a URDF file or its text is required"
-        ) from error
 
 
 def _springs_said(springs: Any, movable: Sequence[str]) -> dict[str, SpringTag]:

@@ -6,7 +6,7 @@ Pinocchio merges bodies behind fixed joints and knows no shapes of its own; othe
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -33,6 +33,18 @@ class Placement:
     """Its origin, shape (3,) [m]."""
     rotation: FloatArray = field(default_factory=lambda: _NO_ROTATION)
     """Its axes as columns, shape (3, 3)."""
+
+    @staticmethod
+    def turned(position: FloatArray, quaternion: FloatArray) -> Placement:
+        """Placement from a position, shape (3,) [m], and a quaternion w, x, y, z, shape (4,)."""
+        w, x, y, z = (float(value) for value in quaternion)
+        rotation = np.asarray(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix())
+        return Placement(read_only(np.array(position, dtype=np.float64)), read_only(rotation))
+
+    @property
+    def inverse(self) -> Placement:
+        """Placement of the other frame in this one."""
+        return Placement(read_only(-self.rotation.T @ self.position), read_only(self.rotation.T.copy()))
 
     @property
     def rpy(self) -> FloatArray:
@@ -127,6 +139,8 @@ class RigidTree:
     """Joints, each before those that its child carries."""
     springs: Mapping[str, SpringTag]
     """Joint springs by joint name."""
+    tip: str | None = None
+    """Body that is the tip unless the caller says another; None if that is not told."""
 
     @property
     def root(self) -> str:
@@ -203,6 +217,8 @@ def write_rigid_tree(tree: RigidTree) -> str:
                 _write_shape(ElementTree.SubElement(link, kind), shape)
     for joint in tree.joints:
         _write_joint(ElementTree.SubElement(robot, "joint", {"name": joint.name}), joint, tree.springs.get(joint.name))
+    if tree.tip is not None:
+        ElementTree.SubElement(robot, f"{{{NAMESPACE}}}tip", {"link": tree.tip})
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode") + "\n"
 
@@ -257,6 +273,7 @@ def _joint(element: ElementTree.Element) -> Joint:
     low, high = (
         float(_numbers(limit, name, "0")[0]) if bounded else sign * np.inf for name, sign in (("lower", -1.0), ("upper", 1.0))
     )
+    low, high = (-np.inf if low <= -LARGEST else low), (np.inf if high >= LARGEST else high)
     return Joint(
         element.get("name", ""),
         kind,
@@ -276,12 +293,13 @@ def _link_of(joint: ElementTree.Element, end: str) -> str:
     return "" if element is None else element.get("link", "")
 
 
-def _text(values: FloatArray | tuple[float, ...]) -> str:
-    return " ".join(repr(float(value)) for value in values)
+def number_text(values: Iterable[float]) -> str:
+    """Numbers separated by spaces, so that reading them gives the same numbers back."""
+    return " ".join(repr(float(value) + 0.0) for value in values)  # without -0.0
 
 
 def _write_placement(element: ElementTree.Element, placement: Placement) -> None:
-    ElementTree.SubElement(element, "origin", {"xyz": _text(placement.position), "rpy": _text(placement.rpy)})
+    ElementTree.SubElement(element, "origin", {"xyz": number_text(placement.position), "rpy": number_text(placement.rpy)})
 
 
 def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
@@ -289,27 +307,27 @@ def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
     made = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
     if shape.kind == "mesh":
         made.set("filename", shape.filename)
-        made.set("scale", _text(shape.size))
+        made.set("scale", number_text(shape.size))
     elif shape.kind == "box":
-        made.set("size", _text(shape.size))
+        made.set("size", number_text(shape.size))
     else:
         for name, value in zip(_SIZES[shape.kind], shape.size, strict=True):
             made.set(name, repr(float(value)))
     if shape.rgba is not None:
-        name = "colour_" + "_".join(f"{value:.3f}" for value in shape.rgba)
+        name = "colour_" + "_".join(f"{value:.6g}" for value in shape.rgba)
         material = ElementTree.SubElement(element, "material", {"name": name})
-        ElementTree.SubElement(material, "color", {"rgba": _text(shape.rgba)})
+        ElementTree.SubElement(material, "color", {"rgba": number_text(shape.rgba)})
 
 
 def _write_joint(element: ElementTree.Element, joint: Joint, spring: SpringTag | None) -> None:
-    bounded = bool(np.all(np.isfinite(joint.limits)))
+    bounded = bool(np.any(np.isfinite(joint.limits)))  # one without a bound on one side gets a very large one
     element.set("type", "continuous" if joint.kind == "revolute" and not bounded else joint.kind)
     _write_placement(element, joint.placement)
     ElementTree.SubElement(element, "parent", {"link": joint.parent})
     ElementTree.SubElement(element, "child", {"link": joint.child})
     if not joint.movable:
         return
-    ElementTree.SubElement(element, "axis", {"xyz": _text(joint.axis)})
+    ElementTree.SubElement(element, "axis", {"xyz": number_text(joint.axis)})
     limit = {"effort": repr(min(joint.effort, LARGEST)), "velocity": repr(min(joint.velocity, LARGEST))}
     if bounded or joint.kind == "prismatic":  # URDF has no prismatic joint without limits
         low, high = np.clip(joint.limits, -LARGEST, LARGEST)

@@ -126,7 +126,7 @@ def test_gravity_of_one_call_does_not_leak_into_the_next(arm: sr.SoftModel) -> N
         (BRANCHED, {"springs": SPRINGS, "tip": 3}, sr.NameNotFound, "frame is called '3'"),
         (BRANCHED, {"springs": SPRINGS, "motors": "elbow"}, sr.ParameterError, "list of joint names"),
         ("<robot name='r'><link name='a'/><link name='b'/></robot>", {"springs": {}}, sr.DescriptionError, "Pinocchio refuses"),
-        ("<mujoco/>", {"springs": {}}, sr.DescriptionError, "root tag <mujoco>"),
+        ("<scene/>", {"springs": {}}, sr.DescriptionError, r"root tag <scene>; one of <robot> \(URDF\), <mujoco> \(MJCF\)"),
         ("<robot", {}, sr.DescriptionError, "not well-formed"),
         ("no_such_file.urdf", {}, sr.DescriptionError, "cannot read 'no_such_file.urdf'"),
         (42, {}, sr.ParameterError, "a robot, a path, or URDF text"),

@@ -1,0 +1,121 @@
+"""What a MuJoCo model can have that bears on the statics and that a tree of springs and motors has not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+
+def joint_name(model: Any, number: int) -> str:
+    """Name of a joint of a MuJoCo model; `joint_<number>` if it has none."""
+    return str(model.joint(number).name) or f"joint_{number}"
+
+
+def driven_joint(mujoco: Any, model: Any, actuator: int) -> int | None:
+    """Number of the joint that an actuator of a MuJoCo model drives; None if it drives something else."""
+    on_joints = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    return int(model.actuator_trnid[actuator, 0]) if int(model.actuator_trntype[actuator]) in on_joints else None
+
+
+def not_carried(mujoco: Any, model: Any) -> list[str]:
+    """List what would be lost.
+
+    Args:
+        mujoco: The package.
+        model: A compiled model.
+
+    Returns:
+        A reason each; empty if the statics of the model is that of its masses, hinges, slides and linear springs.
+    """
+    found = [
+        *_joints(mujoco, model),
+        *_tendons(model),
+        *_actuators(mujoco, model),
+        *_elsewhere(mujoco, model),
+    ]
+    return [f"{what} ({why})" for what, why in found]
+
+
+def _joints(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
+    kinds, springs = np.asarray(model.jnt_type), model.jnt_stiffness != 0.0
+    nonlinear = _rows(model, "jnt_stiffnesspoly", model.njnt)
+    plastic = getattr(model, "jnt_plasticadr", np.full(model.njnt, -1)) >= 0
+    rubbing = np.zeros(model.njnt, dtype=bool)
+    for dof in range(model.nv):
+        rubbing[model.dof_jntid[dof]] |= model.dof_frictionloss[dof] > 0.0
+    free, ball = (kinds == int(kind) for kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL))
+    for what, chosen, why in (
+        ("free joints", free, "a floating base is not at rest under a load; fix it to the world"),
+        ("ball joints", ball, "hinges and slides are supported"),
+        ("joints with nonlinear stiffness", nonlinear & ~free, "springs are linear"),
+        ("plastic joint springs", plastic, "where they rest depends on what has happened"),
+        ("joints with spring and dry friction", springs & rubbing, "they rest anywhere within the friction"),
+    ):
+        names = [f"{joint_name(model, number)} of body {_body(model, number)}" for number in np.flatnonzero(chosen).tolist()]
+        if names:
+            yield f"{what} {_few(names)}", why
+
+
+def _tendons(model: Any) -> Iterable[tuple[str, str]]:
+    for what, chosen in (
+        ("tendons with stiffness", (model.tendon_stiffness != 0.0) | _rows(model, "tendon_stiffnesspoly", model.ntendon)),
+        ("tendons with limits", model.tendon_limited != 0),
+        ("tendons with dry friction", model.tendon_frictionloss > 0.0),
+    ):
+        names = [str(model.tendon(number).name) or f"tendon {number}" for number in np.flatnonzero(chosen).tolist()]
+        if names:
+            yield f"{what} {_few(names)}", "only joints have springs"
+
+
+def _actuators(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
+    """Actuators that pull although their control is zero, except on a motor, which stands where it is told."""
+    none, affine = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
+    names = []
+    for number, bias in enumerate(model.actuator_biastype.tolist()):
+        still = bias == none or (bias == affine and not np.any(model.actuator_biasprm[number, :2]))
+        joint = driven_joint(mujoco, model, number)
+        if still or (joint is not None and model.jnt_stiffness[joint] == 0.0):
+            continue
+        names.append(str(model.actuator(number).name) or f"actuator {number}")
+    if names:
+        yield f"actuators with a force of their own {_few(names)}", "only joints without stiffness can be motors"
+
+
+def _elsewhere(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
+    active = [mujoco.mjtEq(int(kind)).name for kind, on in zip(model.eq_type, model.eq_active0, strict=True) if on]
+    if active:
+        yield f"equality constraints {_few(active)}", "loops and couplings are not supported"
+    if model.nflex:
+        yield (
+            f"{model.nflex} flexes",
+            "bodies that deform between their vertices; a chain of hinges with stiffness is supported",
+        )
+    bodies = [str(model.body(number).name) or f"body_{number}" for number in np.flatnonzero(model.body_plugin >= 0)]
+    if bodies:
+        yield f"plugins with forces on bodies {_few(bodies)}", "as of the cable; a chain of hinges with stiffness is supported"
+    floating = [str(model.body(number).name) or f"body_{number}" for number in np.flatnonzero(model.body_gravcomp)]
+    if floating:
+        yield f"gravity compensation of bodies {_few(floating)}", "every body has its whole weight"
+    if np.any(model.opt.wind) and (model.opt.density > 0.0 or model.opt.viscosity > 0.0):
+        yield "wind", "loads are said by the caller"
+    flags = mujoco.mjtDisableBit
+    off = flags.mjDSBL_SPRING if hasattr(flags, "mjDSBL_SPRING") else flags.mjDSBL_PASSIVE  # springs had no flag of their own
+    if model.opt.disableflags & int(off) and np.any(model.jnt_stiffness):
+        yield "springs that are switched off", "take their stiffness away instead"
+
+
+def _rows(model: Any, field: str, count: int) -> Any:
+    """Which rows of a field are not all zero; MuJoCo before 4 does not have it."""
+    values = getattr(model, field, None)
+    return np.zeros(count, dtype=bool) if values is None else np.any(np.asarray(values) != 0.0, axis=1)
+
+
+def _body(model: Any, joint: int) -> str:
+    number = int(model.jnt_bodyid[joint])
+    return str(model.body(number).name) or f"body_{number}"
+
+
+def _few(names: list[str], most: int = 5) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

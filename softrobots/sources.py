@@ -1,0 +1,43 @@
+"""Where a description comes from: a robot of this package, a file, or text; as URDF, MJCF or SDF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from softrobots.errors import DescriptionError, ParameterError
+from softrobots.mesh_files import with_absolute_paths
+from softrobots.readers import to_urdf
+
+
+def read_source(source: Any, field: str = "source") -> tuple[str, str]:
+    """Return a description as URDF text, and a label for errors.
+
+    MJCF and SDF are translated (`softrobots.readers`). Relative paths of meshes are relative to the file that names them; in
+    the text they are written out.
+
+    Args:
+        source: A robot of this package, a path (`Path` or text), or the text itself (starting with `<`).
+        field: Name of the parameter, for the error.
+
+    Returns:
+        URDF text, and where it comes from.
+
+    Raises:
+        ParameterError: If it is something else.
+        DescriptionError: If the file cannot be read, is of another kind, or has what cannot be translated.
+        MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
+    """
+    if not isinstance(source, type) and callable(getattr(source, "urdf", None)):
+        return str(source.urdf()), type(source).__name__
+    if isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
+        return to_urdf(source.lstrip("\ufeff \t\r\n"), "the text"), "the text"
+    if not isinstance(source, str | Path):
+        raise ParameterError(field, source, "a robot, a path, or URDF text (or that of MJCF or SDF)")
+    try:
+        text = Path(source).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise DescriptionError(
+            f"cannot read {str(source)[:200]!r}: {error}; a path of a URDF, MJCF or SDF file or its text is required"
+        ) from error
+    return to_urdf(with_absolute_paths(text, Path(source).parent), str(source), Path(source)), str(source)
