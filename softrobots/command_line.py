@@ -26,6 +26,11 @@ def add_load(parser: argparse.ArgumentParser, force: Sequence[float] = (0.0, 0.0
     parser.add_argument(
         "--force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), default=tuple(force), help=f"force on the tip [N] ({told})"
     )
+    add_gravity(parser)
+
+
+def add_gravity(parser: argparse.ArgumentParser) -> None:
+    """Give a parser `--gravity` [m/s^2]; see `gravity_of`."""
     told = "gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)"
     parser.add_argument("--gravity", type=float, nargs="*", metavar="G", help=told)
 

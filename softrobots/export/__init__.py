@@ -1,0 +1,9 @@
+"""Robots written in the formats of other tools."""
+
+from softrobots.export.formats import FORMATS, export_model
+from softrobots.export.mjcf import to_mjcf
+from softrobots.export.sdf import to_sdf
+from softrobots.export.sidecar import to_json
+from softrobots.export.snippets import to_pinocchio, to_pybullet
+
+__all__ = ["FORMATS", "export_model", "to_json", "to_mjcf", "to_pinocchio", "to_pybullet", "to_sdf"]

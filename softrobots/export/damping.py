@@ -1,0 +1,94 @@
+r"""How strongly exported joints are damped: so that a simulation settles, by one stated rule.
+
+A chain of springs without damping swings for ever. With the mass matrix `M` and the stiffness `K` of the elastic joints at
+rest, motors held, its modes have the frequencies `w` of `K v = w^2 M v`. Stiffness-proportional damping
+
+.. math:: D = \frac{2}{w_1} K
+
+with the lowest of them, `w_1`, keeps `D` diagonal and leaves the modes as they are. A mode of frequency `w` then follows
+`x'' + 2 (w^2 / w_1) x' + w^2 x = 0`, whose damping ratio is `w / w_1 >= 1`: the slowest mode is critically damped and decays
+like `e^{-w_1 t}`, no mode oscillates, and every one decays at `(w^2 - w \sqrt{w^2 - w_1^2}) / w_1 > w_1 / 2` or faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.checks import FloatArray
+from softrobots.errors import DescriptionError
+from softrobots.model import SoftModel
+from softrobots.rigid_tree import RigidTree
+from softrobots.urdf_tags import SpringTag
+
+DAMPING = ("critical", "file")
+"""Where the damping of the spring joints comes from: the rule of this module, or the description."""
+
+
+def mass_matrix(model: SoftModel, q_motors: FloatArray) -> FloatArray:
+    """Mass matrix with the springs relaxed.
+
+    Args:
+        model: A robot without sections of constant strain.
+        q_motors: Motor joints, then muscles (of no effect), shape (n_motors,) [rad, m or N].
+
+    Returns:
+        Mass matrix in the order of Pinocchio's velocities, shape (nv, nv) [kg m^2, kg m, kg].
+
+    Raises:
+        DescriptionError: If the robot has more joints than Pinocchio's workspace is made for.
+    """
+    structure = model.structure
+    joints = np.zeros(model.pinocchio.nv)
+    joints[structure.motor_indices] = q_motors[: len(structure.motor_joints)]
+    joints[structure.spring_indices] = structure.strain_law.rest
+    pinocchio_model, data = model.workspace(None)
+    upper = np.triu(pin.crba(pinocchio_model, data, model.embed(joints)))
+    made: FloatArray = upper + np.triu(upper, 1).T
+    return made
+
+
+def lowest_frequency(model: SoftModel, mass: FloatArray) -> float:
+    """Lowest natural frequency of the spring joints, the motors held, without gravity.
+
+    Args:
+        model: A robot with spring joints and without sections of constant strain.
+        mass: Its mass matrix, shape (nv, nv).
+
+    Returns:
+        Frequency `w_1` [rad/s].
+
+    Raises:
+        DescriptionError: If the springs move no mass.
+    """
+    springs = model.structure.spring_indices
+    root = 1.0 / np.sqrt(model.structure.strain_law.stiffness)
+    slowest = np.linalg.eigvalsh(root[:, None] * mass[np.ix_(springs, springs)] * root)[-1]  # 1 / w^2, largest: most exact
+    if not slowest > 0.0:
+        raise DescriptionError(
+            f"the springs of {model.pinocchio.name} move no mass, so that nothing swings; give its links mass"
+        )
+    return float(1.0 / np.sqrt(slowest))
+
+
+def damped(tree: RigidTree, springs: Mapping[str, SpringTag], frequency: float | None) -> RigidTree:
+    """Damp the spring joints with `2 k / w_1`.
+
+    Args:
+        tree: The robot.
+        springs: Spring by joint.
+        frequency: Lowest frequency `w_1` [rad/s]; None leaves the damping as it is.
+
+    Returns:
+        The robot with that damping.
+    """
+    if frequency is None:
+        return tree
+    joints = (
+        replace(joint, damping=2.0 * springs[joint.name].stiffness / frequency) if joint.name in springs else joint
+        for joint in tree.joints
+    )
+    return replace(tree, joints=tuple(joints))

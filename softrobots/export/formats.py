@@ -1,0 +1,97 @@
+"""Writing a robot into a file of another tool's format."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from softrobots.errors import ParameterError
+from softrobots.export.mjcf import to_mjcf
+from softrobots.export.number_sources import PackagedRobot
+from softrobots.export.sdf import to_sdf
+from softrobots.export.sidecar import to_json
+from softrobots.export.snippets import to_pinocchio, to_pybullet
+from softrobots.files import as_path, new_file, write_text
+from softrobots.loader import load_model
+from softrobots.model import SoftModel
+
+
+class Format(NamedTuple):
+    """A format of files."""
+
+    suffix: str
+    """How its files end."""
+    write: Callable[..., str]
+    """Makes the text: takes the model, perhaps `q_motors`, and options."""
+    meaning: str
+    """What it is for, in a few words."""
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Names of what `write` takes besides the model."""
+        return tuple(inspect.signature(self.write).parameters)[1:]
+
+
+FORMATS: Mapping[str, Format] = {
+    "mjcf": Format(".xml", to_mjcf, "MuJoCo"),
+    "sdf": Format(".sdf", to_sdf, "Drake and Gazebo"),
+    "pybullet": Format(".py", to_pybullet, "PyBullet, as Python with springs as torques"),
+    "pinocchio": Format(".py", to_pinocchio, "Pinocchio, as Python with springs and a solver"),
+    "json": Format(".json", to_json, "any other tool, as a table of what URDF readers miss"),
+}
+"""The formats by name."""
+
+
+def export_model(
+    source: Any, path: str | os.PathLike[str], format: str | None = None, *, overwrite: bool = False, **options: Any
+) -> Path:
+    """Write a robot into a file of another tool's format.
+
+    Args:
+        source: A model, or what `load_model` takes: a robot, a path, or text.
+        path: The file.
+        format: Name of the format, one of `FORMATS`; guessed from the suffix of the file where only one format has it.
+        overwrite: Whether a file that exists may be replaced.
+        options: Passed on to the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `robot`; see `to_mjcf` ...
+
+    Returns:
+        The path.
+
+    Raises:
+        ParameterError: If the format is unknown or cannot be guessed, it has no such option, or the exporter refuses an
+            argument or the robot.
+        DescriptionError: If the source cannot be loaded or the exporter refuses the robot.
+        NameNotFound: As `load_model`.
+        OutputExists: If the file exists and `overwrite` is false, or is a folder.
+        OutputError: If it cannot be written.
+    """
+    name = format if format is not None else guess_format(path)
+    if not isinstance(name, str) or name not in FORMATS:
+        raise ParameterError("format", name, f"one of {', '.join(FORMATS)}")
+    chosen = FORMATS[name]
+    for option, value in options.items():
+        if option not in chosen.options:
+            having = ", ".join(other for other, row in FORMATS.items() if option in row.options)
+            raise ParameterError(option, value, f"left out for {name}; formats that have it: {having or 'none'}")
+    new_file(path, overwrite=overwrite)  # tells at once
+    model = source if isinstance(source, SoftModel) else load_model(source)
+    if "robot" in chosen.options and isinstance(source, PackagedRobot):
+        options = {"robot": source} | options
+    return write_text(path, chosen.write(model, **options), overwrite=overwrite)
+
+
+def guess_format(path: str | os.PathLike[str]) -> str:
+    """Format of a file, from its suffix.
+
+    Raises:
+        ParameterError: If no format or several have it, or `path` is no path.
+    """
+    suffix = as_path("path", path).suffix.lower()
+    found = [name for name, row in FORMATS.items() if row.suffix == suffix]
+    if len(found) != 1:
+        told = ", ".join(found) or ", ".join(f"{name} ({row.suffix})" for name, row in FORMATS.items())
+        raise ParameterError("format", None, f"said for a file that ends in {suffix or 'nothing'}: one of {told}")
+    return found[0]

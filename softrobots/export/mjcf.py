@@ -1,0 +1,215 @@
+"""Robots as MJCF, the format of MuJoCo, with springs, damping, collision exclusions, actuators and a home position."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import finite_array
+from softrobots.export.meshes import MeshFiles, mujoco_reads
+from softrobots.export.prepared import PreparedRobot, neighbours, prepare
+from softrobots.export.servos import ANGLE_ERROR, Motor, Muscle, Servo
+from softrobots.export.xml_text import document, inertia_in_body
+from softrobots.model import SoftModel
+from softrobots.rigid_tree import Body, Joint, Placement, Shape, number_text
+
+_GREY = (0.6, 0.6, 0.6, 1.0)
+_DRAWN, _HIDDEN = "2", "3"  # MuJoCo's groups of shapes
+
+
+def to_mjcf(
+    model: SoftModel,
+    q_motors: Any = None,
+    *,
+    actuators: str = "driven",
+    damping: str = "critical",
+    gravity: Any = None,
+    limits: bool = True,
+) -> str:
+    """Write a robot as MJCF that MuJoCo 3 and 4 read.
+
+    Bodies and joints are called as in the URDF; fixed links stay bodies; a site stands at the tip; all numbers have all their
+    digits. Springs are `stiffness` and `springref`. Neighbours along the chain do not collide (`prepared.neighbours`). Meshes
+    in STL and OBJ are named by their whole path, others are left out.
+
+    Driven motors are position actuators (`softrobots.export.servos`), whose joints have the damping at which the motor just
+    reaches its largest speed under its largest torque, unless `damping` is "file". Muscles are fixed tendons, whose `length` is
+    the muscle's less its rest length, linear in the joints; with a motor each if tensions are given, or a position actuator if
+    lengths are. The keyframe `home` holds the relaxed springs and these actuators.
+
+    Args:
+        model: The robot.
+        q_motors: Motor joints, then muscles, shape (n_motors,) [rad, m or N]; relaxed by default.
+        actuators: "driven", or "welded": motor joints become fixed, tensions become shifts of the springs' references.
+        damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        limits: Whether the springs have their limits; the statics reports them and goes beyond.
+
+    Returns:
+        MJCF text.
+
+    Raises:
+        ParameterError: If an argument does not fit, or the robot has sections of constant strain, springs that are not linear,
+            or muscles of given length that were to be welded.
+        DescriptionError: If the robot has moving links without mass, or more joints than Pinocchio's workspace is made for.
+    """
+    field = np.zeros(3) if gravity is None else finite_array("gravity", gravity, (3,), "m/s^2")
+    robot = prepare(model, q_motors, actuators=actuators, damping=damping)
+    root = ElementTree.Element("mujoco", {"model": robot.tree.name or "robot"})
+    compiler = {"angle": "radian", "autolimits": "true", "fusestatic": "false", "inertiafromgeom": "false"}
+    ElementTree.SubElement(root, "compiler", compiler)
+    option = ElementTree.SubElement(root, "option", {"gravity": number_text(field)})
+    if robot.motors or robot.muscles:
+        option.set("integrator", "implicitfast")  # takes the damping of actuators implicitly, too
+    assets = ElementTree.SubElement(root, "asset")
+    bodies = _Bodies(robot, limits, damping == "critical", assets)
+    bodies.write(ElementTree.SubElement(root, "worldbody"))
+    if not len(assets):
+        root.remove(assets)
+    pairs = neighbours(robot.tree)
+    if pairs:
+        contact = ElementTree.SubElement(root, "contact")
+        for first, second in pairs:
+            ElementTree.SubElement(contact, "exclude", {"body1": first, "body2": second})
+    if robot.muscles:
+        _write_tendons(ElementTree.SubElement(root, "tendon"), robot.muscles)
+    key = {"name": "home", "qpos": number_text(robot.home[name] for name in bodies.order)}
+    if robot.motors or robot.muscles:
+        _write_actuators(ElementTree.SubElement(root, "actuator"), robot)
+        key["ctrl"] = number_text([*(motor.position for motor in robot.motors), *map(_command, robot.muscles)])
+    if bodies.order:
+        ElementTree.SubElement(ElementTree.SubElement(root, "keyframe"), "key", key)
+    return document(root, _head(robot, bodies.meshes, limits))
+
+
+class _Bodies:
+    """Writes bodies into each other, and remembers the order of the joints and what became of meshes."""
+
+    def __init__(self, robot: PreparedRobot, limits: bool, limit_speed: bool, assets: ElementTree.Element) -> None:
+        self._robot, self._limits, self._assets = robot, limits, assets
+        self._damping = {motor.joint.name: motor.speed_damping for motor in robot.motors} if limit_speed else {}
+        self._mesh_names: dict[tuple[Path, tuple[float, ...]], str] = {}
+        self.order: list[str] = []
+        self.meshes = MeshFiles()
+
+    def write(self, world: ElementTree.Element) -> None:
+        """Write the whole tree; a root that is called world is MuJoCo's world."""
+        tree = self._robot.tree
+        if tree.root == "world":
+            self._inside(world, tree.body("world"))
+        else:
+            self._body(world, tree.body(tree.root), Placement(), None)
+
+    def _body(self, parent: ElementTree.Element, body: Body, placement: Placement, joint: Joint | None) -> None:
+        element = ElementTree.SubElement(parent, "body", {"name": body.name, **_where(placement)})
+        if joint is not None and joint.movable:
+            self._joint(element, joint)
+        if body.mass > 0.0:
+            moments = inertia_in_body(body)
+            entries = (moments[pair] for pair in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+            inertial = {"pos": number_text(body.centre.position), "mass": repr(body.mass), "fullinertia": number_text(entries)}
+            ElementTree.SubElement(element, "inertial", inertial)
+        self._inside(element, body)
+
+    def _inside(self, element: ElementTree.Element, body: Body) -> None:
+        drawn = self.meshes.split(body.visuals, mujoco_reads)
+        felt = self.meshes.split(body.collisions, mujoco_reads)
+        for shape, file in drawn:
+            self._geom(element, shape, file, {"group": _DRAWN, "contype": "0", "conaffinity": "0"})
+        for shape, file in felt:  # drawn, too, in place of meshes that cannot be
+            self._geom(element, shape, file, {"group": _HIDDEN if drawn or not body.visuals else _DRAWN})
+        if body.name == self._robot.tip:
+            ElementTree.SubElement(element, "site", {"name": body.name})
+        for joint in self._robot.tree.joints_of(body.name):
+            self._body(element, self._robot.tree.body(joint.child), joint.placement, joint)
+
+    def _joint(self, element: ElementTree.Element, joint: Joint) -> None:
+        self.order.append(joint.name)
+        made = {"name": joint.name, "type": "slide" if joint.kind == "prismatic" else "hinge", "axis": number_text(joint.axis)}
+        spring = self._robot.tree.springs.get(joint.name)
+        if np.all(np.isfinite(joint.limits)) and (self._limits or spring is None):
+            made["range"] = number_text(joint.limits)
+        if spring is not None:
+            made |= {"stiffness": repr(spring.stiffness), "springref": repr(spring.rest)}
+        damping = self._damping.get(joint.name, joint.damping)
+        if damping > 0.0:
+            made["damping"] = repr(damping)
+        ElementTree.SubElement(element, "joint", made)
+
+    def _geom(self, element: ElementTree.Element, shape: Shape, file: Path | None, options: dict[str, str]) -> None:
+        made = {"type": shape.kind}
+        if file is not None:
+            made["mesh"] = self._mesh(file, shape.size)
+        else:
+            halves = (0.5, 0.5, 0.5) if shape.kind == "box" else (1.0, 0.5)  # MuJoCo counts from the centre
+            made["size"] = number_text(half * size for half, size in zip(halves, shape.size, strict=False))
+        rgba = shape.rgba or _GREY
+        ElementTree.SubElement(element, "geom", {**made, **_where(shape.placement), "rgba": number_text(rgba), **options})
+
+    def _mesh(self, file: Path, scale: tuple[float, ...]) -> str:
+        key = (file, scale)
+        if key not in self._mesh_names:
+            self._mesh_names[key] = f"{file.stem}_{len(self._mesh_names) + 1}"
+            made = {"name": self._mesh_names[key], "file": str(file), "scale": number_text(scale)}
+            ElementTree.SubElement(self._assets, "mesh", made)
+        return self._mesh_names[key]
+
+
+def _where(placement: Placement) -> dict[str, str]:
+    made = {"pos": number_text(placement.position)} if np.any(placement.position) else {}
+    if np.any(placement.rotation != np.eye(3)):
+        made["quat"] = number_text(placement.quaternion)
+    return made
+
+
+def _write_tendons(tendons: ElementTree.Element, muscles: Sequence[Muscle]) -> None:
+    for muscle in muscles:
+        fixed = ElementTree.SubElement(tendons, "fixed", {"name": muscle.tag.name})
+        for name, arm in muscle.arms.items():
+            ElementTree.SubElement(fixed, "joint", {"joint": name, "coef": repr(arm)})
+
+
+def _write_actuators(element: ElementTree.Element, robot: PreparedRobot) -> None:
+    for motor in robot.motors:
+        made = {"name": motor.joint.name, "joint": motor.joint.name, **_servo(motor.servo)}
+        ElementTree.SubElement(element, "position", made | _range_of(motor))
+    for muscle in robot.muscles:
+        tag = muscle.tag
+        made = {"name": tag.name, "tendon": tag.name}
+        if muscle.servo is None:  # a positive force of MuJoCo lengthens the tendon, a tension shortens it
+            made |= {"gear": "-1.0", "ctrlrange": number_text((-tag.strongest, tag.strongest))}
+            ElementTree.SubElement(element, "motor", made)
+        else:
+            reach = number_text((tag.shortest - tag.rest_length, tag.longest - tag.rest_length))
+            ElementTree.SubElement(element, "position", made | _servo(muscle.servo) | {"ctrlrange": reach})
+
+
+def _servo(servo: Servo) -> dict[str, str]:
+    made = {"kp": repr(servo.gain), "kv": repr(servo.damping)}
+    return made | ({"forcerange": number_text((-servo.force, servo.force))} if np.isfinite(servo.force) else {})
+
+
+def _range_of(motor: Motor) -> dict[str, str]:
+    limits = motor.joint.limits
+    return {"ctrlrange": number_text(limits)} if np.all(np.isfinite(limits)) else {}
+
+
+def _command(muscle: Muscle) -> float:
+    return muscle.value if muscle.servo is None else muscle.value - muscle.tag.rest_length
+
+
+def _head(robot: PreparedRobot, meshes: MeshFiles, limits: bool) -> list[str]:
+    lines = [f"{robot.tree.name}, for MuJoCo; written by softrobots from its URDF. SI units and radians.", *robot.remarks]
+    if robot.motors:
+        lines.append(
+            f"Position actuators of motors give all their torque at an error of {ANGLE_ERROR} rad; statics holds exactly."
+        )
+    if any(muscle.servo for muscle in robot.muscles):
+        lines.append("The ctrl of a muscle is its length less its rest length [m].")
+    if not limits:
+        lines.append("The springs have no limits here.")
+    return [*lines, *meshes.remark("neither OBJ nor binary STL")]

@@ -1,0 +1,73 @@
+"""Python files as text: literals, tables and templates."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from string import Template
+from typing import Any
+
+_WIDTH = 88
+
+
+def literal(value: Any) -> str:
+    """A value as Python source in ASCII: text in double quotes, numbers with all their digits."""
+    if isinstance(value, str):
+        quoted = ascii(value)
+        return quoted if '"' in quoted else f'"{quoted[1:-1]}"'
+    if isinstance(value, tuple | list):
+        inside = ", ".join(map(literal, value)) + ("," if isinstance(value, tuple) and len(value) == 1 else "")
+        return f"({inside})" if isinstance(value, tuple) else f"[{inside}]"
+    return repr(value)
+
+
+def assignment(name: str, value: Any, comment: str = "") -> str:
+    """A line that assigns a value."""
+    return f"{name} = {literal(value)}" + (f"  # {comment}" if comment else "")
+
+
+def table(name: str, rows: Mapping[str, Any], comment: str) -> str:
+    """A dictionary under a comment, one entry a line, also those of dictionaries inside."""
+    if not rows:
+        return assignment(name, {}, comment)
+    return "\n".join([f"# {comment}", f"{name} = {{", *_entries(rows, "    "), "}"])
+
+
+def block(lines: Iterable[str]) -> str:
+    """Lines that a formatter leaves alone: names can be long."""
+    return "\n".join(["# fmt: off", *lines, "# fmt: on"])
+
+
+def filled(template: str, *, name: str, description: Iterable[str], **fields: str) -> str:
+    """A template of this folder, filled.
+
+    Args:
+        template: Name of the file.
+        name: Name of the robot, for the docstring.
+        description: Paragraphs, for the docstring.
+        fields: Text of the other fields, as it is.
+
+    Returns:
+        Text of the file.
+    """
+    from softrobots import __version__  # here, because the package imports its modules before it knows
+
+    text = Template(Path(__file__).with_name(template).read_text(encoding="utf-8"))
+    paragraphs = "\n\n".join(textwrap.fill(part, _WIDTH, break_long_words=False) for part in description)
+    return text.substitute(name=_in_docstring(name), description=_in_docstring(paragraphs), version=__version__, **fields)
+
+
+def _entries(rows: Mapping[str, Any], indent: str) -> list[str]:
+    lines = []
+    for key, value in rows.items():
+        if isinstance(value, Mapping):
+            lines += [f"{indent}{literal(key)}: {{", *_entries(value, indent + "    "), f"{indent}}},"]
+        else:
+            lines.append(f"{indent}{literal(key)}: {literal(value)},")
+    return lines
+
+
+def _in_docstring(text: str) -> str:
+    """Text without what would end a docstring or mean something in it."""
+    return ascii(text)[1:-1].replace("\\n", "\n").replace("\\", "/").replace('"', "'")

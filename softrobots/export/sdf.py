@@ -1,0 +1,226 @@
+"""Robots as SDF 1.9, the format of Gazebo, which Drake reads too, with the springs and damping of joints."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import LARGEST
+from softrobots.errors import DescriptionError, ParameterError
+from softrobots.export.meshes import MeshFiles, drake_collides, drawn_anywhere
+from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
+from softrobots.export.xml_text import document, inertia_in_body
+from softrobots.model import SoftModel
+from softrobots.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
+
+DRAKE = "http://drake.mit.edu"
+"""XML namespace of Drake's tags."""
+
+_WORLD = "world"
+_WORLD_SHAPES = "world_shapes"  # the world of SDF has none of its own
+_STAND_IN = (1e-3, 1e-6)  # [kg], [kg m^2] of a body without mass that is fixed to the world, where it has no effect
+
+
+def to_sdf(
+    model: SoftModel,
+    q_motors: Any = None,
+    *,
+    actuators: str = "driven",
+    damping: str = "critical",
+    limits: bool = True,
+) -> str:
+    """Write a robot as a model of SDF 1.9.
+
+    Links and joints are called as in the URDF, fixed joints stay fixed joints, the base is fixed to the world; rotations are
+    quaternions, numbers have all their digits. Springs are `spring_stiffness` and `spring_reference`. A moving link without
+    mass becomes a frame, for SDF has no such links; its shapes go to a link that it is fixed to. Meshes are named by their
+    whole path; those to collide are left out unless Drake reads them.
+
+    Driven motor joints are free joints with their limits of torque: SDF has no actuators, a controller is the user's; Drake
+    makes an actuator of each. Springs have the effort 0, so that Drake makes none of them. SDF has no muscles: with muscles,
+    weld.
+
+    Drake is told not to collide neighbours along the chain (`prepared.neighbours`). Gazebo cannot be told pairs, but collides
+    no two links of a model unless `self_collide` is set. Gravity is the world's in SDF, not the model's.
+
+    Args:
+        model: The robot.
+        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Of driven motors,
+            only the frequency that sets the damping depends on them.
+        actuators: "driven", or "welded": motor joints become fixed, tensions become shifts of the springs' references.
+        damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
+        limits: Whether the springs have their limits; the statics reports them and goes beyond.
+
+    Returns:
+        SDF text.
+
+    Raises:
+        ParameterError: If an argument does not fit, muscles were to be driven, or the robot has sections of constant strain,
+            springs that are not linear, or muscles of given length.
+        DescriptionError: If the robot has moving links without mass, a link and a joint of one name, or more joints than
+            Pinocchio's workspace is made for.
+    """
+    robot = prepare(model, q_motors, actuators=actuators, damping=damping)
+    if robot.muscles:
+        raise ParameterError("actuators", actuators, '"welded" for a robot with muscles, which SDF has no word for')
+    tree = robot.tree
+    names = [body.name for body in tree.bodies] + [joint.name for joint in tree.joints]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise DescriptionError(
+            f"{tree.name} has a link and a joint of the name {', '.join(twice)}; SDF wants one name for each"
+        )
+    ElementTree.register_namespace("drake", DRAKE)
+    root = ElementTree.Element("sdf", {"version": "1.9"})
+    writer = _Model(ElementTree.SubElement(root, "model", {"name": tree.name or "robot"}), robot, limits)
+    writer.write()
+    return document(root, _head(robot, writer.meshes, limits))
+
+
+class _Model:
+    """Writes links, frames and joints into a model, and remembers what became of meshes."""
+
+    def __init__(self, element: ElementTree.Element, robot: PreparedRobot, limits: bool) -> None:
+        self._element, self._robot, self._limits = element, robot, limits
+        self._anchor = _anchors(robot.tree)
+        self.meshes = MeshFiles()
+
+    def write(self) -> None:
+        """Write everything."""
+        tree = self._robot.tree
+        places: dict[str, tuple[Placement, str]] = {joint.child: (joint.placement, joint.parent) for joint in tree.joints}
+        links: dict[str, ElementTree.Element] = {}
+        for body in tree.bodies:
+            placement, parent = places.get(body.name, (Placement(), _WORLD))
+            if body.name == _WORLD:
+                if body.visuals or body.collisions:
+                    links[_WORLD] = self._link(replace(body, name=_WORLD_SHAPES), placement, parent)
+            elif body.name in self._anchor:
+                made = {"name": body.name, "attached_to": self._anchor[body.name]}
+                _write_pose(ElementTree.SubElement(self._element, "frame", made), placement, parent)
+            else:
+                links[body.name] = self._link(body, placement, parent)
+        for body in tree.bodies:
+            carrier = self._anchor.get(body.name, body.name)
+            if carrier in links:
+                self._shapes(links[carrier], body, body.visuals, "visual", drawn_anywhere)
+                self._shapes(links[carrier], body, body.collisions, "collision", drake_collides)
+        if tree.root != _WORLD or _WORLD in links:
+            child = tree.root if tree.root != _WORLD else _WORLD_SHAPES
+            self._joint(f"{child}_to_world", "fixed", _WORLD, child)
+        for joint in tree.joints:
+            if joint.movable:
+                self._moving(joint)
+            elif joint.child not in self._anchor and joint.child not in self._anchor.values():
+                self._joint(joint.name, "fixed", joint.parent, joint.child)
+        self._filters()
+
+    def _link(self, body: Body, placement: Placement, parent: str) -> ElementTree.Element:
+        link = ElementTree.SubElement(self._element, "link", {"name": body.name})
+        _write_pose(link, placement, parent)
+        mass, moments = body.mass, inertia_in_body(body)
+        if mass <= 0.0:
+            mass, moments = _STAND_IN[0], _STAND_IN[1] * np.eye(3)
+        inertial = ElementTree.SubElement(link, "inertial")
+        _write_pose(inertial, Placement(body.centre.position))
+        _say(inertial, "mass", mass)
+        entries = ElementTree.SubElement(inertial, "inertia")
+        for first, second in ("xx", "xy", "xz", "yy", "yz", "zz"):
+            _say(entries, f"i{first}{second}", moments["xyz".index(first), "xyz".index(second)])
+        return link
+
+    def _shapes(
+        self, link: ElementTree.Element, body: Body, shapes: Sequence[Shape], kind: str, readable: Callable[[Path], bool]
+    ) -> None:
+        for shape, file in self.meshes.split(shapes, readable):
+            number = len(link.findall(kind)) + 1
+            element = ElementTree.SubElement(link, kind, {"name": f"{kind}_{number}"})
+            _write_pose(element, shape.placement, body.name if body.name in self._anchor else "")
+            geometry = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
+            if file is not None:
+                ElementTree.SubElement(geometry, "uri").text = file.as_uri()
+                ElementTree.SubElement(geometry, "scale").text = number_text(shape.size)
+            elif shape.kind == "box":
+                ElementTree.SubElement(geometry, "size").text = number_text(shape.size)
+            else:
+                for name, value in zip(("radius", "length"), shape.size, strict=False):
+                    _say(geometry, name, value)
+            if kind == "visual" and shape.rgba is not None:
+                material = ElementTree.SubElement(element, "material")
+                for name in ("ambient", "diffuse"):
+                    ElementTree.SubElement(material, name).text = number_text(shape.rgba)
+
+    def _joint(self, name: str, kind: str, parent: str, child: str) -> ElementTree.Element:
+        element = ElementTree.SubElement(self._element, "joint", {"name": name, "type": kind})
+        ElementTree.SubElement(element, "parent").text = parent
+        ElementTree.SubElement(element, "child").text = child
+        return element
+
+    def _moving(self, joint: Joint) -> None:
+        spring = self._robot.tree.springs.get(joint.name)
+        bounded = bool(np.all(np.isfinite(joint.limits))) and (self._limits or spring is None)
+        kind = joint.kind if joint.kind == "prismatic" else "revolute" if bounded else "continuous"
+        axis = ElementTree.SubElement(self._joint(joint.name, kind, joint.parent, joint.child), "axis")
+        ElementTree.SubElement(axis, "xyz").text = number_text(joint.axis)
+        dynamics = ElementTree.SubElement(axis, "dynamics")
+        _say(dynamics, "damping", joint.damping)
+        if spring is not None:
+            _say(dynamics, "spring_stiffness", spring.stiffness)
+            _say(dynamics, "spring_reference", spring.rest)
+        limit = ElementTree.SubElement(axis, "limit")
+        if bounded:
+            _say(limit, "lower", joint.limits[0])
+            _say(limit, "upper", joint.limits[1])
+        for name, value in (("effort", joint.effort if spring is None else 0.0), ("velocity", joint.velocity)):
+            if value < LARGEST:
+                _say(limit, name, value)
+
+    def _filters(self) -> None:
+        """Tell Drake which pairs do not collide; a pair is a group that ignores itself."""
+        pairs = (
+            (self._anchor.get(first, first), self._anchor.get(second, second)) for first, second in neighbours(self._robot.tree)
+        )
+        for number, pair in enumerate(dict.fromkeys(pairs), 1):
+            made = {"name": f"neighbours_{number}"}
+            group = ElementTree.SubElement(self._element, f"{{{DRAKE}}}collision_filter_group", made)
+            for name in pair:
+                ElementTree.SubElement(group, f"{{{DRAKE}}}member").text = name if name != _WORLD else _WORLD_SHAPES
+            ElementTree.SubElement(group, f"{{{DRAKE}}}ignored_collision_filter_group").text = made["name"]
+
+
+def _anchors(tree: RigidTree) -> dict[str, str]:
+    """By name of each moving body without mass, the first body with mass that it is fixed to."""
+    group = weld_groups(tree)
+    heavy: dict[str, str] = {}
+    for body in tree.bodies:
+        if body.mass > 0.0:
+            heavy.setdefault(group[body.name], body.name)
+    static = group[tree.root]
+    return {body.name: heavy[group[body.name]] for body in tree.bodies if body.mass <= 0.0 and group[body.name] != static}
+
+
+def _write_pose(element: ElementTree.Element, placement: Placement, relative_to: str = "") -> None:
+    relative_to = "" if relative_to == _WORLD else relative_to
+    if not relative_to and not np.any(placement.position) and np.array_equal(placement.rotation, np.eye(3)):
+        return
+    w, x, y, z = placement.quaternion
+    made = {"relative_to": relative_to} if relative_to else {}
+    pose = ElementTree.SubElement(element, "pose", made | {"rotation_format": "quat_xyzw"})
+    pose.text = number_text([*placement.position, x, y, z, w])
+
+
+def _say(element: ElementTree.Element, name: str, value: float) -> None:
+    ElementTree.SubElement(element, name).text = repr(float(value))
+
+
+def _head(robot: PreparedRobot, meshes: MeshFiles, limits: bool) -> list[str]:
+    lines = [f"{robot.tree.name}, SDF 1.9 for Drake and Gazebo; written by softrobots from its URDF. SI units and radians."]
+    lines += [*robot.remarks, "Gravity is not in this file: it is the world's."]
+    if not limits:
+        lines.append("The springs have no limits here.")
+    return [*lines, *meshes.remark("to collide and not OBJ, glTF or VTK, which alone Drake reads")]

@@ -1,0 +1,130 @@
+r"""Position servos that stand for motors and muscles in a simulator.
+
+Statics holds an actuator exactly; a servo gives way. Its gain is its largest force over a small error,
+
+.. math:: k_p = F / \varepsilon, \qquad k_v = 2 \sqrt{k_p I}
+
+and `k_v` damps it critically with the inertia `I` of the softest motion that moves this actuator by one unit at home: for a
+motor, all that it carries turns about its axis; for a muscle, the springs of its segment share its elongation as
+`K^{-1} A^T`. (A simulator that takes `I` from the inverse of the mass matrix, as MuJoCo's `dampratio` does, finds the body next
+to the motor, behind which the rest hangs on springs: a two-thousandth of it in the inflatable arm.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.checks import LARGEST, FloatArray
+from softrobots.model import SoftModel
+from softrobots.rigid_tree import Joint
+from softrobots.urdf_tags import MuscleTag
+
+ANGLE_ERROR = 1e-2
+"""Error at which the servo of a turning motor gives all its torque [rad]."""
+
+LENGTH_ERROR = 1e-3
+"""The same of a muscle, as a share of its rest length, and of a sliding motor, as a share of its travel."""
+
+_UNLIMITED = 1e3  # gain of a motor whose torque has no limit, per stiffness of the stiffest spring
+
+
+class Servo(NamedTuple):
+    """A position servo: `force = gain (command - position) - damping velocity`, within its limits."""
+
+    gain: float
+    """Force per error [N m/rad or N/m]."""
+    damping: float
+    """Force per speed [N m s/rad or N s/m]."""
+    force: float
+    """Largest force [N m or N]; infinite without a limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motor:
+    """A motor joint that moves."""
+
+    joint: Joint
+    """The joint."""
+    position: float
+    """Where it is at home [rad or m]."""
+    servo: Servo
+    """What drives it."""
+
+    @property
+    def speed_damping(self) -> float:
+        """Damping with which it just reaches its largest speed under its largest force; at least that of the description."""
+        fastest, force = self.joint.velocity, self.servo.force
+        return max(self.joint.damping, force / fastest if 0.0 < fastest < LARGEST and force < LARGEST else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Muscle:
+    """A muscle that pulls, whose length is linear in joint coordinates."""
+
+    tag: MuscleTag
+    """Where it runs, and its limits."""
+    arms: Mapping[str, float]
+    """Derivative of its length by joint [m/rad, or 1 at a sliding joint]; joints that do not change it are left out."""
+    value: float
+    """Its length [m] or tension [N] at home."""
+    servo: Servo | None
+    """What drives it to a length; None if its tension is given."""
+
+
+def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str, float], mass: FloatArray) -> tuple[Motor, ...]:
+    """Motors with servos.
+
+    Args:
+        model: The robot.
+        joints: Its joints.
+        positions: Position by motor joint [rad or m].
+        mass: Mass matrix at home, shape (nv, nv).
+
+    Returns:
+        The motors, base to tip.
+    """
+    by_name = {joint.name: joint for joint in joints}
+    inertia = dict(zip(positions, np.diag(mass)[model.structure.motor_indices].tolist(), strict=True))
+    return tuple(
+        Motor(by_name[name], position, _motor_servo(by_name[name], model.stiffest, inertia[name]))
+        for name, position in positions.items()
+    )
+
+
+def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[Muscle, ...]:
+    """Muscles, with servos if their lengths are given.
+
+    Args:
+        model: The robot.
+        values: Their lengths [m] or tensions [N], shape (n_muscles,).
+        mass: Mass matrix at home, shape (nv, nv).
+
+    Returns:
+        The muscles, in the order of the model.
+    """
+    structure, made = model.structure, []
+    springs = structure.spring_indices
+    elastic = mass[np.ix_(springs, springs)]
+    for tag, row, value in zip(model.muscles, structure.muscle_matrix, values.tolist(), strict=True):
+        arms = {name: arm for name, arm in zip(structure.spring_joints, row.tolist(), strict=True) if arm != 0.0}
+        motion = row / structure.strain_law.stiffness
+        motion /= row @ motion
+        gain = tag.strongest / (LENGTH_ERROR * tag.rest_length)
+        servo = Servo(gain, 2.0 * math.sqrt(gain * float(motion @ elastic @ motion)), tag.strongest)
+        made.append(Muscle(tag, arms, value, servo if model.muscle_input == "lengths" else None))
+    return tuple(made)
+
+
+def _motor_servo(joint: Joint, stiffest: float, inertia: float) -> Servo:
+    if not 0.0 < joint.effort < LARGEST:
+        gain, force = _UNLIMITED * (stiffest or 1.0), math.inf
+    else:
+        travel = joint.limits[1] - joint.limits[0]
+        slides = joint.kind == "prismatic" and 0.0 < travel < LARGEST
+        gain, force = joint.effort / (LENGTH_ERROR * travel if slides else ANGLE_ERROR), joint.effort
+    return Servo(gain, 2.0 * math.sqrt(gain * inertia), force)

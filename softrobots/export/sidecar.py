@@ -1,0 +1,218 @@
+"""A robot as JSON beside its URDF: springs, roles, sections and muscles, with unit and source of every number.
+
+For tools that read URDF but not our tags. Every number is an object `{"value", "unit", "source"}`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+from softrobots.argument_notes import argument_notes
+from softrobots.description import declared_arguments
+from softrobots.errors import ParameterError, SoftRobotsError
+from softrobots.export.number_sources import PackagedRobot, Rules, check_robot, derived_numbers, number_rules
+from softrobots.inflated_beam import wrinkling_moment
+from softrobots.model import SoftModel, check_model
+from softrobots.paths import xacro_folder
+from softrobots.rigid_tree import Joint, read_rigid_tree
+from softrobots.urdf_tags import LumpedSectionTag, SectionTag, read_tags
+
+FORMAT = "softrobots sidecar"
+"""What the files call themselves."""
+
+VERSION = 1
+"""Version of the format."""
+
+_WIDTH = 128
+_CALLER = "given by the caller"
+_TURNING, _SLIDING = ("rad", "N m/rad", "N m s/rad"), ("m", "N/m", "N s/m")
+
+_CONVENTIONS = {
+    "units": "SI and radians",
+    "numbers": "value, unit and source; a source in terms of names is an expression in `parameters` and `derived`, as Python "
+    "writes it, lists counted from 0",
+    "joints": "coordinates, axes, parents and children as in the URDF; roles: motor (held), spring (free, with a spring), "
+    "section (follows the coordinates of a section), locked (held at zero)",
+    "springs": "torque = stiffness (q - rest), the load that the spring carries, minus what it exerts; in equilibrium "
+    "stiffness (q - rest) = J^T f - g(q), with dead forces f and the gravity torques g",
+    "damping": "for simulators only; statics does not use it",
+    "wrinkling_moment": "moment at the first wrinkle of an inflated link [Troise 2021] (3); the springs are good below it",
+    "max_moment": "moment of an inflated link never above this, along its bend: min(stiffness |s|, max_moment) s / |s|, with "
+    "s = q - rest of its springs",
+    "sections": "the six joints of a section of constant strain follow four coordinates (bending about x and y, twist, "
+    "elongation) with the stiffness EI / length, EI / length, GJ / length, EA / length; rest: strains kx, ky, twist, stretch "
+    "where all joints are at zero",
+    "lumped_sections": "spring joints that stand for a section, by coordinate; hinge: length of rod from its start to them",
+    "muscles": "length = rest_length + sum of arms times coordinates; the arms are distance sin(azimuth) of bend_x, "
+    "-distance cos(azimuth) of bend_y and 1 of stretch; a tension t adds the energy t length, so that it moves the rest of a "
+    "joint spring by -arm t / stiffness; muscle_input tells whether lengths or forces are given",
+    "lines": "lines along a segment that are drawn and do nothing",
+}
+
+
+def to_json(model: SoftModel, robot: PackagedRobot | None = None) -> str:
+    """Write what a URDF reader misses of a robot as JSON.
+
+    The sources of numbers are the tags of the URDF that they were read from, or what the caller of `load_model` said; given the
+    robot, they are expressions in its parameters, and each parameter has the source that its xacro file gives.
+
+    Args:
+        model: The robot.
+        robot: The parameters that it was made from, if it is one of this package.
+
+    Returns:
+        JSON text. It holds what `load_model` needs besides the URDF: springs, motors, tip and muscle input.
+
+    Raises:
+        ParameterError: If `model` is none, or `robot` is not what it was made from.
+    """
+    from softrobots import __version__  # here, because the package imports its modules before it knows
+
+    checked = check_model(model)
+    rules: Rules = {}
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "written_by": f"softrobots {__version__}",
+        "robot": checked.pinocchio.name,
+    }
+    if robot is not None:
+        if check_robot(robot).urdf() != checked.urdf:
+            raise ParameterError("robot", robot, "the robot that the model was loaded from; it has another description")
+        rules = number_rules(robot)
+        content |= {"made_by": type(robot).__name__, "xacro": robot.XACRO}
+    content["conventions"] = _CONVENTIONS
+    if robot is not None:
+        content |= {"parameters": _parameters(robot), "derived": _derived(robot)}
+    content |= {"tip": checked.tip, "muscle_input": checked.muscle_input}
+    content |= _Parts(checked, rules).all()
+    return _text(content, "") + "\n"
+
+
+class _Parts:
+    """The parts of a model as JSON objects."""
+
+    def __init__(self, model: SoftModel, rules: Rules) -> None:
+        self._model, self._rules = model, rules
+        self._tags = read_tags(model.urdf)
+
+    def all(self) -> dict[str, Any]:
+        """All of them, by kind."""
+        joints = [joint for joint in read_rigid_tree(self._model.urdf).joints if joint.movable]
+        tags = self._tags
+        return {
+            "joints": [self._joint(joint) for joint in joints],
+            "inflated_links": [self._inflated_link(tag) for tag in tags.inflated_links],
+            "sections": [self._section(tag) for tag in tags.sections],
+            "lumped_sections": [self._section(tag) for tag in tags.lumped_sections],
+            "muscles": self._muscles(),
+            "lines": [
+                {"name": tag.name, "segment": tag.segment, **self._numbers(tag, "line", azimuth="rad", distance="m")}
+                for tag in tags.lines
+            ],
+        }
+
+    def _number(self, part: str, name: str, value: Any, unit: str, tag: str) -> dict[str, Any]:
+        return {"value": value, "unit": unit, "source": self._rules.get((part, name), f"<{tag}> of the URDF")}
+
+    def _numbers(self, tag: Any, kind: str, **units: str) -> dict[str, Any]:
+        return {
+            name: self._number(tag.name, name, getattr(tag, name), unit, f"softrobots:{kind}") for name, unit in units.items()
+        }
+
+    def _joint(self, joint: Joint) -> dict[str, Any]:
+        position, stiffness, damping = _SLIDING if joint.kind == "prismatic" else _TURNING
+        made: dict[str, Any] = {"name": joint.name, "type": joint.kind, "role": self._role(joint.name)}
+        made |= {"parent": joint.parent, "child": joint.child}
+        if joint.kind != "continuous":
+            for name, value in zip(("lower", "upper"), joint.limits, strict=True):
+                made[name] = self._number(joint.name, name, value, position, "limit")
+        made["damping"] = self._number(joint.name, "damping", joint.damping, damping, "dynamics")
+        spring = self._model.structure.parts.springs.get(joint.name)
+        if spring is not None:
+            for name, unit in (("stiffness", stiffness), ("rest", position)):
+                made[name] = self._number(joint.name, name, getattr(spring, name), unit, "softrobots:spring")
+                if self._tags.springs.get(joint.name) != spring:
+                    made[name]["source"] = _CALLER
+        return made
+
+    def _role(self, joint: str) -> str:
+        structure = self._model.structure
+        if joint in structure.motor_joints:
+            return "motor"
+        if joint in structure.spring_joints:
+            return "spring"
+        return "section" if any(joint in tag.joints for tag in structure.parts.sections) else "locked"
+
+    def _inflated_link(self, tag: Any) -> dict[str, Any]:
+        name = " ".join(tag.springs)
+        values = {"radius": (tag.radius, "m"), "pressure": (tag.pressure, "Pa")}
+        if tag.max_moment is not None:
+            values["max_moment"] = (tag.max_moment, "N m")
+        made = {key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()}
+        moment = wrinkling_moment(tag.pressure, tag.radius)
+        source = self._rules.get((name, "wrinkling_moment"), "pi**2 / 4 * pressure * radius**3")
+        return {"springs": list(tag.springs), **made, "wrinkling_moment": {"value": moment, "unit": "N m", "source": source}}
+
+    def _section(self, tag: SectionTag | LumpedSectionTag) -> dict[str, Any]:
+        made: dict[str, Any] = {"name": tag.name, "segment": tag.segment}
+        if isinstance(tag, SectionTag):
+            kind, made["joints"] = "softrobots:section", list(tag.joints)
+            values = {"EI": (tag.bending_stiffness, "N m2"), "GJ": (tag.torsional_stiffness, "N m2")}
+            values["EA"] = (tag.axial_stiffness, "N")
+        else:
+            kind, made["joints"] = "softrobots:lumped_section", dict(tag.joints)
+            values = {"hinge": (tag.hinge, "m")}
+        values |= {"length": (tag.length, "m"), "radius": (tag.radius, "m")}
+        made |= {key: self._number(tag.name, key, *value, kind) for key, value in values.items()}
+        return made | {"rest": self._number(tag.name, "rest", list(tag.rest), "rad/m, rad/m, rad/m, -", kind)}
+
+    def _muscles(self) -> list[dict[str, Any]]:
+        structure, made = self._model.structure, []
+        units = {"azimuth": "rad", **dict.fromkeys(("distance", "rest_length", "shortest", "longest"), "m"), "strongest": "N"}
+        for tag, row in zip(structure.muscles, structure.muscle_matrix.tolist(), strict=True):
+            arms = {name: arm for name, arm in zip(structure.strain_law.names, row, strict=True) if arm != 0.0}
+            numbers = self._numbers(tag, "muscle", **units)
+            made.append({"name": tag.name, "segment": tag.segment, **numbers, "arms": arms})
+        return made
+
+
+def _parameters(robot: PackagedRobot) -> dict[str, Any]:
+    file = xacro_folder() / robot.XACRO
+    defaults, made = declared_arguments(file), {}
+    for name, note in argument_notes(file).items():
+        source = note.source
+        if not _is_default(robot, name):
+            source = f"{_CALLER} (default {defaults[name] or 'none'}: {source})"
+        made[name] = {"value": getattr(robot, name), "unit": note.unit, "meaning": note.text, "source": source}
+    return made
+
+
+def _derived(robot: PackagedRobot) -> dict[str, Any]:
+    return {name: number._asdict() for name, number in derived_numbers(robot).items()}
+
+
+def _is_default(robot: Any, name: str) -> bool:
+    """Whether a parameter would be the same if it were not given."""
+    default = next(field.default for field in dataclasses.fields(robot) if field.name == name)
+    try:
+        twin: Any = dataclasses.replace(robot, **{name: default})
+    except SoftRobotsError:  # the default does not go with the other parameters
+        return False
+    return bool(getattr(twin, name) == getattr(robot, name))
+
+
+def _text(value: Any, indent: str) -> str:
+    """JSON with all digits; what fits into a line stands in one."""
+    line = json.dumps(value, allow_nan=False)
+    if not isinstance(value, dict | list | tuple) or len(indent) + len(line) <= _WIDTH:
+        return line
+    inner = indent + "  "
+    if isinstance(value, dict):
+        items = [f"{json.dumps(key)}: {_text(item, inner)}" for key, item in value.items()]
+    else:
+        items = [_text(item, inner) for item in value]
+    opening, closing = ("{", "}") if isinstance(value, dict) else ("[", "]")
+    return f"{opening}\n{inner}" + f",\n{inner}".join(items) + f"\n{indent}{closing}"

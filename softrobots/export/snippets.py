@@ -1,0 +1,239 @@
+"""Python files that stand alone: a robot with its springs in PyBullet, and on Pinocchio, without this package.
+
+Neither tool reads joint springs from a URDF. The files hold the URDF, a table of the springs, and the code that applies them;
+the code is in two templates beside this module.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import finite_array
+from softrobots.description import parse_xml
+from softrobots.errors import ParameterError
+from softrobots.export.damping import lowest_frequency, mass_matrix
+from softrobots.export.held import HeldRobot, hold
+from softrobots.export.prepared import prepare
+from softrobots.export.python_text import assignment, block, filled, table
+from softrobots.model import SoftModel
+from softrobots.rigid_tree import Body, RigidTree, Shape, read_rigid_tree, write_rigid_tree
+from softrobots.urdf_tags import NAMESPACE
+
+MOST_JOINTS = 127
+"""Joints that PyBullet takes in one robot, fixed ones counted; beyond that it cannot tell their states."""
+
+HOLDING_FORCE = 1e6
+"""Largest torque [N m] or force [N] with which a driven motor holds its position in PyBullet."""
+
+_TINY_MASS, _TINY_INERTIA = 1e-9, 1e-12  # [kg], [kg m^2], of links without mass: PyBullet would take 1 kg and 1 kg m^2
+_FASTEST = 100.0  # [rad/s or m/s], of a motor without limit
+_REST = 2e-5  # [rad or m], motion during the slowest decay time that counts as rest
+
+
+def to_pybullet(
+    model: SoftModel,
+    q_motors: Any = None,
+    *,
+    actuators: str = "driven",
+    damping: str = "critical",
+    gravity: Any = None,
+    limits: bool = True,
+) -> str:
+    """Write a robot as a Python file for PyBullet that stands alone: URDF, springs and the code that applies them.
+
+    The file has `load(client)`, `drive(robot, positions)`, `apply_springs(robot)`, `step(robot, force, link)` and
+    `settle(robot, force, link)`. Springs are torques by a linearly implicit rule, stable at PyBullet's 240 Hz for light links,
+    too: the docstring of the file has the equations and the limits. Meshes are left out.
+
+    Args:
+        model: The robot.
+        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Tensions are in the
+            references of the springs.
+        actuators: "driven": PyBullet's position control holds the motors, whatever the load; "welded": their joints are fixed.
+        damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
+        gravity: Gravity, shape (3,) [m/s^2], world axes, that the file sets when it is run by itself; None: weightless.
+        limits: Whether the springs have their limits; the statics reports them and goes beyond.
+
+    Returns:
+        Text of the file.
+
+    Raises:
+        ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, muscles of given
+            length, springs that are not linear, or more joints than PyBullet takes.
+        DescriptionError: If a moving link has no mass.
+    """
+    held = _held(model, q_motors)
+    field = _gravity(gravity)
+    robot = prepare(model, q_motors, actuators=actuators, damping=damping)
+    joints = {joint.name: joint for joint in robot.tree.joints}
+    if len(joints) > MOST_JOINTS:
+        raise ParameterError(
+            "model",
+            model,
+            f"a robot of at most {MOST_JOINTS} joints, fixed ones counted, for PyBullet; this one has {len(joints)} (a chain "
+            "has fewer with fewer hinges, torsion=False or extension=False)",
+        )
+    positions = np.array([*held.motors.values(), *held.tensions.values()])
+    frequency = robot.frequency or lowest_frequency(model, mass_matrix(model, positions))
+    springs = {name: (tag.stiffness, tag.rest, joints[name].damping) for name, tag in held.springs.items()}
+    driven = {name: position for name, position in held.motors.items() if joints[name].movable}
+    motors = {name: (position, min(joints[name].velocity, _FASTEST)) for name, position in driven.items()}
+    data = [
+        assignment("TIP", robot.tip),
+        assignment("GRAVITY", field, "[m/s^2], of main()"),
+        table("SPRINGS", springs, "joint: stiffness [N m/rad or N/m], rest [rad or m], damping [N m s/rad or N s/m]"),
+        table("MOTORS", motors, "joint: position [rad or m], largest speed [rad/s or m/s]"),
+        assignment("HOLDING_FORCE", HOLDING_FORCE, "[N m or N], of motors"),
+        assignment("REST", _REST, "[rad or m], motion that settle() calls rest"),
+        assignment("QUIET_TIME", 1.0 / _slowest_decay(frequency, springs), "[s], for as long as this"),
+    ]
+    shapes = [shape for body in robot.tree.bodies for shape in (*body.visuals, *body.collisions)]
+    return filled(
+        "pybullet_template.txt",
+        name=robot.tree.name,
+        description=_pybullet_lines(held, actuators, damping, frequency, limits),
+        meshes=str(sum(shape.kind == "mesh" for shape in shapes)),
+        joints=str(len(joints)),
+        data=block(data),
+        urdf=_inside_quotes(write_rigid_tree(_for_pybullet(robot.tree, held, limits))),
+    )
+
+
+def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None) -> str:
+    """Write a robot as a Python file for Pinocchio that stands alone: URDF, springs and a solver for the equilibrium.
+
+    The file has arrays `STIFFNESS` and `REST` in the order of the velocities of its Pinocchio model, `residual`, `tangent`,
+    `solve(q_motors, force, gravity)` by Newton's method, under a world-fixed force at the tip, and `stable`.
+
+    Args:
+        model: The robot.
+        q_motors: Motor joints, then muscle tensions, that are the default in the file, shape (n_motors,) [rad, m or N]; relaxed
+            by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes, when the file is run by itself; None: weightless.
+
+    Returns:
+        Text of the file.
+
+    Raises:
+        ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, muscles of given
+            length, or springs that are not linear.
+    """
+    held = _held(model, q_motors)
+    names, matrix = model.structure.spring_joints, model.structure.muscle_matrix.tolist()
+    arms = {
+        muscle.name: {name: arm for name, arm in zip(names, row, strict=True) if arm != 0.0}
+        for muscle, row in zip(model.muscles, matrix, strict=True)
+    }
+    tips = [joint.child for joint in read_rigid_tree(model.urdf).joints if joint.name == model.tip]
+    data = [
+        assignment("ZERO", (0.0, 0.0, 0.0)),
+        assignment("TIP", (tips or [model.tip])[0]),
+        assignment("GRAVITY", _gravity(gravity), "[m/s^2], of main()"),
+        table("SPRINGS", model.spring_table, "joint: stiffness [N m/rad or N/m], rest [rad or m]"),
+        assignment("MOTORS", list(held.motors), "joints"),
+        table("MUSCLES", arms, "muscle: derivative of its length by joint [m/rad or -]"),
+        assignment("Q_MOTORS", [*held.motors.values(), *held.tensions.values()], "of motors, then muscles [rad, m or N]"),
+        assignment("LOCKED", list(held.locked), "joints"),
+    ]
+    return filled(
+        "pinocchio_template.txt",
+        name=model.pinocchio.name,
+        description=_pinocchio_lines(held),
+        data=block(data),
+        urdf=_inside_quotes(_without_meshes(model.urdf)),
+    )
+
+
+def _held(model: SoftModel, q_motors: Any) -> HeldRobot:
+    held = hold(model, q_motors)
+    if not held.springs:
+        raise ParameterError("model", model, "a robot with springs; every tool loads a rigid one from its URDF")
+    return held
+
+
+def _gravity(gravity: Any) -> tuple[float, ...]:
+    return (0.0, 0.0, 0.0) if gravity is None else tuple(finite_array("gravity", gravity, (3,), "m/s^2").tolist())
+
+
+def _inside_quotes(text: str) -> str:
+    """XML that three quotes can hold; in attributes they are escaped already."""
+    return text.replace('"""', "&quot;&quot;&quot;")
+
+
+def _without_meshes(urdf: str) -> str:
+    """The document without comments and without shapes whose files are somewhere else."""
+    root = parse_xml(urdf, "the URDF")
+    for link in root.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            if shape.find("geometry/mesh") is not None:
+                link.remove(shape)
+    ElementTree.register_namespace("softrobots", NAMESPACE)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _slowest_decay(frequency: float, springs: Mapping[str, tuple[float, float, float]]) -> float:
+    """Rate at which the slowest motion dies out [1/s]; joints without damping do not count."""
+    return min([0.5 * frequency, *(stiffness / damping for stiffness, _, damping in springs.values() if damping > 0.0)])
+
+
+def _for_pybullet(tree: RigidTree, held: HeldRobot, limits: bool) -> RigidTree:
+    """The tree as PyBullet is to read it: no damping at springs, no meshes, mass everywhere but at the root."""
+    bodies = []
+    for body in tree.bodies:
+        solid = replace(body, visuals=_solids(body.visuals), collisions=_solids(body.collisions))
+        bodies.append(solid if body.name == tree.root else _with_mass(solid))
+    joints = []
+    for joint in tree.joints:
+        spring = joint.name in held.springs
+        bounds = joint.limits if limits or not spring else (-np.inf, np.inf)
+        joints.append(replace(joint, damping=0.0, limits=bounds) if spring else joint)
+    return replace(tree, bodies=tuple(bodies), joints=tuple(joints), springs=held.springs)
+
+
+def _solids(shapes: Iterable[Shape]) -> tuple[Shape, ...]:
+    return tuple(shape for shape in shapes if shape.kind != "mesh")
+
+
+def _with_mass(body: Body) -> Body:
+    return body if body.mass > 0.0 else replace(body, mass=_TINY_MASS, inertia=_TINY_INERTIA * np.eye(3))
+
+
+def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, frequency: float, limits: bool) -> list[str]:
+    lines = []
+    if actuators == "welded" and held.motors:
+        at = ", ".join(f"{name} {position!r}" for name, position in held.motors.items())
+        lines.append(f"Motors are welded: their joints are fixed at [rad or m]: {at}.")
+    elif held.motors:
+        lines.append("Motors are driven: position control holds them at the positions of the table MOTORS.")
+    if held.tensions:
+        pulls = ", ".join(f"{name} {tension!r}" for name, tension in held.tensions.items())
+        lines.append(f"Muscles pull with [N]: {pulls}. That stands in the rest positions, rest - A^T t / k, exactly.")
+    if damping == "critical":
+        lines.append(
+            f"Damping of the springs is 2 k / w1, with the lowest frequency at rest w1 = {frequency!r} rad/s (motors held, "
+            "weightless): the slowest mode is critically damped, no mode oscillates."
+        )
+    else:
+        lines.append("Damping of the springs is that of the description.")
+    if not limits:
+        lines.append("The springs have no limits.")
+    if held.locked:
+        lines.append(f"Locked at zero: {', '.join(held.locked)}.")
+    return lines
+
+
+def _pinocchio_lines(held: HeldRobot) -> list[str]:
+    lines = []
+    given = [f"positions of {', '.join(held.motors)} [rad or m]"] if held.motors else []
+    if held.tensions:
+        given.append(f"tensions of {', '.join(held.tensions)} [N]")
+    lines.append(f"q_motors holds the {', then the '.join(given)}." if given else "q_motors is empty: nothing is driven.")
+    if held.locked:
+        lines.append(f"Locked at zero: {', '.join(held.locked)}.")
+    return lines

@@ -1,0 +1,34 @@
+"""What the XML formats share: a head that says what a file is, and inertia in the axes of the body."""
+
+from __future__ import annotations
+
+import textwrap
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
+
+from softrobots.checks import FloatArray
+from softrobots.rigid_tree import Body
+
+_WIDTH = 110
+
+
+def inertia_in_body(body: Body) -> FloatArray:
+    """Inertia about the centre of mass in the axes of the body, shape (3, 3) [kg m^2]."""
+    turn = body.centre.rotation
+    return turn @ body.inertia @ turn.T
+
+
+def document(root: ElementTree.Element, head: Iterable[str]) -> str:
+    """A whole document.
+
+    Args:
+        root: Its root element.
+        head: Paragraphs of the comment that it starts with.
+
+    Returns:
+        Text.
+    """
+    ElementTree.indent(root)
+    paragraphs = (textwrap.wrap(text.replace("--", "- -"), _WIDTH, break_long_words=False) for text in head)
+    lines = "\n     ".join(line for paragraph in paragraphs for line in paragraph)
+    return f'<?xml version="1.0" ?>\n<!-- {lines} -->\n{ElementTree.tostring(root, encoding="unicode")}\n'
