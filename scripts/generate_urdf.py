@@ -8,6 +8,7 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots.files import make_folder, write_atomically
+from softrobots.generated import generated_files
 from softrobots.paths import urdf_folder
 
 
@@ -31,9 +32,7 @@ def main(argv: list[str] | None = None) -> int:
 def update(folder: Path, *, check: bool) -> int:
     """Write or compare the files in a folder; return how many differed."""
     stale = 0
-    for name, robot in sr.ROBOTS.items():
-        path, text = folder / f"{name}.urdf", robot().urdf().encode("utf-8")
-        same = path.is_file() and path.read_bytes() == text
+    for path, text, same in generated_files(folder):
         if not check and not same:
             make_folder(folder)
             write_atomically(path, lambda file, content=text: file.write(content))

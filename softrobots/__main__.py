@@ -1,0 +1,8 @@
+"""`python -m softrobots` is the command `softrobots`."""
+
+import sys
+
+from softrobots.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,12 @@
+"""The subcommands of `softrobots`, one module each.
+
+A module has `add_parser(subparsers)`, which adds its parser and sets `run` on it: a function of the parsed arguments that does
+the job, raises errors of `softrobots.errors`, and returns None, or 1 if what it looked at is wrong.
+"""
+
+from softrobots.commands import doctor, export, urdf
+
+COMMANDS = (urdf, export, doctor)
+"""Modules of the subcommands, in the order of the help."""
+
+__all__ = ["COMMANDS"]
