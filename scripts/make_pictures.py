@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 import softrobots as sr
+from softrobots import inflated_beam
 from softrobots.browser import take_picture
 from softrobots.command_line import exit_status
+from softrobots.composition import fix_joints
+from softrobots.third_party import robot_file
+from softrobots.ur5_bench import UR5Bench
 
 
 def loaded_inflatable_arm() -> sr.Viewer:
@@ -42,11 +49,31 @@ def growing_helix_tube() -> sr.Viewer:
     return viewer
 
 
+def characterisation_bench() -> sr.Viewer:
+    """A UR5 pushes an inflated link through wrinkling (needs example-robot-data)."""
+    row = inflated_beam.TABLE_3[2]
+    link = sr.InflatableArm(link_lengths=(0.6,), stiffness=row.stiffness, pressure=row.pressure, max_moment=row.max_moment)
+    bench = UR5Bench(link=link)
+    viewer = sr.view(bench.model, bench.push(np.linspace(0.0, bench.push_end(), 41)).trajectory())
+    viewer.look_from(*bench.camera)
+    return viewer
+
+
+def ur5_with_soft_arm() -> sr.Viewer:
+    """A UR5 carries the inflatable arm with 1 kg at its tip (needs example-robot-data)."""
+    arm = fix_joints(sr.InflatableArm(), {"motor_1": 0.0, "motor_2": math.pi / 2, "motor_3": 0.0})
+    model = sr.load_model(sr.mount(robot_file("ur_description/urdf/ur5_robot.urdf"), "tool0", arm, xyz=(0.0, 0.0, 0.165)))
+    pose, payload = (0.0, -2.1, 1.9, 0.2, math.pi / 2, 0.0), (0.0, 0.0, -9.81)
+    return sr.view(model, sr.solve_equilibrium(model, pose, payload, gravity=sr.EARTH_GRAVITY))
+
+
 PICTURES = {
     "inflatable_arm": (loaded_inflatable_arm, "Inflatable arm, 18 N on the tip", 0.85),
     "pcc_arm": (loaded_pcc_arm, "PCC arm, held muscle lengths, own weight and 8 N on the tip", 0.0),
     "helix_tube": (sagging_helix_tube, "Helical tube under its own weight", 0.0),
     "helix_growth": (growing_helix_tube, "Growth of the helical tube", 0.45),
+    "ur5_bench": (characterisation_bench, "UR5 pushes an inflated link at 30 kPa", 0.8),
+    "ur5_with_soft_arm": (ur5_with_soft_arm, "UR5 with a soft arm, 1 kg at its tip", 0.0),
 }
 """What each picture shows, its title, and the share of its animation at which it is taken."""
 

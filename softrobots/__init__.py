@@ -1,6 +1,7 @@
 """Soft robots as rigid-body robot descriptions, with certified statics and inverse kinematics on Pinocchio."""
 
-from softrobots import constant_curvature, helix, inflated_beam
+from softrobots import constant_curvature, export, helix, inflated_beam
+from softrobots.composition import mount
 from softrobots.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.errors import (
     DescriptionError,
@@ -22,6 +23,7 @@ from softrobots.errors import (
     ViewerError,
 )
 from softrobots.growth import grown_coordinates
+from softrobots.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
 from softrobots.inverse_kinematics import IkSolution, solve_ik
 from softrobots.load_estimation import LoadEstimate, estimate_load
 from softrobots.loader import load_model
@@ -47,6 +49,7 @@ __all__ = [
     "FileFormatError",
     "HelixTube",
     "IkSolution",
+    "ImposedDisplacement",
     "InflatableArm",
     "LoadEstimate",
     "LoadNotFound",
@@ -77,12 +80,14 @@ __all__ = [
     "distributed_force",
     "elastostatic_jacobian",
     "estimate_load",
+    "export",
     "follow_trajectory",
     "grown_coordinates",
     "helix",
     "inflated_beam",
     "load_model",
     "load_result",
+    "mount",
     "quintic",
     "read_waypoints",
     "sample_workspace",
@@ -90,6 +95,7 @@ __all__ = [
     "save_result",
     "solve_equilibrium",
     "solve_ik",
+    "solve_imposed_displacement",
     "straight_line",
     "view",
     "waypoints",
