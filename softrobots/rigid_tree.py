@@ -173,10 +173,11 @@ def read_rigid_tree(urdf: str, source: str = "the URDF") -> RigidTree:
     """
     root = parse_xml(urdf, source)
     try:
-        bodies = {element.get("name", ""): _body(element) for element in root.findall("link")}
+        colours = {element.get("name", ""): element.find("color") for element in root.iter("material") if len(element)}
+        bodies = {element.get("name", ""): _body(element, colours) for element in root.findall("link")}
         joints = [_joint(element) for element in root.findall("joint")]
     except (ValueError, IndexError) as error:
-        raise DescriptionError(f"{source} has a number that is none: {error}") from error
+        raise DescriptionError(f"{source} cannot be read: {error}") from error
     carried = {joint.child for joint in joints}
     roots = [name for name in bodies if name not in carried]
     if root.tag != "robot" or len(roots) != 1:
@@ -238,9 +239,12 @@ def _placement(element: ElementTree.Element) -> Placement:
     return Placement(read_only(_numbers(origin, "xyz", "0 0 0")), read_only(np.asarray(pin.rpy.rpyToMatrix(*rpy))))
 
 
-def _body(link: ElementTree.Element) -> Body:
+_Colours = Mapping[str, ElementTree.Element | None]  # by name of the material
+
+
+def _body(link: ElementTree.Element, colours: _Colours) -> Body:
     inertial = link.find("inertial")
-    shapes = {kind: tuple(_shape(element) for element in link.findall(kind)) for kind in ("visual", "collision")}
+    shapes = {kind: tuple(_shape(element, colours) for element in link.findall(kind)) for kind in ("visual", "collision")}
     name = link.get("name", "")
     if inertial is None:
         return Body(name, 0.0, Placement(), np.zeros((3, 3)), shapes["visual"], shapes["collision"])
@@ -251,7 +255,7 @@ def _body(link: ElementTree.Element) -> Body:
     return Body(name, mass, _placement(inertial), inertia, shapes["visual"], shapes["collision"])
 
 
-def _shape(element: ElementTree.Element) -> Shape:
+def _shape(element: ElementTree.Element, colours: _Colours) -> Shape:
     geometry = element.find("geometry")
     found = next(iter(geometry)) if geometry is not None and len(geometry) else None
     if found is None or found.tag not in _SIZES:
@@ -260,7 +264,9 @@ def _shape(element: ElementTree.Element) -> Shape:
         size = _numbers(found, "scale", "1 1 1")
     else:
         size = np.concatenate([_numbers(found, name, "1 1 1" if name == "size" else "1") for name in _SIZES[found.tag]])
-    colour = element.find("material/color")
+    material, colour = element.find("material"), element.find("material/color")
+    if material is not None and colour is None:
+        colour = colours.get(material.get("name", ""))
     rgba = None if colour is None else tuple(_numbers(colour, "rgba", "1 1 1 1").tolist())
     return Shape(found.tag, tuple(size.tolist()), _placement(element), rgba, found.get("filename", ""))
 

@@ -10,15 +10,18 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import finite_array
+from softrobots.errors import DescriptionError
 from softrobots.export.meshes import MeshFiles, mujoco_reads
-from softrobots.export.prepared import PreparedRobot, neighbours, prepare
+from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
 from softrobots.export.servos import ANGLE_ERROR, Motor, Muscle, Servo
 from softrobots.export.xml_text import document, inertia_in_body
 from softrobots.model import SoftModel
-from softrobots.rigid_tree import Body, Joint, Placement, Shape, number_text
+from softrobots.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 
 _GREY = (0.6, 0.6, 0.6, 1.0)
 _DRAWN, _HIDDEN = "2", "3"  # MuJoCo's groups of shapes
+_SMALLEST = 1e-15  # [kg m^2], of a moving body
+_ROUNDING = 1e-12  # relative, of moments of inertia
 
 
 def to_mjcf(
@@ -55,10 +58,12 @@ def to_mjcf(
     Raises:
         ParameterError: If an argument does not fit, or the robot has sections of constant strain, springs that are not linear,
             or muscles of given length that were to be welded.
-        DescriptionError: If the robot has moving links without mass, or more joints than Pinocchio's workspace is made for.
+        DescriptionError: If the robot has moving links without mass or moments of inertia, a link with moments that no body
+            has, a link `world` that is not its root, or more joints than Pinocchio's workspace is made for.
     """
     field = np.zeros(3) if gravity is None else finite_array("gravity", gravity, (3,), "m/s^2")
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
+    _refuse(robot.tree)
     root = ElementTree.Element("mujoco", {"model": robot.tree.name or "robot"})
     compiler = {"angle": "radian", "autolimits": "true", "fusestatic": "false", "inertiafromgeom": "false"}
     ElementTree.SubElement(root, "compiler", compiler)
@@ -109,9 +114,7 @@ class _Bodies:
         if joint is not None and joint.movable:
             self._joint(element, joint)
         if body.mass > 0.0:
-            moments = inertia_in_body(body)
-            entries = (moments[pair] for pair in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-            inertial = {"pos": number_text(body.centre.position), "mass": repr(body.mass), "fullinertia": number_text(entries)}
+            inertial = {"pos": number_text(body.centre.position), "mass": repr(body.mass), **_inertia(body)}
             ElementTree.SubElement(element, "inertial", inertial)
         self._inside(element, body)
 
@@ -157,6 +160,41 @@ class _Bodies:
             made = {"name": self._mesh_names[key], "file": str(file), "scale": number_text(scale)}
             ElementTree.SubElement(self._assets, "mesh", made)
         return self._mesh_names[key]
+
+
+def _refuse(tree: RigidTree) -> None:
+    """Refuse what MuJoCo refuses: a second world, inertia of no body, and moving bodies without any."""
+    if any(body.name == "world" for body in tree.bodies[1:]):
+        raise DescriptionError(f"{tree.name} has a link world that is not its root; MuJoCo has that name for the root alone")
+    group, turning = weld_groups(tree), set()
+    for body in (body for body in tree.bodies if body.mass > 0.0):
+        low, middle, high = np.linalg.eigvalsh(inertia_in_body(body)).tolist()
+        if low < -_ROUNDING * high or low + middle < high * (1.0 - _ROUNDING):
+            raise DescriptionError(
+                f"link {body.name} of {tree.name} has the principal moments of inertia {low:g}, {middle:g}, {high:g} kg m^2, "
+                "which no body has and MuJoCo refuses; none below 0, and none above the sum of the others, is required"
+            )
+        if low >= _SMALLEST:
+            turning.add(group[body.name])
+    points = [joint.child for joint in tree.joints if joint.movable and joint.child not in turning]
+    if points:
+        raise DescriptionError(
+            f"{tree.name} has moving links without moments of inertia ({', '.join(points)}), which MuJoCo refuses; give them "
+            f"three of at least {_SMALLEST:g} kg m^2"
+        )
+
+
+def _inertia(body: Body) -> dict[str, str]:
+    """Inertia of a body; by principal moments where rounding alone may break the rules of MuJoCo (plates, rods, points)."""
+    moments = inertia_in_body(body)
+    (low, middle, high), axes = np.linalg.eigh(moments)
+    if low > _ROUNDING * high and low + middle > high * (1.0 + _ROUNDING):
+        entries = (moments[pair] for pair in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+        return {"fullinertia": number_text(entries)}
+    low = max(low, 0.0)
+    principal = (low, middle, min(high, low + middle))
+    turned = Placement(rotation=axes * np.sign(np.linalg.det(axes)))
+    return {"diaginertia": number_text(principal), "quat": number_text(turned.quaternion)}
 
 
 def _where(placement: Placement) -> dict[str, str]:

@@ -62,14 +62,18 @@ def to_sdf(
     Raises:
         ParameterError: If an argument does not fit, muscles were to be driven, or the robot has sections of constant strain,
             springs that are not linear, or muscles of given length.
-        DescriptionError: If the robot has moving links without mass, a link and a joint of one name, or more joints than
-            Pinocchio's workspace is made for.
+        DescriptionError: If the robot has moving links without mass, a link and a joint of one name or one that SDF has for
+            itself, or more joints than Pinocchio's workspace is made for.
     """
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
     if robot.muscles:
         raise ParameterError("actuators", actuators, '"welded" for a robot with muscles, which SDF has no word for')
     tree = robot.tree
     names = [body.name for body in tree.bodies] + [joint.name for joint in tree.joints]
+    reserved = [body.name for body in tree.bodies[1:] if body.name == _WORLD]
+    reserved += [name for name in names if "::" in name or (name.startswith("__") and name.endswith("__"))]
+    if reserved:
+        raise DescriptionError(f"{tree.name} has links or joints called {', '.join(reserved)}; SDF has those names for itself")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise DescriptionError(
@@ -88,7 +92,14 @@ class _Model:
     def __init__(self, element: ElementTree.Element, robot: PreparedRobot, limits: bool) -> None:
         self._element, self._robot, self._limits = element, robot, limits
         self._anchor = _anchors(robot.tree)
+        self._names = {body.name for body in robot.tree.bodies} | {joint.name for joint in robot.tree.joints}
+        self._world_shapes = self._free_name(_WORLD_SHAPES)
         self.meshes = MeshFiles()
+
+    def _free_name(self, wanted: str) -> str:
+        while wanted in self._names:
+            wanted += "_"
+        return wanted
 
     def write(self) -> None:
         """Write everything."""
@@ -99,7 +110,7 @@ class _Model:
             placement, parent = places.get(body.name, (Placement(), _WORLD))
             if body.name == _WORLD:
                 if body.visuals or body.collisions:
-                    links[_WORLD] = self._link(replace(body, name=_WORLD_SHAPES), placement, parent)
+                    links[_WORLD] = self._link(replace(body, name=self._world_shapes), placement, parent)
             elif body.name in self._anchor:
                 made = {"name": body.name, "attached_to": self._anchor[body.name]}
                 _write_pose(ElementTree.SubElement(self._element, "frame", made), placement, parent)
@@ -111,8 +122,8 @@ class _Model:
                 self._shapes(links[carrier], body, body.visuals, "visual", drawn_anywhere)
                 self._shapes(links[carrier], body, body.collisions, "collision", drake_collides)
         if tree.root != _WORLD or _WORLD in links:
-            child = tree.root if tree.root != _WORLD else _WORLD_SHAPES
-            self._joint(f"{child}_to_world", "fixed", _WORLD, child)
+            child = tree.root if tree.root != _WORLD else self._world_shapes
+            self._joint(self._free_name(f"{child}_to_world"), "fixed", _WORLD, child)
         for joint in tree.joints:
             if joint.movable:
                 self._moving(joint)
@@ -189,7 +200,7 @@ class _Model:
             made = {"name": f"neighbours_{number}"}
             group = ElementTree.SubElement(self._element, f"{{{DRAKE}}}collision_filter_group", made)
             for name in pair:
-                ElementTree.SubElement(group, f"{{{DRAKE}}}member").text = name if name != _WORLD else _WORLD_SHAPES
+                ElementTree.SubElement(group, f"{{{DRAKE}}}member").text = name if name != _WORLD else self._world_shapes
             ElementTree.SubElement(group, f"{{{DRAKE}}}ignored_collision_filter_group").text = made["name"]
 
 

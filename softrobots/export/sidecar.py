@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from typing import Any
 
 from softrobots.argument_notes import argument_notes
@@ -127,7 +128,8 @@ class _Parts:
         made: dict[str, Any] = {"name": joint.name, "type": joint.kind, "role": self._role(joint.name)}
         made |= {"parent": joint.parent, "child": joint.child}
         if joint.kind != "continuous":
-            for name, value in zip(("lower", "upper"), joint.limits, strict=True):
+            bounds = zip(("lower", "upper"), joint.limits, strict=True)
+            for name, value in ((name, value) for name, value in bounds if math.isfinite(value)):  # JSON has no infinity
                 made[name] = self._number(joint.name, name, value, position, "limit")
         made["damping"] = self._number(joint.name, "damping", joint.damping, damping, "dynamics")
         spring = self._model.structure.parts.springs.get(joint.name)

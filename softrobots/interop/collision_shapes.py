@@ -7,8 +7,8 @@ equilibrium in MuJoCo is off by 0.08 to 0.33 rad.
 from __future__ import annotations
 
 import copy
+import itertools
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Collection
 
 import pinocchio as pin
 
@@ -17,7 +17,7 @@ from softrobots.model import MAX_DOF
 
 
 def overlapping_shapes(document: UrdfDocument) -> Problems:
-    """Pairs of shapes that overlap with all joints at zero, on two links with a link without shapes between them.
+    """Pairs of shapes that overlap with all joints at zero, on two links that are not parent and child.
 
     Args:
         document: The file; shapes from mesh files are left out.
@@ -31,12 +31,14 @@ def overlapping_shapes(document: UrdfDocument) -> Problems:
         geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError):
         return  # what Pinocchio refuses is told by `checks`
+    if model.nv > MAX_DOF:  # `checks` tells of what is too large
+        return
     owners = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
-    for i, link in enumerate(owners):
-        above = _shaped_above(document, link, owners)
-        for j in (j for j, other in enumerate(owners) if other == above):
+    parents = {link: end_of(joint, "parent") for link, joint in document.carrier.items()}
+    for (j, above), (i, link) in itertools.combinations(enumerate(owners), 2):
+        if above != link and parents.get(link) != above and parents.get(above) != link:
             geometry.addCollisionPair(pin.CollisionPair(j, i))
-    if not len(geometry.collisionPairs) or model.nv > MAX_DOF:  # `checks` tells of what is too large
+    if not len(geometry.collisionPairs):
         return
     data = geometry.createData()
     pin.computeDistances(model, model.createData(), geometry, data, pin.neutral(model))
@@ -54,10 +56,3 @@ def _without_meshes(document: UrdfDocument) -> str:
             if element.find("geometry/mesh") is not None:
                 link.remove(element)
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def _shaped_above(document: UrdfDocument, link: str, shaped: Collection[str]) -> str | None:
-    """The next link with shapes towards the root, unless it is the parent: no tool lets parent and child collide."""
-    above = [end_of(document.joints[joint], "parent") for joint in document.way_to_root(link)]
-    found = next((place for place, name in enumerate(above) if name in shaped), 0)
-    return above[found] if found > 0 else None

@@ -183,11 +183,14 @@ def _springs(document: UrdfDocument) -> Problems:
     """Roles and springs tell softrobots what moves; their copies for Gazebo become SDF, for Drake and Gazebo."""
     if not document.has_tags:
         return
+    tags = [element for element in document.root.findall("gazebo") if element.find("springStiffness") is not None]
     copies = {
         element.get("reference", ""): tuple(element.findtext(key, "") for key in ("springStiffness", "springReference"))
-        for element in document.root.findall("gazebo")
-        if element.find("springStiffness") is not None
+        for element in tags
     }
+    for name, count in Counter(element.get("reference", "") for element in tags).items():
+        if count > 1:
+            yield name, f"joint {name} has {count} springs for Gazebo; one is required"
     for name, joint in document.moving.items():
         spring = tag_of(joint, "spring")
         if tag_of(joint, "role") is None:

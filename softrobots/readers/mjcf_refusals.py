@@ -75,12 +75,25 @@ def _actuators(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
     names = []
     for number, bias in enumerate(model.actuator_biastype.tolist()):
         still = bias == none or (bias == affine and not np.any(model.actuator_biasprm[number, :2]))
+        still = still and not _kept_from_zero(model, number)
         joint = driven_joint(mujoco, model, number)
         if still or (joint is not None and model.jnt_stiffness[joint] == 0.0):
             continue
         names.append(str(model.actuator(number).name) or f"actuator {number}")
     if names:
         yield f"actuators with a force of their own {_few(names)}", "only joints without stiffness can be motors"
+
+
+def _kept_from_zero(model: Any, actuator: int) -> bool:
+    """Whether the range of its control, activation or force leaves out zero, so that MuJoCo moves zero into it."""
+    return any(
+        limited[actuator] and not ranges[actuator, 0] <= 0.0 <= ranges[actuator, 1]
+        for limited, ranges in (
+            (model.actuator_ctrllimited, model.actuator_ctrlrange),
+            (model.actuator_actlimited, model.actuator_actrange),
+            (model.actuator_forcelimited, model.actuator_forcerange),
+        )
+    )
 
 
 def _elsewhere(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:

@@ -61,7 +61,18 @@ class TreeBuilder:
             source: Where it comes from, for errors.
             bodies: Names of all bodies to come; made-up links get others.
             joints: Names of all joints to come.
+
+        Raises:
+            DescriptionError: If a name is there twice: that of the file is the one that another body or joint is given.
         """
+        bodies, joints = list(bodies), list(joints)
+        for names in (bodies, joints):
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise DescriptionError(
+                    f"{source} has a name {', '.join(twice)} that is also made up for a part without one or in a nested model; "
+                    "choose another"
+                )
         self._name, self._source = name, source
         self._links, self._names = {"world", *bodies}, set(joints)
         self._bodies: list[Body] = [Body("world", 0.0, Placement(), read_only(np.zeros((3, 3))))]
