@@ -84,6 +84,9 @@ def measure(arguments: argparse.Namespace) -> Results:
         raise sr.MissingDependency(TOOLS[missing[0]].package, TOOLS[missing[0]].extra)
     asked = arguments.tools or [name for name, tool in TOOLS.items() if tool.version is not None]
     simulators = [name for name in SIMULATORS if name in asked]
+    if arguments.equilibrium_only and not simulators:
+        requirement = f"tools with one of {', '.join(SIMULATORS)} among them: the others have no statics"
+        raise sr.ParameterError("--tools", asked, requirement)
     results: Results = {"springs": [], "equilibrium": [], "kinematics": []}
     if not arguments.kinematics_only:
         results["springs"] = arriving_springs(simulators, arguments.robots)

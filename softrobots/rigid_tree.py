@@ -199,10 +199,14 @@ def write_rigid_tree(tree: RigidTree) -> str:
         tree: Bodies, joints and springs.
 
     Returns:
-        URDF text. A joint without finite limits becomes continuous if it turns.
+        URDF text, with the hints that keep links and springs in MuJoCo and Gazebo's parser. A joint without finite limits
+        becomes continuous if it turns.
     """
     ElementTree.register_namespace("softrobots", NAMESPACE)
     robot = ElementTree.Element("robot", {"name": tree.name or "robot"})
+    ElementTree.SubElement(
+        ElementTree.SubElement(robot, "mujoco"), "compiler", {"discardvisual": "false", "fusestatic": "false"}
+    )
     for body in tree.bodies:
         link = ElementTree.SubElement(robot, "link", {"name": body.name})
         if body.mass > 0.0:
@@ -218,6 +222,11 @@ def write_rigid_tree(tree: RigidTree) -> str:
                 _write_shape(ElementTree.SubElement(link, kind), shape)
     for joint in tree.joints:
         _write_joint(ElementTree.SubElement(robot, "joint", {"name": joint.name}), joint, tree.springs.get(joint.name))
+    for name, spring in tree.springs.items():
+        _write_hints(robot, name, springStiffness=repr(float(spring.stiffness)), springReference=repr(float(spring.rest)))
+    for joint in tree.joints:
+        if joint.child == (tree.tip or "tip") and joint.kind == "fixed":
+            _write_hints(robot, joint.name, preserveFixedJoint="true")
     if tree.tip is not None:
         ElementTree.SubElement(robot, f"{{{NAMESPACE}}}tip", {"link": tree.tip})
     ElementTree.indent(robot)
@@ -323,6 +332,13 @@ def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
         name = "colour_" + "_".join(f"{value:.6g}" for value in shape.rgba)
         material = ElementTree.SubElement(element, "material", {"name": name})
         ElementTree.SubElement(material, "color", {"rgba": number_text(shape.rgba)})
+
+
+def _write_hints(robot: ElementTree.Element, joint: str, **hints: str) -> None:
+    """Tell Gazebo's parser about a joint."""
+    element = ElementTree.SubElement(robot, "gazebo", {"reference": joint})
+    for name, value in hints.items():
+        ElementTree.SubElement(element, name).text = value
 
 
 def _write_joint(element: ElementTree.Element, joint: Joint, spring: SpringTag | None) -> None:

@@ -202,6 +202,16 @@ def test_urdf_translates_mjcf(told, tool, tmp_path: Path) -> None:
     assert sr.load_model(out).spring_table["j"][0] == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("write", [sr.export.to_mjcf, sr.export.to_sdf])
+def test_translations_follow_the_rules_that_files_of_ours_follow(write, arm: sr.SoftModel, told, tool, tmp_path: Path) -> None:
+    for name in ("mujoco", "pydrake"):
+        tool(name)
+    file = tmp_path / "robot.xml"
+    file.write_text(write(arm), encoding="utf-8")
+    status, out, err = told("urdf", str(file), "--check")
+    assert (status, err) == (0, ""), out
+
+
 def test_urdf_checks_files_robots_and_xacro_files(told) -> None:
     for words in ([str(ARM)], ["inflatable_arm"], [str(xacro_folder() / "inflatable_arm.urdf.xacro")]):
         status, out, err = told("urdf", *words, "--check")
@@ -285,6 +295,19 @@ def test_urdf_refuses_files_that_are_no_robot(told, tmp_path: Path) -> None:
 
 
 # --- softrobots doctor
+
+
+@pytest.mark.parametrize("words", [["urdf", "--check"], ["export", "-o", "made.xml"]])
+@pytest.mark.parametrize("name", ["robot.urdf", "robot.urdf.xacro"])
+def test_files_that_are_no_text_are_refused(
+    words: list[str], name: str, told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_bytes(b"solid \xff\xfe")
+    status, out, err = told(words[0], name, *words[1:])
+    assert (status, out) == (2, "")
+    assert err.startswith("error: cannot read")
+    assert name in err
 
 
 def test_doctor_finds_this_installation_well(told) -> None:

@@ -384,6 +384,11 @@ def test_the_script_refuses_numbers_of_poses_that_do_not_exist(poses: str, capsy
     assert "from 1 to 5" in capsys.readouterr().err
 
 
+def test_the_script_refuses_to_compare_nothing(capsys: pytest.CaptureFixture) -> None:
+    assert run_script(["--equilibrium-only", "--tools", "yourdfpy"]) == 2
+    assert "tools with one of MuJoCo, Drake, PyBullet" in capsys.readouterr().err
+
+
 def test_the_script_tells_of_a_tool_that_is_missing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     monkeypatch.setattr("softrobots.interop.tools.installed_version", lambda package: None)
     assert run_script(["--tools", "Drake"]) == 2

@@ -185,9 +185,13 @@ def is_urdf_file(path: Path) -> bool:
     """Whether the root tag of an XML file is that of URDF.
 
     Raises:
-        DescriptionError: If it is not XML.
+        DescriptionError: If it cannot be read, or is not XML.
     """
-    return parse_xml(path.read_text(encoding="utf-8-sig"), str(path)).tag == "robot"
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"cannot read {path}: {error}") from error
+    return parse_xml(text, str(path)).tag == "robot"
 
 
 def _pinocchio_poses(file: Path, label: str, count: int, seed: int) -> _Truth:
