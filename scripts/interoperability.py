@@ -87,6 +87,8 @@ def measure(arguments: argparse.Namespace) -> Results:
     if arguments.equilibrium_only and not simulators:
         requirement = f"tools with one of {', '.join(SIMULATORS)} among them: the others have no statics"
         raise sr.ParameterError("--tools", asked, requirement)
+    if arguments.kinematics_only and (arguments.no_simulation or arguments.poses != POSES or arguments.robots != list(ROBOTS)):
+        raise sr.ParameterError("--kinematics-only", True, "given without --robots, --poses and --no-simulation")
     results: Results = {"springs": [], "equilibrium": [], "kinematics": []}
     if not arguments.kinematics_only:
         results["springs"] = arriving_springs(simulators, arguments.robots)

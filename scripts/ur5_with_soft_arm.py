@@ -12,6 +12,7 @@ import argparse
 import json
 import math
 import sys
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -111,6 +112,7 @@ def run(arguments: argparse.Namespace) -> Path:
     arm, held = soft_arm(arguments)
     urdf = mounted(ur5, arm, held)
     model = sr.load_model(urdf)
+    within_limits("--pose", arguments.pose, model.motor_limits)
     folder = free_folder(arguments.output or Path("output") / f"ur5_with_soft_arm_{datetime.now():%Y%m%d_%H%M%S}")
 
     rigid = sr.solve_equilibrium(model, arguments.pose)  # without load
@@ -147,8 +149,17 @@ def soft_arm(arguments: argparse.Namespace) -> tuple[SoftArm, dict[str, float]]:
         return sr.PccArm(muscle_azimuths=()), {}
     if name == "helix_tube":
         return sr.HelixTube(**pressure), {}
-    angles = finite_array("--arm-angles", arguments.arm_angles or (0.0, math.pi / 2, 0.0), (3,), "rad")
-    return sr.InflatableArm(**pressure), {f"motor_{i + 1}": float(angle) for i, angle in enumerate(angles)}
+    arm, angles = sr.InflatableArm(**pressure), arguments.arm_angles or (0.0, math.pi / 2, 0.0)
+    within_limits("--arm-angles", angles, np.array([[-arm.motor_limit, arm.motor_limit]] * 3))
+    return arm, {f"motor_{i + 1}": float(angle) for i, angle in enumerate(angles)}
+
+
+def within_limits(option: str, angles: Sequence[float], limits: FloatArray) -> None:
+    """Refuse angles that are not finite or beyond limits, shape (n, 2) [rad]."""
+    checked = finite_array(option, angles, (len(limits),), "rad")
+    if np.any((checked < limits[:, 0]) | (checked > limits[:, 1])):
+        told = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in limits)
+        raise sr.ParameterError(option, list(angles), f"within the limits of the joints, {told} rad")
 
 
 def mounted(ur5: Path, arm: SoftArm, held: dict[str, float]) -> str:
@@ -213,6 +224,7 @@ def summarise(
         "payload_kg": load.payload,
         "tip_without_load_m": rigid.tip_position.tolist(),
         "sag_m": float(np.linalg.norm(same.tip_position - sr.solve_equilibrium(model, same.q_motors).tip_position)),
+        "path": len(before.times) > 1,
         "tip_error_before_m": float(before.tip_error.max()),
         "tip_error_after_m": float(after.tip_error[-1] if len(before.times) == 1 else after.tip_error.max()),
         "tip_turned_before_rad": turned(rigid, same),
@@ -254,18 +266,19 @@ def table(summary: dict[str, object]) -> str:
         for name, start, end, before, after, limit in rows
     ]
     carried, mass = float(summary["carried_mass_kg"]), float(summary["payload_kg"])  # type: ignore[arg-type]
+    way = (" (rigid IK, largest)", " (largest)") if summary["path"] else ("", "")
     facts = [
         ("carried by the flange", f"{carried:.3f} kg, {mass:g} kg of it at the tip (a UR5 may carry {UR5_PAYLOAD:g} kg)"),
         ("sag of the tip against the rigid arm", f"{1e3 * float(summary['sag_m']):.2f} mm"),  # type: ignore[arg-type]
-        ("tip error before", f"{1e3 * float(summary['tip_error_before_m']):.2f} mm"),  # type: ignore[arg-type]
-        ("tip error after compensation", f"{1e3 * float(summary['tip_error_after_m']):.1e} mm"),  # type: ignore[arg-type]
+        (f"tip error before{way[0]}", f"{1e3 * float(summary['tip_error_before_m']):.2f} mm"),  # type: ignore[arg-type]
+        (f"tip error after compensation{way[1]}", f"{1e3 * float(summary['tip_error_after_m']):.1e} mm"),  # type: ignore[arg-type]
         ("tip turned before", f"{float(summary['tip_turned_before_rad']):.4f} rad"),  # type: ignore[arg-type]
         ("tip turned after compensation", f"{float(summary['tip_turned_after_rad']):.4f} rad"),  # type: ignore[arg-type]
         ("largest moment of an inflated link", wrinkling(summary)),
         ("every equilibrium certified stable", "yes" if summary["all_stable"] else "NO"),
         ("joints within limits", "yes" if summary["within_limits"] else "NO"),
     ]
-    lines += ["", *(f"{name:<38}{value}" for name, value in facts)]
+    lines += ["", *(f"{name:<40}{value}" for name, value in facts)]
     over = [
         name
         for name, torque, limit in zip(

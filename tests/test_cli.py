@@ -21,6 +21,7 @@ from softrobots.interop.tools import TOOLS
 from softrobots.interop.urdf_rules import RULES
 from softrobots.paths import urdf_folder, xacro_folder
 from tests.conftest import CHECKOUT, missing
+from tests.foreign import BRANCHED, SPRINGS
 
 ARM = urdf_folder() / "inflatable_arm.urdf"
 
@@ -409,3 +410,30 @@ def test_versions_are_compared_by_their_numbers(version: str | None, minimum: st
     state = PackageState(Package("p", minimum, "", ""), version)
     assert state.ok == ok
     assert bool(state.advice) != ok
+
+
+# --- softrobots export
+
+
+def test_export_takes_springs_of_somebodys_robot(told, tmp_path: Path) -> None:
+    file, made = tmp_path / "branched.urdf", tmp_path / "branched.sdf"
+    file.write_text(BRANCHED, encoding="utf-8")
+    springs = ["--spring", "wrist=20,0.1", "--spring", "slider=800"]
+    status, out, err = told("export", str(file), *springs, "--tip", "finger", "-o", str(made))
+    assert (status, err) == (0, "")
+    assert "2 springs, 3 actuators" in out
+    model = sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
+    assert made.read_text(encoding="utf-8") == sr.export.to_sdf(model)
+
+
+@pytest.mark.parametrize("word", ["wrist", "wrist=", "wrist=soft", "=20", "wrist=20,far"])
+def test_export_refuses_words_that_are_no_spring(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["export", "arm.urdf", "--spring", word, "-o", "arm.xml"])
+    assert "JOINT=K" in capsys.readouterr().err
+
+
+def test_export_tells_what_it_wrote_of_sections(told, tmp_path: Path) -> None:
+    status, out, _ = told("export", "pcc_arm", "-o", str(tmp_path / "arm.json"))
+    assert status == 0
+    assert "8 sections, 0 springs, 6 actuators" in out

@@ -387,6 +387,8 @@ def test_the_script_refuses_numbers_of_poses_that_do_not_exist(poses: str, capsy
 def test_the_script_refuses_to_compare_nothing(capsys: pytest.CaptureFixture) -> None:
     assert run_script(["--equilibrium-only", "--tools", "yourdfpy"]) == 2
     assert "tools with one of MuJoCo, Drake, PyBullet" in capsys.readouterr().err
+    assert run_script(["--kinematics-only", "--poses", "2"]) == 2
+    assert "without --robots, --poses" in capsys.readouterr().err
 
 
 def test_the_script_tells_of_a_tool_that_is_missing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:

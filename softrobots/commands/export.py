@@ -23,6 +23,7 @@ _EXAMPLES = """examples:
   softrobots export pcc_arm_lumped hinges=6 -o pcc.xml
   softrobots export pcc_arm_lumped --muscles forces --welded --motors 20 5 5 10 0 0 -o pcc.sdf
   softrobots export helix_tube_lumped --format pybullet -o helix.py
+  softrobots export ur5.urdf --spring wrist_1_joint=40 --spring wrist_3_joint=25,0.1 --tip tool0 -o ur5.xml
 """
 
 
@@ -37,6 +38,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("robot", metavar="ROBOT", help=f"{', '.join(ROBOTS)}, or a file")
     parser.add_argument("parameters", nargs="*", metavar="FIELD=VALUE", help="parameters of the robot (softrobots urdf --list)")
+    told = "a spring of a joint of somebody's URDF, K [N m/rad or N/m], relaxed at REST [rad or m] (0); once for each joint"
+    parser.add_argument("--spring", action="append", type=_spring, default=[], metavar="JOINT=K[,REST]", help=told)
+    parser.add_argument("--tip", metavar="LINK", help="the link that is the tip (as the file says, or its only end)")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="the file to write")
     told = "; ".join(f"{name} ({row.suffix}): {row.meaning}" for name, row in FORMATS.items())
     parser.add_argument("--format", choices=FORMATS, help=f"{told}. By default what the suffix of FILE says")
@@ -67,7 +71,22 @@ def run(arguments: argparse.Namespace) -> None:
     source = robot_source(arguments.robot, arguments.parameters)
     if "robot" in FORMATS[name].options and isinstance(source, PackagedRobot):
         options["robot"] = source  # for the sources of its numbers
-    model = load_model(source, muscles=arguments.muscles)
+    model = load_model(source, springs=dict(arguments.spring) or None, tip=arguments.tip, muscles=arguments.muscles)
     path = export_model(model, arguments.output, name, overwrite=arguments.overwrite, **options)
-    kept = f"{len(model.structure.spring_joints)} springs, {model.n_motors}{' welded' if arguments.welded else ''} actuators"
+    sections = f"{len(model.structure.section_table)} sections, " if model.structure.sections is not None else ""
+    welded = " welded" if arguments.welded else ""
+    kept = f"{sections}{len(model.structure.spring_joints)} springs, {model.n_motors}{welded} actuators"
     sys.stdout.write(f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}\n")
+
+
+def _spring(word: str) -> tuple[str, tuple[float, float]]:
+    """A spring as it is typed, JOINT=K or JOINT=K,REST."""
+    joint, equals, numbers = word.rpartition("=")
+    stiffness, _, rest = numbers.partition(",")
+    try:
+        spring = float(stiffness), float(rest or 0.0)
+    except ValueError:
+        equals = ""
+    if not joint or not equals:
+        raise argparse.ArgumentTypeError(f"{word!r}: JOINT=K or JOINT=K,REST is required")
+    return joint, spring

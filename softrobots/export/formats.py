@@ -93,5 +93,6 @@ def guess_format(path: str | os.PathLike[str]) -> str:
     found = [name for name, row in FORMATS.items() if row.suffix == suffix]
     if len(found) != 1:
         told = ", ".join(found) or ", ".join(f"{name} ({row.suffix})" for name, row in FORMATS.items())
-        raise ParameterError("format", None, f"said for a file that ends in {suffix or 'nothing'}: one of {told}")
+        given = f"(not given, for {path})"
+        raise ParameterError("format", given, f"said for such a file name, by --format or format=: {told}")
     return found[0]

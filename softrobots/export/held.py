@@ -54,14 +54,14 @@ def check_linear(model: Any) -> SoftModel:
     if checked.structure.sections is not None:
         raise ParameterError(
             "model",
-            checked,
-            'a chain of joint springs, as chain="lumped" makes it: the six joints of a section of constant strain follow four '
-            "coordinates by a map that is not linear, which no simulator holds",
+            checked.pinocchio.name,
+            'a chain of joint springs, as chain="lumped" makes it (pcc_arm_lumped, helix_tube_lumped): the six joints of a '
+            "section of constant strain follow four coordinates by a map that is not linear, which no simulator holds",
         )
     if type(checked.springs) is not LinearSprings:
         raise ParameterError(
             "model",
-            checked,
+            checked.pinocchio.name,
             f"a robot with linear springs, not {type(checked.springs).__name__}: simulators know no other law of a joint "
             "spring, and a file with linear ones would be another robot",
         )
@@ -79,7 +79,7 @@ def check_joint_springs(model: Any) -> SoftModel:
     if checked.muscles and checked.muscle_input != "forces":
         raise ParameterError(
             "model",
-            checked,
+            checked.pinocchio.name,
             'a robot whose muscles have given tensions, load_model(..., muscles="forces") with the muscle_forces of an '
             "equilibrium: muscles of given length tie the joints of a segment together, which is no joint spring",
         )
