@@ -23,7 +23,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import bench_plots, inflated_beam, plots
-from softrobots.checks import positive_integer
+from softrobots.checks import non_negative_number, positive_integer
 from softrobots.command_line import exit_status
 from softrobots.files import csv_text, free_folder, make_folder, write_text
 from softrobots.inflated_beam import CharacterisationRow, fit_characterisation
@@ -65,6 +65,10 @@ def run(arguments: argparse.Namespace) -> Path:
     if steps < 10:
         raise sr.ParameterError("--steps", steps, "at least 10, for slope and plateau to be told apart")
     shown = _shown(arguments.scene_pressure, rows)
+    for name, deviation in zip(("FORCE", "ANGLE"), arguments.noise, strict=True):
+        non_negative_number(f"--noise {name}", deviation)
+    if arguments.seed < 0:
+        raise sr.ParameterError("--seed", arguments.seed, "a whole number from 0")
     if not arguments.no_plots:
         plots.require_matplotlib()  # tells at once what is missing
     folder = free_folder(arguments.output or Path("output") / f"ur5_bench_{datetime.now():%Y%m%d_%H%M%S}")

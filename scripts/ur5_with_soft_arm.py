@@ -143,6 +143,8 @@ def soft_arm(arguments: argparse.Namespace) -> tuple[SoftArm, dict[str, float]]:
     name, pressure = arguments.robot, {} if arguments.pressure is None else {"pressure": arguments.pressure}
     if name != "inflatable_arm" and arguments.arm_angles is not None:
         raise sr.ParameterError("--arm-angles", arguments.arm_angles, f"left out with --robot {name}, which has no motors")
+    if name != "pcc_arm" and pressure:
+        positive_number("--pressure", arguments.pressure, "Pa")  # without it there is no wrinkling margin
     if name == "pcc_arm":
         if pressure:
             raise sr.ParameterError("--pressure", arguments.pressure, "left out with --robot pcc_arm, which is not inflated")

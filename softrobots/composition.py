@@ -89,8 +89,8 @@ def mount(
         if np.any(base.placement.position) or np.any(base.placement.rotation != np.eye(3)):
             pose = pose @ base.placement
             position, angles = pose.position, pose.rpy
-    _prepare_child(child, base, carrier)
-    prefix_names(child.dom, prefix)
+    prefix_names(child.dom, prefix)  # first: what refers to the joint on the world gets its new name, too
+    _prepare_child(child, base, carrier, prefix)
     for tag in ours(carrier.dom, "tip") if tip is not None else ():
         carrier.dom.removeChild(tag)
     _check_names(carrier, child, prefix, prefix + joint)
@@ -138,7 +138,7 @@ def fix_joints(robot: Robot | Path | str, positions: Mapping[str, float]) -> str
     movable = {joint.name: joint for joint in part.tree.joints if joint.movable}
     inside = {name for section in part.tags.sections for name in section.joints}
     elements = {e.getAttribute("name"): e for e in children(part.dom) if e.tagName == "joint"}
-    followed = {m.getAttribute("joint"): n for n, e in elements.items() for m in e.getElementsByTagName("mimic")}
+    mimics = [(m.getAttribute("joint"), n) for n, e in elements.items() for m in e.getElementsByTagName("mimic")]
     for name, value in positions.items():
         if name not in movable:
             raise NameNotFound("movable joint", str(name), movable)
@@ -148,8 +148,9 @@ def fix_joints(robot: Robot | Path | str, positions: Mapping[str, float]) -> str
             raise ParameterError(f"positions[{name!r}]", value, f"within the limits {list(joint.limits)}")
         if name in part.tags.springs or name in inside:
             raise DescriptionError(f"{where} is elastic; only joints without a spring can be fixed")
-        if followed.get(name, name) not in positions:
-            raise DescriptionError(f"{where} is mimicked by {followed[name]}; fix that joint, too")
+        following = [follower for followed, follower in mimics if followed == name and follower not in positions]
+        if following:
+            raise DescriptionError(f"{where} is mimicked by {', '.join(following)}; fix that, too")
         if joint.kind not in ("revolute", "continuous", "prismatic"):
             raise DescriptionError(f"{where} is {joint.kind}; revolute, continuous and prismatic joints can be fixed")
     for name, value in positions.items():
@@ -197,15 +198,20 @@ def _joint_on_world(part: _Part) -> Joint | None:
     root = part.tree.body(part.tree.root)
     joints = part.tree.joints_of(root.name)
     empty = root.name == _WORLD and root.mass == 0.0 and not root.visuals and not root.collisions
+    empty = empty and part.tip != root.name
     return joints[0] if empty and len(joints) == 1 and not joints[0].movable else None
 
 
-def _prepare_child(child: _Part, base: Joint | None, carrier: _Part) -> None:
-    """Take out what the whole has once, or not at all."""
+def _prepare_child(child: _Part, base: Joint | None, carrier: _Part, prefix: str) -> None:
+    """Take out what the whole has once, or not at all; names have their prefix already."""
     gone = ours(child.dom, "tip")
     for element in children(child.dom):
-        on_world = base is not None and element.getAttribute("name") in (_WORLD, base.name)
-        if element.tagName in ("link", "joint") and on_world:
+        if base is not None and (element.tagName, element.getAttribute("name")) in (
+            ("link", prefix + _WORLD),
+            ("joint", prefix + base.name),
+        ):
+            gone.append(element)
+        if base is not None and element.tagName == "gazebo" and element.getAttribute("reference") == prefix + _WORLD:
             gone.append(element)
         if element.tagName == "mujoco" and any(other.tagName == "mujoco" for other in children(carrier.dom)):
             gone.append(element)

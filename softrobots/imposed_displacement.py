@@ -33,6 +33,7 @@ _GAP = 1e-12  # largest distance of the probe from where it is meant to be, rela
 _LARGEST_STEP = 0.5  # [rad], norm of one Newton step
 _NEWTON_STEPS = 20
 _SHORTEST = 1e-6  # share of the way that is not halved again
+_SMALL_MOVE = 0.01  # [rad or m] of a spring: so near that no other path is meant
 _STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the springs' own stiffness
 
 
@@ -176,6 +177,19 @@ class _Held(NamedTuple):
     tangent: FloatArray
     """With the force turning as the robot does."""
 
+    def step(self, torque: FloatArray, way: float) -> FloatArray | None:
+        """Change of springs and reaction that takes up a torque, shape (n,) [N m or N], and moves the probe by a way [m].
+
+        Shape (n + 1,); None where the path turns back.
+        """
+        n = len(torque)
+        matrix: FloatArray = np.zeros((n + 1, n + 1))
+        matrix[:n, :n], matrix[:n, n], matrix[n, :n] = self.tangent, -self.contact.gradient, self.contact.gradient
+        try:
+            return np.asarray(np.linalg.solve(matrix, np.append(torque, way)))
+        except np.linalg.LinAlgError:
+            return None
+
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
@@ -203,7 +217,6 @@ class _Problem:
     def newton(self, here: _Held, wanted: float, most: int) -> tuple[_Held | None, int]:
         """Newton to a displacement from nearby, and the evaluations spent; None where it does not converge in `most`."""
         n = self.model.n_springs
-        matrix: FloatArray = np.zeros((n + 1, n + 1))
         for iteration in range(1, most + 1):
             gap = wanted - here.contact.displacement
             if not math.isfinite(here.state.error) or not math.isfinite(gap):
@@ -211,12 +224,8 @@ class _Problem:
             settled = here.state.error <= largest_residual(self.model, here.state.scale, self.tolerance)
             if settled and abs(gap) <= self.largest_gap:
                 return here, iteration
-            matrix[:n, :n], matrix[:n, n], matrix[n, :n] = here.tangent, -here.contact.gradient, here.contact.gradient
-            try:
-                step = np.linalg.solve(matrix, np.append(-here.state.residual, gap))
-            except np.linalg.LinAlgError:
-                return None, iteration
-            if not np.linalg.norm(step[:n]) <= _LARGEST_STEP:
+            step = here.step(-here.state.residual, gap)
+            if step is None or not np.linalg.norm(step[:n]) <= _LARGEST_STEP:
                 return None, iteration
             here = self.at(here.state.q_springs + step[:n], here.reaction + float(step[n]))
         return None, most
@@ -232,11 +241,31 @@ def _follow(problem: _Problem, here: _Held, wanted: float, most: int) -> tuple[_
             part = wanted if aim == 1.0 else origin + aim * (wanted - origin)
             there, used = problem.newton(here, part, min(_NEWTON_STEPS, most - spent))
             spent += used
-            if there is None:
+            if there is None or not _same_path(problem, here, there):
                 step *= 0.5
             else:
                 here, reached, step = there, aim, 2.0 * step
     return here, spent
+
+
+def _same_path(problem: _Problem, here: _Held, there: _Held) -> bool:
+    """Whether a step is sure to have stayed on the path: a short one, or one that went about where the path points.
+
+    A long one that ends unstable where it began stable is not: beyond the knee of a link, Newton finds the path on which a
+    second one goes limp, too, as easily as the one on which that unloads.
+    """
+    moved = there.state.q_springs - here.state.q_springs
+    if np.abs(moved).max() <= _SMALL_MOVE:
+        return True
+    model = problem.model
+    stable = [_stable_while_held(model, held.tangent, held.contact.gradient) for held in (here, there)]
+    if stable[0] and not stable[1]:
+        return False
+    predicted = here.step(np.zeros(len(moved)), there.contact.displacement - here.contact.displacement)
+    if predicted is None:
+        return False
+    missed, expected = np.abs(moved - predicted[:-1]).max(), np.abs(predicted[:-1]).max()
+    return bool(missed <= max(0.5 * expected, _SMALL_MOVE))
 
 
 def _result(problem: _Problem, held: _Held, wanted: float, iterations: int) -> ImposedDisplacement:

@@ -96,6 +96,9 @@ def estimate_load(
     With more than three motors the fit is least squares; with fewer the force is the one that the damped search finds from
     zero, close to the smallest.
 
+    Where a link has a largest moment, several forces may give the same torques, with the link on its plateau or not, and
+    "newton" returns the one that it comes to from zero, or none where the plateau bars the way.
+
     Args:
         model: The robot, with at least one motor.
         q_motors: Motor coordinates, shape (n_motors,) [rad or m].

@@ -75,7 +75,7 @@ class UR5Bench:
     without gravity, as the paper's model. The motors of the link are locked.
 
     Raises:
-        ParameterError: If the link is not one link, or a number is out of range.
+        ParameterError: If the link is not one link, is bent at rest, or a number is out of range.
     """
 
     link: InflatableArm
@@ -93,6 +93,8 @@ class UR5Bench:
         """Check the numbers."""
         if not isinstance(self.link, InflatableArm) or self.link.n_links != 1:
             raise ParameterError("link", self.link, "an InflatableArm with one link")
+        if any(np.ravel(self.link.rest_side)) or any(np.ravel(self.link.rest_up)):
+            raise ParameterError("link", self.link, "straight at rest: the probe pushes orthogonally to the axis of the link")
         for name in ("probe_length", "ball_radius"):
             positive_number(name, getattr(self, name), "m")
         if positive_number("probe_distance", self.probe_distance, "m") >= self.length:

@@ -231,7 +231,8 @@ class Viewer:
         """
         along, middle = tip - self._start, 0.5 * (self._start + tip)
         azimuth = np.arctan2(along[1], along[0]) - np.deg2rad(78.0)
-        away = 0.94 * self._size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
+        size = max(self._size, 0.95 * float(np.linalg.norm(along)))  # a robot that is bent at rest may be stretched out here
+        away = 0.94 * size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
         self.look_from(middle + away, middle)
 
     def look_from(self, eye: Any, centre: Any) -> None:

@@ -355,3 +355,30 @@ def test_what_does_not_fit_is_refused(arguments: tuple, options: dict, error: ty
 def test_joints_that_cannot_be_fixed_are_refused(robot: object, positions: object, error: type, message: str) -> None:
     with pytest.raises(error, match=message):
         fix_joints(robot, positions)
+
+
+def test_every_joint_that_mimics_a_fixed_one_must_be_fixed() -> None:
+    followers = [
+        joint(name, parent, child, "0 0 1").replace("<limit", '<mimic joint="j1"/><limit')
+        for name, parent, child in (("j2", "b", "c"), ("j3", "c", "d"))
+    ]
+    text = '<link name="a"/>' + joint("j1", "a", "b", "0 0 1") + "".join(followers)
+    with pytest.raises(sr.DescriptionError, match="mimicked by j2"):
+        fix_joints(f'<robot name="r">{text}</robot>', {"j1": 0.3, "j3": 0.3})
+
+
+ON_WORLD = '<link name="world"/>' + joint("base_fixed", "world", "base", "0 0 1", "fixed")
+
+
+def test_references_to_the_joint_on_the_world_get_its_new_name() -> None:
+    tags = '<gazebo reference="world"><static>1</static></gazebo><gazebo reference="base_fixed"><a>1</a></gazebo>'
+    whole = sr.mount(sr.InflatableArm(), "tip", f'<robot name="r">{ON_WORLD}{tags}</robot>')
+    assert '<gazebo reference="soft_base_fixed">' in whole
+    assert '<gazebo reference="base_fixed">' not in whole
+    assert '<gazebo reference="world">' not in whole
+
+
+def test_a_world_that_is_the_tip_stays() -> None:
+    tag = '<softrobots:tip xmlns:softrobots="urn:softrobots:urdf" link="world"/>'
+    model = sr.load_model(sr.mount(sr.InflatableArm(), "tip", f'<robot name="r">{ON_WORLD}{tag}</robot>'))
+    assert model.tip == "soft_world"

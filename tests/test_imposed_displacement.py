@@ -302,3 +302,27 @@ def test_a_robot_without_springs_and_a_frame_that_is_not_there_are_refused(one: 
         sr.solve_imposed_displacement(one, (0, 0), 0.01, direction=(0, 0, 1), frame="probe")
     with pytest.raises(sr.ParameterError, match="model"):
         sr.solve_imposed_displacement("arm", (0, 0), 0.01, direction=(0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    ("motors", "direction", "displacement", "along"),
+    [
+        # At once, Newton lands where both links are limp (unstable), while on the path the second one unloads.
+        ((0.90865768, 1.16468892, 1.21750246), (0.43418114, -0.88488188, -0.00938766), 0.4, (1.0, 0.0, 0.0)),
+        ((0.67992841, 0.68332295, -0.99980484), (-2.73710131, -0.95061033, -1.41968199), 0.36, None),
+        # From there no step led on.
+        ((0.67992841, 0.68332295, -0.99980484), (-2.73710131, -0.95061033, -1.41968199), 0.69178, None),
+    ],
+)
+def test_one_step_ends_on_the_path_of_many(
+    motors: tuple[float, ...], direction: tuple[float, ...], displacement: float, along: tuple[float, ...] | None
+) -> None:
+    model = sr.load_model(sr.InflatableArm(max_moment=14.0, rest_up=0.05))
+    at_once = sr.solve_imposed_displacement(model, motors, displacement, direction=direction, along=along)
+    held = None
+    for way in np.linspace(0.0, displacement, 101):
+        held = sr.solve_imposed_displacement(model, motors, way, direction=direction, along=along, start=held)
+    assert held is not None
+    assert at_once.stable
+    assert held.stable
+    np.testing.assert_allclose(at_once.q_springs, held.q_springs, rtol=0.0, atol=1e-8)  # both solve to 1e-10 N m

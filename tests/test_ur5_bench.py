@@ -349,7 +349,7 @@ def test_without_robot_data_the_script_says_what_to_install(
         (["--scene-pressure", "20", "--pressures", "10"], "--scene-pressure"),
         (["--beyond", "1"], "beyond"),
         (["--beyond", "20", "--pressures", "50"], "where the ball leaves the end of the link"),
-        (["--noise", "-1", "0", "--pressures", "10", "--steps", "10"], "force_std"),
+        (["--noise", "-1", "0", "--pressures", "10", "--steps", "10"], "--noise"),
     ],
 )
 def test_the_script_refuses_bad_input_and_leaves_nothing(
@@ -359,3 +359,8 @@ def test_the_script_refuses_bad_input_and_leaves_nothing(
     assert run_script("ur5_bench", [*arguments, "--output", str(folder)]) == 2
     assert told in capsys.readouterr().err
     assert not folder.exists()
+
+
+def test_the_bench_refuses_a_link_that_is_bent_at_rest() -> None:
+    with pytest.raises(sr.ParameterError, match="straight"):
+        UR5Bench(link=sr.InflatableArm(link_lengths=(0.6,), rest_side=0.1))
