@@ -25,7 +25,8 @@ from softrobots.renaming import children, ours, prefix_names, shift_segments, us
 from softrobots.rigid_tree import Joint, Placement, RigidTree, number_text, read_rigid_tree
 from softrobots.robots import Robot
 from softrobots.sources import read_source
-from softrobots.urdf_tags import NAMESPACE, RobotTags, read_tags
+from softrobots.tag_reader import read_tags
+from softrobots.urdf_tags import NAMESPACE, RobotTags
 
 _WORLD = "world"
 _JOINT_DETAILS = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")

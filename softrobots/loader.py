@@ -19,7 +19,8 @@ from softrobots.robots import Robot
 from softrobots.sources import read_source
 from softrobots.strain_chain import joint_positions
 from softrobots.structure import Parts
-from softrobots.urdf_tags import RobotTags, SectionTag, SpringTag, read_tags
+from softrobots.tag_reader import read_tags
+from softrobots.urdf_tags import RobotTags, SectionTag, SpringTag
 
 
 def load_model(

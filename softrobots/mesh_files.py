@@ -5,16 +5,15 @@ A URDF names a mesh as `package://<package>/<path>`, as `file://<path>`, or as a
 
 from __future__ import annotations
 
+import html
 import os
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from xml.sax.saxutils import escape, unescape
 
 from softrobots.description import parse_xml
 
-_QUOTES = {'"': "&quot;", "'": "&apos;"}
 _MESH = re.compile(r"""(<mesh\b[^>]*?\bfilename\s*=\s*)(?:"([^"]*)"|'([^']*)')""")
 
 
@@ -48,10 +47,10 @@ def with_absolute_paths(urdf: str, folder: Path) -> str:
     """
 
     def absolute(match: re.Match[str]) -> str:
-        name = unescape(match[2] if match[2] is not None else match[3], {code: sign for sign, code in _QUOTES.items()})
+        name = html.unescape(match[2] if match[2] is not None else match[3])
         if not name.strip() or "://" in name or Path(name).is_absolute():
             return match[0]
-        return f'{match[1]}"{escape(str((folder / name).resolve()), _QUOTES)}"'
+        return f'{match[1]}"{html.escape(str((folder / name).resolve()))}"'
 
     return _MESH.sub(absolute, urdf)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import metadata
 from pathlib import Path
 
 from softrobots.errors import MissingDependency, NameNotFound
@@ -39,6 +38,8 @@ def package_folders() -> list[str]:
 
 
 def _share() -> Path:
+    from importlib import metadata  # brings the email package along
+
     try:
         distribution = metadata.distribution("example-robot-data")
     except metadata.PackageNotFoundError as error:

@@ -16,8 +16,8 @@ import pytest
 import softrobots as sr
 from softrobots.composition import fix_joints
 from softrobots.kinematics import frame_placement
+from softrobots.tag_reader import read_tags
 from softrobots.third_party import robot_file
-from softrobots.urdf_tags import read_tags
 from tests.conftest import missing
 from tests.foreign import INERTIAL, joint
 

@@ -19,7 +19,8 @@ import softrobots as sr
 from softrobots.description import declared_arguments, expand, parse_xml
 from softrobots.paths import urdf_folder, xacro_folder
 from softrobots.robots import HelixTube, PccArm
-from softrobots.urdf_tags import NAMESPACE, read_tags
+from softrobots.tag_reader import read_tags
+from softrobots.urdf_tags import NAMESPACE
 from tests.oracles import tube_points
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO

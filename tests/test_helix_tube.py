@@ -30,7 +30,8 @@ from softrobots.description import expand
 from softrobots.kinematics import frame_placement
 from softrobots.paths import urdf_folder, xacro_folder
 from softrobots.robots import HelixTube
-from softrobots.urdf_tags import NAMESPACE, read_tags
+from softrobots.tag_reader import read_tags
+from softrobots.urdf_tags import NAMESPACE
 from tests.helix_rods import actuator_frames, gauss
 from tests.test_pcc_description import changed, check_portable, edited, gazebo_numbers, link_masses, link_poses, within_joint
 

@@ -24,8 +24,8 @@ from softrobots.interop.kinematics import compare_kinematics, pose_error
 from softrobots.interop.tools import TOOLS, find_tool, installed_tools
 from softrobots.paths import urdf_folder
 from softrobots.robots import HelixTube, InflatableArm, PccArm, Robot
+from softrobots.tag_reader import read_tags
 from softrobots.third_party import robot_file
-from softrobots.urdf_tags import read_tags
 from tests.conftest import missing
 from tests.foreign import BRANCHED, INERTIAL, joint
 

@@ -25,7 +25,9 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
     code = "import softrobots, sys; print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
     assert "pinocchio" in loaded
-    assert not loaded & {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "mujoco", "tqdm"}
+    heavy = {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "tqdm"}
+    heavy |= {"mujoco", "pydrake", "pybullet", "urchin", "ikpy", "roboticstoolbox", "viser"}
+    assert not loaded & (heavy | {"urllib.request"})  # brings http, ssl and email along, an eighth of the whole
 
 
 def test_every_public_name_exists() -> None:
@@ -71,18 +73,37 @@ def imports_of(file: Path) -> set[str]:
     return found
 
 
-def test_imports_point_one_way() -> None:
-    """No cycle among the modules, not even through an import inside a function."""
+def import_graph() -> dict[str, set[str]]:
+    """Which modules each module of the package imports, also inside functions."""
     files = {
         ".".join(f.relative_to(CHECKOUT).with_suffix("").parts).removesuffix(".__init__"): f for f in PACKAGE.rglob("*.py")
     }
-    graph = {
+    return {
         name: (imports_of(file) & files.keys()) - {name, "softrobots"} for name, file in files.items() if name != "softrobots"
     }
+
+
+def test_imports_point_one_way() -> None:
+    """No cycle among the modules, not even through an import inside a function."""
+    graph = import_graph()
     while graph:
         leaves = {name for name, needs in graph.items() if not needs & graph.keys()}
         assert leaves, f"a cycle among {sorted(graph)}"
         graph = {name: needs for name, needs in graph.items() if name not in leaves}
+
+
+def test_the_statics_knows_nothing_of_descriptions_arms_and_other_tools() -> None:
+    graph = import_graph()
+    reached = {
+        f"softrobots.{name}" for name in ("trajectory", "load_estimation", "imposed_displacement", "stability", "workspace")
+    }
+    assert reached < graph.keys()
+    while new := {needed for name in reached for needed in graph[name]} - reached:
+        reached |= new
+    assert "softrobots.elastostatics" in reached
+    roots = {name.split(".")[1] for name in reached}
+    assert not roots & {"robots", "helix", "constant_curvature", "export", "readers", "interop", "commands", "composition"}
+    assert not roots & {"description", "tag_reader", "rigid_tree", "rigid_tree_urdf", "sources", "loader", "scene", "viewer"}
 
 
 def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
@@ -92,6 +113,10 @@ def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
         "paths",
         "description",
         "urdf_tags",
+        "tag_reader",
+        "mesh_files",
+        "renaming",
+        "argument_notes",
         "springs",
         "time_law",
         "stumpff",

@@ -27,7 +27,8 @@ from softrobots.description import expand
 from softrobots.kinematics import frame_placement
 from softrobots.paths import xacro_folder
 from softrobots.robots import PccArm
-from softrobots.urdf_tags import NAMESPACE, read_tags
+from softrobots.tag_reader import read_tags
+from softrobots.urdf_tags import NAMESPACE
 
 XACRO = xacro_folder() / PccArm.XACRO
 SHAPES: tuple[dict[str, Any], ...] = (

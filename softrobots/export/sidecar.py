@@ -18,7 +18,8 @@ from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model import SoftModel, check_model
 from softrobots.paths import xacro_folder
 from softrobots.rigid_tree import Joint, read_rigid_tree
-from softrobots.urdf_tags import LumpedSectionTag, SectionTag, read_tags
+from softrobots.tag_reader import read_tags
+from softrobots.urdf_tags import LumpedSectionTag, SectionTag
 
 FORMAT = "softrobots sidecar"
 """What the files call themselves."""

@@ -13,7 +13,7 @@ from softrobots.interop.urdf_rules import Finding, check_rules
 from softrobots.loader import load_model
 from softrobots.robots import Robot
 from softrobots.sources import read_source
-from softrobots.urdf_tags import read_tags
+from softrobots.tag_reader import read_tags
 
 
 def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[Finding, ...]:
