@@ -26,7 +26,7 @@ from softrobots.checks import FloatArray, finite_array, non_negative_number, pos
 from softrobots.command_line import exit_status
 from softrobots.composition import fix_joints
 from softrobots.files import free_folder, make_folder, write_text
-from softrobots.rigid_tree import read_rigid_tree
+from softrobots.rigid_tree_urdf import read_rigid_tree
 from softrobots.third_party import robot_file
 
 UR5 = "ur_description/urdf/ur5_robot.urdf"

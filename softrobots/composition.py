@@ -22,7 +22,8 @@ from softrobots.description import expand
 from softrobots.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.paths import xacro_folder
 from softrobots.renaming import children, ours, prefix_names, shift_segments, used_names
-from softrobots.rigid_tree import Joint, Placement, RigidTree, number_text, read_rigid_tree
+from softrobots.rigid_tree import Joint, Placement, RigidTree, number_text
+from softrobots.rigid_tree_urdf import read_rigid_tree
 from softrobots.robots import Robot
 from softrobots.sources import read_source
 from softrobots.tag_reader import read_tags
@@ -278,12 +279,7 @@ def _fix(document: minidom.Document, element: minidom.Element, joint: Joint, pos
             element.removeChild(inner)
     if position == 0.0:
         return
-    turns = joint.kind != "prismatic"
-    moved = Placement(
-        read_only(np.zeros(3) if turns else position * joint.axis),
-        read_only(np.asarray(pin.exp3(position * joint.axis)) if turns else np.eye(3)),
-    )
-    placed = joint.placement @ moved
+    placed = joint.placement_at(position)
     origins = [inner for inner in children(element) if inner.tagName == "origin"]
     origin = origins[0] if origins else element.appendChild(document.createElement("origin"))
     origin.setAttribute("xyz", number_text(placed.position))

@@ -77,6 +77,18 @@ def find_mesh(name: str, folders: Sequence[str]) -> Path | None:
     return next((file.resolve() for file in found if file.is_file()), None)
 
 
+def remove_mesh_shapes(robot: ElementTree.Element) -> None:
+    """Take the shapes from mesh files, visual and collision, out of a description, in place.
+
+    Args:
+        robot: Its root element.
+    """
+    for link in robot.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            if shape.find("geometry/mesh") is not None:
+                link.remove(shape)
+
+
 def only_found(
     urdf: str, folders: Sequence[str], readable: Callable[[Path], bool] | None = None
 ) -> tuple[str, tuple[str, ...]]:

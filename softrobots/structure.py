@@ -122,6 +122,14 @@ class Structure:
         made = {f"{row.name}_{strain}": row for row in self.section_table for strain in STRAINS}
         return made | {joint: row for row in self.section_table for joint in row.joint_names}
 
+    @property
+    def moment_arms(self) -> dict[str, dict[str, float]]:
+        """By muscle, the derivative of its length by spring joint or section coordinate [m/rad or -]; zeros are left out."""
+        names, made = self.strain_law.names, {}
+        for tag, row in zip(self.muscles, self.muscle_matrix.tolist(), strict=True):
+            made[tag.name] = {name: arm for name, arm in zip(names, row, strict=True) if arm != 0.0}
+        return made
+
     def indices(self, names: Sequence[str]) -> Any:
         """Places of joints in Pinocchio's velocity vector."""
         made = np.array([self._pin.joints[self._pin.getJointId(name)].idx_v for name in names], dtype=np.intp)

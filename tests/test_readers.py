@@ -20,7 +20,8 @@ from softrobots.export import to_mjcf, to_sdf
 from softrobots.interop.newton import balance_point
 from softrobots.kinematics import frame_placement
 from softrobots.readers.shared_mass import give_mass
-from softrobots.rigid_tree import Body, Placement, read_rigid_tree
+from softrobots.rigid_tree import Body, Placement
+from softrobots.rigid_tree_urdf import read_rigid_tree
 from softrobots.scene import Scene
 from tests.conftest import missing
 

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.paths import urdf_folder
-from softrobots.rigid_tree import Placement, RigidTree, read_rigid_tree, write_rigid_tree
+from softrobots.rigid_tree import Placement, RigidTree
+from softrobots.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
 from softrobots.third_party import package_folders, robot_file
 from softrobots.urdf_tags import SpringTag
 from tests.conftest import missing

@@ -74,6 +74,14 @@ def lowest_frequency(model: SoftModel, mass: FloatArray) -> float:
     return float(1.0 / np.sqrt(slowest))
 
 
+def rule_told(frequency: float) -> str:
+    """The rule in words, with the lowest frequency `w_1` [rad/s], for the head of a file."""
+    return (
+        f"Damping of the springs is 2 k / w1, with the lowest frequency at rest w1 = {frequency!r} rad/s (motors held, "
+        "weightless): the slowest mode is critically damped, no mode oscillates."
+    )
+
+
 def damped(tree: RigidTree, springs: Mapping[str, SpringTag], frequency: float | None) -> RigidTree:
     """Damp the spring joints with `2 k / w_1`.
 

@@ -11,18 +11,15 @@ and the six joints of a section of constant strain follow four coordinates; neit
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-import pinocchio as pin
-
 from softrobots.errors import ParameterError
 from softrobots.model import SoftModel, check_model
-from softrobots.rigid_tree import Joint, Placement, RigidTree, read_rigid_tree
+from softrobots.rigid_tree import RigidTree
+from softrobots.rigid_tree_urdf import read_rigid_tree
 from softrobots.springs import LinearSprings
 from softrobots.urdf_tags import SpringTag
 
@@ -133,13 +130,8 @@ def weld(tree: RigidTree, positions: Mapping[str, float]) -> RigidTree:
     Returns:
         The robot with those joints fixed; every body is where it was.
     """
-    joints = tuple(_fixed(joint, positions[joint.name]) if joint.name in positions else joint for joint in tree.joints)
-    return dataclasses.replace(tree, joints=joints)
-
-
-def _fixed(joint: Joint, position: float) -> Joint:
-    if joint.kind == "prismatic":
-        motion = Placement(position * joint.axis)
-    else:
-        motion = Placement(rotation=np.asarray(pin.exp3(position * joint.axis)))
-    return dataclasses.replace(joint, kind="fixed", placement=joint.placement @ motion)
+    joints = (
+        replace(joint, kind="fixed", placement=joint.placement_at(positions[joint.name])) if joint.name in positions else joint
+        for joint in tree.joints
+    )
+    return replace(tree, joints=tuple(joints))

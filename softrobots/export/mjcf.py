@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import finite_array
 from softrobots.errors import DescriptionError
 from softrobots.export.meshes import MeshFiles, mujoco_reads
-from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
+from softrobots.export.prepared import PreparedRobot, checked_gravity, neighbours, prepare, weld_groups
 from softrobots.export.servos import ANGLE_ERROR, Motor, Muscle, Servo
-from softrobots.export.xml_text import document, inertia_in_body
+from softrobots.export.xml_text import document
 from softrobots.model import SoftModel
 from softrobots.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 
@@ -61,7 +60,7 @@ def to_mjcf(
         DescriptionError: If the robot has moving links without mass or moments of inertia, a link with moments that no body
             has, a link `world` that is not its root, or more joints than Pinocchio's workspace is made for.
     """
-    field = np.zeros(3) if gravity is None else finite_array("gravity", gravity, (3,), "m/s^2")
+    field = checked_gravity(gravity)
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
     _refuse(robot.tree)
     root = ElementTree.Element("mujoco", {"model": robot.tree.name or "robot"})
@@ -168,7 +167,7 @@ def _refuse(tree: RigidTree) -> None:
         raise DescriptionError(f"{tree.name} has a link world that is not its root; MuJoCo has that name for the root alone")
     group, turning = weld_groups(tree), set()
     for body in (body for body in tree.bodies if body.mass > 0.0):
-        low, middle, high = np.linalg.eigvalsh(inertia_in_body(body)).tolist()
+        low, middle, high = np.linalg.eigvalsh(body.inertia_in_body).tolist()
         if low < -_ROUNDING * high or low + middle < high * (1.0 - _ROUNDING):
             raise DescriptionError(
                 f"link {body.name} of {tree.name} has the principal moments of inertia {low:g}, {middle:g}, {high:g} kg m^2, "
@@ -186,7 +185,7 @@ def _refuse(tree: RigidTree) -> None:
 
 def _inertia(body: Body) -> dict[str, str]:
     """Inertia of a body; by principal moments where rounding alone may break the rules of MuJoCo (plates, rods, points)."""
-    moments = inertia_in_body(body)
+    moments = body.inertia_in_body
     (low, middle, high), axes = np.linalg.eigh(moments)
     if low > _ROUNDING * high and low + middle > high * (1.0 + _ROUNDING):
         entries = (moments[pair] for pair in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))

@@ -10,13 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from softrobots.checks import FloatArray, choice
+from softrobots.checks import FloatArray, choice, finite_array
 from softrobots.errors import DescriptionError, ParameterError
-from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix
+from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix, rule_told
 from softrobots.export.held import ACTUATORS, check_linear, hold, locked_joints, weld
 from softrobots.export.servos import Motor, Muscle, motors_of, muscles_of
 from softrobots.model import SoftModel
-from softrobots.rigid_tree import RigidTree, read_rigid_tree
+from softrobots.rigid_tree import RigidTree
+from softrobots.rigid_tree_urdf import read_rigid_tree
 from softrobots.urdf_tags import SpringTag
 
 _LIGHTEST = 1e-15  # [kg]; MuJoCo refuses moving bodies below
@@ -86,6 +87,15 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
         frequency=frequency,
         remarks=_remarks(checked, values, welded, frequency),
     )
+
+
+def checked_gravity(gravity: Any) -> tuple[float, ...]:
+    """Gravity, shape (3,) [m/s^2]; zeros for None.
+
+    Raises:
+        ParameterError: If the shape differs or a number is not finite.
+    """
+    return (0.0, 0.0, 0.0) if gravity is None else tuple(finite_array("gravity", gravity, (3,), "m/s^2").tolist())
 
 
 def weld_groups(tree: RigidTree) -> dict[str, str]:
@@ -166,12 +176,7 @@ def _remarks(model: SoftModel, motors: FloatArray, welded: bool, frequency: floa
     if model.n_motors:
         at = ", ".join(f"{name} {value!r}" for name, value in zip(model.motor_joints, motors.tolist(), strict=True))
         made.append(f"{'Held' if welded else 'Home'} at [rad, m or N]: {at}.")
-    made.append("Damping of the joints is that of the description.")
-    if frequency is not None:
-        made[-1] = (
-            f"Damping of the springs is 2 k / w1, with the lowest frequency at rest w1 = {frequency!r} rad/s (motors held, "
-            "weightless): the slowest mode is critically damped, no mode oscillates."
-        )
+    made.append("Damping of the joints is that of the description." if frequency is None else rule_told(frequency))
     if model.spring_groups:
         made.append("Inflated links wrinkle beyond a moment; the springs here do not.")
     return tuple(made)

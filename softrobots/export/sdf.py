@@ -14,7 +14,7 @@ from softrobots.checks import LARGEST
 from softrobots.errors import DescriptionError, ParameterError
 from softrobots.export.meshes import MeshFiles, drake_collides, drawn_anywhere
 from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
-from softrobots.export.xml_text import document, inertia_in_body
+from softrobots.export.xml_text import document
 from softrobots.model import SoftModel
 from softrobots.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 
@@ -134,7 +134,7 @@ class _Model:
     def _link(self, body: Body, placement: Placement, parent: str) -> ElementTree.Element:
         link = ElementTree.SubElement(self._element, "link", {"name": body.name})
         _write_pose(link, placement, parent)
-        mass, moments = body.mass, inertia_in_body(body)
+        mass, moments = body.mass, body.inertia_in_body
         if mass <= 0.0:
             mass, moments = _STAND_IN[0], _STAND_IN[1] * np.eye(3)
         inertial = ElementTree.SubElement(link, "inertial")

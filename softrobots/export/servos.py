@@ -108,15 +108,15 @@ def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[
         The muscles, in the order of the model.
     """
     structure, made = model.structure, []
+    arms = structure.moment_arms
     springs = structure.spring_indices
     elastic = mass[np.ix_(springs, springs)]
     for tag, row, value in zip(model.muscles, structure.muscle_matrix, values.tolist(), strict=True):
-        arms = {name: arm for name, arm in zip(structure.spring_joints, row.tolist(), strict=True) if arm != 0.0}
         motion = row / structure.strain_law.stiffness
         motion /= row @ motion
         gain = tag.strongest / (LENGTH_ERROR * tag.rest_length)
         servo = Servo(gain, 2.0 * math.sqrt(gain * float(motion @ elastic @ motion)), tag.strongest)
-        made.append(Muscle(tag, arms, value, servo if model.muscle_input == "lengths" else None))
+        made.append(Muscle(tag, arms[tag.name], value, servo if model.muscle_input == "lengths" else None))
     return tuple(made)
 
 

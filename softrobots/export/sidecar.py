@@ -17,7 +17,8 @@ from softrobots.export.number_sources import PackagedRobot, Rules, check_robot, 
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model import SoftModel, check_model
 from softrobots.paths import xacro_folder
-from softrobots.rigid_tree import Joint, read_rigid_tree
+from softrobots.rigid_tree import Joint
+from softrobots.rigid_tree_urdf import read_rigid_tree
 from softrobots.tag_reader import read_tags
 from softrobots.urdf_tags import LumpedSectionTag, SectionTag
 
@@ -173,13 +174,12 @@ class _Parts:
         return made | {"rest": self._number(tag.name, "rest", list(tag.rest), "rad/m, rad/m, rad/m, -", kind)}
 
     def _muscles(self) -> list[dict[str, Any]]:
-        structure, made = self._model.structure, []
         units = {"azimuth": "rad", **dict.fromkeys(("distance", "rest_length", "shortest", "longest"), "m"), "strongest": "N"}
-        for tag, row in zip(structure.muscles, structure.muscle_matrix.tolist(), strict=True):
-            arms = {name: arm for name, arm in zip(structure.strain_law.names, row, strict=True) if arm != 0.0}
-            numbers = self._numbers(tag, "muscle", **units)
-            made.append({"name": tag.name, "segment": tag.segment, **numbers, "arms": arms})
-        return made
+        arms = self._model.structure.moment_arms
+        return [
+            {"name": tag.name, "segment": tag.segment, **self._numbers(tag, "muscle", **units), "arms": arms[tag.name]}
+            for tag in self._model.structure.muscles
+        ]
 
 
 def _parameters(robot: PackagedRobot) -> dict[str, Any]:

@@ -13,15 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import finite_array
 from softrobots.description import parse_xml
 from softrobots.errors import ParameterError
-from softrobots.export.damping import lowest_frequency, mass_matrix
+from softrobots.export.damping import lowest_frequency, mass_matrix, rule_told
 from softrobots.export.held import HeldRobot, hold
-from softrobots.export.prepared import prepare
+from softrobots.export.prepared import checked_gravity, prepare
 from softrobots.export.python_text import assignment, block, filled, table
+from softrobots.mesh_files import remove_mesh_shapes
 from softrobots.model import SoftModel
-from softrobots.rigid_tree import Body, RigidTree, Shape, read_rigid_tree, write_rigid_tree
+from softrobots.rigid_tree import Body, RigidTree, Shape
+from softrobots.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
 from softrobots.urdf_tags import NAMESPACE
 
 MOST_JOINTS = 127
@@ -68,7 +69,7 @@ def to_pybullet(
         DescriptionError: If a moving link has no mass.
     """
     held = _held(model, q_motors)
-    field = _gravity(gravity)
+    field = checked_gravity(gravity)
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
     joints = {joint.name: joint for joint in robot.tree.joints}
     if len(joints) > MOST_JOINTS:
@@ -124,19 +125,14 @@ def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None)
             length, or springs that are not linear.
     """
     held = _held(model, q_motors)
-    names, matrix = model.structure.spring_joints, model.structure.muscle_matrix.tolist()
-    arms = {
-        muscle.name: {name: arm for name, arm in zip(names, row, strict=True) if arm != 0.0}
-        for muscle, row in zip(model.muscles, matrix, strict=True)
-    }
     tips = [joint.child for joint in read_rigid_tree(model.urdf).joints if joint.name == model.tip]
     data = [
         assignment("ZERO", (0.0, 0.0, 0.0)),
         assignment("TIP", (tips or [model.tip])[0]),
-        assignment("GRAVITY", _gravity(gravity), "[m/s^2], of main()"),
+        assignment("GRAVITY", checked_gravity(gravity), "[m/s^2], of main()"),
         table("SPRINGS", model.spring_table, "joint: stiffness [N m/rad or N/m], rest [rad or m]"),
         assignment("MOTORS", list(held.motors), "joints"),
-        table("MUSCLES", arms, "muscle: derivative of its length by joint [m/rad or -]"),
+        table("MUSCLES", model.structure.moment_arms, "muscle: derivative of its length by joint [m/rad or -]"),
         assignment("Q_MOTORS", [*held.motors.values(), *held.tensions.values()], "of motors, then muscles [rad, m or N]"),
         assignment("LOCKED", list(held.locked), "joints"),
     ]
@@ -156,10 +152,6 @@ def _held(model: SoftModel, q_motors: Any) -> HeldRobot:
     return held
 
 
-def _gravity(gravity: Any) -> tuple[float, ...]:
-    return (0.0, 0.0, 0.0) if gravity is None else tuple(finite_array("gravity", gravity, (3,), "m/s^2").tolist())
-
-
 def _inside_quotes(text: str) -> str:
     """XML that three quotes can hold; in attributes they are escaped already."""
     return text.replace('"""', "&quot;&quot;&quot;")
@@ -168,10 +160,7 @@ def _inside_quotes(text: str) -> str:
 def _without_meshes(urdf: str) -> str:
     """The document without comments and without shapes whose files are somewhere else."""
     root = parse_xml(urdf, "the URDF")
-    for link in root.iter("link"):
-        for shape in [*link.findall("visual"), *link.findall("collision")]:
-            if shape.find("geometry/mesh") is not None:
-                link.remove(shape)
+    remove_mesh_shapes(root)
     ElementTree.register_namespace("softrobots", NAMESPACE)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -214,13 +203,7 @@ def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, frequency: fl
     if held.tensions:
         pulls = ", ".join(f"{name} {tension!r}" for name, tension in held.tensions.items())
         lines.append(f"Muscles pull with [N]: {pulls}. That stands in the rest positions, rest - A^T t / k, exactly.")
-    if damping == "critical":
-        lines.append(
-            f"Damping of the springs is 2 k / w1, with the lowest frequency at rest w1 = {frequency!r} rad/s (motors held, "
-            "weightless): the slowest mode is critically damped, no mode oscillates."
-        )
-    else:
-        lines.append("Damping of the springs is that of the description.")
+    lines.append(rule_told(frequency) if damping == "critical" else "Damping of the springs is that of the description.")
     if not limits:
         lines.append("The springs have no limits.")
     if held.locked:

@@ -1,4 +1,4 @@
-"""What the XML formats share: a head that says what a file is, and inertia in the axes of the body."""
+"""What the XML formats share: a head that says what a file is."""
 
 from __future__ import annotations
 
@@ -6,16 +6,7 @@ import textwrap
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
 
-from softrobots.checks import FloatArray
-from softrobots.rigid_tree import Body
-
 _WIDTH = 110
-
-
-def inertia_in_body(body: Body) -> FloatArray:
-    """Inertia about the centre of mass in the axes of the body, shape (3, 3) [kg m^2]."""
-    turn = body.centre.rotation
-    return turn @ body.inertia @ turn.T
 
 
 def document(root: ElementTree.Element, head: Iterable[str]) -> str:

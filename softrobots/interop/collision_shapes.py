@@ -12,8 +12,10 @@ import xml.etree.ElementTree as ElementTree
 
 import pinocchio as pin
 
-from softrobots.interop.urdf_document import Problems, UrdfDocument, end_of
+from softrobots.interop.urdf_document import Problems, UrdfDocument
+from softrobots.mesh_files import remove_mesh_shapes
 from softrobots.model import MAX_DOF
+from softrobots.rigid_tree_urdf import link_at
 
 
 def overlapping_shapes(document: UrdfDocument) -> Problems:
@@ -34,7 +36,7 @@ def overlapping_shapes(document: UrdfDocument) -> Problems:
     if model.nv > MAX_DOF:  # `checks` tells of what is too large
         return
     owners = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
-    parents = {link: end_of(joint, "parent") for link, joint in document.carrier.items()}
+    parents = {link: link_at(joint, "parent") for link, joint in document.carrier.items()}
     for (j, above), (i, link) in itertools.combinations(enumerate(owners), 2):
         if above != link and parents.get(link) != above and parents.get(above) != link:
             geometry.addCollisionPair(pin.CollisionPair(j, i))
@@ -51,8 +53,5 @@ def overlapping_shapes(document: UrdfDocument) -> Problems:
 def _without_meshes(document: UrdfDocument) -> str:
     """The document without shapes from mesh files, which may not be there."""
     root = copy.deepcopy(document.root)
-    for link in root.findall("link"):
-        for element in (*link.findall("visual"), *link.findall("collision")):
-            if element.find("geometry/mesh") is not None:
-                link.remove(element)
+    remove_mesh_shapes(root)
     return ElementTree.tostring(root, encoding="unicode")

@@ -14,6 +14,7 @@ import numpy as np
 
 from softrobots.checks import FloatArray
 from softrobots.interop.tools import find_tool
+from softrobots.rigid_tree_urdf import link_at
 
 Poses = Mapping[str, FloatArray]
 """Pose of each link in the world by its name, each (4, 4) [m]."""
@@ -49,7 +50,7 @@ def open_in(name: str, file: Path) -> Iterator[LoadedRobot]:
 def joint_of_link(file: Path) -> dict[str, ElementTree.Element]:
     """The joint that carries each link of a URDF file, by the name of the link."""
     joints = ElementTree.parse(file).getroot().findall("joint")
-    return {child.get("link", ""): joint for joint in joints for child in joint.findall("child")}
+    return {link_at(joint, "child"): joint for joint in joints}
 
 
 def _along_the_tree(file: Path, steps: Callable[[str, str], FloatArray]) -> dict[str, FloatArray]:
@@ -59,16 +60,11 @@ def _along_the_tree(file: Path, steps: Callable[[str, str], FloatArray]) -> dict
     for link in carriers:
         path = [link]
         while path[-1] in carriers and path[-1] not in poses:
-            path.append(_parent(carriers[path[-1]]))
+            path.append(link_at(carriers[path[-1]], "parent"))
         poses.setdefault(path[-1], np.eye(4))
         for child, parent in zip(path[-2::-1], path[:0:-1], strict=True):
             poses[child] = poses[parent] @ steps(child, parent)
     return poses
-
-
-def _parent(joint: ElementTree.Element) -> str:
-    element = joint.find("parent")
-    return "" if element is None else element.get("link", "")
 
 
 def _homogeneous(rotation: Any, translation: Any) -> FloatArray:

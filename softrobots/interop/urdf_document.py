@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError
+from softrobots.rigid_tree_urdf import link_at
 from softrobots.urdf_tags import NAMESPACE
 
 Problems = Iterator[tuple[str, str]]
@@ -39,7 +40,7 @@ class UrdfDocument:
         """Joints by name."""
         self.moving = {name: joint for name, joint in self.joints.items() if joint.get("type") != "fixed"}
         """Joints that are not fixed, by name."""
-        self.carrier = {end_of(joint, "child"): joint for joint in self.joints.values()}
+        self.carrier = {link_at(joint, "child"): joint for joint in self.joints.values()}
         """The joint that carries a link, by the name of the link."""
         self.has_tags = any(str(element.tag).startswith(f"{{{NAMESPACE}}}") for element in self.root.iter())
         """Whether any tag of this package is in it."""
@@ -49,7 +50,7 @@ class UrdfDocument:
         path: list[str] = []
         while link in self.carrier and len(path) <= len(self.carrier):
             path.append(name_of(self.carrier[link]))
-            link = end_of(self.carrier[link], "parent")
+            link = link_at(self.carrier[link], "parent")
         return path
 
     def foreign(self) -> frozenset[str]:
@@ -58,7 +59,7 @@ class UrdfDocument:
         They are those that stand before the first joint with a role of ours, in a file where joints without a role move there.
         """
         with_role = {name for name, joint in self.moving.items() if tag_of(joint, "role") is not None}
-        ways = {name: [name, *self.way_to_root(end_of(joint, "parent"))] for name, joint in self.joints.items()}
+        ways = {name: [name, *self.way_to_root(link_at(joint, "parent"))] for name, joint in self.joints.items()}
         before = {name for name, way in ways.items() if with_role.isdisjoint(way)}
         if not with_role or before.isdisjoint(self.moving):
             return frozenset()
@@ -78,12 +79,6 @@ class UrdfDocument:
 def name_of(element: ElementTree.Element) -> str:
     """The name of an element; empty if it has none."""
     return element.get("name", "")
-
-
-def end_of(joint: ElementTree.Element, which: str) -> str:
-    """Name of the link at an end of a joint, "parent" or "child"."""
-    element = joint.find(which)
-    return "" if element is None else element.get("link", "")
 
 
 def tag_of(element: ElementTree.Element, name: str) -> ElementTree.Element | None:

@@ -15,16 +15,15 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.interop.collision_shapes import overlapping_shapes
-from softrobots.interop.urdf_document import Problems, UrdfDocument, end_of, name_of, number_of, numbers_of, tag_of
+from softrobots.interop.urdf_document import Problems, UrdfDocument, name_of, number_of, numbers_of, tag_of
+from softrobots.rigid_tree import SOLIDS
+from softrobots.rigid_tree_urdf import link_at
 from softrobots.urdf_tags import NAMESPACE
 
 LIGHTEST = 1e-6
 """Links must be heavier [kg]: at this mass Gazebo's parser drops a link and everything that it carries."""
 SMALLEST_INERTIA = 1e-15
 """Principal moments of inertia must be larger [kg m^2]: MuJoCo refuses a file with smaller ones."""
-
-SHAPES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
-"""Shapes that all tools know, with their sizes."""
 
 _ROUNDING = 1e-12  # relative; of lengths and eigenvalues of numbers that are written with all their digits
 
@@ -96,7 +95,7 @@ def _root_link(document: UrdfDocument) -> Problems:
         return
     if document.links["world"].find("inertial") is not None:
         yield "world", "the link world has a mass"
-    below = [joint for joint in document.joints.values() if end_of(joint, "parent") == "world"]
+    below = [joint for joint in document.joints.values() if link_at(joint, "parent") == "world"]
     if len(below) != 1 or below[0].get("type") != "fixed":
         yield "world", f"world carries {', '.join(map(name_of, below)) or 'nothing'}; one fixed joint is required"
 
@@ -147,7 +146,7 @@ def _mimics(document: UrdfDocument) -> Problems:
         master = mimic.get("joint", "")
         if master not in document.moving or master in mimics:
             yield name, f"joint {name} mimics {master!r}; a movable joint that mimics none is required"
-        elif master not in document.way_to_root(end_of(document.joints[name], "parent")):
+        elif master not in document.way_to_root(link_at(document.joints[name], "parent")):
             yield name, f"joint {name} mimics {master}, which is not on its way to the root"
 
 
@@ -157,11 +156,11 @@ def _shapes(document: UrdfDocument) -> Problems:
         for element in (*link.findall("visual"), *link.findall("collision")):
             geometry = element.find("geometry")
             shapes = [] if geometry is None else list(geometry)
-            if len(shapes) != 1 or shapes[0].tag not in SHAPES:
+            if len(shapes) != 1 or shapes[0].tag not in SOLIDS:
                 told = ", ".join(str(shape.tag) for shape in shapes) or "nothing"
-                yield name, f"a {element.tag} of link {name} is {told}; one of {', '.join(SHAPES)} is required"
+                yield name, f"a {element.tag} of link {name} is {told}; one of {', '.join(SOLIDS)} is required"
                 continue
-            sizes = numbers_of(shapes[0], *SHAPES[shapes[0].tag])
+            sizes = numbers_of(shapes[0], *SOLIDS[shapes[0].tag])
             if not sizes or not all(0.0 < size < math.inf for size in sizes):
                 yield name, f"a {element.tag} of link {name} is a {shapes[0].tag} of the sizes {sizes}; positive is required"
 
@@ -230,7 +229,7 @@ def _order_of_hinges(document: UrdfDocument) -> Problems:
     for section in document.root.findall(f"{{{NAMESPACE}}}lumped_section"):
         x, y = section.get("bend_x", ""), section.get("bend_y", "")
         if x in document.joints and y in document.joints:
-            first[x in document.way_to_root(end_of(document.joints[y], "parent"))] += 1
+            first[x in document.way_to_root(link_at(document.joints[y], "parent"))] += 1
     if abs(first[True] - first[False]) > 1:
         told = f"{first[True]} sections bend about x first, {first[False]} about y"
         yield "", f"{told}; both orders must be as frequent, or the chain converges at first order only"

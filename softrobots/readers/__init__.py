@@ -13,7 +13,8 @@ from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError
 from softrobots.readers.mjcf import read_mjcf
 from softrobots.readers.sdf import read_sdf
-from softrobots.rigid_tree import RigidTree, write_rigid_tree
+from softrobots.rigid_tree import RigidTree
+from softrobots.rigid_tree_urdf import write_rigid_tree
 
 KINDS: Mapping[str, str] = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF"}
 """What can be read, by root tag."""

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.checks import read_only
 from softrobots.errors import DescriptionError, MissingDependency
@@ -81,7 +80,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
         site = model.site(number)
         if site.name:
             builder.add_frame(site.name, bodies[model.site_bodyid[number]], Placement.turned(site.pos, site.quat))
-    return builder.tree("tip" if builder.has("tip") else _only_end(model, bodies))
+    return builder.tree()
 
 
 def _motions(mujoco: Any, model: Any, body: int) -> tuple[list[Motion], Placement]:
@@ -91,15 +90,15 @@ def _motions(mujoco: Any, model: Any, body: int) -> tuple[list[Motion], Placemen
     first = int(model.body_jntadr[body])
     for joint in range(first, first + int(model.body_jntnum[body])):
         slides = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        kind = "prismatic" if slides else "revolute"
         axis, anchor = np.array(model.jnt_axis[joint]), np.zeros(3) if slides else np.array(model.jnt_pos[joint])
         reference = float(model.qpos0[model.jnt_qposadr[joint]])
-        back = Placement(-reference * axis) if slides else Placement(rotation=np.asarray(pin.exp3(-reference * axis)))
         dof = int(model.jnt_dofadr[joint])
         motions.append(
             Motion(
                 joint_name(model, joint),
-                "prismatic" if slides else "revolute",
-                place @ Placement(anchor) @ back,
+                kind,
+                place @ Placement(anchor) @ Placement.moved(kind, axis, -reference),
                 axis,
                 tuple(model.jnt_range[joint].tolist()) if model.jnt_limited[joint] else (-np.inf, np.inf),
                 _effort(mujoco, model, joint),
@@ -127,13 +126,6 @@ def _effort(mujoco: Any, model: Any, joint: int) -> float:
         if driven_joint(mujoco, model, number) == joint
     ]
     return max(limits, default=np.inf)
-
-
-def _only_end(model: Any, bodies: list[str]) -> str | None:
-    """The one moving body that carries none, or None if there are several."""
-    parents = set(model.body_parentid[1:].tolist())
-    ends = [number for number in range(1, model.nbody) if number not in parents and model.body_weldid[number] != 0]
-    return bodies[ends[0]] if len(ends) == 1 else None
 
 
 def _body_name(model: Any, number: int) -> str:

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray, read_only
+from softrobots.checks import read_only
 from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError, MissingDependency
 from softrobots.readers.drake_log import warnings_of_drake
 from softrobots.readers.sdf_refusals import not_carried
-from softrobots.readers.sdf_shapes import visible_shapes
+from softrobots.readers.sdf_shapes import placement_of, visible_shapes
 from softrobots.readers.tree_builder import Motion, TreeBuilder
 from softrobots.rigid_tree import Body, Placement, RigidTree
 from softrobots.urdf_tags import SpringTag
@@ -96,8 +96,9 @@ def _tree(plant: Any, source: str, frames: set[str], shapes: dict[str, list[Any]
         builder.add(body, names[edge.parent.index()], motions, end)
     for frame in _items(plant.get_frame, "FrameIndex", plant.num_frames()):
         if frame.name() in frames and not frame.is_body_frame():
-            builder.add_frame(_name(plant, frame, model), names[frame.body().index()], _pose(frame.GetFixedPoseInBodyFrame()))
-    return builder.tree("tip" if builder.has("tip") else _only_end(edges, names))
+            place = placement_of(frame.GetFixedPoseInBodyFrame())
+            builder.add_frame(_name(plant, frame, model), names[frame.body().index()], place)
+    return builder.tree()
 
 
 def _edges(plant: Any, source: str) -> list[_Edge]:
@@ -154,11 +155,11 @@ def _motions(
 ) -> tuple[list[Motion], Placement]:
     joint = edge.joint
     start, end = (
-        _pose(joint.frame_on_parent().GetFixedPoseInBodyFrame()),
-        _pose(joint.frame_on_child().GetFixedPoseInBodyFrame()),
+        placement_of(joint.frame_on_parent().GetFixedPoseInBodyFrame()),
+        placement_of(joint.frame_on_child().GetFixedPoseInBodyFrame()),
     )
     if joint.num_velocities() == 0:
-        joined = start @ _pose(joint.X_FM()) @ end.inverse
+        joined = start @ placement_of(joint.X_FM()) @ end.inverse
         return [], joined.inverse if edge.reversed else joined
     axis = np.array(joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis())
     if edge.reversed:  # the same motion seen from the other side
@@ -206,15 +207,6 @@ def _body(body: Any, name: str, shapes: dict[str, list[Any]]) -> Body:
     return Body(name, mass, Placement(read_only(np.array(inertia.get_com()))), read_only(np.array(about_centre)), drawn)
 
 
-def _only_end(edges: list[_Edge], names: dict[Any, str]) -> str | None:
-    moving: set[Any] = set()
-    for edge in edges:
-        if edge.joint.num_velocities() or edge.parent.index() in moving:
-            moving.add(edge.child.index())
-    ends = moving - {edge.parent.index() for edge in edges}
-    return names[ends.pop()] if len(ends) == 1 else None
-
-
 def _name(plant: Any, thing: Any, model: str) -> str:
     """Name of a body, joint or frame; with those of the models that it is in, below the robot's own."""
     within = str(plant.GetModelInstanceName(thing.model_instance())).split("::")
@@ -223,11 +215,6 @@ def _name(plant: Any, thing: Any, model: str) -> str:
 
 def _top(plant: Any, thing: Any) -> str:
     return str(plant.GetModelInstanceName(thing.model_instance())).split("::")[0]
-
-
-def _pose(pose: Any) -> Placement:
-    rotation: FloatArray = np.array(pose.rotation().matrix())
-    return Placement(read_only(np.array(pose.translation())), read_only(rotation))
 
 
 def _items(get: Any, index: str, count: int) -> Iterator[Any]:

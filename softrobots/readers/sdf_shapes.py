@@ -48,9 +48,14 @@ def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
     return shapes
 
 
+def placement_of(pose: Any) -> Placement:
+    """A `RigidTransform` of Drake as a placement."""
+    return Placement(read_only(np.array(pose.translation())), read_only(np.array(pose.rotation().matrix())))
+
+
 def _shape(inspector: Any, geometry: Any) -> Shape | None:
     shape, pose = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
-    place = Placement(read_only(np.array(pose.translation())), read_only(np.array(pose.rotation().matrix())))
+    place = placement_of(pose)
     kind, rgba = type(shape).__name__, _colour(inspector.GetIllustrationProperties(geometry))
     if kind == "Box":
         return Shape("box", (shape.width(), shape.depth(), shape.height()), place, rgba)

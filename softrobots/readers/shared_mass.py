@@ -37,7 +37,7 @@ def give_mass(body: Body, point: FloatArray, count: int) -> tuple[Body, float]:
     """
     if body.mass <= 0.0 or count == 0:
         return body, 0.0
-    moments = _second_moment(body.centre.rotation @ body.inertia @ body.centre.rotation.T)
+    moments = _second_moment(body.inertia_in_body)
     away = point - body.centre.position
     if np.linalg.eigvalsh(moments)[0] <= 0.0:
         return body, 0.0

@@ -78,10 +78,8 @@ class TreeBuilder:
         self._bodies: list[Body] = [Body("world", 0.0, Placement(), read_only(np.zeros((3, 3))))]
         self._joints: list[Joint] = []
         self._springs: dict[str, SpringTag] = {}
-
-    def has(self, name: str) -> bool:
-        """Whether a link has that name, or will have it."""
-        return name in self._links
+        self._moving: set[str] = set()
+        self._carriers: set[str] = set()
 
     def draw_on_world(self, world: Body) -> None:
         """Give the world its shapes."""
@@ -105,6 +103,9 @@ class TreeBuilder:
             bounds = np.array([bound for bound in motion.limits if not np.isinf(bound)])
             self._check(f"the joint {motion.name}", motion.start.position, motion.start.rotation, motion.axis, bounds)
             self._check(f"the joint {motion.name}", motion.damping)
+        self._carriers.add(parent)
+        if motions or parent in self._moving:
+            self._moving.add(body.name)
         if not motions:
             self._fix(body, parent, end)
             return
@@ -131,22 +132,21 @@ class TreeBuilder:
 
     def add_frame(self, name: str, parent: str, placement: Placement) -> None:
         """Add a link without mass that only marks a place on a body; not if another link has its name."""
-        if self.has(name):
+        if name in self._links:
             return
         self._links.add(name)
         self._fix(small_ball(name, 0.0, np.zeros(3), 0.0), parent, placement)
 
-    def tree(self, tip: str | None) -> RigidTree:
-        """Return the tree.
-
-        Args:
-            tip: Link that is the tip by default, or None.
+    def tree(self) -> RigidTree:
+        """Return the tree; its tip is the link called `tip`, or the only moving body that carries none.
 
         Raises:
             DescriptionError: If there is nothing but the world.
         """
         if len(self._bodies) == 1:
             raise DescriptionError(f"{self._source} has no bodies")
+        ends = self._moving - self._carriers
+        tip = "tip" if "tip" in self._links else next(iter(ends)) if len(ends) == 1 else None
         return RigidTree(self._name, tuple(self._bodies), tuple(self._joints), dict(self._springs), tip)
 
     def _shared(self, body: Body, motions: Sequence[Motion], end: Placement) -> tuple[Body, list[float]]:
