@@ -141,7 +141,8 @@ class InMujoco:
 
     def mass(self) -> np.ndarray:
         made = np.zeros((self.model.nv, self.model.nv))
-        self.mujoco.mj_fullM(self.model, self.data, made)
+        for column, unit in zip(made, np.eye(self.model.nv), strict=True):  # mj_fullM is called otherwise in MuJoCo 3
+            self.mujoco.mj_mulM(self.model, self.data, column, unit)
         return made
 
     def pose(self, name: str) -> np.ndarray:
