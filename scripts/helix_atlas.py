@@ -20,7 +20,7 @@ import softrobots as sr
 from softrobots import helix, helix_plots, plots
 from softrobots.checks import positive_number
 from softrobots.command_line import exit_status
-from softrobots.files import csv_text, free_folder, make_folder, new_file, write_atomically, write_text
+from softrobots.files import csv_text, free_folder, make_folder, write_text
 from softrobots.helix import atlas
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
@@ -76,10 +76,10 @@ def run(arguments: argparse.Namespace) -> None:
     make_folder(folder)
     if arguments.docs is not None:
         for name, figure in zip(PICTURES[:2], figures, strict=False):
-            print(save(figure, folder / f"{name}.png", overwrite=True))
+            print(plots.write_png(figure, folder / f"{name}.png", overwrite=True))
         return
     for name, figure in zip(PICTURES, figures, strict=False):
-        save(figure, folder / f"{name}.png")
+        plots.write_png(figure, folder / f"{name}.png", overwrite=False)
     shapes.write_csv(folder / "shapes.csv")
     write_text(folder / "contraction_limits.csv", csv_text(LIMIT_COLUMNS, limits), overwrite=False)
     write_text(folder / "grasp_forces.csv", csv_text(FORCE_COLUMNS, forces), overwrite=False)
@@ -127,12 +127,6 @@ def table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table in Markdown."""
     lines = [names, ["---"] * len(names), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
-
-
-def save(figure: Any, path: Path, *, overwrite: bool = False) -> Path:
-    """Write a picture."""
-    write_atomically(new_file(path, overwrite=overwrite), lambda file: figure.savefig(file, format="png"))
-    return path
 
 
 def main(argv: list[str] | None = None) -> int:

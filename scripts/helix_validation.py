@@ -28,7 +28,7 @@ import softrobots as sr
 from softrobots import helix, plots
 from softrobots.body import body_at
 from softrobots.command_line import exit_status
-from softrobots.files import csv_text, free_folder, make_folder, new_file, write_atomically, write_text
+from softrobots.files import csv_text, free_folder, make_folder, write_text
 from softrobots.kinematics import frame_placement
 from softrobots.paths import urdf_folder
 from softrobots.robots import HelixTube
@@ -309,17 +309,15 @@ def run(arguments: argparse.Namespace) -> bool:
     if not arguments.no_plots:
         drawing = figure(rows, arguments.tolerance)
         for place, overwrite in ((folder, False), *([(arguments.docs, True)] if arguments.docs else [])):
-            files.append(new_file(place / NAMES[2], overwrite=overwrite))
-            write_atomically(files[-1], lambda file: drawing.savefig(file, format="png"))
+            files.append(plots.write_png(drawing, place / NAMES[2], overwrite=overwrite))
     print(f"\nwritten: {', '.join(map(str, files))}")
     return passed
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run from the command line; 0 if every tube is on its helix, 1 if not, 2 after bad input."""
-    arguments, passed = parser().parse_args(argv), []
-    status = exit_status(lambda: passed.append(run(arguments)))
-    return status if status != 0 else int(not passed[0])
+    arguments = parser().parse_args(argv)
+    return exit_status(lambda: run(arguments))
 
 
 if __name__ == "__main__":

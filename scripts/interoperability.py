@@ -28,7 +28,7 @@ import softrobots as sr
 from softrobots import plots
 from softrobots.command_line import exit_status
 from softrobots.export import to_mjcf, to_sdf
-from softrobots.files import make_folder, new_file, write_atomically, write_text
+from softrobots.files import make_folder, new_file, write_text
 from softrobots.interop.cases import WELDED, equilibrium_cases
 from softrobots.interop.kinematics import KinematicsRow, compare_kinematics
 from softrobots.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
@@ -299,8 +299,7 @@ def write_docs(results: Results, checkout: Path) -> list[Path]:
         raise sr.FileFormatError(f"cannot read the README of {checkout}: {error}") from error
     updated, drawing = readme_with(readme, results), figure(results)
     files = [write_text(checkout / "docs" / "interoperability.json", as_json(results), overwrite=True)]
-    files.append(new_file(checkout / "docs" / "images" / "interoperability.png", overwrite=True))
-    write_atomically(files[-1], lambda file: drawing.savefig(file, format="png"))
+    files.append(plots.write_png(drawing, checkout / "docs" / "images" / "interoperability.png", overwrite=True))
     files.append(write_text(checkout / "README.md", updated, overwrite=True))
     return files
 
@@ -357,9 +356,8 @@ def run(arguments: argparse.Namespace) -> bool:
 
 def main(argv: list[str] | None = None) -> int:
     """Run from the command line; 0 if every tool agrees, 1 if not, 2 after bad input."""
-    arguments, passed = parser().parse_args(argv), []
-    status = exit_status(lambda: passed.append(run(arguments)))
-    return status if status != 0 else int(not passed[0])
+    arguments = parser().parse_args(argv)
+    return exit_status(lambda: run(arguments))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from softrobots import inflated_beam
 from softrobots.browser import take_picture
 from softrobots.command_line import exit_status
 from softrobots.composition import fix_joints
-from softrobots.third_party import robot_file
+from softrobots.third_party import UR5, robot_file
 from softrobots.ur5_bench import UR5Bench
 
 
@@ -62,7 +62,7 @@ def characterisation_bench() -> sr.Viewer:
 def ur5_with_soft_arm() -> sr.Viewer:
     """A UR5 carries the inflatable arm with 1 kg at its tip (needs example-robot-data)."""
     arm = fix_joints(sr.InflatableArm(), {"motor_1": 0.0, "motor_2": math.pi / 2, "motor_3": 0.0})
-    model = sr.load_model(sr.mount(robot_file("ur_description/urdf/ur5_robot.urdf"), "tool0", arm, xyz=(0.0, 0.0, 0.165)))
+    model = sr.load_model(sr.mount(robot_file(UR5), "tool0", arm, xyz=(0.0, 0.0, 0.165)))
     pose, payload = (0.0, -2.1, 1.9, 0.2, math.pi / 2, 0.0), (0.0, 0.0, -9.81)
     return sr.view(model, sr.solve_equilibrium(model, pose, payload, gravity=sr.EARTH_GRAVITY))
 

@@ -27,10 +27,8 @@ from softrobots.command_line import exit_status
 from softrobots.composition import fix_joints
 from softrobots.files import free_folder, make_folder, write_text
 from softrobots.rigid_tree_urdf import read_rigid_tree
-from softrobots.third_party import robot_file
+from softrobots.third_party import UR5, robot_file
 
-UR5 = "ur_description/urdf/ur5_robot.urdf"
-"""The UR5 in example-robot-data."""
 UR5_PAYLOAD = 5.0
 """What a UR5 may carry, by its maker [kg]."""
 POSE = (0.0, -2.1, 1.9, 0.2, math.pi / 2, 0.0)
@@ -125,8 +123,8 @@ def run(arguments: argparse.Namespace) -> Path:
         sr.save_result(after, folder / "result.npz")
         sr.save_csv(after, folder / "result.csv")
         write_text(folder / f"{model.pinocchio.name}.urdf", urdf, overwrite=False)
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        (folder / "table.txt").write_text(table(summary) + "\n", encoding="utf-8")
+        write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
+        write_text(folder / "table.txt", table(summary) + "\n", overwrite=False)
         if figure is not None:
             figure.savefig(folder / "poses.png")
         viewer.write_html(folder / "scene.html", title=f"UR5 with a soft arm, {load.payload:g} kg at its tip")

@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 
 from softrobots import inflated_beam
-from softrobots.plots import COLOURS, new_figure
+from softrobots.plots import COLOURS, MARKERS, new_figure
 from softrobots.ur5_bench import BenchRun, Measurement
 
 Push = tuple[inflated_beam.CharacterisationRow, BenchRun, Measurement]
 """A push: the row of Table 3 that the true link has, the run, and what the instruments read."""
-
-_MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
 def force_displacement(pushes: Sequence[Push]) -> Any:
@@ -35,7 +33,7 @@ def force_displacement(pushes: Sequence[Push]) -> Any:
         colour = COLOURS[number % len(COLOURS)]
         axes.plot(1e3 * run.displacement, run.force, color=colour, lw=1.2)
         axes.plot(
-            1e3 * run.displacement, measured.force, color=colour, ls="", marker=_MARKERS[number % len(_MARKERS)], ms=4,
+            1e3 * run.displacement, measured.force, color=colour, ls="", marker=MARKERS[number % len(MARKERS)], ms=4,
             label=f"{row.pressure / 1e3:g} kPa",
         )  # fmt: skip
     axes.set(
@@ -69,7 +67,7 @@ def moment_angle(pushes: Sequence[Push]) -> Any:
             measured.angle, measured.moment, pressure=row.pressure, radius=run.bench.radius
         )  # fmt: skip
         axes.plot(
-            measured.angle, measured.moment, color=colour, ls="", marker=_MARKERS[number % len(_MARKERS)], ms=4,
+            measured.angle, measured.moment, color=colour, ls="", marker=MARKERS[number % len(MARKERS)], ms=4,
             label=f"{row.pressure / 1e3:g} kPa",
         )  # fmt: skip
         angles = np.linspace(0.0, max(float(measured.angle.max()), 0.0), 400)

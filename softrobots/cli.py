@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: Words of the command line; by default those of the process.
 
     Returns:
-        The exit status: 0, 1 if something was checked and is wrong, or as `command_line.exit_status` tells.
+        The exit status, as `command_line.exit_status` tells; 141 if nobody reads the output any more.
     """
     made = parser()
     arguments, rest = made.parse_known_args(argv)
@@ -41,14 +41,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not hasattr(arguments, "parameters") or any(word.startswith("-") or "=" not in word for word in rest):
             made.error(f"unrecognized arguments: {' '.join(rest)}")
         arguments.parameters += rest
-    answers: list[object] = []
     try:
-        status = exit_status(lambda: answers.append(arguments.run(arguments)))
+        status = exit_status(lambda: arguments.run(arguments))
         sys.stdout.flush()
     except BrokenPipeError:  # whoever read the output has seen enough, e.g. head
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
-    return status or next((answer for answer in answers if isinstance(answer, int)), 0)
+    return status
 
 
 if __name__ == "__main__":

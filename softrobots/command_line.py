@@ -59,13 +59,14 @@ def exit_status(run: Callable[[], object]) -> int:
     """Run a script and tell how it ended; an error is a line on stderr.
 
     Args:
-        run: The whole job.
+        run: The whole job. It returns False if it checked something that is wrong; whatever else it returns is fine.
 
     Returns:
-        0, or 1 if there is no answer (`NotConverged`), 2 after any other error of ours, 130 after Ctrl-C.
+        0, or 1 if a check failed or there is no answer (`NotConverged`), 2 after any other error of ours, 130 after Ctrl-C.
     """
     try:
-        run()
+        if run() is False:
+            return 1
     except SoftRobotsError as error:
         sys.stderr.write(f"error: {error}\n")
         return 1 if isinstance(error, NotConverged) else 2

@@ -14,7 +14,7 @@ from softrobots import helix
 from softrobots.checks import FloatArray, finite_array, positive_number
 from softrobots.errors import ParameterError
 from softrobots.helix_sheet import draw, sheet
-from softrobots.plots import COLOURS, new_figure
+from softrobots.plots import COLOURS, MARKERS, new_figure
 
 MOST_HELICES = 60
 """Helices that `grid` draws at most."""
@@ -23,7 +23,6 @@ MOST_DIAMETERS = 100.0
 """Length over diameter of a tube that `grid` draws, at most."""
 
 _STYLES = ("-", "--", "-.")
-_MARKERS = ("o", "s", "^", "D", "v", "P")
 _THIN_STYLE = (0, (1.0, 1.6))
 
 
@@ -125,7 +124,7 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     left, right = figure.subplots(1, 2, sharey=True)
     for number, depth in enumerate(depths):
         found, colour = _grasp(test, pressures, depth), COLOURS[number]
-        style = {"color": colour, "marker": _MARKERS[number], "ms": 7, "clip_on": False}
+        style = {"color": colour, "marker": MARKERS[number], "ms": 7, "clip_on": False}
         left.plot(pressures / 1e3, found.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
         told = f"force, deflected by {1e3 * depth:.3g} mm"
         left.plot(pressures / 1e3, found.force, lw=2.2, ls=_STYLES[number % 3], markevery=(number, 3), label=told, **style)

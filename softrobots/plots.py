@@ -1,11 +1,12 @@
 """Figures of trajectories, after Figures 10 and 11 of [Troise 2021]. Needs matplotlib (extra `plot`).
 
-Every function returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Lines differ in style as well as in
-colour, so that they can be told apart in grey.
+The functions return a `matplotlib.figure.Figure`; save it with `figure.savefig(path)` or `write_png`. Lines differ in style as
+well as in colour, so that they can be told apart in grey.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,14 @@ import numpy as np
 from softrobots.checks import FloatArray, finite_array, positive_integer
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import MissingDependency, ParameterError
+from softrobots.files import new_file, write_atomically
 from softrobots.kinematics import backbone
 from softrobots.trajectory import Trajectory
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito
 """Line colours that colour-blind people can tell apart."""
-_MARKERS = ("o", "s", "^", "D", "v", "P")
+MARKERS = ("o", "s", "^", "D", "v", "P")
+"""Markers that tell lines apart in grey."""
 
 
 def require_matplotlib() -> Any:
@@ -100,7 +103,7 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
     axes = figure.add_subplot()
     every = max(len(trajectory.times) // 10, 1)
     for number, name in enumerate(trajectory.model.motor_joints):
-        colour, marker = COLOURS[number % 6], _MARKERS[number % 6]
+        colour, marker = COLOURS[number % 6], MARKERS[number % 6]
         style = {"color": colour, "marker": marker, "markevery": every, "ms": 5}
         axes.plot(trajectory.times, trajectory.q_motors[:, number], label=f"{name}, elastic", **style)
         axes.plot(rigid.times, rigid.q_motors[:, number], ls="--", mfc="white", label=f"{name}, rigid", **style)
@@ -135,7 +138,7 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
             np.maximum(error, 1e-16) * 1e3,
             color=COLOURS[number % 6],
             ls=("-", "--", "-.", ":")[number % 4],
-            marker=_MARKERS[number % 6],
+            marker=MARKERS[number % 6],
             markevery=every,
             ms=5,
             label=label,
@@ -218,6 +221,19 @@ def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:
 def _check(trajectory: Trajectory) -> None:
     if not isinstance(trajectory, Trajectory):
         raise ParameterError("trajectory", trajectory, "a Trajectory")
+
+
+def write_png(figure: Any, path: str | Path, *, overwrite: bool) -> Path:
+    """Write a figure as PNG, whole or not at all, and return its path.
+
+    Raises:
+        ParameterError: If the path is none.
+        OutputExists: If the file exists and `overwrite` is false, or is a folder.
+        OutputError: If the file cannot be written.
+    """
+    target = new_file(path, overwrite=overwrite)
+    write_atomically(target, lambda file: figure.savefig(file, format="png"))
+    return target
 
 
 def new_figure(size: tuple[float, float]) -> Any:

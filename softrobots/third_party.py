@@ -6,6 +6,9 @@ from pathlib import Path
 
 from softrobots.errors import MissingDependency, NameNotFound
 
+UR5 = "ur_description/urdf/ur5_robot.urdf"
+"""The UR5 of Universal Robots."""
+
 _SHARE = "cmeel.prefix/share"  # where the wheel keeps its data; the package has no Python module
 
 
@@ -13,7 +16,7 @@ def robot_file(name: str) -> Path:
     """Path of a robot description of example-robot-data.
 
     Args:
-        name: Path below its folder `robots`, e.g. "ur_description/urdf/ur5_robot.urdf".
+        name: Path below its folder `robots`, e.g. `UR5`.
 
     Returns:
         The path; the file exists.

@@ -20,6 +20,7 @@ from softrobots.inverse_kinematics import IkSolution, solve_ik, start_motors
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
+from softrobots.progress import with_progress
 from softrobots.sensitivity import tip_motion
 from softrobots.tip_search import POSITION_TOLERANCE, Goal, LocalSolution, search
 
@@ -183,7 +184,8 @@ def follow_trajectory(
             if method == "paper"
             else _exact_steps(model, points, load, first, inner, tolerance, allow_jumps)
         )
-        equilibria = (first, *_with_progress(steps, len(points) - 1, method, progress))
+        bar = with_progress(steps, progress, label=f"waypoints ({method})", unit="wp", total=len(points) - 1)
+        equilibria = (first, *bar)
         return Trajectory(read_only(moments), read_only(points), equilibria, method)
 
     try:
@@ -195,16 +197,6 @@ def follow_trajectory(
             with contextlib.suppress(TargetUnreachable):
                 return follow_from(solve_ik(model, points[0], q_motors0=motors, starts=1, **options).equilibrium)
         raise
-
-
-def _with_progress(steps: Iterable[Equilibrium], total: int, method: str, progress: bool | str) -> Iterable[Equilibrium]:
-    if not progress:
-        return steps
-    from tqdm import tqdm
-
-    label = progress if isinstance(progress, str) else f"waypoints ({method})"
-    bar: Iterable[Equilibrium] = tqdm(steps, total=total, desc=label, unit="wp")
-    return bar
 
 
 def _named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachable:

@@ -7,7 +7,6 @@ example-robot-data (extra `robots`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -25,12 +24,10 @@ from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loader import load_model
 from softrobots.model import SoftModel
 from softrobots.paths import xacro_folder
+from softrobots.progress import with_progress
 from softrobots.robots import InflatableArm
-from softrobots.third_party import robot_file
+from softrobots.third_party import UR5, robot_file
 from softrobots.trajectory import Trajectory
-
-UR5_FILE = "ur_description/urdf/ur5_robot.urdf"
-"""The UR5 in example-robot-data."""
 
 UR5_JOINTS = (
     "shoulder_pan_joint",
@@ -185,7 +182,7 @@ class UR5Bench:
         probe = _part("probe", length=self.probe_length, radius=self.ball_radius)
         stand = _part("stand", length=z - 3.0 * self.radius, radius=1.3 * self.radius, mass=_STAND_MASS)
         mark = _part("mark", length=_MARK[0], radius=_MARK[1] * self.radius, offset=beside, mass=_MARK_MASS)
-        whole = mount(robot_file(UR5_FILE), "tool0", probe, prefix="probe_")
+        whole = mount(robot_file(UR5), "tool0", probe, prefix="probe_")
         whole = mount(whole, "world", stand, prefix="stand_", xyz=(clamp[0], clamp[1], 0.0))
         whole = mount(whole, "world", self.link, prefix="soft_", xyz=clamp, rpy=(0.0, 0.0, 0.5 * np.pi))
         on_link = (self.test.arm, beside, 0.0)
@@ -227,7 +224,7 @@ class UR5Bench:
         first = solve_ik(model, start, orientation=_TOOL, q_motors0=motors)
         motors, held = first.q_motors, None
         steps = []
-        for way in _with_progress(wanted.tolist(), progress):
+        for way in with_progress(wanted.tolist(), progress, label="push", unit="step"):
             found = solve_ik(model, start + way * _PUSH, orientation=_TOOL, q_motors0=motors, starts=1)
             motors = found.q_motors
             probe = np.array(frame_placement(model, found.equilibrium.q, PROBE).translation)
@@ -333,12 +330,3 @@ class BenchRun:
 def _part(part: str, **numbers: float) -> str:
     """URDF text of a part of the bench."""
     return expand(xacro_folder() / "bench_part.urdf.xacro", {"part": part, **{name: repr(n) for name, n in numbers.items()}})
-
-
-def _with_progress(steps: Iterable[float], progress: bool | str) -> Iterable[float]:
-    if not progress:
-        return steps
-    from tqdm import tqdm
-
-    bar: Iterable[float] = tqdm(steps, desc=progress if isinstance(progress, str) else "push", unit="step")
-    return bar

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +13,7 @@ from softrobots.errors import NeutralEquilibrium, ParameterError
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
+from softrobots.progress import with_progress
 from softrobots.sensitivity import tip_motion
 
 
@@ -82,7 +82,7 @@ def sample_workspace(
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ParameterError("seed", seed, "a whole number, zero or above")
     random = np.random.default_rng(int(seed))
-    drawn = (model.actuators.draw(random) for _ in _with_progress(count, progress))
+    drawn = (model.actuators.draw(random) for _ in with_progress(range(count), progress, label="samples", unit="sample"))
     rows = [row for motors in drawn if motors is not None and (row := _sample(model, load, motors)) is not None]
     if not rows:
         raise ParameterError("samples", samples, "such that one is a stable equilibrium; none is")
@@ -140,12 +140,3 @@ def workspace_at(
         if np.abs(tip - tips[row]).max() > 1e-9 * max(model.reach, 1.0):
             raise ParameterError("tip_positions", tips[row], f"the tip of its row {row}, {tip.tolist()}")
     return Workspace(model, load, read_only(motors), read_only(springs), read_only(tips), read_only(measures), int(refused))
-
-
-def _with_progress(count: int, progress: bool | str) -> Iterable[int]:
-    if not progress:
-        return range(count)
-    from tqdm import tqdm
-
-    bar: Iterable[int] = tqdm(range(count), desc=progress if isinstance(progress, str) else "samples", unit="sample")
-    return bar

@@ -17,7 +17,7 @@ import softrobots as sr
 from softrobots.composition import fix_joints
 from softrobots.kinematics import frame_placement
 from softrobots.tag_reader import read_tags
-from softrobots.third_party import robot_file
+from softrobots.third_party import UR5, robot_file
 from tests.conftest import missing
 from tests.foreign import INERTIAL, joint
 
@@ -43,7 +43,7 @@ def stand(xyz: str = "0.1 0.2 0.3", rpy: str = "0.4 -0.5 0.6", more: str = "") -
 @pytest.fixture(scope="session")
 def ur5() -> Path:
     try:
-        return robot_file("ur_description/urdf/ur5_robot.urdf")
+        return robot_file(UR5)
     except sr.MissingDependency as error:
         missing(str(error))
         raise

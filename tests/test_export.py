@@ -22,7 +22,7 @@ import softrobots as sr
 from softrobots import cli
 from softrobots.export import FORMATS, export_model, to_mjcf, to_sdf
 from softrobots.export.meshes import mujoco_reads
-from softrobots.third_party import robot_file
+from softrobots.third_party import UR5, robot_file
 from tests.conftest import missing
 from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 
@@ -580,7 +580,7 @@ def test_a_world_with_shapes_and_a_box(tool: Tool) -> None:
 
 def ur5() -> sr.SoftModel:
     try:
-        file = robot_file("ur_description/urdf/ur5_robot.urdf")
+        file = robot_file(UR5)
     except sr.MissingDependency:
         missing("example-robot-data is not installed")
     return sr.load_model(file, springs={"wrist_1_joint": 400.0, "wrist_3_joint": (250.0, 0.1)}, tip="tool0")

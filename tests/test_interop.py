@@ -25,7 +25,7 @@ from softrobots.interop.tools import TOOLS, find_tool, installed_tools
 from softrobots.paths import urdf_folder
 from softrobots.robots import HelixTube, InflatableArm, PccArm, Robot
 from softrobots.tag_reader import read_tags
-from softrobots.third_party import robot_file
+from softrobots.third_party import UR5, robot_file
 from tests.conftest import missing
 from tests.foreign import BRANCHED, INERTIAL, joint
 
@@ -493,7 +493,7 @@ def test_a_third_party_robot_with_springs_said_by_the_caller() -> None:
     import yourdfpy
 
     try:
-        file = robot_file("ur_description/urdf/ur5_robot.urdf")
+        file = robot_file(UR5)
     except sr.MissingDependency as error:
         missing(str(error))
     model = sr.load_model(file, springs={"wrist_1_joint": 40.0, "wrist_3_joint": (25.0, 0.1)}, tip="tool0")

@@ -13,7 +13,7 @@ from softrobots.composition import fix_joints
 from softrobots.mesh_files import MissingMeshWarning, find_mesh, with_absolute_paths
 from softrobots.mesh_triangles import Triangles
 from softrobots.scene import Scene, Shape
-from softrobots.third_party import package_folders, robot_file
+from softrobots.third_party import UR5, package_folders, robot_file
 from softrobots.viewer import Viewer
 from tests.conftest import missing
 from tests.foreign import INERTIAL, joint
@@ -141,7 +141,7 @@ def test_find_mesh_wants_a_file(tmp_path: Path) -> None:
 def carried() -> sr.SoftModel:
     """A UR5 that carries the inflatable arm, whose motors are held."""
     try:
-        ur5 = robot_file("ur_description/urdf/ur5_robot.urdf")
+        ur5 = robot_file(UR5)
     except sr.MissingDependency as error:
         missing(str(error))
     arm = fix_joints(sr.InflatableArm(), {"motor_1": 0.0, "motor_2": 1.5, "motor_3": 0.0})

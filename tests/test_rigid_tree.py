@@ -18,7 +18,7 @@ import softrobots as sr
 from softrobots.paths import urdf_folder
 from softrobots.rigid_tree import Placement, RigidTree
 from softrobots.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
-from softrobots.third_party import package_folders, robot_file
+from softrobots.third_party import UR5, package_folders, robot_file
 from softrobots.urdf_tags import SpringTag
 from tests.conftest import missing
 from tests.foreign import BRANCHED, INERTIAL, SPRINGS
@@ -159,7 +159,7 @@ def test_what_is_no_tree_is_refused(text: str, told: str) -> None:
 
 def test_robot_files_of_other_people_are_found_or_refused() -> None:
     try:
-        file = robot_file("ur_description/urdf/ur5_robot.urdf")
+        file = robot_file(UR5)
     except sr.MissingDependency as error:
         missing(str(error))
     assert read_rigid_tree(file.read_text()).name == "ur5"
@@ -176,5 +176,5 @@ def test_without_example_robot_data_the_extra_is_named(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(metadata, "distribution", nothing)
     with pytest.raises(sr.MissingDependency, match=r"softrobots\[robots\]"):
-        robot_file("ur_description/urdf/ur5_robot.urdf")
+        robot_file(UR5)
     assert package_folders() == []

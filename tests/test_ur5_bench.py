@@ -26,7 +26,7 @@ ROW = TABLE_3[4]  # 50 kPa
 @pytest.fixture(scope="module")
 def bench() -> UR5Bench:
     try:
-        third_party.robot_file("ur_description/urdf/ur5_robot.urdf")
+        third_party.robot_file(third_party.UR5)
     except sr.MissingDependency as error:
         missing(str(error))
     return UR5Bench(link=link_of(ROW))

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.third_party import robot_file
+from softrobots.third_party import UR5, robot_file
 from tests.conftest import missing
 from tests.test_scripts import run_script
 
@@ -21,7 +21,7 @@ NAME = "ur5_with_soft_arm"
 @pytest.fixture(autouse=True)
 def ur5() -> Path:
     try:
-        return robot_file("ur_description/urdf/ur5_robot.urdf")
+        return robot_file(UR5)
     except sr.MissingDependency as error:
         missing(str(error))
         raise

@@ -1,7 +1,7 @@
 """The subcommands of `softrobots`, one module each.
 
 A module has `add_parser(subparsers)`, which adds its parser and sets `run` on it: a function of the parsed arguments that does
-the job, raises errors of `softrobots.errors`, and returns None, or 1 if what it looked at is wrong.
+the job, raises errors of `softrobots.errors`, and returns None, or whether all that it looked at is well.
 """
 
 from softrobots.commands import doctor, export, urdf

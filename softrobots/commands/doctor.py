@@ -33,8 +33,8 @@ def add_parser(subparsers: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Print the report; 1 if something that is required is missing or wrong."""
+def run(arguments: argparse.Namespace) -> bool:
+    """Print the report; return whether all that is required is there and right."""
     trouble: list[str] = []
     folders = _folders(trouble)
     _packages(trouble)
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         _files(folders, trouble)
         _kinematics(folders, installed_tools() if arguments.all else ("yourdfpy",), trouble)
     _print("", *(["wrong:", *(f"  {text}" for text in trouble)] if trouble else ["all well"]))
-    return 1 if trouble else 0
+    return not trouble
 
 
 def _folders(trouble: list[str]) -> Path | None:

@@ -63,24 +63,24 @@ def add_parser(subparsers: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Do what the arguments ask for; 1 if a check finds anything wrong."""
+def run(arguments: argparse.Namespace) -> bool:
+    """Do what the arguments ask for; return whether a check, if one is asked for, finds all well."""
     _refuse_contradictions(arguments)
     if arguments.list:
         sys.stdout.write(_listing(arguments.robot))
-        return 0
+        return True
     source = robot_source(arguments.robot, arguments.parameters)
     if isinstance(source, Path) and (arguments.output is not None or not arguments.check):
         requirement = "a robot, a xacro, MJCF or SDF file; a URDF file can only be checked, with --check"
         raise ParameterError("ROBOT", str(source), requirement)
     if arguments.check and not report(check_description(source)):
-        return 1
+        return False
     text, _ = read_source(source)
     if arguments.output is not None:
         sys.stdout.write(f"{write_text(arguments.output, text, overwrite=arguments.overwrite)}: written\n")
     elif not arguments.check:
         sys.stdout.write(text)
-    return 0
+    return True
 
 
 def report(findings: tuple[Finding, ...]) -> bool:

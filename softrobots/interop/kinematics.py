@@ -18,7 +18,7 @@ from softrobots.checks import FloatArray, positive_integer
 from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError, SoftRobotsError
 from softrobots.interop.placed_links import Poses, open_in
-from softrobots.interop.tools import find_tool, installed_tools
+from softrobots.interop.tools import Tool, find_tool, installed_tools
 from softrobots.model import MAX_DOF
 from softrobots.robots import Robot
 from softrobots.sources import read_source
@@ -97,7 +97,7 @@ def compare_kinematics(
         tool.load()
     with as_file(source) as (file, label):
         truth = _pinocchio_poses(file, label, count, seed)
-        return tuple(_compare(tool.name, file, label, truth) for tool in chosen)
+        return tuple(_compare(tool, file, label, truth) for tool in chosen)
 
 
 @dataclass(frozen=True)
@@ -107,13 +107,17 @@ class _Truth:
     poses: tuple[Poses, ...]
 
 
-def _compare(name: str, file: Path, label: str, truth: _Truth) -> KinematicsRow:
-    tool = find_tool(name)
-    facts: dict[str, Any] = {"tool": name, "version": str(tool.version), "file": label, "joints_in_file": len(truth.joints)}
-    facts |= {"precision": tool.precision, "limits": tool.limits}
+def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow:
+    facts: dict[str, Any] = {
+        "tool": tool.name,
+        "version": str(tool.version),
+        "file": label,
+        "joints_in_file": len(truth.joints),
+    }
+    facts |= {"joints_in_file": len(truth.joints), "precision": tool.precision, "limits": tool.limits}
     start = time.perf_counter()
     try:
-        with open_in(name, file) as robot:
+        with open_in(tool.name, file) as robot:
             loaded = time.perf_counter()
             found = [robot.poses(values) for values in truth.values]
             finished = time.perf_counter()

@@ -12,7 +12,7 @@ from softrobots.export.snippets import to_pybullet
 from softrobots.interop import bullet_statics, drake_statics, mujoco_statics
 from softrobots.interop.cases import WELDED, EquilibriumCase
 from softrobots.interop.outcomes import Outcome, Question
-from softrobots.interop.tools import installed_version
+from softrobots.interop.tools import find_tool
 
 STATIC_TOLERANCE = 1e-9
 """Largest difference from Pinocchio's coordinates where the forces balance [rad or m]."""
@@ -25,9 +25,7 @@ class Simulator:
     """A tool that knows springs, or is told of them."""
 
     name: str
-    """What it is called."""
-    package: str
-    """Its name on PyPI."""
+    """What it is called, as of `softrobots.interop.tools.TOOLS`."""
     how: str
     """What it gets from us and how it loads it."""
     simulated: str
@@ -46,13 +44,12 @@ class Simulator:
     @property
     def version(self) -> str | None:
         """The installed version, or None."""
-        return installed_version(self.package)
+        return find_tool(self.name).version
 
 
 _TABLE = (
     Simulator(
         "MuJoCo",
-        "mujoco",
         "MJCF of `to_mjcf`, by `MjModel.from_xml_string`",
         "60 s at the defaults: 2 ms, contacts on",
         lambda case: to_mjcf(case.model, case.expected.q_motors, actuators=WELDED, gravity=case.gravity),
@@ -61,7 +58,6 @@ _TABLE = (
     ),
     Simulator(
         "Drake",
-        "drake",
         "SDF of `to_sdf`, by `Parser.AddModelsFromString`",
         f"60 s at {1e3 * drake_statics.TIME_STEP:g} ms, contacts on",
         lambda case: to_sdf(case.model, case.expected.q_motors, actuators=WELDED),
@@ -70,7 +66,6 @@ _TABLE = (
     ),
     Simulator(
         "PyBullet",
-        "pybullet",
         "Python file of `to_pybullet`, with URDF and spring torques",
         "1/240 s, until it rests",
         lambda case: to_pybullet(case.model, case.expected.q_motors, actuators=WELDED),
