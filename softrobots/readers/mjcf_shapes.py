@@ -63,10 +63,7 @@ def _shape(
 
 def _mesh_files(mujoco: Any, model: Any, text: str, path: Path | None) -> dict[int, str]:
     """Files of meshes that are read as they are, by number of the mesh."""
-    try:
-        spec = mujoco.MjSpec.from_string(text) if path is None else mujoco.MjSpec.from_file(str(path))
-    except TypeError:  # MuJoCo 3.2 had another form of these
-        return {}
+    spec = mujoco.MjSpec.from_string(text) if path is None else mujoco.MjSpec.from_file(str(path))
     folder, files = (Path() if path is None else path.parent) / spec.meshdir, {}
     for mesh in spec.meshes:
         file = folder / mesh.file
