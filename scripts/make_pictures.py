@@ -12,6 +12,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import inflated_beam
+from softrobots.bench_run import push_link
 from softrobots.browser import take_picture
 from softrobots.command_line import exit_status
 from softrobots.composition import fix_joints
@@ -54,7 +55,7 @@ def characterisation_bench() -> sr.Viewer:
     row = inflated_beam.TABLE_3[2]
     link = sr.InflatableArm(link_lengths=(0.6,), stiffness=row.stiffness, pressure=row.pressure, max_moment=row.max_moment)
     bench = UR5Bench(link=link)
-    viewer = sr.view(bench.model, bench.push(np.linspace(0.0, bench.push_end(), 41)).trajectory())
+    viewer = sr.view(bench.model, push_link(bench, np.linspace(0.0, bench.push_end(), 41)).trajectory())
     viewer.look_from(*bench.camera)
     return viewer
 

@@ -23,11 +23,12 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import bench_plots, inflated_beam, plots
+from softrobots.bench_run import BenchRun, Measurement, push_link
 from softrobots.checks import non_negative_number, positive_integer
 from softrobots.command_line import exit_status
 from softrobots.files import csv_text, free_folder, make_folder, write_text
 from softrobots.inflated_beam import CharacterisationRow, fit_characterisation
-from softrobots.ur5_bench import UR5_JOINTS, BenchRun, Measurement, UR5Bench
+from softrobots.ur5_bench import UR5_JOINTS, UR5Bench
 
 TABULATED = tuple(row.pressure / 1e3 for row in inflated_beam.TABLE_3)
 """Pressures of Table 3 [kPa]."""
@@ -79,7 +80,7 @@ def run(arguments: argparse.Namespace) -> Path:
         )  # fmt: skip
         bench = UR5Bench(link=link)
         ways = np.linspace(0.0, bench.push_end(arguments.beyond), steps + 1)
-        done = bench.push(ways, progress=f"{row.pressure / 1e3:g} kPa")
+        done = push_link(bench, ways, progress=f"{row.pressure / 1e3:g} kPa")
         force_std, angle_std = arguments.noise
         measured = done.measure(force_std=force_std, angle_std=angle_std, seed=arguments.seed + number)
         pushes.append((row, done, measured))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from softrobots import inflated_beam
+from softrobots.bench_run import BenchRun, Measurement
 from softrobots.plots import COLOURS, MARKERS, new_figure
-from softrobots.ur5_bench import BenchRun, Measurement
 
 Push = tuple[inflated_beam.CharacterisationRow, BenchRun, Measurement]
 """A push: the row of Table 3 that the true link has, the run, and what the instruments read."""

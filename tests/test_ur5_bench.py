@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam, third_party
+from softrobots.bench_run import BenchRun, push_link
 from softrobots.inflated_beam import TABLE_3, BendingTest
 from softrobots.kinematics import frame_placement
-from softrobots.ur5_bench import PROBE, TOUCH, UR5_JOINTS, BenchRun, UR5Bench
+from softrobots.ur5_bench import PROBE, TOUCH, UR5_JOINTS, UR5Bench
 from tests.conftest import missing
 from tests.test_scripts import run_script
 
@@ -34,7 +35,7 @@ def bench() -> UR5Bench:
 
 @pytest.fixture(scope="module")
 def push(bench: UR5Bench) -> BenchRun:
-    return bench.push(np.linspace(0.0, bench.push_end(1.6), 31))
+    return push_link(bench, np.linspace(0.0, bench.push_end(1.6), 31))
 
 
 def link_of(row: inflated_beam.CharacterisationRow) -> sr.InflatableArm:
@@ -238,7 +239,7 @@ def test_a_link_without_a_largest_moment_stays_linear(bench: UR5Bench) -> None:
     linear = UR5Bench(link=link_of(row))
     end = linear.push_end()
     assert float(linear.test.angle(end)) * row.stiffness == pytest.approx(0.95 * 24.63, abs=0.005)
-    run = linear.push(np.linspace(0.0, end, 9))
+    run = push_link(linear, np.linspace(0.0, end, 9))
     read = run.measure()
     fit = inflated_beam.fit_characterisation(read.angle, read.moment, pressure=row.pressure, radius=0.055)
     assert fit.stiffness == pytest.approx(row.stiffness, rel=1e-9)
@@ -269,9 +270,9 @@ def test_pushes_that_cannot_be_are_refused(bench: UR5Bench, push: BenchRun) -> N
     assert float(bench.test.contact(bench.largest_angle)) == pytest.approx(0.57, abs=1e-9)
     for ways in ([], [-0.01], [0.0, np.nan], [most], 0.1):
         with pytest.raises(sr.ParameterError, match="displacements"):
-            bench.push(ways)
+            push_link(bench, ways)
     with pytest.raises(sr.TargetUnreachable):
-        UR5Bench(link=link_of(ROW), touch_position=(1.2, 0.15, 0.35)).push([0.0])
+        push_link(UR5Bench(link=link_of(ROW), touch_position=(1.2, 0.15, 0.35)), [0.0])
     for noise in ({"force_std": -1.0}, {"angle_std": np.inf}, {"seed": -1}, {"seed": 0.5}, {"seed": True}):
         with pytest.raises(sr.ParameterError, match=next(iter(noise))):
             push.measure(**noise)
@@ -334,7 +335,7 @@ def test_without_robot_data_the_script_says_what_to_install(
     def nothing(name: str) -> metadata.Distribution:
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr(third_party.metadata, "distribution", nothing)
+    monkeypatch.setattr(metadata, "distribution", nothing)
     assert run_script("ur5_bench", ["--output", str(tmp_path / "out")]) == 2
     assert "pip install 'softrobots[robots]'" in capsys.readouterr().err
 

@@ -19,6 +19,7 @@ from softrobots.errors import ParameterError
 from softrobots.loader import load_model
 from softrobots.loads import EARTH_GRAVITY
 from softrobots.model import SoftModel
+from softrobots.muscles import MUSCLE_INPUTS
 from softrobots.robots import HelixTube, InflatableArm, PccArm
 
 TOLERANCE = 1e-13
@@ -135,11 +136,11 @@ Gravity = tuple[float, float, float] | None
 
 
 def _arm(pose: str, gravity: Gravity) -> Equilibrium:
-    return _solved("inflatable_arm", _models(InflatableArm())[0], np.array(ARM_POSES[pose]), gravity)
+    return _solved("inflatable_arm", _model(InflatableArm()), np.array(ARM_POSES[pose]), gravity)
 
 
 def _pcc_arm(pose: str, gravity: Gravity) -> Equilibrium:
-    held, pulled = _models(PccArm(chain="lumped"))
+    held, pulled = (_model(PccArm(chain="lumped"), muscles) for muscles in MUSCLE_INPUTS)
     lengths = held.relaxed_motors + np.array(MUSCLE_POSES[pose])
     tensions = _solved("pcc_arm_lumped", held, lengths, gravity).muscle_forces
     return _solved("pcc_arm_lumped", pulled, tensions, gravity)
@@ -147,7 +148,7 @@ def _pcc_arm(pose: str, gravity: Gravity) -> Equilibrium:
 
 def _tube(pose: str, gravity: Gravity) -> Equilibrium:
     tube = HelixTube(chain="lumped", **TUBES[pose])  # type: ignore[arg-type]  # fields of several types
-    return _solved("helix_tube_lumped", _models(tube)[0], np.zeros(0), gravity)
+    return _solved("helix_tube_lumped", _model(tube), np.zeros(0), gravity)
 
 
 def _solved(robot: str, model: SoftModel, motors: np.ndarray, gravity: Gravity) -> Equilibrium:
@@ -155,9 +156,8 @@ def _solved(robot: str, model: SoftModel, motors: np.ndarray, gravity: Gravity) 
 
 
 @lru_cache(maxsize=16)
-def _models(robot: InflatableArm | PccArm | HelixTube) -> tuple[SoftModel, SoftModel]:
-    """The robot with muscles as lengths and as tensions."""
-    return load_model(robot), load_model(robot, muscles="forces")
+def _model(robot: InflatableArm | PccArm | HelixTube, muscles: str = "lengths") -> SoftModel:
+    return load_model(robot, muscles=muscles)
 
 
 _MADE: Mapping[str, Callable[[str, Gravity], Equilibrium]] = {
