@@ -37,7 +37,7 @@ PACKAGES = (
     Package("drake", "1.43", "interop", "simulator"),
     Package("pybullet", "3.2.7", "interop", "simulator; no wheels above Python 3.11"),
     Package("urchin", "0.0.30", "interop-kinematics", "kinematics"),
-    Package("ikpy", "4", "interop-kinematics", "kinematics"),
+    Package("ikpy", "4.2", "interop-kinematics", "kinematics"),
     Package("roboticstoolbox-python", "1.4", "interop-kinematics", "kinematics"),
     Package("viser", "1.0", "interop-kinematics", "browser view with sliders"),
     Package("playwright", "1.45", "dev", "pictures of the browser view"),
