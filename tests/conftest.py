@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -40,6 +41,14 @@ def tool() -> Callable[[str], ModuleType]:
             raise
 
     return load
+
+
+@pytest.fixture
+def bullet(tool: Callable[[str], ModuleType]) -> ModuleType:
+    """The module pybullet, where it has wheels."""
+    if sys.version_info >= (3, 12):
+        pytest.skip("pybullet has no wheels above Python 3.11")
+    return tool("pybullet")
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ import pytest
 import softrobots as sr
 from softrobots.export import to_json, to_mjcf, to_pinocchio, to_sdf
 from softrobots.interop.urdf_rules import check_rules
-from softrobots.rigid_tree import read_rigid_tree
+from softrobots.rigid_tree_urdf import read_rigid_tree
 
 Tool = Callable[[str], Any]
 BALL = "0.01 0.01 0.01"

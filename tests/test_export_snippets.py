@@ -83,13 +83,6 @@ def run_alone(folder: Path, text: str, code: str) -> Any:
     return json.loads(done.stdout)
 
 
-@pytest.fixture
-def bullet(tool: Tool) -> ModuleType:
-    if sys.version_info >= (3, 12):
-        pytest.skip("pybullet has no wheels above Python 3.11")
-    return tool("pybullet")
-
-
 class InBullet:
     """A world of PyBullet with a robot in it."""
 

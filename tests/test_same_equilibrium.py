@@ -6,7 +6,6 @@ import dataclasses
 import importlib.util
 import json
 import re
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -51,13 +50,6 @@ def cases(robot: str) -> tuple[EquilibriumCase, ...]:
 def bent(robot: str) -> list[EquilibriumCase]:
     """The third pose, weightless and under gravity: of the arm one that bends both links, of the tubes the one on its axis."""
     return list(cases(robot)[4:6])
-
-
-@pytest.fixture
-def pybullet(tool: Tool) -> ModuleType:
-    if sys.version_info >= (3, 12):
-        pytest.skip("pybullet has no wheels above Python 3.11")
-    return tool("pybullet")
 
 
 # --- The cases
@@ -133,7 +125,7 @@ def test_a_minute_of_simulation_ends_where_pinocchio_says(tool: Tool, name: str,
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_pybullet_rests_where_pinocchio_says(pybullet: ModuleType, robot: str) -> None:
+def test_pybullet_rests_where_pinocchio_says(bullet: ModuleType, robot: str) -> None:
     for case in bent(robot):
         row = compare_equilibrium(case, "PyBullet")
         assert row.static_difference is None  # it does not tell its torques
@@ -275,20 +267,20 @@ def test_springs_arrive_by_our_files_only(tool: Tool, name: str, module: str, sp
     assert {kind: springs_read(name, text, kind) for kind, text in texts.items()} == springs
 
 
-def test_pybullet_reads_no_springs(pybullet: ModuleType) -> None:
+def test_pybullet_reads_no_springs(bullet: ModuleType) -> None:
     texts = texts_of(cases("inflatable_arm")[0])
     assert {kind: springs_read("PyBullet", text, kind) for kind, text in texts.items()} == {"URDF": 0, "MJCF": 0, "SDF": None}
 
 
-def test_a_torque_that_is_there_is_counted_in_pybullet(pybullet: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_torque_that_is_there_is_counted_in_pybullet(bullet: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """What `springs_read` would see if PyBullet had springs: torques set on all joints, once its brakes are off."""
-    original = pybullet.setJointMotorControl2
+    original = bullet.setJointMotorControl2
 
     def pushed(robot: int, joint: int, mode: int, **options: object) -> None:
         original(robot, joint, mode, **options)
-        original(robot, joint, pybullet.TORQUE_CONTROL, force=-0.1, physicsClientId=options["physicsClientId"])
+        original(robot, joint, bullet.TORQUE_CONTROL, force=-0.1, physicsClientId=options["physicsClientId"])
 
-    monkeypatch.setattr(pybullet, "setJointMotorControl2", pushed)
+    monkeypatch.setattr(bullet, "setJointMotorControl2", pushed)
     assert springs_read("PyBullet", cases("inflatable_arm")[0].model.urdf, "URDF") == 7
 
 
