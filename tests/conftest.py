@@ -22,6 +22,12 @@ settings.load_profile("repeatable")
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """One thread of linear algebra for each of several test processes: more only wait for each other."""
+    if getattr(config.option, "numprocesses", None):
+        os.environ.setdefault("OMP_NUM_THREADS", "1")  # before the processes start
+
+
 def missing(reason: str) -> None:
     """Fail in CI, skip elsewhere, with the reason."""
     if os.environ.get("CI") == "true":
