@@ -1,40 +1,25 @@
-r"""Displacement control: a probe displaces the robot by a given way, and the force follows.
+"""A robot that a probe displaces by a given way, as a certified result: the force follows.
 
 A dead moment cannot hold a link on the plateau of its moment, and a dead force only where the link has turned out of its way; a
-probe can. With the reaction `F` along the probe's line and the springs `y` as unknowns the conditions are
-:math:`r(y) - F \nabla g = 0` and `g(y) = v`, where `g` is the displacement of `softrobots.probes`. Newton solves
-
-.. math:: \begin{pmatrix} K_t & -a \\ a^T & 0 \end{pmatrix} \begin{pmatrix} dy \\ dF \end{pmatrix}
-          = \begin{pmatrix} -r + F a \\ v - g \end{pmatrix}
-
-with :math:`a = \nabla g` and `K_t` the tangent stiffness of springs, load and :math:`-F \nabla^2 g`. The equilibrium is stable
-under the imposed displacement when `K_t` is positive definite on the motions that `a` leaves free.
+probe can. The equations and the solver are in `softrobots.displacement_control`.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from softrobots.blas_threads import one_blas_thread
 from softrobots.checks import FloatArray, finite_array, finite_number, positive_integer, read_only, unit_vector
-from softrobots.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, scaled
+from softrobots.displacement_control import GAP, DisplacementControl, HeldState, follow, stable_while_held
+from softrobots.elastostatics import TOLERANCE
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state, solve_equilibrium
 from softrobots.errors import EquilibriumNotFound, ParameterError
-from softrobots.kinematics import frame_jacobian, frame_placement
+from softrobots.kinematics import frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
-from softrobots.probes import Contact, Probe, face_normal, touch
-
-_GAP = 1e-12  # largest distance of the probe from where it is meant to be, relative to the reach
-_LARGEST_STEP = 0.5  # [rad], norm of one Newton step
-_NEWTON_STEPS = 20
-_SHORTEST = 1e-6  # share of the way that is not halved again
-_SMALL_MOVE = 0.01  # [rad or m] of a spring: so near that no other path is meant
-_STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the springs' own stiffness
+from softrobots.probes import Probe, face_normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,16 +129,16 @@ def solve_imposed_displacement(
     origin = pose.translation + pose.rotation @ touched
     normal = None if axis is None else read_only(face_normal(pose.rotation.T @ line, axis, along))
     probe = Probe(at, read_only(touched), read_only(line), read_only(origin), normal)
-    problem = _Problem(model, motors, free.load, probe, tolerance)
+    problem = DisplacementControl(model, motors, free.load, probe, tolerance)
     here = problem.at(free.q_springs, 0.0)
-    if not np.linalg.norm(here.contact.gradient) > _GAP * model.reach:
+    if not np.linalg.norm(here.contact.gradient) > GAP * model.reach:
         raise ParameterError(
             "direction", direction, f"one in which the springs can move the point; it is at {origin.tolist()} m"
         )
     if start is not None:
         _check_start(problem, start)
         here = problem.at(start.q_springs, start.reaction)
-    here, spent = _follow(problem, here, wanted, most)
+    here, spent = follow(problem, here, wanted, most)
     reached = here.contact.displacement
     if abs(reached - wanted) <= problem.largest_gap:
         return _result(problem, here, wanted, spent)
@@ -167,108 +152,7 @@ def solve_imposed_displacement(
     )
 
 
-class _Held(NamedTuple):
-    """The robot and the probe at given springs and reaction."""
-
-    state: ElasticState
-    """The robot under load and reaction."""
-    contact: Contact
-    reaction: float
-    tangent: FloatArray
-    """With the force turning as the robot does."""
-
-    def step(self, torque: FloatArray, way: float) -> FloatArray | None:
-        """Change of springs and reaction that takes up a torque, shape (n,) [N m or N], and moves the probe by a way [m].
-
-        Shape (n + 1,); None where the path turns back.
-        """
-        n = len(torque)
-        matrix: FloatArray = np.zeros((n + 1, n + 1))
-        matrix[:n, :n], matrix[:n, n], matrix[n, :n] = self.tangent, -self.contact.gradient, self.contact.gradient
-        try:
-            return np.asarray(np.linalg.solve(matrix, np.append(torque, way)))
-        except np.linalg.LinAlgError:
-            return None
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """What stays the same while one displacement is sought."""
-
-    model: SoftModel
-    motors: FloatArray
-    load: Load
-    probe: Probe
-    tolerance: float
-
-    @property
-    def largest_gap(self) -> float:
-        return _GAP * self.model.reach
-
-    def at(self, q_springs: FloatArray, reaction: float) -> _Held:
-        """Evaluate at springs, shape (n_springs,), and a reaction [N]."""
-        point = self.model.coordinates.at(self.motors, q_springs)
-        q = self.model.embed(point.joints)
-        jacobian = point.columns(frame_jacobian(self.model, q, self.probe.frame))[1]
-        contact = touch(self.probe, frame_placement(self.model, q, self.probe.frame), jacobian)
-        state = elastic_state(self.model, self.motors, q_springs, self.load.plus(self.probe.frame, reaction * contact.wrench))
-        return _Held(state, contact, reaction, state.tangent - reaction * contact.turning)
-
-    def newton(self, here: _Held, wanted: float, most: int) -> tuple[_Held | None, int]:
-        """Newton to a displacement from nearby, and the evaluations spent; None where it does not converge in `most`."""
-        n = self.model.n_springs
-        for iteration in range(1, most + 1):
-            gap = wanted - here.contact.displacement
-            if not math.isfinite(here.state.error) or not math.isfinite(gap):
-                return None, iteration
-            settled = here.state.error <= largest_residual(self.model, here.state.scale, self.tolerance)
-            if settled and abs(gap) <= self.largest_gap:
-                return here, iteration
-            step = here.step(-here.state.residual, gap)
-            if step is None or not np.linalg.norm(step[:n]) <= _LARGEST_STEP:
-                return None, iteration
-            here = self.at(here.state.q_springs + step[:n], here.reaction + float(step[n]))
-        return None, most
-
-
-def _follow(problem: _Problem, here: _Held, wanted: float, most: int) -> tuple[_Held, int]:
-    """Go to a displacement along the path, in one step if possible; returns the farthest point and the evaluations spent."""
-    origin = here.contact.displacement
-    reached, step, spent = 0.0, 1.0, 0
-    with one_blas_thread(problem.model.n_springs):
-        while reached < 1.0 and step > _SHORTEST and spent < most:
-            aim = min(1.0, reached + step)
-            part = wanted if aim == 1.0 else origin + aim * (wanted - origin)
-            there, used = problem.newton(here, part, min(_NEWTON_STEPS, most - spent))
-            spent += used
-            if there is None or not _same_path(problem, here, there):
-                step *= 0.5
-            else:
-                here, reached, step = there, aim, 2.0 * step
-    return here, spent
-
-
-def _same_path(problem: _Problem, here: _Held, there: _Held) -> bool:
-    """Whether a step is sure to have stayed on the path: a short one, or one that went about where the path points.
-
-    A long one that ends unstable where it began stable is not: beyond the knee of a link, Newton finds the path on which a
-    second one goes limp, too, as easily as the one on which that unloads.
-    """
-    moved = there.state.q_springs - here.state.q_springs
-    if np.abs(moved).max() <= _SMALL_MOVE:
-        return True
-    model = problem.model
-    stable = [_stable_while_held(model, held.tangent, held.contact.gradient) for held in (here, there)]
-    if stable[0] and not stable[1]:
-        return False
-    predicted = here.step(np.zeros(len(moved)), there.contact.displacement - here.contact.displacement)
-    if predicted is None:
-        return False
-    missed, expected = np.abs(moved - predicted[:-1]).max(), np.abs(predicted[:-1]).max()
-    return bool(missed <= max(0.5 * expected, _SMALL_MOVE))
-
-
-def _result(problem: _Problem, held: _Held, wanted: float, iterations: int) -> ImposedDisplacement:
+def _result(problem: DisplacementControl, held: HeldState, wanted: float, iterations: int) -> ImposedDisplacement:
     """Make the result object."""
     model, probe, contact = problem.model, problem.probe, held.contact
     pressed = problem.load.plus(probe.frame, held.reaction * contact.wrench)
@@ -286,16 +170,8 @@ def _result(problem: _Problem, held: _Held, wanted: float, iterations: int) -> I
         tangent_stiffness=read_only(held.tangent),
         gradient=read_only(contact.gradient),
         gap=abs(contact.displacement - wanted),
-        stable=_stable_while_held(model, held.tangent, contact.gradient),
+        stable=stable_while_held(model, held.tangent, contact.gradient),
     )
-
-
-def _stable_while_held(model: SoftModel, tangent: FloatArray, gradient: FloatArray) -> bool:
-    """Whether a symmetric tangent stiffness is positive definite on the motions that a constraint leaves free."""
-    softness = 1.0 / np.sqrt(model.stiffness)
-    free = np.linalg.qr((softness * gradient)[:, None], mode="complete")[0][:, 1:]
-    on_free = free.T @ scaled(tangent, model.stiffness) @ free
-    return bool(np.linalg.eigvalsh(on_free).min(initial=math.inf) > _STABLE)
 
 
 def imposed_at(
@@ -324,11 +200,11 @@ def imposed_at(
     Returns:
         The result, whether or not it is in balance.
     """
-    problem = _Problem(model, q_motors, load, probe, TOLERANCE)
+    problem = DisplacementControl(model, q_motors, load, probe, TOLERANCE)
     return _result(problem, problem.at(q_springs, reaction), displacement, iterations)
 
 
-def _check_start(problem: _Problem, start: Any) -> None:
+def _check_start(problem: DisplacementControl, start: Any) -> None:
     if not isinstance(start, ImposedDisplacement):
         raise ParameterError("start", start, "an ImposedDisplacement")
     same = start.probe.same_as(problem.probe) and start.load.same_as(problem.load)

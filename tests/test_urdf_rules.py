@@ -211,7 +211,7 @@ def test_what_cannot_be_loaded_is_said(before: str, after: str, what: str, messa
 
 
 def test_a_robot_that_is_too_large_to_be_compared_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The limit of Pinocchio's workspace, as everywhere: it is told at once. Here a small limit, for a long arm takes seconds."""
+    """The limit of Pinocchio's workspace, as everywhere, is told at once. Here it is small, for a long arm takes seconds."""
     monkeypatch.setattr("softrobots.interop.kinematics.MAX_DOF", 6)
     findings = {finding.what: finding for finding in check_description(sr.InflatableArm())}
     assert findings["yourdfpy's kinematics"].problems == ("inflatable_arm has 7 movable joints; from 1 to 6 can be compared",)
