@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 import softrobots as sr
 from softrobots import body_plots, helix, plots
-from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large
+from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
 from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
 
@@ -116,10 +116,9 @@ def run(arguments: argparse.Namespace) -> Path:
             step("done")
             bar.close()
             print(table(summary))
-            print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+            tell_written(folder)
             if arguments.meshcat:
-                print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
-                viewer.wait()
+                serve(viewer)
     return folder
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots import inflated_beam, plots
-from softrobots.command_line import add_load, exit_status, gravity_of
+from softrobots.command_line import add_load, exit_status, gravity_of, serve, tell_written
 from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
 from softrobots.trajectory import METHODS
@@ -92,10 +92,9 @@ def run(arguments: argparse.Namespace) -> Path:
             figure.savefig(folder / f"{name}.png")
         viewer.write_html(folder / "scene.html", title="Inflatable arm, loaded, sag compensated")
         print(table(summary, trajectory.method))
-        print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+        tell_written(folder)
         if arguments.meshcat:
-            print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
-            viewer.wait()
+            serve(viewer)
     return folder
 
 

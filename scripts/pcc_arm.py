@@ -17,7 +17,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import body_plots, plots
-from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large
+from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
 from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
 from softrobots.robots.pcc_arm import CHAINS
@@ -101,10 +101,9 @@ def run(arguments: argparse.Namespace) -> Path:
         print(table(summary))
         if waypoints is not None:
             print(f"largest tip error on the way: {shown.tip_error.max():.3g} m at {len(shown.times)} waypoints")
-        print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+        tell_written(folder)
         if arguments.meshcat:
-            print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
-            viewer.wait()
+            serve(viewer)
     return folder
 
 

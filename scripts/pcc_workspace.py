@@ -15,7 +15,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import body_plots, plots
-from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large
+from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, tell_written
 from softrobots.files import free_folder, make_folder
 
 
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> Path:
     ]
     width = max(len(name) for name, _ in rows)
     print("\n".join(["", *(f"{name:<{width}}  {value:>18}" for name, value in rows)]))
-    print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+    tell_written(folder)
     return folder
 
 

@@ -25,7 +25,7 @@ import softrobots as sr
 from softrobots import bench_plots, inflated_beam, plots
 from softrobots.bench_run import BenchRun, Measurement, push_link
 from softrobots.checks import non_negative_number, positive_integer
-from softrobots.command_line import exit_status
+from softrobots.command_line import exit_status, serve, tell_written
 from softrobots.files import csv_text, free_folder, make_folder, write_text
 from softrobots.inflated_beam import CharacterisationRow, fit_characterisation
 from softrobots.ur5_bench import UR5_JOINTS, UR5Bench
@@ -94,16 +94,15 @@ def run(arguments: argparse.Namespace) -> Path:
         text = json.dumps({"settings": settings, "results": results}, indent=2) + "\n"
         write_text(folder / "results.json", text, overwrite=False)
         if not arguments.no_plots:
-            bench_plots.force_displacement(pushes).savefig(folder / "force_displacement.png")
-            bench_plots.moment_angle(pushes).savefig(folder / "moment_angle.png")
+            plots.write_png(bench_plots.force_displacement(pushes), folder / "force_displacement.png", overwrite=False)
+            plots.write_png(bench_plots.moment_angle(pushes), folder / "moment_angle.png", overwrite=False)
         title = f"UR5 pushes the inflated link at {scene.bench.pressure / 1e3:g} kPa"
         viewer.write_html(folder / "scene.html", title=title)
         print(table(results))
         print(ur5_table([done for _, done, _ in pushes]))
-        print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+        tell_written(folder)
         if arguments.meshcat:
-            print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
-            viewer.wait()
+            serve(viewer)
     return folder
 
 

@@ -23,7 +23,7 @@ import pinocchio as pin
 import softrobots as sr
 from softrobots import plots
 from softrobots.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
-from softrobots.command_line import exit_status
+from softrobots.command_line import exit_status, serve, tell_written
 from softrobots.composition import fix_joints
 from softrobots.files import free_folder, make_folder, write_text
 from softrobots.rigid_tree_urdf import read_rigid_tree
@@ -126,13 +126,12 @@ def run(arguments: argparse.Namespace) -> Path:
         write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
         write_text(folder / "table.txt", table(summary) + "\n", overwrite=False)
         if figure is not None:
-            figure.savefig(folder / "poses.png")
+            plots.write_png(figure, folder / "poses.png", overwrite=False)
         viewer.write_html(folder / "scene.html", title=f"UR5 with a soft arm, {load.payload:g} kg at its tip")
         print(table(summary))
-        print(f"\nwritten to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
+        tell_written(folder)
         if arguments.meshcat:
-            print(f"\nserving {viewer.url} (Ctrl-C ends)\nfrom another machine: {viewer.tunnel}", flush=True)
-            viewer.wait()
+            serve(viewer)
     return folder
 
 

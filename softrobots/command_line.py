@@ -1,10 +1,11 @@
-"""What the scripts share at the command line: the load, the size of a robot, and how a run ends."""
+"""What the scripts share at the command line: the load, the size of a robot, what was written, and how a run ends."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from softrobots.errors import NotConverged, ParameterError, SoftRobotsError
@@ -18,6 +19,21 @@ class Sized(Protocol):
     @property
     def n_joints(self) -> int:
         """Number of movable joints."""
+
+
+class Served(Protocol):
+    """A page that a browser can open."""
+
+    @property
+    def url(self) -> str:
+        """Its address."""
+
+    @property
+    def tunnel(self) -> str:
+        """The command that makes it reachable from another machine."""
+
+    def wait(self) -> None:
+        """Serve until Ctrl-C."""
 
 
 def add_load(parser: argparse.ArgumentParser, force: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
@@ -53,6 +69,18 @@ def refuse_too_large(robot: Sized, option: str, value: Any) -> None:
     """
     if robot.n_joints > MAX_DOF:
         raise ParameterError(option, value, f"so few that the chain has at most {MAX_DOF} joints, not {robot.n_joints}")
+
+
+def tell_written(folder: Path) -> None:
+    """Print the names of the files in a folder of results."""
+    sys.stdout.write(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}\n")
+
+
+def serve(page: Served) -> None:
+    """Print where a page is, and serve it until Ctrl-C: what `--meshcat` asks for."""
+    sys.stdout.write(f"\nserving {page.url} (Ctrl-C ends)\nfrom another machine: {page.tunnel}\n")
+    sys.stdout.flush()
+    page.wait()
 
 
 def exit_status(run: Callable[[], object]) -> int:

@@ -16,7 +16,7 @@ from softrobots.body import body, body_at
 from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number
 from softrobots.equilibrium import Equilibrium, check_same_model
 from softrobots.errors import ParameterError, ViewerError
-from softrobots.files import new_file, write_atomically
+from softrobots.files import new_file, write_text
 from softrobots.kinematics import backbone, frame_placement
 from softrobots.meshcat_arrows import ArrowDrawing
 from softrobots.meshcat_body import BodyDrawing
@@ -291,10 +291,8 @@ class Viewer:
         Raises:
             OutputExists: If the file exists and `overwrite` is false.
         """
-        target = new_file(path, overwrite=overwrite)
-        page = self.html(title).encode("utf-8")
-        write_atomically(target, lambda file: file.write(page))
-        return target
+        new_file(path, overwrite=overwrite)  # tells at once
+        return write_text(path, self.html(title), overwrite=overwrite)
 
     def wait(self) -> None:
         """Serve until Ctrl-C or until the server ends."""

@@ -49,11 +49,16 @@ def tool() -> Callable[[str], ModuleType]:
     return load
 
 
+def skip_without_bullet_wheels() -> None:
+    """PyBullet has wheels for some Pythons only; that is not missing in CI."""
+    if sys.version_info >= (3, 12):
+        pytest.skip("pybullet has no wheels above Python 3.11")
+
+
 @pytest.fixture
 def bullet(tool: Callable[[str], ModuleType]) -> ModuleType:
     """The module pybullet, where it has wheels."""
-    if sys.version_info >= (3, 12):
-        pytest.skip("pybullet has no wheels above Python 3.11")
+    skip_without_bullet_wheels()
     return tool("pybullet")
 
 

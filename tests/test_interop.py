@@ -26,7 +26,7 @@ from softrobots.paths import urdf_folder
 from softrobots.robots import HelixTube, InflatableArm, PccArm, Robot
 from softrobots.tag_reader import read_tags
 from softrobots.third_party import UR5, robot_file
-from tests.conftest import missing
+from tests.conftest import missing, skip_without_bullet_wheels
 from tests.foreign import BRANCHED, INERTIAL, joint
 
 FILE = urdf_folder() / "inflatable_arm.urdf"
@@ -44,8 +44,8 @@ MASSES |= {"helix_tube": (0.5, TUBE_MASS), "helix_tube_lumped": (0.5, TUBE_MASS)
 
 def needed(name: str) -> str:
     """The name of a tool that is installed; otherwise the test fails in CI and is skipped elsewhere."""
-    if name == "PyBullet" and sys.version_info >= (3, 12):
-        pytest.skip("pybullet has no wheels above Python 3.11")
+    if name == "PyBullet":
+        skip_without_bullet_wheels()
     if name not in installed_tools():
         missing(f"{name} is not installed")
     return name
