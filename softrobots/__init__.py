@@ -4,6 +4,7 @@ from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.composition import mount
 from softrobots.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.errors import (
+    ClusterError,
     DescriptionError,
     EquilibriumNotFound,
     FileFormatError,
@@ -25,6 +26,7 @@ from softrobots.errors import (
 from softrobots.growth import grown_coordinates
 from softrobots.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
 from softrobots.inverse_kinematics import IkSolution, solve_ik
+from softrobots.kernels.compiled_model import compile_model as compile  # noqa: F401  (in __all__ it would hide the builtin)
 from softrobots.load_estimation import LoadEstimate, estimate_load
 from softrobots.loader import load_model
 from softrobots.loads import EARTH_GRAVITY, distributed_force
@@ -43,6 +45,7 @@ __version__ = "0.1.0"
 __all__ = [
     "EARTH_GRAVITY",
     "ROBOTS",
+    "ClusterError",
     "DescriptionError",
     "Equilibrium",
     "EquilibriumNotFound",

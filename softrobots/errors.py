@@ -149,6 +149,10 @@ class FileFormatError(SoftRobotsError, ValueError):
     """A results or waypoint file that cannot be read."""
 
 
+class ClusterError(SoftRobotsError, RuntimeError):
+    """A cluster of worker processes cannot be reached, or does not do its work."""
+
+
 class ViewerError(SoftRobotsError, RuntimeError):
     """The browser view cannot be served."""
 

@@ -15,9 +15,11 @@ import pinocchio as pin
 
 from softrobots import inflated_beam
 from softrobots.actuators import Actuators
+from softrobots.chain_reader import read_chain
 from softrobots.checks import LARGEST, FloatArray, finite_array, read_only
 from softrobots.coordinates import Coordinates
 from softrobots.errors import DescriptionError, NameNotFound, ParameterError
+from softrobots.serial_chain import SerialChain
 from softrobots.springs import LinearSprings, SpringLaw, spring_law
 from softrobots.structure import Parts, Structure
 from softrobots.urdf_tags import InflatedLinkTag, MuscleTag
@@ -96,6 +98,7 @@ class SoftModel:
         self._rounding = 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(self.stiffness * self.rest))
         self._reach = self._chain_length()
         self._identity = (urdf, tuple(self.spring_table.items()), self.motor_joints, tip, parts.muscle_input)
+        self._chain: SerialChain | None = None
         self._local = threading.local()
 
     def __repr__(self) -> str:
@@ -330,7 +333,7 @@ class SoftModel:
             if self._pin.nv > MAX_DOF:
                 raise DescriptionError(
                     f"{self._pin.name} has {self._pin.nv} coordinates; Pinocchio's workspace is made for at most {MAX_DOF} "
-                    f"(longer chains need a compiled solver, which this version does not have)"
+                    f"(for longer chains softrobots.compile makes a compiled solver)"
                 )
             if gravity is None:
                 model = self._pin
@@ -342,6 +345,16 @@ class SoftModel:
                     del pairs[kept[0]]
             pair = pairs[gravity] = (model, model.createData())
         return pair
+
+    def chain(self) -> SerialChain:
+        """The robot as a serial chain from base to tip, for compiled solvers; made on first use, without Pinocchio's workspace.
+
+        Raises:
+            DescriptionError: If a joint is not between base and tip, or a link has a largest moment.
+        """
+        if self._chain is None:
+            self._chain = read_chain(self._pin, self._structure, self._springs, self.frame_id(self._tip), self._reach)
+        return self._chain
 
     def _chain_length(self) -> float:
         names = [name for section in self._structure.section_table for name in section.joint_names]

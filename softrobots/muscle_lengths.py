@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray
+from softrobots.checks import FloatArray, read_only
 from softrobots.coordinates import Coordinates, Point, ReducedLoad
 from softrobots.errors import DescriptionError, ParameterError
 from softrobots.joint_loads import JointLoad
@@ -51,10 +51,9 @@ class MuscleLengths:
         self._tags = tuple(tags)
         self._rest_lengths = np.array([tag.rest_length for tag in tags])
         count = len(law.names)
-        self._spread = np.zeros((count, len(tags)))
+        spread = np.zeros((count, len(tags)))
         self._misfit = np.zeros((len(tags), len(tags)))
-        held: set[int] = set()
-        modes, names, turning = [], [], []
+        groups, slopes, modes, names, turning = [], [], [], [], []
         for segment in sorted({tag.segment for tag in tags}):
             rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
             places = {key: list(segments[segment][key]) for key in HELD if key in segments[segment]}
@@ -68,8 +67,11 @@ class MuscleLengths:
             self._misfit[np.ix_(rows, rows)] = np.eye(len(rows)) - arms @ inverse
             for key, row_of_inverse in zip(places, inverse, strict=True):
                 softness = 1.0 / law.stiffness[places[key]]
-                self._spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
-                held |= set(places[key])
+                spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
+                slope = np.zeros(len(tags))
+                slope[rows] = row_of_inverse
+                groups.append(tuple(places[key]))
+                slopes.append(slope)
                 basis = _differences(law.stiffness[places[key]])
                 for number, mode in enumerate(basis.T, start=1):
                     column = np.zeros(count)
@@ -77,11 +79,20 @@ class MuscleLengths:
                     modes.append(column)
                     names.append(f"segment_{segment}_{key}_mode_{number}")
                     turning.append(key != "stretch")
+        held = {place for group in groups for place in group}
         free = [place for place in range(count) if place not in held]
-        columns = [np.eye(count)[place] for place in free] + modes
-        self._free = np.array(columns).reshape(-1, count).T
-        stiffness = np.einsum("ik,i,ik->k", self._free, law.stiffness, self._free)
-        rest = (law.stiffness * law.rest) @ self._free / stiffness
+        self.groups = tuple(groups)
+        """Elastic coordinates of the robot without muscles whose sum the lengths hold, group by group."""
+        self.slopes = read_only(np.array(slopes).reshape(-1, len(tags)))
+        """Derivative of those sums with respect to the lengths, shape (n_groups, n_muscles) [rad/m or -]."""
+        self.spread = read_only(spread)
+        """Elastic coordinates of the robot without muscles by change of the lengths, shape (count, n_muscles)."""
+        self.free = read_only(np.concatenate([np.eye(count)[free], np.array(modes).reshape(-1, count)]).T)
+        """The same by free coordinates, shape (count, n)."""
+        stiffness = np.einsum("ik,i,ik->k", self.free, law.stiffness, self.free)
+        rest = (law.stiffness * law.rest) @ self.free / stiffness
+        self.elastic = read_only((self.free * law.stiffness[:, None]).T / stiffness[:, None])
+        """Free coordinates by those without muscles, shape (n, count): `elastic @ free = 1`, `elastic @ spread = 0`."""
         angles = np.array([*(law.turning[place] for place in free), *turning], dtype=bool)
         self.law = ElasticLaw((*(law.names[place] for place in free), *names), stiffness, np.asarray(rest), angles)
         """Stiffness of the free coordinates."""
@@ -90,12 +101,12 @@ class MuscleLengths:
         """Go to given coordinates."""
         count = len(motors) - len(self._tags)
         strains = self.strains(motors, elastic)
-        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self._spread, self._free, self._law, strains)
+        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self.spread, self.free, self._law, strains)
 
     def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
         change = motors[len(motors) - len(self._tags) :] - self._rest_lengths
-        return np.asarray(self._spread @ change + self._free @ elastic)
+        return np.asarray(self.spread @ change + self.free @ elastic)
 
     def consistent(self, motors: FloatArray) -> FloatArray:
         """Nearest motors and lengths that arcs explain, shape (n_motors,)."""
@@ -142,7 +153,7 @@ class MuscleLengths:
                 f"muscle lengths that one arc a segment explains{stretch}; those of segment {segment} miss the nearest arc by "
                 f"{misfit.max():.3g} m, allowed {CONSISTENT:g} m"
             )
-        spread = self._spread @ change
+        spread = self.spread @ change
         for segment, bending, _ in self._bendings(motors):
             stretches = self._segments[segment].get("stretch")
             length = self._section_lengths[segment]
@@ -183,7 +194,7 @@ class MuscleLengths:
     def _bendings(self, motors: FloatArray) -> list[tuple[int, float, tuple[FloatArray, FloatArray]]]:
         """Each segment with muscles: number, largest bending of a section [rad], slopes of bending it and of turning it."""
         first = len(motors) - len(self._tags)
-        spread = self._spread @ (motors[first:] - self._rest_lengths)
+        spread = self.spread @ (motors[first:] - self._rest_lengths)
         found = []
         for segment in sorted({tag.segment for tag in self._tags}):
             about_x, about_y = (list(self._segments[segment][key]) for key in ("bend_x", "bend_y"))
@@ -192,8 +203,8 @@ class MuscleLengths:
             x, y = about_x[most], about_y[most]
             size = max(float(bendings[most]), 1e-300)
             along, across = np.zeros(len(motors)), np.zeros(len(motors))
-            along[first:] = (spread[x] * self._spread[x] + spread[y] * self._spread[y]) / size
-            across[first:] = (spread[x] * self._spread[y] - spread[y] * self._spread[x]) / size
+            along[first:] = (spread[x] * self.spread[x] + spread[y] * self.spread[y]) / size
+            across[first:] = (spread[x] * self.spread[y] - spread[y] * self.spread[x]) / size
             found.append((segment, float(bendings[most]), (along, across)))
         return found
 

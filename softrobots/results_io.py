@@ -29,8 +29,9 @@ from softrobots.probes import Probe
 from softrobots.tip_search import Goal
 from softrobots.trajectory import Trajectory
 from softrobots.workspace import Workspace, workspace_at
+from softrobots.workspace_map import WorkspaceMap, packed, unpacked
 
-Result = Equilibrium | IkSolution | ImposedDisplacement | LoadEstimate | Trajectory | Workspace
+Result = Equilibrium | IkSolution | ImposedDisplacement | LoadEstimate | Trajectory | Workspace | WorkspaceMap
 """What can be saved."""
 
 _FORMAT = 1
@@ -42,7 +43,8 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
     The file appears whole or not at all: it is written beside its place and moved there.
 
     Args:
-        result: An equilibrium, imposed displacement, load estimate, IK solution, trajectory or workspace.
+        result: An equilibrium, imposed displacement, load estimate, IK solution, trajectory, workspace or
+            workspace map.
         path: File to write; `.npz` is added if it has no ending.
         overwrite: Replace an existing file.
 
@@ -57,7 +59,9 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
     kind = next((name for name, (cls, _, _) in _KINDS.items() if isinstance(result, cls)), None)
     if kind is None:
         raise ParameterError(
-            "result", result, "an Equilibrium, IkSolution, ImposedDisplacement, LoadEstimate, Trajectory or Workspace"
+            "result",
+            result,
+            "an Equilibrium, IkSolution, ImposedDisplacement, LoadEstimate, Trajectory, Workspace or WorkspaceMap",
         )
     path = as_path("path", path)
     named = path if path.suffix or path.is_dir() else path.with_suffix(".npz")
@@ -310,6 +314,15 @@ def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
     return workspace_at(model, load, **arrays, refused=int(fields["refused"]))
 
 
+def _pack_map(result: WorkspaceMap) -> dict[str, Any]:
+    return _pack_model(result.model, Load.of(result.model, gravity=result.gravity)) | packed(result)
+
+
+def _unpack_map(fields: Mapping[str, Any]) -> WorkspaceMap:
+    model, load = _unpack_model(fields)
+    return unpacked(model, load.gravity, fields)
+
+
 _KINDS: dict[str, tuple[type, Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Result]]] = {
     "equilibrium": (Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
     "ik_solution": (IkSolution, _pack_solution, _unpack_solution),
@@ -317,4 +330,5 @@ _KINDS: dict[str, tuple[type, Callable[[Any], dict[str, Any]], Callable[[Mapping
     "load_estimate": (LoadEstimate, _pack_estimate, _unpack_estimate),
     "trajectory": (Trajectory, _pack_trajectory, _unpack_trajectory),
     "workspace": (Workspace, _pack_workspace, _unpack_workspace),
+    "workspace_map": (WorkspaceMap, _pack_map, _unpack_map),
 }

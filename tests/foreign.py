@@ -8,10 +8,18 @@ INERTIAL = '<inertial><mass value="0.5"/><inertia ixx="0.01" ixy="0" ixz="0" iyy
 LIMIT = '<limit lower="-2" upper="2" effort="10" velocity="1"/>'
 
 
-def joint(name: str, parent: str, child: str, axis: str, kind: str = "revolute", xyz: str = "0.3 0 0") -> str:
+def joint(
+    name: str,
+    parent: str,
+    child: str,
+    axis: str,
+    kind: str = "revolute",
+    xyz: str = "0.3 0 0",
+    rpy: str = "0.1 0.2 0.3",
+) -> str:
     limit = "" if kind == "continuous" else LIMIT
     return (
-        f'<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="0.1 0.2 0.3"/><parent link="{parent}"/>'
+        f'<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="{rpy}"/><parent link="{parent}"/>'
         f'<child link="{child}"/><axis xyz="{axis}"/>{limit}</joint><link name="{child}">{INERTIAL}</link>'
     )
 

@@ -1,0 +1,113 @@
+"""How fast the compiled solvers are, each job against what one would use instead.
+
+All alternatives of a job run in turn, round after round, in one process and on one thread; costs are CPU time where nothing
+else is said, ratios are taken within a round, and what is printed are medians. Answers are compared with those of
+solve_equilibrium and its like before anything is timed. What needs a package that is not installed is named as skipped.
+Nothing fails because it is slow: the table says which targets are met.
+
+Takes minutes; with --cpp one more, for g++ to compile Pinocchio's forward kinematics (needs g++ and libeigen3-dev).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import softrobots as sr
+from softrobots import plots
+from softrobots.benchmark.jobs import JOBS, measure
+from softrobots.benchmark.pictures import PICTURES, picture
+from softrobots.benchmark.race import Settings, quick_settings
+from softrobots.benchmark.results import Results, as_json, marked, read_results, require_whole, table
+from softrobots.command_line import exit_status
+from softrobots.files import make_folder, new_file, write_text
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
+"""Between these lines of README.md and docs/compiled.md stand the tables."""
+PAGES = {"README.md": True, "docs/compiled.md": False}
+"""Pages with a table, and whether only what has a target is in it."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    told = f"jobs to run, of {', '.join(JOBS)} (all)"
+    made.add_argument("--only", nargs="+", choices=list(JOBS), default=list(JOBS), metavar="JOB", help=told)
+    made.add_argument("--rounds", type=int, default=9, help="rounds of each race (%(default)s)")
+    made.add_argument("--cpp", action="store_true", help="compile and time Pinocchio's forward kinematics in C++")
+    made.add_argument("--quick", action="store_true", help="small sizes, to see that everything runs; the figures mean nothing")
+    told = "make tables and pictures of saved results instead"
+    made.add_argument("--from", type=Path, dest="saved", metavar="FILE", help=told)
+    made.add_argument("--json", type=Path, metavar="FILE", help="also write the results to a new file")
+    made.add_argument("--plots", type=Path, metavar="FOLDER", help="draw the curves into a folder (jobs sizes and batches)")
+    told = "write docs/benchmark.json, docs/images/benchmark_*.png and the tables in README.md and docs/compiled.md"
+    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
+    return made
+
+
+def document(results: Results, *, targets_only: bool) -> str:
+    """What a page shows of the results: machine, table and notes."""
+    rows = [row for row in results.rows if row.target is not None or not targets_only]
+    named = {name: value for name, value in results.machine.items() if name not in ("processor", "system")}
+    told = ", ".join([results.machine["processor"], results.machine["system"], *map(" ".join, named.items())])
+    machine = f"Medians of {results.settings['rounds']} rounds on: {told}."
+    notes = [] if targets_only else ["\n".join(f"- {note}" for note in results.notes)]
+    return "\n\n".join(part for part in [machine, table(rows), *notes] if part)
+
+
+def write_pictures(results: Results, folder: Path, *, overwrite: bool) -> list[Path]:
+    """Draw what there are curves for; return the files."""
+    names = [name for name in PICTURES if any(curve.picture == name for curve in results.curves)]
+    make_folder(folder)
+    return [plots.write_png(picture(results, name), folder / f"benchmark_{name}.png", overwrite=overwrite) for name in names]
+
+
+def write_docs(results: Results, checkout: Path) -> list[Path]:
+    """Write results, pictures and tables into a checkout; return the files."""
+    require_whole(results, list(JOBS))
+    texts = {}
+    for name, targets_only in PAGES.items():
+        try:
+            text = (checkout / name).read_text(encoding="utf-8")
+        except (OSError, ValueError) as error:
+            raise sr.FileFormatError(f"cannot read {checkout / name}: {error}") from error
+        texts[name] = marked(text, name, BEGIN, END, document(results, targets_only=targets_only))
+    files = write_pictures(results, checkout / "docs" / "images", overwrite=True)
+    files.append(write_text(checkout / "docs" / "benchmark.json", as_json(results), overwrite=True))
+    return files + [write_text(checkout / name, text, overwrite=True) for name, text in texts.items()]
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Do the whole job."""
+    settings = Settings(arguments.rounds, progress=True, cpp=arguments.cpp)
+    if arguments.quick:
+        settings = quick_settings(arguments.rounds, progress=True, cpp=arguments.cpp)
+    if arguments.rounds < 1:
+        raise sr.ParameterError("--rounds", arguments.rounds, "at least 1")
+    if arguments.plots is not None or arguments.docs is not None:
+        plots.require_matplotlib()  # tells at once what is missing
+    if arguments.json is not None:
+        new_file(arguments.json, overwrite=False)
+    results = measure(settings, arguments.only) if arguments.saved is None else read_results(arguments.saved)
+    print(f"\n{document(results, targets_only=False)}")
+    written = []
+    if arguments.json is not None:
+        written.append(write_text(arguments.json, as_json(results), overwrite=False))
+    if arguments.plots is not None:
+        written += write_pictures(results, arguments.plots, overwrite=False)
+    if arguments.docs is not None:
+        written += write_docs(results, make_folder(arguments.docs))
+    if written:
+        print(f"\nwritten: {', '.join(map(str, written))}")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run from the command line; bad input ends with status 2, slowness does not."""
+    arguments = parser().parse_args(argv)
+    return exit_status(lambda: run(arguments))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

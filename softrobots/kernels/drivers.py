@@ -1,0 +1,196 @@
+"""What generated code does with its evaluations: Newton passes, and descent on the energy for cases that they do not settle.
+
+Functions in the kernel language. Their text goes into every generated module as it stands here, behind the constants and
+functions that are declared first; so one text is run by Python, compiled for single cases and for lanes, and translated to C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from softrobots.kernels.intrinsics import Array, sqrt
+from softrobots.kernels.settings import ARMIJO, DESCENT_STEPS, LARGEST_STEP, LEAST_SOFTNESS, PASSES, TIGHT, TOLERANCE
+
+# Made for each robot: places in the workspace, counts, tolerances, and straight-line code.
+START: int
+UNKNOWN: int
+STEP: int
+KEPT: int
+WAY: int
+ENERGY: int
+SLOPE: int
+ERROR: int
+LENGTH: int
+SIZE: int
+SOFTEST: int
+NEGATIVES: int
+ROOM: int
+MODE: int
+ROUNDING: int
+GUARD: int
+SPENT: int
+N: int
+HELD: int
+SPRING_ROUNDING: float
+SOFTNESS: tuple[float, ...]
+GROUP: tuple[int, ...]
+REST: tuple[float, ...]
+first_pass: Callable[[Array], None]
+newton_pass: Callable[[Array], None]
+prepare: Callable[[Array], None]
+evaluate: Callable[[Array], None]
+
+
+def is_settled(w: Array, tolerance: float) -> bool:
+    """Tell whether the residual is within a relative tolerance, or within the rounding of the spring torques."""
+    return w[ERROR] <= tolerance * tolerance * w[SIZE] or w[ERROR] <= SPRING_ROUNDING * SPRING_ROUNDING
+
+
+def is_stable(w: Array) -> bool:
+    """Tell whether all pivots of springs are clearly positive, and those of the multipliers negative: one for each."""
+    return w[SOFTEST] > LEAST_SOFTNESS and w[NEGATIVES] - HELD < 0.5 and HELD - w[NEGATIVES] < 0.5
+
+
+def move(w: Array, share: float) -> None:
+    """Go a share of the way from where a line search started."""
+    for i in range(N):
+        w[UNKNOWN + i] = w[KEPT + i] + share * w[WAY + i]
+
+
+def keep(w: Array) -> None:
+    """Remember the unknowns and their step, for a line search."""
+    for i in range(N):
+        w[KEPT + i] = w[UNKNOWN + i]
+        w[WAY + i] = w[STEP + i]
+
+
+def leave_saddle(w: Array) -> None:
+    """Go away from an unstable equilibrium in a direction of no symmetry, soft springs more, without changing held sums."""
+    keep(w)
+    for i in range(N):
+        w[WAY + i] = 0.1 * SOFTNESS[i] * (1.0 + 0.3 * i / N)
+    for group in range(HELD):
+        total = 0.0
+        count = 0
+        for i in range(N):
+            if GROUP[i] == group:
+                total += w[WAY + i]
+                count += 1
+        for i in range(N):
+            if GROUP[i] == group:
+                w[WAY + i] -= total / count
+    move(w, 1.0)
+
+
+def outcome(w: Array) -> int:
+    """Return the status of the point that was evaluated last."""
+    if w[ENERGY] - w[ENERGY] != 0.0:
+        return 4  # infinite, or no number
+    if w[ROOM] < 0.0:
+        return 3  # a section beyond its range
+    if not is_settled(w, TOLERANCE):
+        return 2  # not in balance
+    if not is_stable(w):
+        return 1  # in balance, but not stable
+    return 0
+
+
+def search_line(w: Array) -> bool:
+    """Go along the step as far as the energy falls (Armijo); tell whether anything is gained by it."""
+    keep(w)
+    energy = w[ENERGY]
+    slope = w[SLOPE]
+    error = w[ERROR]
+    rounding = w[ROUNDING]
+    share = 1.0
+    if w[LENGTH] > LARGEST_STEP * LARGEST_STEP:
+        share = LARGEST_STEP / sqrt(w[LENGTH])
+    slope *= share
+    largest = share
+    move(w, share)
+    evaluate(w)
+    while not w[ENERGY] <= energy + ARMIJO * slope + rounding and share > 1e-12 * largest:
+        share *= 0.5
+        slope *= 0.5
+        move(w, share)
+        evaluate(w)
+    if not w[ENERGY] <= energy + rounding or (-slope < rounding and not w[ERROR] < error):
+        move(w, 0.0)  # nothing is gained
+        evaluate(w)
+        return False
+    return True
+
+
+def descend(w: Array) -> int:
+    """Newton descent on the energy from the unknowns in the workspace; return the status.
+
+    Where pivots are not positive they are made so, and a step that does not lower the energy is halved. It ends in a stable
+    equilibrium unless there is none, a section comes to the end of its range, or the steps are spent.
+    """
+    saddles = 0
+    w[GUARD] = 0.0
+    w[SPENT] = 0.0
+    evaluate(w)
+    for _ in range(DESCENT_STEPS):
+        w[SPENT] += 1.0
+        stable = is_stable(w)
+        if is_settled(w, TIGHT):
+            if stable or saddles == 3:
+                break
+            saddles += 1
+            leave_saddle(w)
+            evaluate(w)
+        else:
+            if not stable:
+                w[GUARD] = 1.0
+                evaluate(w)
+                w[GUARD] = 0.0
+            if not search_line(w):
+                break
+    return outcome(w)
+
+
+def go_to_start(w: Array) -> None:
+    """Put the unknowns where the springs are relaxed, or as given where muscle lengths hold sums of them."""
+    for i in range(N):
+        if HELD > 0:
+            w[UNKNOWN + i] = w[START + i]
+        else:
+            w[UNKNOWN + i] = REST[i]
+
+
+def settle_from(w: Array) -> int:
+    """Descend from given unknowns."""
+    prepare(w)
+    return descend(w)
+
+
+def settle(w: Array) -> int:
+    """Find the equilibrium from rest: Newton passes while they go well, else descent from rest; return the status."""
+    if HELD > 0:
+        go_to_start(w)
+    first_pass(w)
+    for _ in range(PASSES):
+        if w[MODE] > 0.5:
+            break
+        newton_pass(w)
+    if w[MODE] > 0.5 and w[MODE] < 1.5:
+        return 0
+    go_to_start(w)
+    return descend(w)
+
+
+FUNCTIONS: tuple[Callable[..., object], ...] = (
+    is_settled,
+    is_stable,
+    move,
+    keep,
+    leave_saddle,
+    outcome,
+    search_line,
+    descend,
+    go_to_start,
+    settle_from,
+    settle,
+)
+"""All of them, each behind those that it uses."""

@@ -1,0 +1,48 @@
+"""What the kernel language has built in, for plain Python; other back ends bring their own.
+
+Functions in the kernel language import these names, so that they can be run, checked and tested where they are written. Their
+text alone goes into a generated module, which is then run with the names of its back end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence
+from typing import TypeAlias
+
+Array: TypeAlias = MutableSequence[float]
+"""A flat array of numbers: a list in Python, a block of rows in NumPy, `double *` in C."""
+
+
+def where(condition: bool, a: float, b: float) -> float:
+    """Return `a` where the condition holds, else `b`; both have been evaluated."""
+    return a if condition else b
+
+
+def floor(x: float) -> float:
+    """Return the largest whole number that is not above `x`, as a float.
+
+    Raises:
+        OverflowError: If `x` is infinite (in plain Python only).
+        ValueError: If `x` is NaN (in plain Python only).
+    """
+    return float(math.floor(x))
+
+
+def fabs(x: float) -> float:
+    """Return `x` without its sign."""
+    return math.fabs(x)
+
+
+def sqrt(x: float) -> float:
+    """Return the square root of `x`.
+
+    Raises:
+        ValueError: If `x` is negative (in plain Python only).
+    """
+    return math.sqrt(x)
+
+
+def zeros(count: int) -> Array:
+    """Return a new array of `count` zeros."""
+    return [0.0] * count

@@ -1,0 +1,127 @@
+"""The generated module of a robot: constants, straight-line functions and drivers as one text in the kernel language."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from softrobots.kernels import drivers, lane_drivers, motor_drivers, settings, trigonometry
+from softrobots.kernels.blocks import Block
+from softrobots.kernels.layout import Layout
+from softrobots.kernels.long_program import long_program
+from softrobots.kernels.motor_program import force_blocks, target_blocks
+from softrobots.kernels.short_program import equilibrium_blocks
+from softrobots.kernels.unknowns import Unknowns
+
+
+@dataclass(frozen=True)
+class Program:
+    """A generated module."""
+
+    text: str
+    """Its text."""
+    lane_text: str
+    """What follows it where many cases are worked on side by side."""
+    layout: Layout
+    """Places in the workspace."""
+    size: int
+    """Size of the workspace of one case."""
+    entry_points: tuple[str, ...]
+    """Functions that solve a case, and the places in the workspace that a caller needs."""
+
+
+def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
+    """Generate the code of a robot.
+
+    Args:
+        unknowns: The chain.
+        weight: Whether there is gravity.
+
+    Returns:
+        The program.
+    """
+    layout = Layout(unknowns.chain.n_motors, len(unknowns.strains))
+    functions, lane_functions = [*drivers.FUNCTIONS], [*lane_drivers.FUNCTIONS]
+    tables: dict[str, object] = {}
+    loops, lane_loops = [], []
+    if unknowns.is_short:
+        blocks, size = equilibrium_blocks(unknowns, layout, weight=weight)
+        lanes = blocks[1:3]
+    else:
+        parts = long_program(unknowns, layout, weight=weight)
+        blocks, size, lanes = parts.blocks, parts.size, parts.blocks
+        tables |= {**parts.places, **parts.tables}
+        loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
+    if unknowns.moved_by_motors:
+        by_force, size = force_blocks(unknowns, layout, size, weight=weight)
+        by_target = target_blocks(unknowns, layout, weight=weight)
+        blocks = blocks + by_force + by_target
+        lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
+        functions += motor_drivers.FUNCTIONS
+        lane_functions += lane_drivers.MOTOR_FUNCTIONS
+    title = f'"""Statics of {unknowns.chain.name}{", with gravity" if weight else ", weightless"}: generated code."""'
+    text = "\n\n\n".join(
+        [
+            title + "\n\n" + _constants(unknowns, layout, size, tables),
+            *_texts(trigonometry.FUNCTIONS),
+            *(block.text() for block in blocks),
+            *loops,
+            *_texts(functions),
+        ]
+    )
+    lane_texts = [lane_block(block).text(lanes=True) for block in lanes]
+    lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *_texts(lane_functions)])
+    entries = ["settle", "settle_from", *(("estimate", "reach", "follow") if unknowns.moved_by_motors else ())]
+    return Program(text + "\n", lane_text + "\n", layout, size, (*entries, *layout.constants(), "WORKSPACE_SIZE"))
+
+
+def _lanes(size: int) -> int:
+    """How many cases are worked on side by side: so many that their workspaces stay in the cache of a core."""
+    count = settings.LANES
+    while count > settings.FEWEST_LANES and count * size * 8 > settings.LANE_MEMORY:
+        count //= 2
+    return count
+
+
+def lane_block(block: Block) -> Block:
+    """The same block under the name that its form for lanes has."""
+    return Block(f"{block.name}_lanes", block.purpose, block.parameters, block.trace, block.stores)
+
+
+def _constants(unknowns: Unknowns, layout: Layout, size: int, tables: dict[str, object]) -> str:
+    chain, strains = unknowns.chain, unknowns.strains
+    softest = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
+    group = {strain: row for row, one in enumerate(chain.held) for strain in one}
+    made: dict[str, object] = dict(layout.constants())
+    made |= {
+        "WORKSPACE_SIZE": size,
+        "LANES": _lanes(size),
+        "HELD": len(chain.held),
+        "TOLERANCE": settings.TOLERANCE,
+        "TIGHT": settings.TIGHT,
+        "LEAST_SOFTNESS": settings.LEAST_SOFTNESS,
+        "LARGEST_STEP": settings.LARGEST_STEP,
+        "ARMIJO": settings.ARMIJO,
+        "PASSES": settings.PASSES,
+        "DESCENT_STEPS": settings.DESCENT_STEPS,
+        "SEARCH_STEPS": settings.SEARCH_STEPS,
+        "LEAST_SIZE": settings.LEAST_SIZE,
+        "OBSERVABLE": settings.OBSERVABLE,
+        "REACH": float(chain.reach),
+        "N_VARIED": max(layout.motors, 3),
+        "LOWER": tuple(np.maximum(chain.limits[: layout.motors, 0], -1e300).tolist()),
+        "UPPER": tuple(np.minimum(chain.limits[: layout.motors, 1], 1e300).tolist()),
+        "SPRING_ROUNDING": unknowns.spring_rounding,
+        "REST": tuple(float(chain.rest[strain]) for strain in strains),
+        "SOFTNESS": tuple((softest / float(chain.stiffness[strain])) ** 0.5 for strain in strains),
+        "GROUP": tuple(group.get(strain, -1) for strain in strains),
+    }
+    return "\n".join(f"{name} = {value!r}" for name, value in (made | tables).items())
+
+
+def _texts(functions: Iterable[Callable[..., object]]) -> Sequence[str]:
+    return [textwrap.dedent(inspect.getsource(function)).rstrip() for function in functions]

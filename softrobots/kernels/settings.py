@@ -1,0 +1,48 @@
+"""Tolerances of the compiled solvers; those of `softrobots.elastostatics`, where it has them."""
+
+from __future__ import annotations
+
+TOLERANCE = 1e-10
+"""Largest residual of an answer, relative to the size of the load."""
+
+TIGHT = 1e-12
+"""Residual at which Newton stops; reached from one below `TOLERANCE` in one step."""
+
+LEAST_SIZE = 1e-3
+"""Least size of a load [N m]."""
+
+LEAST_SOFTNESS = 1e-9
+"""Smallest pivot that counts as positive, relative to the springs' own stiffness."""
+
+LARGEST_STEP = 0.5
+"""Largest Newton step, as a norm [rad]."""
+
+ARMIJO = 1e-4
+"""Share of the predicted fall of the energy that a step must reach."""
+
+ROUNDING = 1e-14
+"""Energies this close, relative to their terms, cannot be told apart."""
+
+LANES = 128
+"""Most cases that are worked on side by side."""
+
+FEWEST_LANES = 8
+"""Fewest: two vectors of four numbers, so that one is computed while the other waits."""
+
+LANE_MEMORY = 262_144
+"""Workspace of all lanes together [bytes]."""
+
+OBSERVABLE = 1e-3
+"""Smallest singular value of the elastostatic Jacobian at which the motors feel every force, relative to the reach."""
+
+PASSES = 10
+"""Newton passes before a case is left to the descent or the search."""
+
+DESCENT_STEPS = 200
+"""Most steps of a descent."""
+
+SEARCH_STEPS = 100
+"""Most steps of a search for a force or for motors."""
+
+LONGEST_LINE = 24
+"""Most joints of a robot that is traced in one straight line; longer ones get loops."""

@@ -1,0 +1,43 @@
+"""What became of a case."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Outcome of one case of a compiled solver; everything but `CERTIFIED` is a failure, and says which."""
+
+    CERTIFIED = 0
+    """In balance to 1e-10 of the load, and certified stable."""
+    UNSTABLE = 1
+    """In balance, but not stable: neutral, or a saddle that the descent did not leave."""
+    UNSETTLED = 2
+    """Not in balance within the steps."""
+    OUT_OF_RANGE = 3
+    """A section is bent or twisted to the end of its range."""
+    NOT_A_NUMBER = 4
+    """The input is not finite, or too large to compute with."""
+    UNOBSERVABLE = 5
+    """The force explains the motor torques, but so do others: the motors do not feel one of its directions here."""
+    NOT_REACHED = 6
+    """No force was found that explains the motor torques; the tip does not reach its target, or only by a jump."""
+    BEYOND_LIMITS = 7
+    """The tip reaches its target only with a motor beyond its limits."""
+
+    @property
+    def explanation(self) -> str:
+        """The status in words."""
+        return _WORDS[self]
+
+
+_WORDS = {
+    Status.CERTIFIED: "certified stable",
+    Status.UNSTABLE: "in balance, but not stable",
+    Status.UNSETTLED: "not in balance",
+    Status.OUT_OF_RANGE: "a section is at the end of its range",
+    Status.NOT_A_NUMBER: "a number that is not finite, or too large to compute with",
+    Status.UNOBSERVABLE: "the motors do not feel every direction of the force",
+    Status.NOT_REACHED: "no force explains the torques, or the target is not reached",
+    Status.BEYOND_LIMITS: "the target is reached only with a motor beyond its limits",
+}

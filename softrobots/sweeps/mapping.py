@@ -1,0 +1,116 @@
+"""Mapping what the loaded arm reaches, carries, and which pressure it needs: the blocks of a sweep put together."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from softrobots.checks import (
+    finite_array,
+    increasing,
+    non_negative_array,
+    positive_integer,
+    positive_number,
+    unit_vector,
+)
+from softrobots.errors import ParameterError
+from softrobots.kernels.compiled_model import compile_model
+from softrobots.loads import Load
+from softrobots.model import SoftModel, check_model
+from softrobots.progress import with_progress
+from softrobots.sweeps.block import solve_block
+from softrobots.sweeps.load_case import SweepCase, package_version
+from softrobots.sweeps.postures import check_arm
+from softrobots.sweeps.scheduling import run_blocks
+from softrobots.target_grid import TargetGrid
+from softrobots.workspace_map import WorkspaceMap
+
+BLOCK = 512
+"""Targets of a block."""
+
+DOWN = (0.0, 0.0, -1.0)
+"""Direction of a weight."""
+
+
+def map_workspace(
+    model: SoftModel,
+    grid: TargetGrid,
+    loads: Any,
+    *,
+    direction: Any = DOWN,
+    gravity: Any = None,
+    tolerance: float = 1e-9,
+    backend: str | None = None,
+    threads: int = 1,
+    scheduler: str | None = None,
+    progress: bool | str = False,
+) -> WorkspaceMap:
+    """Find out, for every target and load, whether the loaded arm gets there, and the pressure that it needs.
+
+    The targets are cut into blocks of `BLOCK`. A block is solved by the compiled solvers and by itself, so that threads and
+    clusters give the same bytes as a single thread (on processors of one kind).
+
+    Args:
+        model: An arm with three motors, the first about the vertical through the base, and two inflated links.
+        grid: Targets of the tip.
+        loads: Sizes of the force on the tip, zero or above, increasing, shape (n_loads,) [N].
+        direction: Direction of the force, world axes, shape (3,); a weight by default.
+        gravity: Gravity that the arm itself feels, shape (3,) [m/s^2]; None: weightless.
+        tolerance: Largest distance of the tip from a target that is reached [m].
+        backend: Back end of `softrobots.compile`.
+        threads: Threads of this process, without a scheduler.
+        scheduler: Address of a Dask scheduler that has the work done; None: this process. Its workers need the same version of
+            softrobots.
+        progress: Show a progress bar on stderr; a text is its label.
+
+    Returns:
+        The maps.
+
+    Raises:
+        ParameterError: If an argument is out of range, or the robot is no such arm.
+        DescriptionError: If the robot is no serial chain with linear springs.
+        MissingDependency: If the back end or distributed is not installed.
+        ClusterError: If the cluster does not do the work.
+    """
+    check_arm(check_model(model))
+    if not isinstance(grid, TargetGrid):
+        raise ParameterError("grid", grid, "a TargetGrid")
+    sizes = increasing("loads", non_negative_array("loads", finite_array("loads", loads, (None,), "N"), "N"), "N")
+    positive_integer("number of loads", len(sizes), 100_000)
+    along = unit_vector("direction", direction)
+    weight = Load.of(model, gravity=gravity).gravity
+    case = SweepCase.of(
+        model,
+        direction=along,
+        loads=sizes,
+        gravity=weight,
+        tolerance=positive_number("tolerance", tolerance, "m"),
+        backend=compile_model(model, backend=backend).backend,
+        version=package_version(),
+    )
+    targets = grid.targets
+    blocks = [targets[first : first + BLOCK] for first in range(0, len(targets), BLOCK)]
+    answers = run_blocks(partial(solve_block, case), blocks, threads=positive_integer("threads", threads), scheduler=scheduler)
+    cases = (len(targets), len(sizes))
+    reached, required, payload = np.zeros(cases, dtype=bool), np.zeros(cases), np.zeros(len(targets))
+    motors, springs = np.zeros((*cases, model.n_motors)), np.zeros((*cases, model.n_springs))
+    for number, answer in with_progress(answers, progress, label="targets", unit="block", total=len(blocks)):
+        rows = slice(number * BLOCK, number * BLOCK + len(answer.payload))
+        reached[rows], required[rows], payload[rows] = answer.reached, answer.required_pressure, answer.payload
+        motors[rows], springs[rows] = answer.q_motors, answer.q_springs
+    shape = grid.shape
+    return WorkspaceMap(
+        model=model,
+        grid=grid,
+        direction=along,
+        loads=sizes,
+        gravity=weight,
+        tolerance=case.tolerance,
+        reached=reached.reshape(*shape, -1),
+        required_pressure=required.reshape(*shape, -1),
+        payload=payload.reshape(shape),
+        q_motors=motors.reshape(*shape, len(sizes), -1),
+        q_springs=springs.reshape(*shape, len(sizes), -1),
+    )

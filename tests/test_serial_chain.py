@@ -1,0 +1,333 @@
+"""The serial chain that compiled solvers read: kinematics and masses written out in NumPy and SciPy, against Pinocchio."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import softrobots as sr
+from softrobots.kinematics import frame_placement
+from softrobots.model import SoftModel
+from softrobots.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain
+from softrobots.structure import Parts
+from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from tests.test_composition import ur5  # noqa: F401 - a fixture
+from tests.test_strain_chain import rotation, screw_matrix
+
+HEAVY = INERTIAL.replace("<inertial>", '<inertial><origin xyz="0.02 -0.03 0.05" rpy="0.3 0 0"/>')  # off its link's origin
+
+# An odd axis, a slide on a slanted one, a continuous joint about -y, and fixed links with mass in between.
+ODD = (
+    f'<robot name="odd"><link name="base">{INERTIAL}</link>'
+    + joint("plinth", "base", "column", "0 0 1", "fixed", "0.1 0 0.2", "0 0 1")
+    + joint("turn", "column", "arm", "1 2 3")
+    + joint("plate", "arm", "side", "0 0 1", "fixed", "0 0.1 0", "1 0 0")
+    + joint("slide", "side", "sledge", "0 -0.6 0.8", "prismatic", "0.2 0.1 0")
+    + joint("box", "sledge", "case", "0 0 1", "fixed", "0 0 0.1", "0 1 0")
+    + joint("wheel", "case", "fork", "0 -1 0", "continuous", "0.1 0 0.1", f"{math.pi / 2} 0 {-math.pi / 2}")
+    + joint("nose", "fork", "end", "-3 0 1", "revolute", "0.2 0 0")
+    + joint("cap", "end", "tool", "0 0 1", "fixed", "0.05 0.02 -0.1", "0.2 0.4 0.6")
+    + "</robot>"
+).replace(INERTIAL, HEAVY)
+
+
+def odd() -> SoftModel:
+    return sr.load_model(ODD, springs={"slide": (900.0, 0.02), "nose": (30.0, -0.1)})
+
+
+def pcc(**options: object) -> SoftModel:
+    muscles = {"muscles": options.pop("muscles")} if "muscles" in options else {}
+    return sr.load_model(sr.PccArm(segment_lengths=(0.5, 0.4), bending_stiffness=(1.9, 1.2), **options), **muscles)
+
+
+def uneven() -> SoftModel:
+    """Hinges of one segment that differ in stiffness."""
+    alike = pcc(chain="lumped", hinges=3)
+    table = {name: ((1.0 + place / 5) * k, rest) for place, (name, (k, rest)) in enumerate(alike.spring_table.items())}
+    return sr.load_model(alike.urdf, springs=table)
+
+
+ROBOTS: dict[str, Callable[[], SoftModel]] = {
+    "arm": lambda: sr.load_model(sr.InflatableArm()),
+    "pcc": lambda: pcc(elastic_sections=2),
+    "pcc_forces": lambda: pcc(elastic_sections=2, muscles="forces"),
+    "pcc_lumped": lambda: pcc(chain="lumped", hinges=2),
+    "helix": lambda: sr.load_model(sr.HelixTube(elastic_sections=6)),
+    "helix_lumped": lambda: sr.load_model(sr.HelixTube(chain="lumped", hinges=6)),
+    "odd": odd,
+    "stacked": lambda: sr.load_model(sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(elastic_sections=2))),
+    "uneven": uneven,
+}
+
+
+# --- Oracle: the chain as its docstrings say, written out; nothing here calls the package or Pinocchio
+
+
+def placed(turn: np.ndarray, position: np.ndarray) -> np.ndarray:
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = turn, position
+    return made
+
+
+def moved_by(slides: bool, amount: float) -> np.ndarray:
+    return placed(np.eye(3), np.array([0.0, 0.0, amount])) if slides else rotation(2, amount)
+
+
+def section_frames(z: np.ndarray, length: float) -> list[np.ndarray]:
+    """Frames behind the six joints of a section, in its start; the last is SciPy's exponential of the strain."""
+    end = screw_matrix(z, length)
+    x, y, along = end[:3, 3]
+    first = rotation(0, math.atan2(-y, along))
+    second = first @ rotation(1, math.atan2(x, math.hypot(y, along)))
+    third = second @ moved_by(True, math.hypot(x, y, along))
+    about_x, about_y, _ = Rotation.from_matrix(second[:3, :3].T @ end[:3, :3]).as_euler("XYZ")
+    fourth = third @ rotation(0, about_x)
+    return [first, second, third, fourth, fourth @ rotation(1, about_y), end]
+
+
+def walk(chain: SerialChain, motors: np.ndarray, strains: np.ndarray) -> tuple[np.ndarray, list[tuple[np.ndarray, ChainBody]]]:
+    """Pose of the tip, shape (4, 4), and every body with the frame that it moves with."""
+    pose, bodies = np.eye(4), []
+    for element in chain.elements:
+        pose = pose @ placed(element.rotation, element.translation)
+        if isinstance(element, ChainSection):
+            frames = section_frames(strains[element.strain : element.strain + 4], element.length)
+            bodies += [(pose @ frame, body) for frame, body in zip(frames, element.bodies, strict=True)]
+            pose = pose @ frames[-1]
+        else:
+            amount = strains[element.strain] if element.motor is None else motors[element.motor]
+            pose = pose @ moved_by(element.slides, amount)
+            bodies.append((pose, element.body))
+    return pose @ placed(chain.tip_rotation, chain.tip_translation), bodies
+
+
+def potential(bodies: list[tuple[np.ndarray, ChainBody]], gravity: np.ndarray) -> float:
+    return -sum(float(gravity @ (body.mass * pose[:3, 3] + pose[:3, :3] @ body.first_moment)) for pose, body in bodies)
+
+
+# --- Robots of every kind
+
+
+def drawn(model: SoftModel, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Random actuators within their limits, and elastic coordinates up to half a radian or 3 cm from rest."""
+    motors = None
+    while motors is None:
+        motors = model.actuators.draw(rng)
+    size = np.where(model.structure.law.turning, 0.5, 0.03)
+    return motors, model.rest + size * rng.uniform(-1.0, 1.0, model.n_springs)
+
+
+def check_against_pinocchio(model: SoftModel, rng: np.random.Generator, times: int = 5) -> None:
+    """Pose of the tip at random configurations, and potential energy up to what the base holds: a constant."""
+    chain, gravity = model.chain(), rng.normal(size=3)
+    whole, data = model.workspace(tuple(gravity.tolist()))
+    offsets = []
+    for _ in range(times):
+        motors, springs = drawn(model, rng)
+        q, strains = model.configuration(motors, springs), model.structure.strains(motors, springs)
+        tip, bodies = walk(chain, motors, strains)
+        expected = frame_placement(model, q, model.tip).homogeneous
+        # Rounding of metres through at most 24 joints.
+        assert np.abs(tip - expected).max() < 1e-13
+        offsets.append(potential(bodies, gravity) - pin.computePotentialEnergy(whole, data, q))
+    total = sum(inertia.mass for inertia in model.pinocchio.inertias)
+    assert np.ptp(offsets) <= 1e-12 * max(1.0, total * model.reach)  # [J]
+
+
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_tip_and_energy_are_those_of_pinocchio(kind: str, rng: np.random.Generator) -> None:
+    check_against_pinocchio(ROBOTS[kind](), rng)
+
+
+def test_tip_and_energy_of_three_links_that_differ(odd_arm: SoftModel, rng: np.random.Generator) -> None:
+    check_against_pinocchio(odd_arm, rng)
+
+
+@pytest.mark.parametrize("robot", [sr.InflatableArm(), sr.PccArm(elastic_sections=1), sr.HelixTube(elastic_sections=6)])
+def test_tip_and_energy_on_a_ur5(robot: sr.Robot, ur5: Path, rng: np.random.Generator) -> None:  # noqa: F811 - the fixture
+    model = sr.load_model(sr.mount(ur5, "tool0", robot, xyz=(0.02, -0.03, 0.05), rpy=(0.3, -1.1, 0.7)))
+    assert [getattr(e, "motor", None) for e in model.chain().elements[:6]] == list(range(6))
+    check_against_pinocchio(model, rng)
+
+
+AXES = st.one_of(
+    st.sampled_from([(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1), (1, 0, 1), (0, -3, 4), (1, 2, 3)]),
+    st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda axis: np.linalg.norm(axis) > 1e-3),
+)
+ANGLES = st.one_of(st.sampled_from([0.0, math.pi / 2, -math.pi / 2, math.pi]), st.floats(-3.0, 3.0))
+KINDS = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
+LINKS = st.tuples(KINDS, AXES, st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(ANGLES, ANGLES, ANGLES))
+
+
+@given(st.lists(LINKS, min_size=1, max_size=6), st.sets(st.integers(0, 5)), st.integers(0, 2**31))
+@settings(max_examples=150)
+def test_tip_and_energy_of_any_chain(links: list, sprung: set[int], seed: int) -> None:
+    """Whatever the axes, placements and kinds of joints."""
+
+    def words(numbers: tuple) -> str:
+        return " ".join(map(repr, numbers))
+
+    parts = [
+        joint(f"j{i}", f"l{i}", f"l{i + 1}", words(axis), kind, words(xyz), words(rpy))
+        for i, (kind, axis, xyz, rpy) in enumerate([*links, ("revolute", (0, 0, 1), (0.1, 0, 0), (0, 0, 0))])
+    ]
+    text = f'<robot name="any"><link name="l0">{INERTIAL}</link>{"".join(parts)}</robot>'.replace(INERTIAL, HEAVY)
+    springs = {f"j{i}": (10.0, 0.1) for i in sprung if i < len(links) and links[i][0] != "fixed"}
+    check_against_pinocchio(sr.load_model(text, springs=springs), np.random.default_rng(seed), times=2)
+
+
+# --- What constants fold to
+
+
+def test_the_placements_of_the_arm_are_quarter_turns(arm: SoftModel) -> None:
+    """Zeros and ones are exact, so that they fold away."""
+    for element in arm.chain().elements:
+        assert set(np.abs(element.rotation).ravel().tolist()) == {0.0, 1.0}
+        assert np.linalg.det(element.rotation) == 1.0
+        assert np.count_nonzero(element.translation) <= 1
+    assert [element.name for element in arm.chain().elements] == list(arm.pinocchio.names)[1:]
+
+
+def test_sections_follow_each_other_without_a_placement() -> None:
+    """A helix is bent at rest: what its joint origins carry of that is gone from the chain."""
+    for element in ROBOTS["helix"]().chain().elements[1:]:
+        assert np.array_equal(element.rotation, np.eye(3))
+        assert np.array_equal(element.translation, np.zeros(3))
+
+
+def test_a_chain_is_made_once_and_cannot_be_changed(arm: SoftModel) -> None:
+    chain = arm.chain()
+    assert arm.chain() is chain
+    first = chain.elements[0]
+    assert isinstance(first, ChainJoint)
+    arrays = [value for value in vars(chain).values() if isinstance(value, np.ndarray)]
+    assert len(arrays) == 11
+    for array in (*arrays, first.rotation, first.translation, first.body.first_moment):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+
+
+# --- Springs and muscles
+
+
+def test_motors_springs_and_limits_are_those_of_the_model() -> None:
+    model = odd()
+    chain = model.chain()
+    assert [(e.name, e.slides, e.motor, e.strain) for e in chain.elements] == [
+        ("turn", False, 0, None),
+        ("slide", True, None, 0),
+        ("wheel", False, 1, None),
+        ("nose", False, None, 1),
+    ]
+    assert chain.stiffness.tolist() == [900.0, 30.0]
+    assert chain.rest.tolist() == [0.02, -0.1]
+    assert chain.limits.tolist() == [[-2.0, 2.0], [-np.inf, np.inf]]
+    assert (chain.n_motors, chain.reach, chain.held) == (2, model.reach, ())
+
+
+@pytest.mark.parametrize("kind", ["pcc", "pcc_lumped", "uneven", "stacked", "four"])
+def test_muscle_lengths_hold_sums_of_strains(kind: str, rng: np.random.Generator) -> None:
+    """For any lengths that fit together and any elastic coordinates, and with four muscles a segment too."""
+    model = pcc(elastic_sections=3, muscle_azimuths=(0.0, 1.5, 3.0, 4.5)) if kind == "four" else ROBOTS[kind]()
+    chain = model.chain()
+    assert len(chain.held) == 6  # two bendings and the elongation of two segments
+    assert sorted({place for group in chain.held for place in group}) == np.flatnonzero(chain.spread.any(axis=1)).tolist()
+    for _ in range(3):
+        motors, elastic = drawn(model, rng)
+        change = motors[chain.n_motors :] - chain.muscle_rest
+        strains = chain.spread @ change + chain.free @ elastic
+        sums = np.array([strains[list(group)].sum() for group in chain.held])
+        assert np.abs(sums - chain.held_slope @ change).max() < 1e-13  # rad; rounding of a radian
+        assert np.abs(chain.muscle_matrix @ strains - change).max() < 1e-13  # m: those are the lengths
+        assert np.abs(chain.elastic @ strains - elastic).max() < 1e-12
+
+
+@pytest.mark.parametrize("kind", ["pcc", "uneven", "stacked"])
+def test_elastic_coordinates_do_without_what_lengths_prescribe(kind: str) -> None:
+    """`elastic = (N^T K N)^-1 N^T K`: it undoes `free`, and sees nothing of `spread`."""
+    chain = ROBOTS[kind]().chain()
+    weighted = chain.free.T * chain.stiffness
+    assert np.allclose(chain.elastic, np.linalg.solve(weighted @ chain.free, weighted), rtol=0.0, atol=1e-14)
+    assert np.abs(chain.elastic @ chain.free - np.eye(chain.free.shape[1])).max() < 1e-14
+    assert np.abs(chain.elastic @ chain.spread).max() < 1e-13 * np.abs(chain.spread).max()
+
+
+def test_tensions_hold_nothing() -> None:
+    chain = ROBOTS["pcc_forces"]().chain()
+    assert chain.muscle_input == "forces"
+    assert (chain.held, chain.held_slope.shape, chain.muscle_matrix.shape) == ((), (0, 6), (6, 16))
+    assert np.array_equal(chain.elastic, np.eye(16))
+    assert np.array_equal(chain.free, np.eye(16))
+    assert not chain.spread.any()
+
+
+# --- Size and refusals
+
+
+def test_a_long_chain_needs_no_workspace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pinocchio's would take 8 s and 1.8 GB; loading and reading the chain make none."""
+    count = 310
+    links = (joint(f"j{i}", f"l{i}", f"l{i + 1}", "0 1 0", xyz="0.01 0 0", rpy="0 0 0") for i in range(count))
+    text = f'<robot name="long"><link name="l0">{INERTIAL}</link>{"".join(links)}</robot>'
+
+    def refuse(self: object) -> None:
+        raise AssertionError(f"a workspace for {self}")
+
+    monkeypatch.setattr(pin.Model, "createData", refuse)
+    model = sr.load_model(text, springs={f"j{i}": 1.0 for i in range(1, count)})
+    chain = model.chain()
+    assert (len(chain.elements), len(chain.stiffness), chain.n_motors) == (count, count - 1, 1)
+    tip, _ = walk(chain, np.full(1, 0.02), np.full(count - 1, -0.02))
+    angles = np.array([0.02 - 0.02 * i for i in range(count)])
+    # All axes are along -y, so the angles add up in a plane; rounding of 310 turns.
+    expected = 0.01 * np.array([1.0 + np.cos(angles[:-1]).sum(), 0.0, -np.sin(angles[:-1]).sum()])
+    assert np.abs(tip[:3, 3] - expected).max() < 1e-12
+    with pytest.raises(sr.DescriptionError, match=r"310 coordinates; .* at most 300 .*softrobots\.compile"):
+        sr.solve_equilibrium(model, [0.0])
+
+
+def by_hand(kind: object) -> SoftModel:
+    """A robot with a joint that no URDF has."""
+    made = pin.Model()
+    made.name = "hand"
+    made.addJoint(0, kind, pin.SE3.Identity(), "screw")
+    made.addFrame(pin.Frame("tip", 1, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+    return SoftModel(pinocchio_model=made, urdf="", parts=Parts({}, ["screw"]), inflated_links=[], tip="tip")
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (
+            lambda: sr.load_model(BRANCHED, springs=SPRINGS, tip="finger"),
+            r"foreign has joints that are not between base and tip \(finger\): gripper; .*one serial chain from base to tip",
+        ),
+        (
+            lambda: sr.load_model(sr.InflatableArm(), tip="link_1"),
+            r"between base and tip \(link_1\): motor_3, spring_2_side, spring_2_up;",
+        ),
+        (
+            lambda: sr.load_model(sr.InflatableArm(max_moment=15.0)),
+            r"an inflated link of inflatable_arm has max_moment; .*linear springs \(solve_equilibrium takes",
+        ),
+        (lambda: by_hand(pin.JointModelHX(0.3)), "joint screw of hand is a JointModelHX; .*revolute, continuous and prismatic"),
+        (lambda: by_hand(pin.JointModelSpherical()), "joint screw of hand is a JointModelSpherical"),
+    ],
+)
+def test_what_is_no_serial_chain_is_refused(model: Callable[[], SoftModel], message: str) -> None:
+    loaded = model()
+    with pytest.raises(sr.DescriptionError, match=message):
+        loaded.chain()
+
+
+def test_a_branch_that_is_locked_does_no_harm(rng: np.random.Generator) -> None:
+    model = sr.load_model(BRANCHED, springs=SPRINGS, motors=["shoulder", "elbow"], tip="finger")
+    check_against_pinocchio(model, rng)
