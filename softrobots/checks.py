@@ -15,6 +15,7 @@ from softrobots.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
 
+_NOT_NUMBERS = (bool, np.bool_, str, bytes)  # although float() would take them
 
 LARGEST = 1e30
 """Numbers beyond this in size are refused, and positive ones below its inverse: their squares and cubes would overflow."""
@@ -35,23 +36,20 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
     Raises:
         ParameterError: If the shape differs or a number is not finite.
     """
-    requirement = f"an array of {_shape_text(shape)}finite numbers" + (f" [{unit}]" if unit else "")
     try:
         given = np.asarray(value)
-        if given.dtype.kind not in "fiu":  # not text, not truth values, not complex numbers, not objects
-            raise ParameterError(name, value, requirement)
-        array = given.astype(np.float64)  # always a copy
+        kind = given.dtype.kind
+        array = given.astype(np.float64) if kind in "fiu" else None  # always a copy
     except (TypeError, ValueError, OverflowError) as error:
-        if isinstance(error, ParameterError):
-            raise
-        raise ParameterError(name, value, requirement) from error
-    if shape is not None and (
-        array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True))
-    ):
-        raise ParameterError(name, value, f"{requirement} (it has shape {array.shape})")
+        raise ParameterError(name, value, _array_text(shape, unit)) from error
+    if array is None:  # text, truth values, complex numbers, objects
+        raise ParameterError(name, value, _array_text(shape, unit))
+    if shape is not None and array.shape != shape and not _fits(array.shape, shape):
+        raise ParameterError(name, value, f"{_array_text(shape, unit)} (it has shape {array.shape})")
     # A comparison refuses NaN too, and on a short list it is several times faster than NumPy's reductions.
-    if not all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist()):
-        raise ParameterError(name, value, f"{requirement}, at most {LARGEST:g} in size")
+    for number in array.ravel().tolist():
+        if not -LARGEST <= number <= LARGEST:
+            raise ParameterError(name, value, f"{_array_text(shape, unit)}, at most {LARGEST:g} in size")
     return array
 
 
@@ -98,7 +96,7 @@ def finite_number(name: str, value: Any, unit: str = "") -> float:
         ParameterError: If it is not one.
     """
     requirement = "a finite number" + (f" [{unit}]" if unit else "")
-    if isinstance(value, bool | np.bool_ | str | bytes):
+    if isinstance(value, _NOT_NUMBERS):
         raise ParameterError(name, value, requirement)
     try:
         number = float(value)
@@ -185,6 +183,14 @@ def increasing(name: str, values: FloatArray, unit: str) -> FloatArray:
     if np.any(np.diff(values) <= 0.0):
         raise ParameterError(name, values, f"increasing [{unit}]")
     return values
+
+
+def _fits(shape: tuple[int, ...], required: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(required) and all(n is None or n == m for n, m in zip(required, shape, strict=True))
+
+
+def _array_text(shape: tuple[int | None, ...] | None, unit: str) -> str:
+    return f"an array of {_shape_text(shape)}finite numbers" + (f" [{unit}]" if unit else "")
 
 
 def _shape_text(shape: tuple[int | None, ...] | None) -> str:

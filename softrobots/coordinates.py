@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from softrobots.checks import FloatArray, read_only
-from softrobots.joint_loads import JointLoad
+from softrobots.joint_loads import Entries, JointLoad
 from softrobots.strain_chain import STRAINS, SectionChain, joint_positions
 from softrobots.urdf_tags import LumpedSectionTag, SectionTag
 
@@ -70,15 +70,16 @@ class DirectCoordinates:
 
     def __init__(self, motor_indices: Any, elastic_indices: Any, count: int) -> None:
         """Keep the places of both in Pinocchio's velocity vector of length `count`."""
-        self._motors, self._elastic, self._count = motor_indices, elastic_indices, count
-        self._rows = elastic_indices[:, None]
+        self.motor_indices, self.elastic_indices, self._count = motor_indices, elastic_indices, count
+        self.entries = Entries.of(elastic_indices, np.concatenate([motor_indices, elastic_indices]), count)
+        """Rows of the elastic coordinates, columns of both, in a matrix over the joints."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> DirectPoint:
         """Go to given coordinates."""
         joints: FloatArray = np.zeros(self._count)
-        joints[self._motors] = motors
-        joints[self._elastic] = elastic
-        return DirectPoint(joints, self._motors, self._elastic, self._rows)
+        joints[self.motor_indices] = motors
+        joints[self.elastic_indices] = elastic
+        return DirectPoint(joints, self)
 
 
 class DirectPoint(NamedTuple):
@@ -86,12 +87,8 @@ class DirectPoint(NamedTuple):
 
     joints: FloatArray
     """Joint positions."""
-    motor_indices: Any
-    """Places of the actuators."""
-    elastic_indices: Any
-    """Places of the elastic coordinates."""
-    elastic_rows: Any
-    """The same as a column."""
+    coordinates: DirectCoordinates
+    """Which joint is what."""
 
     @property
     def valid(self) -> bool:
@@ -100,13 +97,14 @@ class DirectPoint(NamedTuple):
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
         """Pick rows and columns."""
-        motors, elastic, rows = self.motor_indices, self.elastic_indices, self.elastic_rows
-        torque, derivative = load.torque, load.derivative
-        return ReducedLoad(torque[motors], torque[elastic], derivative[rows, elastic], derivative[rows, motors], 0.0, 0.0)
+        c, torque = self.coordinates, load.torque
+        rows, n = load.derivative(c.entries), len(c.motor_indices)
+        return ReducedLoad(torque[c.motor_indices], torque[c.elastic_indices], rows[:, n:], rows[:, :n], 0.0, 0.0)
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Pick columns."""
-        return jacobian[:, self.motor_indices], jacobian[:, self.elastic_indices]
+        c = self.coordinates
+        return jacobian.take(c.motor_indices, axis=1), jacobian.take(c.elastic_indices, axis=1)
 
 
 class Sections:

@@ -196,8 +196,10 @@ def solve_equilibrium(
     most = (
         (200 if method == "newton" else 1000) if max_iterations is None else positive_integer("max_iterations", max_iterations)
     )
-    state, iterations = settle(model, motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
-    result = equilibrium_from_state(model, motors, load, state, method=method, iterations=iterations, tolerance=tolerance)
+    state, iterations, stable = settle(model, motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
+    result = equilibrium_from_state(
+        model, motors, load, state, method=method, iterations=iterations, tolerance=tolerance, stable=stable
+    )
     if not result.converged:
         raise EquilibriumNotFound(
             f"no equilibrium by {method!r} in {iterations} iterations: residual {result.residual:.3g} N m, required "
@@ -239,8 +241,9 @@ def equilibrium_from_state(
     method: str,
     iterations: int,
     tolerance: float = TOLERANCE,
+    stable: bool | None = None,
 ) -> Equilibrium:
-    """Make the result object of a state."""
+    """Make the result object of a state; `stable` if that is known already."""
     return Equilibrium(
         model=model,
         load=load,
@@ -248,14 +251,14 @@ def equilibrium_from_state(
         q_motors=read_only(q_motors),
         q_springs=read_only(state.q_springs),
         q=read_only(state.q),
-        spring_torques=read_only(model.springs.torque(state.q_springs)),
+        spring_torques=read_only(state.spring_torques),
         motor_torques=read_only(state.load.motors),
         tangent_stiffness=read_only(state.tangent),
         coupling=read_only(state.load.coupling),
         residual=state.error,
         tolerance=largest_residual(model, state.scale, tolerance),
         iterations=iterations,
-        stable=is_stable(model, state.tangent, symmetric=load.conservative),
+        stable=is_stable(model, state.tangent, symmetric=load.conservative) if stable is None else stable,
     )
 
 

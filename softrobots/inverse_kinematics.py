@@ -11,13 +11,14 @@ from typing import Any, NoReturn
 import numpy as np
 
 from softrobots.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
-from softrobots.elastostatics import METHODS, settle
+from softrobots.elastostatics import METHODS, ElasticState, settle
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.kinematics import frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
-from softrobots.tip_search import POSITION_TOLERANCE, SAME, Goal, LocalSolution, search
+from softrobots.tip_goal import Goal, LoadedTip
+from softrobots.tip_search import POSITION_TOLERANCE, SAME, LocalSolution, search
 
 ELBOWS = ("up", "down")
 """Choices of `solve_ik(elbow=...)`."""
@@ -114,12 +115,13 @@ def solve_ik(
             "orientation", orientation, f"None for this robot: it has {freedom} freedoms, {goal.rows} are needed"
         )
 
-    def allowed(local: LocalSolution) -> bool:
+    def allowed(local: LocalSolution[ElasticState]) -> bool:
         return elbow is None or elbow_side(model, local.state.q) == elbow
 
-    ended: list[LocalSolution] = []
+    tip = LoadedTip(model, goal, load, method)
+    ended: list[LocalSolution[ElasticState]] = []
     for start in _starts(model, first, positive_integer("starts", starts, 10_000)):
-        local = search(model, goal, load, start, model.rest, home=first, method=method, tolerance=tolerance)
+        local = search(tip, start, model.rest, home=first, tolerance=tolerance)
         if local is not None:
             ended.append(local)
             if model.muscles and freedom > goal.rows and local.arrived(tolerance) and allowed(local):
@@ -127,7 +129,7 @@ def solve_ik(
     if not ended:
         _raise_unsettled(model, first, load, method, starts)
     sided = [local for local in ended if allowed(local)]
-    found: list[LocalSolution] = []
+    found: list[LocalSolution[ElasticState]] = []
     for local in sorted(sided, key=lambda local: float(np.linalg.norm((local.q_motors - first) / model.motor_scale))):
         if local.arrived(tolerance) and not any(_same_pose(model, local, other) for other in found):
             found.append(local)
@@ -224,7 +226,7 @@ def _has_elbow(model: SoftModel) -> bool:
     return float(np.linalg.norm(last - first)) > SAME * model.reach
 
 
-def _same_pose(model: SoftModel, one: LocalSolution, other: LocalSolution) -> bool:
+def _same_pose(model: SoftModel, one: LocalSolution[ElasticState], other: LocalSolution[ElasticState]) -> bool:
     """Whether two solutions are one, up to whole turns of a motor."""
     apart = one.q_motors - other.q_motors
     apart = np.where(model.actuators.turning, apart - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)), apart)
@@ -232,7 +234,7 @@ def _same_pose(model: SoftModel, one: LocalSolution, other: LocalSolution) -> bo
 
 
 def _raise_unsettled(model: SoftModel, motors: FloatArray, load: Load, method: str, starts: int) -> NoReturn:
-    state, spent = settle(model, motors, load, model.rest, method=method)
+    state, spent, _ = settle(model, motors, load, model.rest, method=method)
     best = equilibrium_from_state(model, motors, load, state, method=method, iterations=spent)
     hint = "; method='newton' settles larger loads" if method == "fixed_point" else ""
     raise EquilibriumNotFound(

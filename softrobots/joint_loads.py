@@ -9,11 +9,29 @@ masked by the order of the joints; a chain of sections combines the columns firs
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.checks import FloatArray, read_only
+
+
+class Entries(NamedTuple):
+    """Rows and columns of a matrix over the joints, shape (nv, nv)."""
+
+    places: Any
+    """Place of each entry in the flat matrix, shape (n, m), integers."""
+    ordered: Any
+    """The same with the indices of each entry in ascending order."""
+    below: FloatArray
+    """Which entries are below the diagonal, shape (n, m): 1 or 0."""
+
+    @classmethod
+    def of(cls, rows: Any, columns: Any, nv: int) -> Entries:
+        """Entries of given rows, shape (n,), and columns, shape (m,)."""
+        rows = rows[:, None]
+        ordered = nv * np.minimum(rows, columns) + np.maximum(rows, columns)
+        return cls(nv * rows + columns, ordered, read_only((columns < rows).astype(np.float64)))
 
 
 class JointLoad(NamedTuple):
@@ -34,17 +52,14 @@ class JointLoad(NamedTuple):
     scale: float
     """Size of the load, `sum |f| reach + |moment|` plus the norm of the gravity torque [N m]."""
 
-    @property
-    def derivative(self) -> FloatArray:
-        """Derivative of `torque` with respect to the joint coordinates, shape (nv, nv)."""
-        upper, strictly_upper = _triangles(len(self.torque))
-        made = (self.angular.T @ self.by_force) * upper
-        made += (made * strictly_upper).T
+    def derivative(self, wanted: Entries) -> FloatArray:
+        """Derivative of `torque` with respect to the joint coordinates: the entries wanted, shape of `wanted`."""
+        made: FloatArray = self.angular.T.dot(self.by_force).take(wanted.ordered)
         if self.by_moment is not None:
-            made += (self.angular.T @ self.by_moment) * strictly_upper.T
+            made += self.angular.T.dot(self.by_moment).take(wanted.places) * wanted.below
         if self.gravity_derivative is not None:
-            made += self.gravity_derivative
-        return np.asarray(made)
+            made += self.gravity_derivative.take(wanted.places)
+        return made
 
     def within(self, columns: FloatArray) -> FloatArray:
         """Blocks of the derivative of forces and moments within groups of joints.

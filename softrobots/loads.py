@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -23,28 +22,39 @@ EARTH_GRAVITY = (0.0, 0.0, -9.81)
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
+def cross_matrix(vector: FloatArray) -> FloatArray:
+    """Matrix `[v]` with `[v] u = v x u`, shape (3, 3)."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _rows(wrench: FloatArray) -> FloatArray:
+    """`LoadTerm.rows` of a wrench."""
+    force, moment = wrench[:3], wrench[3:]
+    nothing = np.zeros((3, 3))
+    return np.vstack([wrench, np.hstack([cross_matrix(force).T, nothing]), np.hstack([nothing, cross_matrix(moment)])])
+
+
+_UNIT_ROWS = np.stack([_rows(unit).ravel() for unit in np.eye(6)], axis=-1)  # (42, 6): rows are linear in the wrench
+
+
 class LoadTerm(NamedTuple):
     """One wrench of a load."""
 
     frame: str
     """Name of the frame."""
-    wrench: FloatArray
-    """Wrench, shape (6,) [N, N m]."""
     force: FloatArray
     """Its force, shape (3,) [N]."""
-    force_cross_transposed: FloatArray
-    """Transpose of the cross matrix of the force, shape (3, 3) [N]."""
-    moment_cross: FloatArray | None
-    """Cross matrix of the moment, shape (3, 3) [N m]; None without a moment."""
+    rows: FloatArray
+    """What multiplies the Jacobian of the frame, shape (7, 6): the wrench; `-f x` on linear rows; `mu x` on angular ones."""
     norms: tuple[float, float]
     """Norms of force [N] and moment [N m]."""
 
     @classmethod
     def of(cls, frame: str, wrench: FloatArray) -> LoadTerm:
         """Prepare a wrench, shape (6,), at a frame."""
-        force, moment = wrench[:3], wrench[3:]
-        norms = (math.hypot(*force.tolist()), math.hypot(*moment.tolist()))
-        return cls(frame, wrench, force, cross_matrix(force).T, cross_matrix(moment) if norms[1] > 0.0 else None, norms)
+        fx, fy, fz, mx, my, mz = wrench.tolist()
+        return cls(frame, wrench[:3], _UNIT_ROWS.dot(wrench).reshape(7, 6), (math.hypot(fx, fy, fz), math.hypot(mx, my, mz)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +68,21 @@ class Load:
     """Wrench by frame name, shape (6,): force [N] then moment [N m], world axes, at the origin of the frame; read-only."""
     gravity: tuple[float, float, float] | None
     """Gravity, world axes [m/s^2]; None: weightless."""
+    terms: tuple[LoadTerm, ...] = field(init=False, repr=False)
+    """The wrenches with the matrices that the statics needs of them."""
+    conservative: bool = field(init=False, repr=False)
+    """Whether the load has a potential: no moment in it."""
 
     def __post_init__(self) -> None:
-        """Keep a read-only copy of the wrenches."""
-        kept = {name: read_only(np.array(wrench)) for name, wrench in self.wrenches.items()}
+        """Keep a read-only copy of the wrenches, and prepare them."""
+        kept, terms, conservative = {}, [], True
+        for frame, wrench in self.wrenches.items():
+            kept[frame] = read_only(np.array(wrench))
+            terms.append(LoadTerm.of(frame, kept[frame]))
+            conservative = conservative and terms[-1].norms[1] == 0.0
         object.__setattr__(self, "wrenches", MappingProxyType(kept))
+        object.__setattr__(self, "terms", tuple(terms))
+        object.__setattr__(self, "conservative", conservative)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle with a plain dictionary."""
@@ -93,7 +113,8 @@ class Load:
         model.frame_id(at)
         total: dict[str, FloatArray] = {}
         if force is not None:
-            total[at] = np.concatenate([finite_array("force", force, (3,), "N"), np.zeros(3)])
+            total[at] = np.zeros(6)
+            total[at][:3] = finite_array("force", force, (3,), "N")
         if wrench is not None:
             several = wrench if isinstance(wrench, Mapping) else {at: wrench}
             for name, value in several.items():
@@ -104,16 +125,6 @@ class Load:
             return cls(total, None)
         x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
         return cls(total, (x, y, z))
-
-    @cached_property
-    def conservative(self) -> bool:
-        """Whether the load has a potential: no moment in it."""
-        return all(term.moment_cross is None for term in self.terms)
-
-    @cached_property
-    def terms(self) -> tuple[LoadTerm, ...]:
-        """The wrenches with the matrices that the statics needs of them."""
-        return tuple(LoadTerm.of(frame, wrench) for frame, wrench in self.wrenches.items())
 
     def same_as(self, other: Load) -> bool:
         """Whether another load has the same wrenches and gravity."""
@@ -159,53 +170,56 @@ def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, Floa
     return {row.name: np.concatenate([share * force, np.zeros(3)]) for row, share in zip(rows, lengths.tolist(), strict=True)}
 
 
-def generalised_load(model: SoftModel, q: FloatArray, load: Load) -> JointLoad:
-    """Torque of a load in joint coordinates, with its exact derivative (see `softrobots.joint_loads`).
+class AppliedLoad:
+    """A load on a robot, ready to be carried to its joints; belongs to the thread that made it.
 
-    (Closed form of the kinematic Hessian; Pinocchio's own static derivatives take the load as a follower.)
-
-    Args:
-        model: The robot.
-        q: Configuration, shape (nq,), finite.
-        load: The load.
-
-    Returns:
-        Torque, derivative, potential and size.
+    (The derivatives are the closed form of the kinematic Hessian; Pinocchio's own static derivatives take the load as a
+    follower.)
     """
-    pin_model, data = model.workspace(load.gravity)
-    nv = pin_model.nv
-    if nv == 0:  # nothing moves; Pinocchio's frame Jacobian crashes without columns
-        return JointLoad(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), None, None, 0.0, 0.0)
-    pin.computeJointJacobians(pin_model, data, q)
-    torque: FloatArray = np.zeros(nv)
-    potential = scale = 0.0
-    angular, by_force, by_moment = [], [], []
-    for term in load.terms:
-        frame = model.frame_id(term.frame)
-        jacobian = pin.getFrameJacobian(pin_model, data, frame, _AXES).reshape(6, nv)
-        torque += term.wrench @ jacobian
-        scale += term.norms[0] * model.reach + term.norms[1]
-        potential -= float(term.force @ pin.updateFramePlacement(pin_model, data, frame).translation)
-        angular.append(jacobian[3:])
-        by_force.append(term.force_cross_transposed @ jacobian[:3])
-        if not load.conservative:
-            by_moment.append(np.zeros((3, nv)) if term.moment_cross is None else term.moment_cross @ jacobian[3:])
-    gravity_derivative: FloatArray | None = None
-    if load.gravity is not None:
-        gravity_derivative = -pin.computeGeneralizedGravityDerivatives(pin_model, data, q)
-        gravity_torque: FloatArray = data.g
-        torque -= gravity_torque
-        scale += math.sqrt(float(gravity_torque @ gravity_torque))
-        potential += pin.computePotentialEnergy(pin_model, data)
-    moments = None if load.conservative else _stacked(by_moment, nv)
-    return JointLoad(torque, _stacked(angular, nv), _stacked(by_force, nv), moments, gravity_derivative, potential, scale)
 
+    def __init__(self, model: SoftModel, load: Load) -> None:
+        """Look up what stays the same while the robot moves."""
+        self._model, self._data = model.workspace(load.gravity)
+        self._load, self._nv, self._terms, self._scale = load, self._model.nv, [], 0.0
+        for term in load.terms:
+            self._terms.append((model.frame_id(term.frame), term))
+            self._scale += term.norms[0] * model.reach + term.norms[1]
 
-def _stacked(rows: list[FloatArray], columns: int) -> FloatArray:
-    return rows[0] if len(rows) == 1 else np.concatenate([np.zeros((0, columns)), *rows])
+    def at(self, q: FloatArray) -> JointLoad:
+        """Torque of the load in joint coordinates, with its exact derivative (see `softrobots.joint_loads`).
 
+        Args:
+            q: Configuration, shape (nq,), finite.
 
-def cross_matrix(vector: FloatArray) -> FloatArray:
-    """Matrix `[v]` with `[v] u = v x u`, shape (3, 3)."""
-    x, y, z = vector.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        Returns:
+            Torque, derivative, potential and size.
+        """
+        model, data, nv = self._model, self._data, self._nv
+        if nv == 0:  # nothing moves; Pinocchio's frame Jacobian crashes without columns
+            return JointLoad(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), None, None, 0.0, 0.0)
+        torques, angular, by_force, by_moment = [], [], [], []
+        potential, scale = 0.0, self._scale
+        for frame, term in self._terms:
+            jacobian = pin.computeFrameJacobian(model, data, q, frame, _AXES)
+            if nv == 1:  # Pinocchio answers one column with a vector
+                jacobian = jacobian.reshape(6, 1)
+            made = term.rows.dot(jacobian)
+            torques.append(made[0])
+            angular.append(jacobian[3:])
+            by_force.append(made[1:4])
+            if not self._load.conservative:
+                by_moment.append(made[4:])
+            potential -= float(term.force.dot(pin.updateFramePlacement(model, data, frame).translation))
+        gravity_derivative: FloatArray | None = None
+        if self._load.gravity is not None:
+            gravity_derivative = -pin.computeGeneralizedGravityDerivatives(model, data, q)
+            torques.append(-data.g)
+            scale += math.hypot(*data.g.tolist())
+            potential += pin.computePotentialEnergy(model, data)
+        if len(angular) != 1:  # no wrench, or several one above the other
+            angular, by_force, by_moment = (
+                [np.concatenate([np.zeros((0, nv)), *rows])] for rows in (angular, by_force, by_moment)
+            )
+        torque = sum(torques[1:], start=torques[0]) if torques else np.zeros(nv)
+        moments = None if self._load.conservative else by_moment[0]
+        return JointLoad(torque, angular[0], by_force[0], moments, gravity_derivative, potential, scale)

@@ -5,18 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
-from softrobots.checks import FloatArray
+import numpy as np
+
+from softrobots.checks import FloatArray, read_only
 from softrobots.errors import DescriptionError
 from softrobots.urdf_tags import InflatedLinkTag
+
+POSITIVE = 1e-9
+"""Smallest eigenvalue of a tangent stiffness that counts as positive, relative to the springs' own stiffness."""
+
+
+SpringState = tuple[float, FloatArray, FloatArray]
+"""Springs at given coordinates: elastic energy [J]; the load they carry, its derivative, shape (n,) [N m or N]; and the tangent
+stiffness, the derivative of that, shape (n, n), read-only."""
 
 
 class SpringLaw(Protocol):
     """What the statics asks of springs.
 
-    The residual, the tangent stiffness and the energy of `softrobots.elastostatics` use the three methods only; the paper's
-    recursions, and the scales and first steps of the solvers, use `stiffness` and `rest`.
+    The residual, the tangent stiffness and the energy of `softrobots.elastostatics` use `at` only; the paper's recursions, and
+    the scales and first steps of the solvers, use `stiffness` and `rest`.
     """
 
     @property
@@ -27,14 +38,12 @@ class SpringLaw(Protocol):
     def rest(self) -> FloatArray:
         """Relaxed coordinates, shape (n,) [rad or m]."""
 
-    def energy(self, y: FloatArray) -> float:
-        """Elastic energy at coordinates `y`, shape (n,) [rad or m] [J]."""
+    @property
+    def least_tangent(self) -> FloatArray:
+        """`stiffness` times `POSITIVE` as a diagonal matrix, shape (n, n), read-only: what a stable tangent exceeds."""
 
-    def torque(self, y: FloatArray) -> FloatArray:
-        """Load carried at coordinates `y`, shape (n,) [N m or N]: the derivative of the energy."""
-
-    def add_tangent(self, matrix: FloatArray, y: FloatArray) -> None:
-        """Add the second derivative of the energy at `y` to a matrix, shape (n, n) [N m/rad or N/m]."""
+    def at(self, y: FloatArray) -> SpringState:
+        """Energy, torque and tangent at coordinates `y`, shape (n,) [rad or m]."""
 
     def saturated(self, y: FloatArray) -> frozenset[int]:
         """Places of the springs that are on a plateau at `y`."""
@@ -49,18 +58,20 @@ class LinearSprings:
     rest: FloatArray
     """Relaxed coordinates, shape (n,) [rad or m]."""
 
-    def energy(self, y: FloatArray) -> float:
-        """Elastic energy at coordinates `y`, shape (n,) [rad or m]: `sum k (y - rest)^2 / 2` [J]."""
+    def at(self, y: FloatArray) -> SpringState:
+        """Energy `sum k (y - rest)^2 / 2`, torque `k (y - rest)` and tangent at coordinates `y`, shape (n,) [rad or m]."""
         stretch = y - self.rest
-        return 0.5 * float(self.stiffness @ (stretch * stretch))
+        torque = self.stiffness * stretch
+        return 0.5 * float(torque.dot(stretch)), torque, self._tangent
 
-    def torque(self, y: FloatArray) -> FloatArray:
-        """Load carried at coordinates `y`, shape (n,) [N m or N]: the derivative of the energy."""
-        return self.stiffness * (y - self.rest)
+    @cached_property
+    def _tangent(self) -> FloatArray:
+        return read_only(np.diag(self.stiffness))
 
-    def add_tangent(self, matrix: FloatArray, y: FloatArray) -> None:
-        """Add the second derivative of the energy, a diagonal, to a matrix, shape (n, n) [N m/rad or N/m]."""
-        matrix.flat[:: matrix.shape[0] + 1] += self.stiffness
+    @cached_property
+    def least_tangent(self) -> FloatArray:
+        """`stiffness` times `POSITIVE` as a diagonal matrix, shape (n, n), read-only: what a stable tangent exceeds."""
+        return read_only(POSITIVE * self._tangent)
 
     def saturated(self, y: FloatArray) -> frozenset[int]:
         """Places of the springs that are on a plateau: none."""
@@ -106,30 +117,26 @@ class SaturatingSprings:
         """Relaxed coordinates, shape (n,) [rad or m]."""
         return self.linear.rest
 
-    def energy(self, y: FloatArray) -> float:
-        """Elastic energy at coordinates `y`, shape (n,) [rad or m] [J]."""
-        saved = sum(
-            0.5 * link.stiffness * (bend - link.max_moment / link.stiffness) ** 2 for link, _, bend in self._beyond_knee(y)
-        )
-        return self.linear.energy(y) - saved
+    @property
+    def least_tangent(self) -> FloatArray:
+        """`stiffness` times `POSITIVE` as a diagonal matrix, shape (n, n), read-only: what a stable tangent exceeds."""
+        return self.linear.least_tangent
 
-    def torque(self, y: FloatArray) -> FloatArray:
-        """Load carried at coordinates `y`, shape (n,) [N m or N]: the derivative of the energy."""
-        torque = self.linear.torque(y)
-        for link, angles, bend in self._beyond_knee(y):
-            for place, angle in zip(link.places, angles, strict=True):
-                torque[place] = link.max_moment * (angle / bend)
-        return torque
-
-    def add_tangent(self, matrix: FloatArray, y: FloatArray) -> None:
-        """Add the second derivative of the energy at `y` to a matrix, shape (n, n) [N m/rad or N/m]."""
-        self.linear.add_tangent(matrix, y)
-        for link, angles, bend in self._beyond_knee(y):
+    def at(self, y: FloatArray) -> SpringState:
+        """Energy, torque and tangent at coordinates `y`, shape (n,) [rad or m]."""
+        energy, torque, tangent = self.linear.at(y)
+        beyond = self._beyond_knee(y)
+        if beyond:
+            tangent = tangent.copy()
+        for link, angles, bend in beyond:
+            energy -= 0.5 * link.stiffness * (bend - link.max_moment / link.stiffness) ** 2
             across = link.max_moment / bend
             for row, one in zip(link.places, angles, strict=True):
-                matrix[row, row] += across - link.stiffness
+                torque[row] = link.max_moment * (one / bend)
+                tangent[row, row] += across - link.stiffness
                 for column, other in zip(link.places, angles, strict=True):
-                    matrix[row, column] -= across / (bend * bend) * (one * other)
+                    tangent[row, column] -= across / (bend * bend) * (one * other)
+        return energy, torque, read_only(tangent)
 
     def saturated(self, y: FloatArray) -> frozenset[int]:
         """Places of the springs whose link is on its plateau at coordinates `y`, shape (n,)."""

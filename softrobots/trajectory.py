@@ -13,23 +13,20 @@ import numpy as np
 
 from softrobots import inflated_beam
 from softrobots.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
-from softrobots.elastostatics import TOLERANCE, elastic_state, largest_residual, settle
+from softrobots.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, settle
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
-from softrobots.errors import EquilibriumNotFound, NeutralEquilibrium, ParameterError, TargetUnreachable
+from softrobots.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.inverse_kinematics import IkSolution, solve_ik, start_motors
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
 from softrobots.progress import with_progress
-from softrobots.sensitivity import tip_motion
-from softrobots.tip_search import POSITION_TOLERANCE, Goal, LocalSolution, search
+from softrobots.tip_goal import Goal, LoadedTip
+from softrobots.tip_search import POSITION_TOLERANCE, LocalSolution, advance
 
 METHODS = ("newton", "fixed_point", "paper")
 """How `follow_trajectory` follows: exact steps with the springs settled by Newton or by the paper's recursion, or the paper's
 closed-loop inverse kinematics."""
-
-_WARM_DAMPING = 1e-6  # of the first step of a warm-started search, relative to the reach
-_HALVINGS = 6  # of the way between two waypoints before the search starts anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,9 +206,10 @@ def _exact_steps(
     model: SoftModel, points: FloatArray, load: Load, first: Equilibrium, method: str, tolerance: float, allow_jumps: bool
 ) -> Iterable[Equilibrium]:
     state = elastic_state(model, first.q_motors, first.q_springs, load)
-    here = LocalSolution(first.q_motors, state, 0.0, 0.0, 0, 0)
+    here = LocalSolution(first.q_motors, state, 0.0)
+    tip = LoadedTip(model, Goal(points[0]), load, method)
     for number, (last, target) in enumerate(pairwise(points), start=2):
-        reached = _advance(model, last, target, load, here, method, tolerance, _HALVINGS)
+        reached = advance(tip, last, target, here, tolerance)
         if reached is None:
             reached = _jump(model, target, load, here, method, tolerance, number, len(points))
             if not allow_jumps:
@@ -228,62 +226,16 @@ def _exact_steps(
         yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
 
 
-def _advance(
-    model: SoftModel,
-    last: FloatArray,
-    target: FloatArray,
-    load: Load,
-    here: LocalSolution,
-    method: str,
-    tolerance: float,
-    halvings: int,
-) -> LocalSolution | None:
-    """Go from one waypoint to the next by its linear prediction and a search, over waypoints between if need be."""
-    by_motors, by_springs = here.state.point.columns(frame_jacobian(model, here.state.q, model.tip)[:3])
-    try:
-        slope, follow = tip_motion(by_motors, by_springs, here.state.tangent, here.state.load.coupling)
-    except NeutralEquilibrium:  # about to buckle: no linear prediction leads on
-        return None
-    basis, missing = model.actuators.basis, target - frame_placement(model, here.state.q, model.tip).translation
-    step = np.linalg.pinv(slope @ basis, rcond=1e-6) @ missing
-    if float(np.linalg.norm(step)) <= 0.5:
-        motors = model.actuators.go(here.q_motors, basis @ step)
-        springs = here.state.q_springs + follow @ (motors - here.q_motors)
-        found = search(
-            model,
-            Goal(target),
-            load,
-            motors,
-            springs,
-            home=here.q_motors,
-            method=method,
-            tolerance=tolerance,
-            damping=_WARM_DAMPING,
-        )
-        if found is not None and found.error <= tolerance and _apart(model, found.q_motors, here.q_motors) <= 1.0:
-            return found
-    if halvings == 0:
-        return None
-    middle = 0.5 * (last + target)
-    half = _advance(model, last, middle, load, here, method, tolerance, halvings - 1)
-    return None if half is None else _advance(model, middle, target, load, half, method, tolerance, halvings - 1)
-
-
-def _apart(model: SoftModel, one: FloatArray, other: FloatArray) -> float:
-    """Largest change of an actuator over its scale [rad]."""
-    return float(np.abs((one - other) / model.motor_scale).max())
-
-
 def _jump(
     model: SoftModel,
     target: FloatArray,
     load: Load,
-    here: LocalSolution,
+    here: LocalSolution[ElasticState],
     method: str,
     tolerance: float,
     number: int,
     total: int,
-) -> LocalSolution:
+) -> LocalSolution[ElasticState]:
     """Search a waypoint from everywhere when the way from the last one is blocked."""
     try:
         found = solve_ik(
@@ -299,7 +251,7 @@ def _jump(
         raise _named(error, number, total) from error
     solution = found.equilibrium
     state = elastic_state(model, solution.q_motors, solution.q_springs, load)
-    return LocalSolution(solution.q_motors, state, found.error, 0.0, found.iterations, 0)
+    return LocalSolution(solution.q_motors, state, found.error, iterations=found.iterations)
 
 
 def _paper_steps(
@@ -320,7 +272,7 @@ def _paper_steps(
             inverse = np.linalg.pinv(np.concatenate([by_motors, by_springs], axis=1))
             motors = motors + interval / parts * (inverse[: model.n_motors] @ (velocity + gain * error))
             motors = np.clip(motors, *model.motor_limits.T)
-            state, used = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
+            state, used, _ = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
             spent += used
             if state.error > largest_residual(model, state.scale, TOLERANCE):
                 best = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)

@@ -133,7 +133,7 @@ def lagrangian(model: sr.SoftModel, motors: np.ndarray, probe: Probe, reaction: 
     if probe.normal is not None:
         normal = pose.rotation @ probe.normal
         way = float(normal @ offset) / float(normal @ probe.direction)
-    return model.springs.energy(y) + pin.computePotentialEnergy(heavy, data, q) - reaction * way, way
+    return model.springs.at(y)[0] + pin.computePotentialEnergy(heavy, data, q) - reaction * way, way
 
 
 @pytest.mark.parametrize("along", [None, (1.0, 0.1, 0.0)])

@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.loads import Load, generalised_load
+from softrobots.joint_loads import Entries, JointLoad
+from softrobots.loads import AppliedLoad, Load
 from tests.foreign import BRANCHED, LIMIT, SPRINGS
 from tests.oracles import central_difference, flexible_jacobian
 
@@ -21,6 +22,10 @@ MODELS = {
 }
 
 
+def generalised_load(model: sr.SoftModel, q: np.ndarray, load: Load) -> JointLoad:
+    return AppliedLoad(model, load).at(q)
+
+
 def random_load(model: sr.SoftModel, rng: np.random.Generator, *, moments: bool) -> Load:
     mask = np.r_[np.ones(3), np.full(3, float(moments))]
     wrench = {name: 20 * rng.normal(size=6) * mask for name in (model.tip, model.pinocchio.names[2])}
@@ -32,7 +37,8 @@ def random_load(model: sr.SoftModel, rng: np.random.Generator, *, moments: bool)
 def test_derivative_matches_central_differences(model: sr.SoftModel, moments: bool, rng: np.random.Generator) -> None:
     for _ in range(10):
         load, q = random_load(model, rng, moments=moments), rng.uniform(-1.5, 1.5, model.pinocchio.nq)
-        found = generalised_load(model, q, load).derivative
+        every = np.arange(model.pinocchio.nv)
+        found = generalised_load(model, q, load).derivative(Entries.of(every, every, len(every)))
         expected = central_difference(lambda at, load=load: generalised_load(model, at, load).torque, q)
         assert np.abs(found - expected).max() < 1e-7  # step 1e-6: truncation 1e-11, rounding 1e-14 / 1e-6 times 50 N m
         if not moments:  # a world-fixed moment has no potential, and no symmetric derivative

@@ -27,11 +27,8 @@ LAW = SaturatingSprings(
 )
 """Two saturating links with rest angles and a linear spring between them."""
 
-
-def tangent_of(law: SaturatingSprings, y: np.ndarray) -> np.ndarray:
-    matrix = np.zeros((len(y), len(y)))
-    law.add_tangent(matrix, y)
-    return matrix
+ENERGY, TORQUE, TANGENT = range(3)
+"""Places in what `at` answers."""
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +59,12 @@ def test_torque_and_tangent_are_derivatives_of_the_energy(values: list[float]) -
         if abs(np.linalg.norm(bend) - link.max_moment / link.stiffness) < 1e-4:
             y[places] += 1e-3
     rows = step * np.eye(5)
-    torque = [(LAW.energy(y + row) - LAW.energy(y - row)) / (2 * step) for row in rows]
-    tangent = [(LAW.torque(y + row) - LAW.torque(y - row)) / (2 * step) for row in rows]
-    assert np.allclose(LAW.torque(y), torque, rtol=1e-7, atol=1e-7)
+    torque = [(LAW.at(y + row)[ENERGY] - LAW.at(y - row)[ENERGY]) / (2 * step) for row in rows]
+    tangent = [(LAW.at(y + row)[TORQUE] - LAW.at(y - row)[TORQUE]) / (2 * step) for row in rows]
+    assert np.allclose(LAW.at(y)[TORQUE], torque, rtol=1e-7, atol=1e-7)
     # On the plateau the tangent is M / bend across, at most k; its change over a step is relative to the bend.
-    assert np.allclose(tangent_of(LAW, y), tangent, rtol=1e-6, atol=1e-5)
-    assert np.array_equal(tangent_of(LAW, y), tangent_of(LAW, y).T)
+    assert np.allclose(LAW.at(y)[TANGENT], tangent, rtol=1e-6, atol=1e-5)
+    assert np.array_equal(LAW.at(y)[TANGENT], LAW.at(y)[TANGENT].T)
 
 
 @given(st.floats(0.0, 0.5), st.floats(-np.pi, np.pi), st.floats(-np.pi, np.pi))
@@ -77,9 +74,9 @@ def test_the_law_is_the_same_in_all_directions(bend: float, direction: float, tu
     y = bend * np.array([np.cos(direction), np.sin(direction)])
     if abs(K * bend - M) < 1e-9:  # rounding decides there on which side of the knee the tangent is taken
         return
-    assert law.energy(rotation @ y) == pytest.approx(law.energy(y), rel=1e-12, abs=1e-15)
-    assert np.allclose(law.torque(rotation @ y), rotation @ law.torque(y), rtol=0.0, atol=1e-12)
-    assert np.allclose(tangent_of(law, rotation @ y), rotation @ tangent_of(law, y) @ rotation.T, rtol=0.0, atol=1e-10)
+    assert law.at(rotation @ y)[ENERGY] == pytest.approx(law.at(y)[ENERGY], rel=1e-12, abs=1e-15)
+    assert np.allclose(law.at(rotation @ y)[TORQUE], rotation @ law.at(y)[TORQUE], rtol=0.0, atol=1e-12)
+    assert np.allclose(law.at(rotation @ y)[TANGENT], rotation @ law.at(y)[TANGENT] @ rotation.T, rtol=0.0, atol=1e-10)
 
 
 def test_one_spring_bent_alone_follows_the_moment_angle_law_of_the_paper() -> None:
@@ -87,7 +84,7 @@ def test_one_spring_bent_alone_follows_the_moment_angle_law_of_the_paper() -> No
     angles = np.linspace(-0.3, 0.3, 61)
     expected = inflated_beam.moment(angles, stiffness=K, max_moment=M)
     for place in (0, 1):
-        torques = np.array([law.torque(angle * np.eye(2)[place]) for angle in angles])
+        torques = np.array([law.at(angle * np.eye(2)[place])[TORQUE] for angle in angles])
         assert np.allclose(torques[:, place], expected, rtol=1e-15, atol=0.0)
         assert not torques[:, 1 - place].any()
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
+from softrobots.elastostatics import is_stable
 
 
 def test_one_link_buckles_at_k_over_l2() -> None:
@@ -38,6 +39,28 @@ def test_smallest_eigenvalue_changes_sign_at_the_limit(arm: sr.SoftModel) -> Non
     assert 0.0 < below.eigenvalues[0] < 0.01 * 172.71
     assert np.abs(above.q_springs).max() > 1e-2
     assert above.stable
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), -float("inf")])
+def test_a_tangent_that_is_not_finite_is_never_certified(arm: sr.SoftModel, symmetric: bool, wrong: float) -> None:
+    """Eigen's factorisation passes a NaN."""
+    for row, column in itertools.combinations_with_replacement(range(arm.n_springs), 2):
+        tangent = np.diag(arm.stiffness)
+        assert is_stable(arm, tangent, symmetric=symmetric)
+        tangent[row, column] = tangent[column, row] = wrong
+        assert not is_stable(arm, tangent, symmetric=symmetric)
+
+
+def test_pivots_tell_the_sign_of_the_smallest_eigenvalue(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    """NumPy's eigenvalues answer the same, in coordinates scaled by the springs; one within rounding of zero is not stable."""
+    n, k = arm.n_springs, arm.stiffness
+    for least in rng.choice([-1.0, -1e-8, 0.0, 0.9e-9, 1.1e-8, 1e-3, 1.0], 50):
+        turn = np.linalg.qr(rng.normal(size=(n, n)))[0]
+        unit = (turn * np.r_[least, rng.uniform(2.0, 3.0, n - 1)]) @ turn.T
+        tangent = np.sqrt(k)[:, None] * (0.5 * (unit + unit.T)) * np.sqrt(k)
+        assert is_stable(arm, tangent, symmetric=True) == (least > 1e-9)
+    assert not is_stable(arm, np.zeros((n, n)), symmetric=True)
 
 
 def scan(arm: sr.SoftModel, motors: tuple, direction: np.ndarray, forces: np.ndarray) -> list[sr.Equilibrium]:

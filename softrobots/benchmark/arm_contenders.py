@@ -21,8 +21,8 @@ from softrobots.equilibrium import solve_equilibrium
 from softrobots.errors import SoftRobotsError
 from softrobots.kinematics import frame_placement
 
-FIXED_POINT = "Python + Pinocchio, fixed point"
-PLAIN_FIXED_POINT = "Python + Pinocchio, fixed point as one writes it first"
+FIXED_POINT = "Python + Pinocchio, fixed point, hand-tuned"
+PLAIN_FIXED_POINT = "Python + Pinocchio, fixed point"
 GENERAL = "solve_equilibrium"
 MUJOCO = "MuJoCo settling, tuned, steps of 10 ms at most"
 MUJOCO_ANY, MUJOCO_BARE = "MuJoCo settling, tuned, any step", "MuJoCo settling, tuned, any step, contacts off"

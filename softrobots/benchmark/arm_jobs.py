@@ -59,19 +59,19 @@ def equilibria(settings: Settings) -> tuple[list[Row], list[str]]:
     job = "equilibrium, batch"
     fast, plain = batch_name("numba"), batch_name("python")
     rows = [
-        race.cheaper(job, fast, FIXED_POINT, AT_LEAST, 500.0),
+        race.cheaper(job, fast, PLAIN_FIXED_POINT, AT_LEAST, 500.0),
         race.cheaper(job, fast, ARRAYS, AT_LEAST, 50.0),
         race.cheaper(job, fast, MUJOCO, AT_LEAST, 3000.0),
         race.cheaper(job, fast, CPP, AT_LEAST, 2.0),
         race.cheaper(job, fast, MUJOCO_ANY),
         race.cheaper(job, fast, MUJOCO_BARE),
-        race.cheaper(job, fast, PLAIN_FIXED_POINT),
+        race.cheaper(job, fast, FIXED_POINT),
         *(race.cheaper(job, fast, newton_name(name)) for name in NEWTON),
         *(race.cheaper(job, fast, scipy_name(name)) for name in ("root", "least_squares")),
         race.cheaper(job, plain, FIXED_POINT),
         race.cheaper(job, plain, ARRAYS),
-        race.cheaper("equilibrium, one checked call", single_name("numba"), FIXED_POINT, AT_LEAST, 30.0),
-        race.cheaper("equilibrium, one checked call", single_name("numba"), PLAIN_FIXED_POINT),
+        race.cheaper("equilibrium, one checked call", single_name("numba"), PLAIN_FIXED_POINT, AT_LEAST, 30.0),
+        race.cheaper("equilibrium, one checked call", single_name("numba"), FIXED_POINT),
         race.cheaper("equilibrium, one checked call", single_name("python"), FIXED_POINT),
         race.costlier("equilibrium, one checked call", GENERAL, _barest(race), AT_MOST, 2.0),
     ]

@@ -89,7 +89,8 @@ def _single(form: str, count: int) -> Contender:
     """One call a case."""
     solver, forces = _solver(form, count), rod_forces(_CASES)
     _check(form, count, [solver.equilibrium((), force).tip_position for force in forces[:_CHECKED]], forces)
-    return Contender(_CASES, lambda: [solver.equilibrium((), force) for force in forces])
+    none = np.zeros(0)
+    return Contender(_CASES, lambda: [solver.equilibrium(none, force) for force in forces])
 
 
 def _batch(form: str, count: int, batch: int) -> Contender:

@@ -23,6 +23,7 @@ class Package(NamedTuple):
 
 PACKAGES = (
     Package("pin", "3.8", "", "Pinocchio: kinematics, Jacobians, gravity"),
+    Package("eigenpy", "3.12", "", "Pinocchio's bridge to Eigen, and its factorisation of small matrices"),
     Package("numpy", "2.0", "", "arrays"),
     Package("xacro", "2.1.1", "", "the generator of every URDF"),
     Package("yourdfpy", "0.0.57", "", "a second opinion on URDF files"),
