@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from softrobots.checks import FloatArray, choice, finite_array, positive_integer
 from softrobots.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, settled
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import LoadNotFound, ParameterError
+from softrobots.force_search import OBSERVABLE, Directions, search_force, torque_tolerance
 from softrobots.kinematics import frame_jacobian
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
@@ -25,13 +27,6 @@ from softrobots.sensitivity import motor_torque_slope
 METHODS = ("newton", "alternation")
 """The solvers of `estimate_load`; "alternation" is the paper's."""
 
-OBSERVABLE = 1e-3
-"""A direction counts as unobservable when its singular value is below this share of the reach."""
-
-_TOLERANCE = 1e-10  # of the torque equation, relative to the torques
-_MOMENT_FLOOR = 1e-3  # [N m], scale of the residual for vanishing torques
-_FIRST_DAMPING = 0.03  # of the first step, relative to the reach: keeps the force small where it is barely felt
-_LAST_DAMPING = 1e-7
 _INNER = 1e-12  # tolerance of the equilibria on the way
 
 
@@ -122,10 +117,7 @@ def estimate_load(
     """
     check_model(model)
     choice("method", method, METHODS)
-    if model.n_motors == 0:
-        raise ParameterError("model", model, "a robot with at least one motor")
-    if model.muscles and model.muscle_input == "forces":
-        raise ParameterError("model", model, "a robot whose muscle lengths are given: given forces feel no load")
+    check_feels(model)
     motors = model.checked_motors(q_motors)
     torques = finite_array("motor_torques", motor_torques, (model.n_motors,), "N m")
     noise = None if torque_std is None else _noise(torque_std, model.n_motors)
@@ -147,6 +139,18 @@ def estimate_load(
     return result
 
 
+def check_feels(model: SoftModel) -> None:
+    """Refuse robots whose actuators feel no load.
+
+    Raises:
+        ParameterError: If there are none, or muscle tensions are given.
+    """
+    if model.n_motors == 0:
+        raise ParameterError("model", model, "a robot with at least one motor")
+    if model.muscles and model.muscle_input == "forces":
+        raise ParameterError("model", model, "a robot whose muscle lengths are given: given forces feel no load")
+
+
 @dataclass(frozen=True, eq=False)
 class _Problem:
     """The measurement and what is known of the load."""
@@ -158,25 +162,32 @@ class _Problem:
     frame: str
 
     @property
+    def reach(self) -> float:
+        return self.model.reach
+
+    @cached_property
     def tolerance(self) -> float:
-        return _TOLERANCE * max(float(np.linalg.norm(self.torques)), _MOMENT_FLOOR)
+        return torque_tolerance(self.torques)
 
     def load(self, force: FloatArray) -> Load:
         return self.base.plus(self.frame, np.concatenate([force, np.zeros(3)]))
 
-    def equilibrium(self, force: FloatArray, start: FloatArray) -> ElasticState | None:
+    def equilibrium(self, force: FloatArray, near: ElasticState) -> ElasticState | None:
         """Springs in equilibrium under a force; None if there is none to be found."""
+        return self.settled(force, near.q_springs)
+
+    def settled(self, force: FloatArray, start: FloatArray) -> ElasticState | None:
+        """The same from given springs."""
         return settled(self.model, self.motors, self.load(force), start, tolerance=_INNER)
 
     def unexplained(self, state: ElasticState) -> FloatArray:
         """Motor torques minus those of a state."""
         return np.asarray(self.torques - state.load.motors)
 
-    def slope(self, state: ElasticState) -> tuple[FloatArray, FloatArray, FloatArray, Any]:
-        """Singular value decomposition of the torque slope, and which of its directions are observable."""
+    def directions(self, state: ElasticState) -> Directions:
+        """How the torques follow the force."""
         motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
-        left, values, right = np.linalg.svd(motor_torque_slope(motors, springs, state.tangent, state.load.coupling))
-        return left, values, right, values > OBSERVABLE * self.model.reach
+        return Directions.of(motor_torque_slope(motors, springs, state.tangent, state.load.coupling), self.model.reach)
 
 
 def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None) -> bool:
@@ -186,7 +197,7 @@ def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None)
     motors hardly feel may give: a twentieth of the torques, or `OBSERVABLE` of the stiffest spring. What more than three
     motors measure beyond three components may be anything as long as nothing is known of the noise: a least-squares fit.
     """
-    left, values, _, keep = problem.slope(state)
+    left, values, _, keep = problem.directions(state)
     missing = left.T @ problem.unexplained(state)
     scatter = 0.0 if noise is None else 5.0 * float(np.linalg.norm(noise))
     hidden = 0.05 * float(np.linalg.norm(problem.torques)) + OBSERVABLE * problem.model.stiffest
@@ -196,28 +207,10 @@ def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None)
 
 
 def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
-    """Levenberg-Marquardt on the torque equation, in the observable directions of each step."""
-    model = problem.model
-    force = np.zeros(3)
-    state = problem.equilibrium(force, model.rest) or elastic_state(model, problem.motors, model.rest, problem.load(force))
-    damping, spent = _FIRST_DAMPING * model.reach, 0
-    while spent < most:
-        left, values, right, keep = problem.slope(state)
-        missing = left[:, : len(values)].T @ problem.unexplained(state)
-        size = float(np.linalg.norm(missing[keep]))
-        if size <= problem.tolerance:
-            break
-        step = right[: len(values)][keep].T @ (missing[keep] * values[keep] / (values[keep] ** 2 + damping**2))
-        trial = problem.equilibrium(force + step, state.q_springs)
-        spent += 1
-        if trial is not None:
-            left_over = left[:, : len(values)].T @ problem.unexplained(trial)
-            if float(np.linalg.norm(left_over[keep])) < size:
-                force, state = force + step, trial
-                damping = 0.1 * damping if damping > _LAST_DAMPING * model.reach else 0.0
-                continue
-        damping = max(10.0 * damping, 10.0 * _LAST_DAMPING * model.reach)
-    return force, state, spent
+    """Damped Newton, see `softrobots.force_search`."""
+    model, none = problem.model, np.zeros(3)
+    state = problem.settled(none, model.rest) or elastic_state(model, problem.motors, model.rest, problem.load(none))
+    return search_force(problem, state, most)
 
 
 def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
@@ -243,7 +236,7 @@ def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState
 def _estimate(
     problem: _Problem, force: FloatArray, state: ElasticState, method: str, iterations: int, noise: FloatArray | None
 ) -> LoadEstimate:
-    left, values, right, keep = problem.slope(state)
+    left, values, right, keep = problem.directions(state)
     felt = right[: len(values)][keep]
     singular_values = np.zeros(3)
     singular_values[: len(values)] = values

@@ -54,7 +54,10 @@ class MuscleLengths:
         spread = np.zeros((count, len(tags)))
         self._misfit = np.zeros((len(tags), len(tags)))
         groups, slopes, modes, names, turning = [], [], [], [], []
+        self._bent: list[tuple[int, Any, Any]] = []
         for segment in sorted({tag.segment for tag in tags}):
+            about_x, about_y = (np.array(segments[segment][key], dtype=int) for key in ("bend_x", "bend_y"))
+            self._bent.append((segment, about_x, about_y))
             rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
             places = {key: list(segments[segment][key]) for key in HELD if key in segments[segment]}
             arms = muscle_arms([tags[row] for row in rows])[:, [HELD.index(key) for key in places]]
@@ -184,28 +187,25 @@ class MuscleLengths:
     def reached_range(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Slopes of the bending of segments that have reached the range of their sections; see `Actuators.active_limits`."""
         slopes, bends = [], []
-        for _, bending, (along, across) in self._bendings(motors):
+        count = len(motors)
+        for _, bending, (x, y) in self._bendings(motors):
             if bending >= self._largest_bending * (1.0 - 1e-9):
+                spread = self.spread[[x, y]] @ (motors[count - len(self._tags) :] - self._rest_lengths)
+                along, across = np.zeros(count), np.zeros(count)
+                along[count - len(self._tags) :] = (spread[0] * self.spread[x] + spread[1] * self.spread[y]) / bending
+                across[count - len(self._tags) :] = (spread[0] * self.spread[y] - spread[1] * self.spread[x]) / bending
                 slopes.append(along)
                 bends.append(across / np.sqrt(bending))
-        count = len(motors)
         return np.array(slopes).reshape(-1, count), np.array(bends).reshape(-1, count)
 
-    def _bendings(self, motors: FloatArray) -> list[tuple[int, float, tuple[FloatArray, FloatArray]]]:
-        """Each segment with muscles: number, largest bending of a section [rad], slopes of bending it and of turning it."""
-        first = len(motors) - len(self._tags)
-        spread = self.spread @ (motors[first:] - self._rest_lengths)
+    def _bendings(self, motors: FloatArray) -> list[tuple[int, float, tuple[int, int]]]:
+        """Each segment with muscles: number, largest bending of a section [rad], places of the two bendings of that section."""
+        spread = self.spread @ (motors[len(motors) - len(self._tags) :] - self._rest_lengths)
         found = []
-        for segment in sorted({tag.segment for tag in self._tags}):
-            about_x, about_y = (list(self._segments[segment][key]) for key in ("bend_x", "bend_y"))
+        for segment, about_x, about_y in self._bent:
             bendings = np.hypot(spread[about_x], spread[about_y])
-            most = int(np.argmax(bendings))
-            x, y = about_x[most], about_y[most]
-            size = max(float(bendings[most]), 1e-300)
-            along, across = np.zeros(len(motors)), np.zeros(len(motors))
-            along[first:] = (spread[x] * self.spread[x] + spread[y] * self.spread[y]) / size
-            across[first:] = (spread[x] * self.spread[y] - spread[y] * self.spread[x]) / size
-            found.append((segment, float(bendings[most]), (along, across)))
+            most = int(bendings.argmax())
+            found.append((segment, float(bendings[most]), (int(about_x[most]), int(about_y[most]))))
         return found
 
 

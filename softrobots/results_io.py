@@ -26,7 +26,7 @@ from softrobots.loader import load_model
 from softrobots.loads import Load
 from softrobots.model import SoftModel
 from softrobots.probes import Probe
-from softrobots.tip_search import Goal
+from softrobots.tip_goal import Goal
 from softrobots.trajectory import Trajectory
 from softrobots.workspace import Workspace, workspace_at
 from softrobots.workspace_map import WorkspaceMap, packed, unpacked

@@ -6,18 +6,14 @@ At every step the elastic coordinates are in equilibrium; the step uses the exac
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.checks import FloatArray
-from softrobots.elastostatics import ElasticState, settled
 from softrobots.errors import NeutralEquilibrium
-from softrobots.kinematics import frame_jacobian, frame_placement
-from softrobots.loads import Load
 from softrobots.model import SoftModel
-from softrobots.sensitivity import tip_motion
 
 POSITION_TOLERANCE = 1e-9
 """Default distance of the tip from its target [m]."""
@@ -28,70 +24,44 @@ ANGLE_TOLERANCE = 1e-9
 SAME = 1e-6
 """Actuator coordinates closer than this, over their scale, are one [rad]."""
 
+LEVER = 0.2
+"""Distance that a radian of orientation counts for, relative to the reach."""
+
 _FIRST_DAMPING = 0.03  # of the first step, relative to the reach
 _LAST_DAMPING = 1e-8
+_WARM_DAMPING = 1e-6  # of the first step of a search that starts from a prediction
+_HALVINGS = 6  # of the way between two waypoints
 _LARGEST_STEP = 0.5  # [rad], norm of one step over the scale of the actuators
 _STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as no slope: nothing nearer is near
 _NEAR = 0.02  # distance from the goal, relative to the reach, that the way home may cost for a step
-_LEVER = 0.2  # distance that a radian of orientation counts for, relative to the reach
 
 
-class Goal(NamedTuple):
-    """Where the tip must be, and perhaps how it must stand there."""
-
-    position: FloatArray
-    """Position, shape (3,) [m], world axes."""
-    rotation: FloatArray | None = None
-    """Orientation of the tip, shape (3, 3), or the direction of its z axis, shape (3,), of length 1; None: any."""
+class Settled(Protocol):
+    """A robot in equilibrium."""
 
     @property
-    def rows(self) -> int:
-        """Number of conditions: 3 for a position, 2 more for a direction, 3 more for an orientation."""
-        return 3 if self.rotation is None else 5 if self.rotation.ndim == 1 else 6
-
-    def missing(self, model: SoftModel, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Way from the tip to the goal: translation, shape (3,) [m], and rotation vector, shape (3,) [rad], world axes."""
-        pose = frame_placement(model, q, model.tip)
-        return self.position - pose.translation, self._turn(pose.rotation)
-
-    def _turn(self, rotation: FloatArray) -> FloatArray:
-        if self.rotation is None:
-            return np.zeros(3)
-        if self.rotation.ndim == 2:
-            return np.asarray(pin.log3(self.rotation @ rotation.T))
-        pointing = rotation[:, 2]
-        axis = np.cross(pointing, self.rotation)
-        sine, cosine = float(np.linalg.norm(axis)), float(pointing @ self.rotation)
-        if sine > 0.0:
-            return np.asarray(axis * (np.arctan2(sine, cosine) / sine))
-        return np.zeros(3) if cosine > 0.0 else np.pi * rotation[:, 0]  # opposite: any way round
-
-    def jacobian(self, model: SoftModel, q: FloatArray) -> FloatArray:
-        """Derivative of what `missing` is measured by, per joint, shape (3 or 6, nv), turns times the lever [m/rad]."""
-        columns = frame_jacobian(model, q, model.tip)
-        if self.rotation is None:
-            return columns[:3]
-        turning = columns[3:]
-        if self.rotation.ndim == 1:
-            pointing = frame_placement(model, q, model.tip).rotation[:, 2]
-            turning = turning - np.outer(pointing, pointing @ turning)
-        return np.concatenate([columns[:3], _LEVER * model.reach * turning])
+    def q_springs(self) -> FloatArray:
+        """Elastic coordinates, shape (n_springs,) [rad or m]."""
 
 
-class LocalSolution(NamedTuple):
+State = TypeVar("State", bound=Settled)
+
+
+@dataclass(frozen=True, eq=False)
+class LocalSolution(Generic[State]):
     """Where a local search ended."""
 
     q_motors: FloatArray
     """Actuator coordinates, shape (n_motors,)."""
-    state: ElasticState
+    state: State
     """The robot there."""
     error: float
     """Distance of the tip from the target [m]."""
-    angle: float
+    angle: float = 0.0
     """Angle between the tip and the wanted orientation [rad]; 0 if none is wanted."""
-    iterations: int
+    iterations: int = 0
     """Steps."""
-    unsettled: int
+    unsettled: int = 0
     """Actuator coordinates tried at which the robot did not settle."""
 
     def arrived(self, tolerance: float) -> bool:
@@ -100,32 +70,54 @@ class LocalSolution(NamedTuple):
 
     def miss(self, model: SoftModel) -> float:
         """Distance and angle as one distance [m]."""
-        return float(np.hypot(self.error, _LEVER * model.reach * self.angle))
+        return float(np.hypot(self.error, LEVER * model.reach * self.angle))
+
+
+class SoughtTip(Protocol[State]):
+    """A robot under a load and the goal of its tip, whoever settles the springs."""
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+
+    @property
+    def rows(self) -> int:
+        """Number of conditions: 3 for a position, up to 6 with an orientation."""
+
+    def towards(self, position: FloatArray) -> SoughtTip[State]:
+        """The same robot with the tip to go to another position, shape (3,) [m]."""
+
+    def settle(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[State] | None:
+        """Let the elastic coordinates settle from a start, shape (n_springs,); None if they do not."""
+
+    def missing(self, state: State) -> FloatArray:
+        """Way from the tip to the goal, shape (rows,) [m]."""
+
+    def motion(self, state: State) -> tuple[FloatArray, FloatArray]:
+        """How tip and elastic coordinates follow the actuators, shapes (rows, n_motors) and (n_springs, n_motors).
+
+        Raises:
+            NeutralEquilibrium: If they do not: the robot is about to buckle.
+        """
 
 
 def search(
-    model: SoftModel,
-    goal: Goal,
-    load: Load,
+    tip: SoughtTip[State],
     q_motors: FloatArray,
     q_springs: FloatArray,
     *,
     home: FloatArray | None = None,
-    method: str = "newton",
     tolerance: float = POSITION_TOLERANCE,
     damping: float = _FIRST_DAMPING,
     max_iterations: int = 100,
-) -> LocalSolution | None:
+) -> LocalSolution[State] | None:
     """Search from one start by Levenberg-Marquardt within the actuator limits.
 
     Args:
-        model: The robot.
-        goal: The goal.
-        load: The load.
+        tip: The robot and its goal.
         q_motors: Start of the actuators, shape (n_motors,), within the limits.
         q_springs: Start of the elastic coordinates, shape (n_springs,).
         home: Actuator coordinates to stay near to where there is freedom (more actuators than conditions); None: `q_motors`.
-        method: How the springs settle.
         tolerance: Distance at which the search ends [m].
         damping: Damping of the first step, relative to the reach; small for starts near the solution.
         max_iterations: Most steps.
@@ -133,30 +125,29 @@ def search(
     Returns:
         Where the search ended, at the goal or not; None if the start itself has no equilibrium.
     """
-    here = _settle_at(model, q_motors, load, q_springs, method, goal)
+    here = tip.settle(q_motors, q_springs)
     if here is None:
         return None
-    basis = model.actuators.basis
-    mu, redundant, unsettled, pace = damping * model.reach, basis.shape[1] > goal.rows, 0, 1.0
+    model, basis = tip.model, tip.model.actuators.basis
+    inverse = np.linalg.pinv(basis)
+    mu, redundant, unsettled, pace = damping * model.reach, basis.shape[1] > tip.rows, 0, 1.0
     home = q_motors if home is None else home
     last: tuple[FloatArray, FloatArray] | None = None  # step and drift that led here
-    reached: LocalSolution | None = None  # the last place on the way home that is at the goal
+    reached: LocalSolution[State] | None = None  # the last place on the way home that is at the goal
     for iteration in range(1, max_iterations + 1):
-        translation, turn = goal.missing(model, here.state.q)
-        missing = translation if goal.rotation is None else np.concatenate([translation, _LEVER * model.reach * turn])
-        motors, springs = here.state.point.columns(goal.jacobian(model, here.state.q))
+        missing = tip.missing(here.state)
         try:
-            slope, follow = tip_motion(motors, springs, here.state.tangent, here.state.load.coupling)
+            slope, follow = tip.motion(here.state)
         except NeutralEquilibrium:
             break
         slope = slope @ basis
         arrived = here.arrived(tolerance)
         reached = here if arrived else reached
         going_home = redundant and reached is not None
-        homeward = np.linalg.pinv(basis) @ (home - here.q_motors) if going_home else np.zeros(basis.shape[1])
+        homeward = inverse @ (home - here.q_motors) if going_home else np.zeros(basis.shape[1])
         towards, drift, free = _step(model, here.q_motors, slope, missing, mu, homeward)
         if arrived and float(np.abs(drift).max()) <= SAME:
-            return here._replace(iterations=iteration - 1, unsettled=unsettled)
+            return replace(here, iterations=iteration - 1, unsettled=unsettled)
         pace = pace if last is None else _pace(*last, drift)
         miss, last = here.miss(model), None
         if not arrived and float(np.linalg.norm(free @ (slope.T @ missing))) <= _STATIONARY * model.reach * miss:
@@ -165,7 +156,7 @@ def search(
         step *= min(1.0, _LARGEST_STEP / max(float(np.linalg.norm(step)), 1e-300))
         moved = model.actuators.go(here.q_motors, basis @ step)
         guess = here.state.q_springs + follow @ (moved - here.q_motors)
-        there = _settle_at(model, moved, load, guess, method, goal)
+        there = tip.settle(moved, guess)
         unsettled += there is None
         # Drifting home costs distance in second order, which the next step makes good.
         drifted = pace * float(np.linalg.norm(drift))
@@ -179,20 +170,53 @@ def search(
             if mu > 1e6 * model.reach:
                 break
     ended = here if reached is None or here.arrived(tolerance) else reached
-    return ended._replace(iterations=iteration, unsettled=unsettled)
+    return replace(ended, iterations=iteration, unsettled=unsettled)
 
 
-def _settle_at(
-    model: SoftModel, q_motors: FloatArray, load: Load, start: FloatArray, method: str, goal: Goal
-) -> LocalSolution | None:
-    """Elastic coordinates in equilibrium and the distance of the tip; None if they do not settle."""
-    if not model.actuators.admit(q_motors):
+def advance(
+    tip: SoughtTip[State],
+    last: FloatArray,
+    target: FloatArray,
+    here: LocalSolution[State],
+    tolerance: float = POSITION_TOLERANCE,
+    halvings: int = _HALVINGS,
+) -> LocalSolution[State] | None:
+    """Go from one waypoint to the next by its linear prediction and a search, over waypoints between if need be.
+
+    Args:
+        tip: The robot; its goal does not matter.
+        last: The waypoint before, shape (3,) [m].
+        target: The waypoint, shape (3,) [m].
+        here: The robot at the waypoint before.
+        tolerance: Distance at which a search ends [m].
+        halvings: How often the way may be halved.
+
+    Returns:
+        The robot at the waypoint; None if no continuous motion leads there.
+    """
+    there = tip.towards(target)
+    try:
+        slope, follow = there.motion(here.state)
+    except NeutralEquilibrium:  # about to buckle: no linear prediction leads on
         return None
-    state = settled(model, q_motors, load, start, method=method)
-    if state is None:
+    actuators = tip.model.actuators
+    step = np.linalg.pinv(slope @ actuators.basis, rcond=1e-6) @ there.missing(here.state)
+    if float(np.linalg.norm(step)) <= 0.5:
+        motors = actuators.go(here.q_motors, actuators.basis @ step)
+        springs = here.state.q_springs + follow @ (motors - here.q_motors)
+        found = search(there, motors, springs, home=here.q_motors, tolerance=tolerance, damping=_WARM_DAMPING)
+        if found is not None and found.error <= tolerance and _apart(tip.model, found.q_motors, here.q_motors) <= 1.0:
+            return found
+    if halvings == 0:
         return None
-    translation, turn = goal.missing(model, state.q)
-    return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)), 0, 0)
+    middle = 0.5 * (last + target)
+    half = advance(tip, last, middle, here, tolerance, halvings - 1)
+    return None if half is None else advance(tip, middle, target, half, tolerance, halvings - 1)
+
+
+def _apart(model: SoftModel, one: FloatArray, other: FloatArray) -> float:
+    """Largest change of an actuator over its scale [rad]."""
+    return float(np.abs((one - other) / model.motor_scale).max())
 
 
 def _pace(step: FloatArray, last_drift: FloatArray, drift: FloatArray) -> float:
@@ -216,16 +240,19 @@ def _step(
     pull = normals @ (slope.T @ missing) / np.maximum((normals * normals).sum(axis=1), 1e-300)
     held = np.zeros(len(normals), dtype=bool)
     while True:
-        rows = normals[held]
-        free = np.eye(basis.shape[1]) - np.linalg.pinv(rows) @ rows
-        open_slope = slope @ free
-        # Going along a curved limit costs what the pull against it times its curvature gives: rows of their own.
-        curved = np.sqrt(np.maximum(pull[held], 0.0))[:, None] * bends[held] @ free
-        whole = np.concatenate([open_slope, curved[curved.any(axis=1)]])
+        rows, free, open_slope, whole = normals[held], np.eye(basis.shape[1]), slope, slope
+        if len(rows):
+            free -= np.linalg.pinv(rows) @ rows
+            open_slope = slope @ free
+            # Going along a curved limit costs what the pull against it times its curvature gives: rows of their own.
+            curved = np.sqrt(np.maximum(pull[held], 0.0))[:, None] * bends[held] @ free
+            whole = np.concatenate([open_slope, curved[curved.any(axis=1)]])
         towards = free @ _damped_step(
             whole, np.concatenate([missing, np.zeros(len(whole) - len(missing))]), damping, 1e-12 * model.reach
         )
-        drift = free @ (homeward - np.linalg.pinv(open_slope, rcond=1e-9) @ (open_slope @ homeward))
+        drift = homeward
+        if homeward.any():
+            drift = free @ (homeward - np.linalg.pinv(open_slope, rcond=1e-9) @ (open_slope @ homeward))
         pressed = ~held & (normals @ (towards + drift) > 1e-12)
         if not pressed.any():
             return towards, drift, free

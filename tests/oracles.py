@@ -102,3 +102,32 @@ def paper_closed_loop(
         springs = settle(motors, springs)
         tips.append(flexible_table(angles(motors, springs))[-1][:3, 3])
     return np.array(tips)
+
+
+def arm_balance(
+    motors: np.ndarray, springs: np.ndarray, forces: np.ndarray, stiffness: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Residual (n, 4), tangent stiffness (n, 4, 4) and tip (n, 3) of the weightless paper's arm, for n cases.
+
+    theory 1.4 on the DH table: r = k q - J_k^T f, and entries f . (z_i x (z_j x (p_e - p_j))), i <= j, of d(J_k^T f)/dq.
+    """
+    angles = np.array([motors[:, 0], motors[:, 1], springs[:, 0], springs[:, 1], motors[:, 2], springs[:, 2], springs[:, 3]])
+    half = np.pi / 2
+    rows = [(0.0, half), (0.03, -half), (0.0, half), (0.57, 0.0), (0.03, -half), (0.0, half), (0.57, 0.0)]
+    turn, position = np.tile(np.eye(3), (len(motors), 1, 1)), np.zeros((len(motors), 3))
+    axes, origins = [], []
+    for theta, (a, alpha) in zip(angles, rows, strict=True):
+        axes.append(turn[:, :, 2])
+        origins.append(position)
+        c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        zero = np.zeros_like(c)
+        link = [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [zero, zero + sa, zero + ca]]
+        position = position + a * (turn @ np.array([c, s, zero]).T[:, :, None])[:, :, 0]
+        turn = turn @ np.moveaxis(np.array(link), 2, 0)
+    columns = {j: np.cross(axes[j], position - origins[j]) for j in (2, 3, 5, 6)}
+    residual = stiffness * springs - np.stack([np.sum(column * forces, axis=1) for column in columns.values()], axis=1)
+    tangent = np.tile(stiffness * np.eye(4), (len(motors), 1, 1))
+    for row, i in enumerate(columns):
+        for column, j in enumerate(columns):
+            tangent[:, row, column] -= np.sum(forces * np.cross(axes[min(i, j)], columns[max(i, j)]), axis=1)
+    return residual, tangent, position

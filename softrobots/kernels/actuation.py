@@ -27,11 +27,30 @@ class Actuation:
     def put(self, run: Any, w: Any, motors: FloatArray) -> None:
         """Write one case into a workspace, with its start."""
         layout = run.layout
-        w[: self._count] = motors[: self._count]
+        w[: self._count] = run.flat(motors[: self._count])
         if self._tensions:
-            w[layout.pull : layout.pull + layout.unknowns] = self._pulls(motors[None])[0]
+            w[layout.pull : layout.pull + layout.unknowns] = run.flat(self._pulls(motors[None]))
         if self._lengths:
-            w[layout.start : layout.start + layout.unknowns] = self._starts(motors[None])[0]
+            w[layout.start : layout.start + layout.unknowns] = run.flat(self._starts(motors[None]))
+
+    def jacobian(self, run: Any, w: Any) -> FloatArray:
+        """Elastostatic Jacobian of all actuators where a workspace has been looked at, shape (3, n_motors)."""
+        tip, chain = run.program.tip, self._chain
+        joints = _rows(w, tip.jacobian, self._count)
+        if self._lengths:
+            return np.concatenate([joints, _rows(w, tip.held_columns, tip.held) @ chain.held_slope], axis=1)
+        if self._tensions:  # a tension adds the energy t A s
+            by_force = _rows(w, tip.columns, tip.unknowns)
+            return np.concatenate([joints, -by_force @ chain.muscle_matrix[:, self._strains].T], axis=1)
+        return joints
+
+    def loads(self, run: Any, w: Any) -> FloatArray:
+        """Load on motor joints and muscles of given length there, shape (n_motors,) [N m or N]."""
+        tip = run.program.tip
+        joints = _rows(w, tip.motor_torques, self._count, 1)[0]
+        if self._lengths:
+            return np.concatenate([joints, _rows(w, tip.held_loads, tip.held, 1)[0] @ self._chain.held_slope])
+        return np.asarray(joints)
 
     def rows(self, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Motor joints, loads of tensions and starts of many cases; without muscles the latter have no rows."""
@@ -50,9 +69,14 @@ class Actuation:
         """Unknown strains of one case from its elastic coordinates, shape (n,)."""
         return np.asarray(self._model.structure.strains(motors, elastic)[self._strains])
 
-    def of_elastic(self, elastic: FloatArray) -> FloatArray:
-        """Unknown strains of robots without muscles, shape (n, n_unknowns)."""
-        return elastic if self._plain else np.asarray(elastic[:, self._strains])
+    def of_elastic(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Unknown strains of many cases, shape (n, n_unknowns)."""
+        if self._plain:
+            return elastic
+        strains = elastic @ self._chain.free.T
+        if self._lengths:
+            strains = strains + (motors[:, self._count :] - self._chain.muscle_rest) @ self._chain.spread.T
+        return np.asarray(strains[:, self._strains])
 
     def elastic(self, unknowns: FloatArray) -> FloatArray:
         """Elastic coordinates from the unknowns, shape (..., n_springs); locked strains are at rest."""
@@ -68,3 +92,8 @@ class Actuation:
     def _starts(self, motors: FloatArray) -> FloatArray:
         change = motors[:, self._count :] - self._chain.muscle_rest
         return np.ascontiguousarray((self._relaxed + change @ self._chain.spread.T)[:, self._strains])
+
+
+def _rows(w: Any, place: int, count: int, rows: int = 3) -> FloatArray:
+    """Part of a workspace as a matrix."""
+    return np.array(w[place : place + rows * count], dtype=np.float64).reshape(rows, count)

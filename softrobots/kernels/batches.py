@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -76,10 +76,22 @@ def without(array: FloatArray, bad: Any, instead: Any = 0.0) -> FloatArray:
     return made
 
 
-def fail(statuses: Any, residuals: FloatArray, bad: Any) -> None:
-    """Mark rows whose input was none, and take NaN out of the residuals of others that failed."""
+def fail(statuses: Any, bad: Any, errors: Sequence[FloatArray], others: Sequence[FloatArray]) -> None:
+    """Mark rows whose input was none, and take NaN out of all that failed.
+
+    Args:
+        statuses: Status of each case, changed in place.
+        bad: Which rows had no input, truth values.
+        errors: What is infinite where there is no answer, shape (n,) each, changed in place.
+        others: What is zero there instead of no number, shape (n,) or (n, columns) each, changed in place.
+    """
     statuses[bad] = Status.NOT_A_NUMBER
-    residuals[bad | ~np.isfinite(residuals)] = np.inf
+    failed = np.flatnonzero(statuses)
+    for error in errors:
+        error[bad] = np.inf
+        error[failed] = np.nan_to_num(error[failed], nan=np.inf, posinf=np.inf)
+    for other in others:
+        other[failed] = np.nan_to_num(other[failed], posinf=0.0, neginf=0.0)
 
 
 def statuses_of(values: Any) -> Any:

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import choice, finite_array, positive_number, read_only
+from softrobots.checks import FloatArray, choice, finite_array, positive_number, read_only
 from softrobots.errors import EquilibriumNotFound, LoadNotFound, ParameterError, TargetUnreachable
-from softrobots.inverse_kinematics import solve_ik
+from softrobots.inverse_kinematics import solve_ik, start_motors
 from softrobots.kernels.actuation import Actuation
 from softrobots.kernels.batches import batch_rows, fail, gravity_vector, in_parts, statuses_of, unusable, without
+from softrobots.kernels.chain_search import ChainSearch
 from softrobots.kernels.machines import BACKENDS, available_backend, make_run
 from softrobots.kernels.program import make_program
 from softrobots.kernels.results import (
@@ -26,6 +27,7 @@ from softrobots.kernels.results import (
 )
 from softrobots.kernels.statuses import Status
 from softrobots.kernels.unknowns import Unknowns
+from softrobots.load_estimation import check_feels
 from softrobots.model import SoftModel, check_model
 from softrobots.tip_search import POSITION_TOLERANCE
 
@@ -113,7 +115,7 @@ class CompiledModel:
 
         Args:
             gravity: That for robots with weight.
-            prefix: Begins every external name.
+            prefix: Begins every name, with an underscore behind it.
 
         Raises:
             ParameterError: If the prefix is no name.
@@ -121,7 +123,7 @@ class CompiledModel:
         from softrobots.kernels.c_source import to_c
 
         program = self._run(gravity).program
-        return to_c(program.text, prefix=prefix, exported=program.entry_points)
+        return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
 
     def equilibrium(
         self, q_motors: Any, force: Any = _NO_FORCE, *, gravity: Any = None, q_springs0: Any = None
@@ -215,7 +217,7 @@ class CompiledModel:
             count,
             threads,
         )
-        fail(statuses, residuals, bad)
+        fail(statuses, bad, [residuals], [found, tips])
         return EquilibriumBatch(
             read_only(self._actuation.elastic(found)), statuses_of(statuses), read_only(residuals), read_only(tips)
         )
@@ -232,7 +234,8 @@ class CompiledModel:
             The force, and the robot in equilibrium under it.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or the robot has muscles or no motors.
+            ParameterError: If a shape differs, a number is not finite, the robot has no actuators or muscles of given
+                tension, or no shape of it has such muscle lengths.
             LoadNotFound: If no force is found that explains the torques, or the motors do not feel every direction of it.
         """
         if (
@@ -253,15 +256,18 @@ class CompiledModel:
         return self._checked_estimate(q_motors, motor_torques, gravity)
 
     def _checked_estimate(self, q_motors: Any, motor_torques: Any, gravity: Any) -> CompiledLoadEstimate:
-        self._needs_motors("estimate_load", "softrobots.estimate_load")
+        check_feels(self._model)
         run = self._run(gravity is not None)
         motors = self._model.checked_motors(q_motors)
         torques = finite_array("motor_torques", motor_torques, self._shape, "N m")
-        w = run.workspace()
-        w[: self._motors] = motors
-        w[self._torques : self._torques + self._motors] = torques
-        _put_gravity(run, w, gravity)
-        status = run.estimate(w)
+        if self._unknowns.is_short:
+            w = run.workspace()
+            w[: self._motors] = motors
+            w[self._torques : self._torques + self._motors] = torques
+            _put_gravity(run, w, gravity)
+            status = run.estimate(w)
+        else:
+            status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
         found = CompiledLoadEstimate(w, run.layout, self._actuation)
         if status != Status.CERTIFIED:
             raise LoadNotFound(
@@ -286,26 +292,27 @@ class CompiledModel:
             One row a case.
 
         Raises:
-            ParameterError: If a shape differs, gravity is not finite, or the robot has muscles or no motors.
+            ParameterError: If a shape differs, gravity is not finite, or the robot has no actuators or muscles of given
+                tension.
         """
-        self._needs_motors("estimate_loads", "softrobots.estimate_load")
+        check_feels(self._model)
         run = self._run(gravity is not None)
         motors, torques = batch_rows(q_motors=(q_motors, self._motors), motor_torques=(motor_torques, self._motors))
         down = gravity_vector(gravity)
-        bad = unusable(motors, torques)
-        motors, torques = without(motors, bad), without(torques, bad)
+        bad = unusable(motors, torques) | self._actuation.unsuited(motors)
+        motors, torques = without(motors, bad, self._model.relaxed_motors), without(torques, bad)
         count = len(motors)
         unknowns, forces = np.zeros((count, run.layout.unknowns)), np.zeros((count, 3))
         residuals, unexplained, observed = np.zeros(count), np.zeros(count), np.zeros(count)
         statuses = np.zeros(count, dtype=np.uint8)
         in_parts(
-            lambda first, last: run.estimate_batch(
+            lambda first, last: self._search(run).estimate_batch(
                 motors, torques, down, forces, unknowns, residuals, unexplained, observed, statuses, first, last
             ),
             count,
             threads,
         )
-        fail(statuses, residuals, bad)
+        fail(statuses, bad, [residuals, unexplained], [unknowns, forces, observed])
         return LoadBatch(
             read_only(self._actuation.elastic(unknowns)),
             statuses_of(statuses),
@@ -343,12 +350,12 @@ class CompiledModel:
             One row a target.
 
         Raises:
-            ParameterError: If a shape differs, gravity or tolerance is out of range, or the robot has muscles or no motors.
+            ParameterError: If a shape differs, gravity or tolerance is out of range, or the robot has no actuators.
         """
-        self._needs_motors("inverse_kinematics", "softrobots.solve_ik")
+        relaxed = start_motors(self._model, None)
         run = self._run(gravity is not None)
         positive_number("tolerance", tolerance, "m")
-        begin = self._model.relaxed_motors if q_motors0 is None else q_motors0
+        begin = relaxed if q_motors0 is None else q_motors0
         springs = self._model.rest if q_springs0 is None else q_springs0
         points, loads, motors, unknowns = batch_rows(
             targets=(targets, 3),
@@ -357,21 +364,20 @@ class CompiledModel:
             q_springs0=(springs, self._model.n_springs),
         )
         down = gravity_vector(gravity)
-        bad = unusable(points, loads, motors, unknowns)
-        points, loads, motors = (without(one, bad) for one in (points, loads, motors))
-        unknowns = without(self._actuation.of_elastic(unknowns), bad)
+        bad = unusable(points, loads, motors, unknowns) | self._actuation.unsuited(motors)
+        points, loads, motors = without(points, bad), without(loads, bad), without(motors, bad, relaxed)
+        unknowns = self._actuation.of_elastic(motors, without(unknowns, bad))
         count = len(points)
         motors, unknowns = np.array(motors), np.array(unknowns)
         residuals, errors, statuses = np.zeros(count), np.zeros(count), np.zeros(count, dtype=np.uint8)
         in_parts(
-            lambda first, last: run.reach_batch(
+            lambda first, last: self._search(run).reach_batch(
                 points, loads, down, motors, unknowns, residuals, errors, statuses, tolerance, first, last
             ),
             count,
             threads,
         )
-        fail(statuses, residuals, bad)
-        errors[bad] = np.inf
+        fail(statuses, bad, [residuals, errors], [unknowns, motors])
         return MotorBatch(
             read_only(self._actuation.elastic(unknowns)),
             statuses_of(statuses),
@@ -403,10 +409,10 @@ class CompiledModel:
             Motors, elastic coordinates and errors of the waypoints; see the status of each.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or the robot has muscles or no motors.
+            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators.
             TargetUnreachable: If the first waypoint cannot be reached; from `solve_ik` if no start is given.
         """
-        self._needs_motors("follow", "softrobots.follow_trajectory")
+        start_motors(self._model, None)
         run = self._run(gravity is not None)
         (points,) = batch_rows(targets=(targets, 3))
         if np.any(unusable(points)):
@@ -419,38 +425,46 @@ class CompiledModel:
             motors = solve_ik(self._model, points[0], load, gravity=gravity, tolerance=tolerance).q_motors
         else:
             motors = self._model.checked_motors(q_motors0, "q_motors0")
-        w = run.workspace()
-        layout = run.layout
-        w[: self._motors] = motors
-        w[layout.force : layout.force + 3] = load
-        w[layout.unknown : layout.unknown + layout.unknowns] = self._actuation.unknowns(motors, self._model.rest)
+        down = gravity_vector(gravity)
+        if self._unknowns.is_short:
+            batch, spent = self._follow(run, points, load, down, motors, tolerance)
+        else:
+            batch, spent = self._search(run).follow(points, load, down, motors, tolerance)
+        if batch.status[0] != Status.CERTIFIED:
+            raise TargetUnreachable(
+                f"waypoint 1 of {len(points)}: {Status(batch.status[0]).explanation}; the tip comes to "
+                f"{batch.tip_error[0]:.3g} m of it",
+                best=batch.q_motors[0],
+                residual=float(batch.tip_error[0]),
+                iterations=spent,
+            )
+        return batch
+
+    def _follow(
+        self, run: Any, points: FloatArray, load: FloatArray, gravity: FloatArray, motors: FloatArray, tolerance: float
+    ) -> tuple[MotorBatch, int]:
+        """Follow a path by generated code; what `ChainSearch.follow` is to other chains."""
+        w, layout, count = run.workspace(), run.layout, len(points)
+        w[: self._motors] = run.flat(motors)
+        w[layout.force : layout.force + 3] = run.flat(load)
+        w[layout.gravity : layout.gravity + 3] = run.flat(gravity)
+        w[layout.unknown : layout.unknown + layout.unknowns] = run.flat(self._actuation.unknowns(motors, self._model.rest))
         w[layout.single("tolerated")] = float(tolerance)
-        _put_gravity(run, w, gravity)
-        count = len(points)
         found, unknowns = run.array(count * self._motors), run.array(count * layout.unknowns)
         residuals, errors, statuses = run.array(count), run.array(count), run.array(count)
         run.follow(w, run.flat(points), count, found, unknowns, residuals, errors, statuses)
-        if statuses[0] != 0:
-            raise TargetUnreachable(
-                f"waypoint 1 of {count}: {Status(int(statuses[0])).explanation}; the tip comes to "
-                f"{float(errors[0]) ** 0.5:.3g} m of it",
-                best=np.asarray(found)[: self._motors],
-                residual=float(errors[0]) ** 0.5,
-                iterations=int(w[layout.single("spent")]),
-            )
-        return MotorBatch(
+        batch = MotorBatch(
             read_only(self._actuation.elastic(np.reshape(unknowns, (count, layout.unknowns)))),
             statuses_of(np.asarray(statuses, dtype=np.uint8)),
             read_only(np.sqrt(residuals)),
             read_only(np.reshape(found, (count, self._motors))),
             read_only(np.sqrt(errors)),
         )
+        return batch, int(w[layout.single("spent")])
 
-    def _needs_motors(self, job: str, instead: str) -> None:
-        if not self._unknowns.moved_by_motors:
-            raise ParameterError(
-                "model", self._model, f"a robot with motor joints and without muscles for {job}; {instead} takes muscles, too"
-            )
+    def _search(self, run: Any) -> Any:
+        """Who does load estimation and inverse kinematics: generated code, or searches in Python on top of it."""
+        return run if self._unknowns.is_short else ChainSearch(self._model, self._actuation, run)
 
     def _run(self, weight: bool) -> Any:
         run = self._runs.get(weight)

@@ -84,8 +84,8 @@ def leave_saddle(w: Array) -> None:
 
 def outcome(w: Array) -> int:
     """Return the status of the point that was evaluated last."""
-    if w[ENERGY] - w[ENERGY] != 0.0:
-        return 4  # infinite, or no number
+    if w[ENERGY] - w[ENERGY] != 0.0 or not w[SIZE] < 1e300:
+        return 4  # infinite, or no number; of a load whose square is infinite every residual is a small part
     if w[ROOM] < 0.0:
         return 3  # a section beyond its range
     if not is_settled(w, TOLERANCE):

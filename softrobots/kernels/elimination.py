@@ -47,14 +47,6 @@ class Beyond:
         """Nothing beyond the tip."""
         return cls(constants(np.zeros((3, 3))), [constants(np.zeros(3)) for _ in range(right_hand_sides)], 1.0, 0.0)
 
-    def with_multipliers(self, count: int) -> Beyond:
-        """The same with `count` more components, not yet coupled."""
-        n = len(self.matrix)
-        matrix = constants(np.zeros((n + count, n + count)))
-        matrix[:n, :n] = self.matrix
-        columns = [np.concatenate([one, constants(np.zeros(count))]) for one in self.columns]
-        return Beyond(matrix, columns, self.softest, self.negatives)
-
 
 @dataclass
 class Eliminated:

@@ -23,6 +23,7 @@ UNKNOWN: int
 ERROR: int
 MODE: int
 MISSING: int
+UNEXPLAINED: int
 OBSERVED: int
 TIP: int
 TORQUES: int
@@ -31,6 +32,7 @@ TOLERATED: int
 N: int
 N_MOTORS: int
 LANES: int
+LANE_SIZE: int
 WORKSPACE_SIZE: int
 first_pass_lanes: Callable[[Array], None]
 newton_pass_lanes: Callable[[Array], None]
@@ -62,7 +64,7 @@ def settle_batch(
     last: int,
 ) -> None:
     """Settle the cases from `first` up to `last`, each from rest; `pulls` and `starts` may be empty."""
-    lanes = zeros(WORKSPACE_SIZE * LANES)
+    lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
     for begin in range(first, last, LANES):
         for lane in range(LANES):
@@ -120,7 +122,7 @@ def estimate_batch(
     last: int,
 ) -> None:
     """Estimate the forces of the cases from `first` up to `last`."""
-    lanes = zeros(WORKSPACE_SIZE * LANES)
+    lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
     for begin in range(first, last, LANES):
         for lane in range(LANES):
@@ -138,7 +140,7 @@ def estimate_batch(
         for lane in range(min(LANES, last - begin)):
             row = begin + lane
             mode = lanes[MODE * LANES + lane]
-            for j in range(WORKSPACE_SIZE):
+            for j in range(LANE_SIZE):
                 case[j] = lanes[j * LANES + lane]
             if mode > 0.5 and mode < 1.5:
                 statuses[row] = estimated(case)
@@ -149,7 +151,7 @@ def estimate_batch(
             for j in range(3):
                 forces[row, j] = case[FORCE + j]
             residuals[row] = sqrt(case[ERROR])
-            unexplained[row] = sqrt(case[MISSING])
+            unexplained[row] = sqrt(case[UNEXPLAINED])
             observed[row] = sqrt(case[OBSERVED])
 
 
@@ -167,7 +169,7 @@ def reach_batch(
     last: int,
 ) -> None:
     """Put the tips of the cases from `first` up to `last` at their targets, from the motors and unknowns that come in."""
-    lanes = zeros(WORKSPACE_SIZE * LANES)
+    lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
     for begin in range(first, last, LANES):
         for lane in range(LANES):
@@ -189,7 +191,7 @@ def reach_batch(
         for lane in range(min(LANES, last - begin)):
             row = begin + lane
             mode = lanes[MODE * LANES + lane]
-            for j in range(WORKSPACE_SIZE):
+            for j in range(LANE_SIZE):
                 case[j] = lanes[j * LANES + lane]
             statuses[row] = 0
             if mode < 0.5 or mode > 1.5 or within_limits(case, 0) != 0:

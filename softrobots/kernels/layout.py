@@ -18,6 +18,7 @@ SINGLES = (
     "guard",
     "rounding",
     "missing",
+    "unexplained",
     "observed",
     "damping",
     "tolerated",
@@ -26,9 +27,9 @@ SINGLES = (
 """Single numbers of a case: energy [J]; derivative of the energy along the step; squared residual; squared length of the step;
 squared size of the load; smallest pivot in size; number of pivots that are not positive; room of the sections in their range;
 what is to become of the case (`softrobots.kernels.drivers`); largest energy that the next point may have; whether pivots are
-guarded; rounding of the energy [J]; squared distance from the target [m^2] or squared motor torque that is not explained;
-squared smallest singular value of the elastostatic Jacobian [m^2]; damping of a search [m]; largest distance from a target [m];
-steps spent."""
+guarded; rounding of the energy [J]; squared distance from the target [m^2] or squared motor torque that another force would
+explain; squared motor torque that the force does not explain; squared smallest singular value of the elastostatic Jacobian
+[m^2]; damping of a search [m]; largest distance from a target [m]; steps spent."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,9 @@ Three ways per evaluation, each a loop: outwards with the axes (`enter`), back w
 outwards again with the steps (`take`). Elements of a kind share their code; numbers in which they differ stand in a table, and
 what an element needs again on a later way is kept in its record in the workspace. The cost is proportional to the number of
 elements.
+
+A look at the tip (`softrobots.kernels.long_tip`) goes the same ways with three more right-hand sides: how the tip moves with
+the unknowns.
 """
 
 from __future__ import annotations
@@ -16,72 +19,12 @@ import numpy as np
 
 from softrobots.kernels.blocks import Block, hoist
 from softrobots.kernels.elements import Load, constants, vector
-from softrobots.kernels.elimination import Beyond, release
+from softrobots.kernels.elimination import Beyond
 from softrobots.kernels.expressions import Expression, Scalar
 from softrobots.kernels.layout import Layout
-from softrobots.kernels.recursion import Balance, TracedElement, enter, leave
-from softrobots.kernels.unknowns import Unknowns, softness_of
-
-MOST_MULTIPLIERS = 3
-"""Bending about two axes and elongation: what muscle lengths hold of a segment."""
-
-
-@dataclass(frozen=True)
-class Passing:
-    """Places in the workspace of what elements pass on to each other."""
-
-    first: int
-    """Where they begin."""
-
-    @property
-    def axes(self) -> int:
-        """Axes behind the last element entered (9)."""
-        return self.first
-
-    @property
-    def lever(self) -> int:
-        """Levers of force and weight (6)."""
-        return self.axes + 9
-
-    @property
-    def matrix(self) -> int:
-        """`P` of the elimination, upper triangle by columns (21)."""
-        return self.lever + 6
-
-    @property
-    def column(self) -> int:
-        """`s` of the elimination (6)."""
-        return self.matrix + 21
-
-    @property
-    def turn(self) -> int:
-        """Turn of all nearer to the base, and multipliers (6)."""
-        return self.column + 6
-
-    @property
-    def sums(self) -> int:
-        """Elastic energy, squared weight, room, smallest pivot, number of negative ones (5)."""
-        return self.turn + 6
-
-    @property
-    def steps(self) -> int:
-        """Slope, squared residual, squared step (3)."""
-        return self.sums + 5
-
-    @property
-    def force(self) -> int:
-        """Force and gravity in the axes behind the leading motors (6)."""
-        return self.steps + 3
-
-    @property
-    def base(self) -> int:
-        """Axes and origin of the frame behind the leading motors (12)."""
-        return self.force + 6
-
-    @property
-    def end(self) -> int:
-        """The first place behind."""
-        return self.base + 12
+from softrobots.kernels.passing import Passing, TipPlaces, load_beyond, sides, store_beyond
+from softrobots.kernels.recursion import Balance, Left, TracedElement, enter, leave
+from softrobots.kernels.unknowns import Unknowns
 
 
 @dataclass
@@ -138,7 +81,9 @@ class TableColumns:
         return [column[row] for row in range(self._count) for column in self._columns]
 
 
-def element_kinds(unknowns: Unknowns, layout: Layout, passing: Passing, *, weight: bool) -> list[Kind]:
+def element_kinds(
+    unknowns: Unknowns, layout: Layout, passing: Passing, *, weight: bool, tip: TipPlaces | None = None
+) -> list[Kind]:
     """Trace the code of every kind of element behind the leading motors.
 
     Args:
@@ -146,6 +91,7 @@ def element_kinds(unknowns: Unknowns, layout: Layout, passing: Passing, *, weigh
         layout: The places in the workspace.
         passing: Places of what elements pass on.
         weight: Whether there is gravity.
+        tip: For a look at the tip: the places of what that passes on and finds.
 
     Returns:
         The kinds.
@@ -153,7 +99,10 @@ def element_kinds(unknowns: Unknowns, layout: Layout, passing: Passing, *, weigh
     groups: dict[Any, list[int]] = {}
     for row in range(unknowns.leading_motors, len(unknowns.chain.elements)):
         groups.setdefault(_signature(unknowns, row), []).append(row)
-    return [_trace_kind(number, rows, unknowns, layout, passing, weight=weight) for number, rows in enumerate(groups.values())]
+    return [
+        _trace_kind(number, rows, unknowns, layout, passing, weight=weight, tip=tip)
+        for number, rows in enumerate(groups.values())
+    ]
 
 
 def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
@@ -164,29 +113,52 @@ def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     return one.kind, one.moving, one.held, held, str(zeros), bool(np.any(one.translation != 0.0))
 
 
-def _trace_kind(number: int, rows: list[int], unknowns: Unknowns, layout: Layout, passing: Passing, *, weight: bool) -> Kind:
-    names = ("at", "row", "q")
-    way_out = Block(f"enter_{number}", "Go through an element outwards.", names)
+def _trace_kind(
+    number: int,
+    rows: list[int],
+    unknowns: Unknowns,
+    layout: Layout,
+    passing: Passing,
+    *,
+    weight: bool,
+    tip: TipPlaces | None,
+) -> Kind:
+    names, look = ("at", "row", "q"), "" if tip is None else "tip_"
+    way_out = Block(f"enter_{look}{number}", "Go through an element outwards.", names)
     trace = way_out.trace
-    way_in = Block(f"leave_{number}", "Go through it inwards and eliminate its coordinates.", names, trace)
-    take = Block(f"take_{number}", "Find its steps.", names, trace)
+    way_in = Block(f"leave_{look}{number}", "Go through it inwards and eliminate its coordinates.", names, trace)
+    take = Block(f"take_{look}{number}", "Find its steps.", names, trace)
     columns = TableColumns(way_out, f"TABLE_{number}", len(rows))
     element = _common(rows, unknowns, way_out, layout, columns)
     axes_loads = way_out.loads(passing.axes, 9)
     entered = enter(element, vector(axes_loads).reshape(3, 3))
     way_out.store_all(passing.axes, entered.end.ravel().tolist())
 
-    state, loads, beyond, balance = _arriving(way_in, element, passing, unknowns.multipliers_at(rows[0]), weight=weight)
+    multipliers = unknowns.multipliers_at(rows[0])
+    state, loads, beyond, balance = _arriving(way_in, element, passing, multipliers, weight=weight, tip=tip)
     guard = way_in.load(layout.single("guard"))
-    left = leave(element, entered, loads, beyond, balance, guard=guard)
+    left = leave(element, entered, loads, beyond, balance, tip_columns=tip is not None, guard=guard if tip is None else 0.0)
     way_in.store_all(passing.lever, [one for load in left.loads for one in load.lever])
-    _store_beyond(way_in, passing, left.beyond)
-    way_in.store_all(passing.sums, [balance.energy, balance.weight, balance.room, left.beyond.softest, left.beyond.negatives])
+    store_beyond(way_in, passing, left.beyond, tip)
+    if tip is None:
+        way_in.store_all(
+            passing.sums, [balance.energy, balance.weight, balance.room, left.beyond.softest, left.beyond.negatives]
+        )
+        second = _take_step(take, element, left, layout, passing, multipliers)
+    else:
+        second = _take_tip(take, way_in, left, layout, passing, tip, multipliers)
+    size = hoist([way_in, take], way_out, [*state, guard, *second], 0, "at", overwritten=axes_loads)
+    size += hoist([take], way_in, second, size, "at", overwritten=state)
+    return Kind(number, rows, [way_out, way_in, take], columns.numbers, columns.width, size)
 
-    turn_loads = take.loads(passing.turn, 3 + unknowns.multipliers_at(rows[0]))
-    sum_loads = take.loads(passing.steps, 3)
-    turn = vector(turn_loads)
+
+def _take_step(
+    take: Block, element: TracedElement, left: Left, layout: Layout, passing: Passing, multipliers: int
+) -> list[Expression]:
+    """Find the Newton step of an element; return what it reads that the elements before have written."""
+    turn_loads, sum_loads = take.loads(passing.turn, 3 + multipliers), take.loads(passing.steps, 3)
     if left.eliminated is not None:
+        turn = vector(turn_loads)
         steps = left.eliminated.steps(0, turn)
         sums: list[Scalar] = list(sum_loads)
         for place, step in enumerate(steps):
@@ -196,10 +168,30 @@ def _trace_kind(number: int, rows: list[int], unknowns: Unknowns, layout: Layout
             take.store(layout.step - layout.unknown + place, step, "q")
         take.store_all(passing.turn, (turn + left.twists @ steps)[:3].tolist())
         take.store_all(passing.steps, sums)
-    second = [*turn_loads, *sum_loads]
-    size = hoist([way_in, take], way_out, [*state, guard, *second], 0, "at", overwritten=axes_loads)
-    size += hoist([take], way_in, second, size, "at", overwritten=state)
-    return Kind(number, rows, [way_out, way_in, take], columns.numbers, columns.width, size)
+    return [*turn_loads, *sum_loads]
+
+
+def _take_tip(
+    take: Block, way_in: Block, left: Left, layout: Layout, passing: Passing, tip: TipPlaces, multipliers: int
+) -> list[Expression]:
+    """Find how an element follows a force on the tip; for a motor, what is known of the Jacobian before the last element."""
+    turn_loads = [take.loads(place, 3 + multipliers) for place in sides(passing.turn, tip.turn)]
+    bend_loads = [take.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
+    if left.eliminated is None:
+        twist, bend = left.motion.twists[:, 0], left.motion.bends[:, 0]
+        way_in.store(tip.motor_torques, left.motion.torque[0], "q")
+        for axis, (nearer, turn) in enumerate(zip(bend_loads, turn_loads[1:], strict=True)):
+            follow = left.motion.moves[axis, 0] - twist @ vector(nearer) + bend @ vector(turn[:3])
+            take.store(tip.jacobian + axis * tip.motors, follow, "q")
+            way_in.store(tip.twists + axis * tip.motors, twist[axis], "q")
+    else:
+        steps = [left.eliminated.steps(side, vector(turn)) for side, turn in enumerate(turn_loads)]
+        for place, turn, step in zip(sides(passing.turn, tip.turn), turn_loads, steps, strict=True):
+            take.store_all(place, (vector(turn) + left.twists @ step)[:3].tolist())
+        for axis, (nearer, step) in enumerate(zip(bend_loads, steps[1:], strict=True)):
+            take.store_all(tip.columns + axis * tip.unknowns - layout.unknown, step.tolist(), "q")
+            take.store_all(tip.bends + 3 * axis, (vector(nearer) + left.motion.bends @ step).tolist())
+    return [one for part in (*turn_loads, *bend_loads) for one in part]
 
 
 def _common(rows: list[int], unknowns: Unknowns, block: Block, layout: Layout, columns: TableColumns) -> TracedElement:
@@ -232,7 +224,7 @@ def _common(rows: list[int], unknowns: Unknowns, block: Block, layout: Layout, c
 
 
 def _arriving(
-    block: Block, element: TracedElement, passing: Passing, multipliers: int, *, weight: bool
+    block: Block, element: TracedElement, passing: Passing, multipliers: int, *, weight: bool, tip: TipPlaces | None
 ) -> tuple[list[Expression], list[Load], Beyond, Balance]:
     """What an element finds on the way back."""
     levers = block.loads(passing.lever, 6 if weight else 3)
@@ -240,56 +232,6 @@ def _arriving(
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0)]
     if weight:
         loads.append(Load(vector(forces[3:]), vector(levers[3:]), element.mass_beyond))
-    n = 3 + multipliers
-    upper = block.loads(passing.matrix, n * (n + 1) // 2)
-    column = block.loads(passing.column, n)
     sums = block.loads(passing.sums, 5)
-    matrix = constants(np.zeros((n, n)))
-    for (row, other), value in zip(_upper(n), upper, strict=True):
-        matrix[row, other] = matrix[other, row] = value
-    beyond = Beyond(matrix, [vector(column)], sums[3], sums[4])
-    return [*levers, *upper, *column, *sums], loads, beyond, Balance(sums[0], sums[1], sums[2])
-
-
-def _store_beyond(block: Block, passing: Passing, beyond: Beyond) -> None:
-    n = len(beyond.matrix)
-    block.store_all(passing.matrix, [beyond.matrix[row, other] for row, other in _upper(n)])
-    block.store_all(passing.column, beyond.columns[0].tolist())
-
-
-def _upper(n: int) -> list[tuple[int, int]]:
-    """Places of the upper triangle by columns: those of three rows come first."""
-    return [(row, column) for column in range(n) for row in range(column + 1)]
-
-
-def segment_blocks(unknowns: Unknowns, passing: Passing, segment: int) -> tuple[list[Block], int]:
-    """Trace what happens at the ends of a segment whose sums are held.
-
-    Args:
-        unknowns: The chain.
-        passing: Places of what elements pass on.
-        segment: Its number.
-
-    Returns:
-        `hold` at its tip, `release` at its base on the way back, `let_go` there on the way out; and the size of the record.
-    """
-    softness = softness_of(unknowns, segment)
-    count = len(softness)
-    hold = Block(f"hold_{segment}", "Begin with the multipliers of a segment: nothing is coupled with them yet.")
-    hold.store_all(passing.matrix + 6, [0.0] * (count * (count + 7) // 2))
-    hold.store_all(passing.column + 3, [0.0] * count)
-    back = Block(f"release_{segment}", "Eliminate the multipliers of a segment.", ("at",))
-    n = 3 + count
-    upper, column = back.loads(passing.matrix, n * (n + 1) // 2), back.loads(passing.column, n)
-    signs = back.loads(passing.sums + 3, 2)
-    matrix = constants(np.zeros((n, n)))
-    for (row, other), value in zip(_upper(n), upper, strict=True):
-        matrix[row, other] = matrix[other, row] = value
-    made, beyond = release(Beyond(matrix, [vector(column)], signs[0], signs[1]), count, softness)
-    _store_beyond(back, passing, beyond)
-    back.store_all(passing.sums + 3, [beyond.softest, beyond.negatives])
-    out = Block(f"let_go_{segment}", "Find the multipliers of a segment.", ("at",), back.trace)
-    turn = out.loads(passing.turn, 3)
-    out.store_all(passing.turn + 3, made.steps(0, vector(turn)).tolist())
-    size = hoist([out], back, turn, 0, "at", overwritten=[*upper, *column])
-    return [hold, back, out], size
+    beyond, state = load_beyond(block, passing, 3 + multipliers, tip)
+    return [*levers, *state, *sums], loads, beyond, Balance(sums[0], sums[1], sums[2])

@@ -10,9 +10,13 @@ import numpy as np
 from softrobots.kernels.blocks import Block
 from softrobots.kernels.elements import Load, constants, vector
 from softrobots.kernels.expressions import Scalar, larger
+from softrobots.kernels.held_segments import segment_blocks
 from softrobots.kernels.layout import Layout
-from softrobots.kernels.long_chain import Passing, element_kinds, segment_blocks
+from softrobots.kernels.long_chain import Kind, element_kinds
+from softrobots.kernels.long_tip import CONTROL as LOOK
+from softrobots.kernels.long_tip import tip_frame
 from softrobots.kernels.passes import decide, go_on, point_numbers
+from softrobots.kernels.passing import Passing, TipPlaces
 from softrobots.kernels.settings import LEAST_SIZE
 from softrobots.kernels.short_chain import place_base
 from softrobots.kernels.unknowns import Unknowns
@@ -24,33 +28,40 @@ class LongProgram:
     """The parts of the code."""
 
     blocks: list[Block]
-    """Straight-line functions."""
+    """Straight-line functions that find equilibria."""
+    look: list[Block]
+    """Those that look at the tip of one."""
     tables: dict[str, tuple[float, ...] | tuple[int, ...]]
     """Tables that they and the loops read."""
     places: dict[str, int]
     """Places in the workspace of the bounds of the loops, and how many steps a loop has."""
+    lane_size: int
+    """Size of the workspace that equilibria need."""
     size: int
     """Size of the workspace."""
+    tip: TipPlaces
+    """Places in it of what a look finds."""
     stages: dict[str, list[tuple[int, str]]]
-    """Of each of the three ways, `enter`, `leave`, `take`: what is called for elements of which kind."""
+    """Of each of the three ways, `enter`, `leave`, `take`, and of those of a look: what is called for elements of which
+    kind."""
 
     def loops(self, suffix: str = "") -> str:
         """Functions that go over the elements.
 
         Args:
-            suffix: Ends the names of all functions: "_lanes" for those that work on many cases.
+            suffix: Ends the names of all functions: "_lanes" for those that work on many cases, which have no look at the tip.
         """
-        texts = [self._way(way, suffix) for way in ("enter", "leave", "take")]
-        texts.append(_CONTROL.replace("_SUFFIX", suffix))
-        return "\n\n\n".join(texts)
+        ways = [way for way in self.stages if not suffix or way in _WAYS]
+        texts = [*(self._way(way, suffix) for way in ways), _CONTROL.replace("_SUFFIX", suffix)]
+        return "\n\n\n".join(texts if suffix else [*texts, LOOK])
 
     def _way(self, way: str, suffix: str) -> str:
         # The bounds come from the workspace: compilers would unroll a loop whose length they know, for minutes.
         place = " * LANES" if suffix else ""
-        back = way == "leave"
+        back = way.startswith("leave")
         lines = [
             f"def {way}_all{suffix}(w: Array) -> None:",
-            f'    """{_WAYS[way]}"""',
+            f'    """{_WAYS[way.removesuffix("_tip")]}"""',
             "    i = N_ELEMENTS - 1" if back else "    i = 0",
             f"    while i {'>=' if back else '<'} w[{'FIRST' if back else 'COUNT'}{place}]:",
             "        kind = KIND[i]",
@@ -108,37 +119,71 @@ def long_program(unknowns: Unknowns, layout: Layout, *, weight: bool) -> LongPro
         The program.
     """
     passing = Passing(layout.prepared)
-    kinds = element_kinds(unknowns, layout, passing, weight=weight)
-    record = passing.end + 3  # before it: the share of the step that a pass goes, and the bounds of the loops
-    steps: dict[int, tuple[int, int, int, int]] = {}  # by element: kind, place of its record, of its table row, coordinate
     tables: dict[str, tuple[float, ...] | tuple[int, ...]] = {}
-    bounds = {"FIRST": passing.end + 1, "COUNT": passing.end + 2}
-    stages: dict[str, list[tuple[int, str]]] = {"enter": [], "leave": [], "take": []}
+    stages: dict[str, list[tuple[int, str]]] = {}
+    kinds = element_kinds(unknowns, layout, passing, weight=weight)
+    # Before the records: the share of the step that a pass goes, and the bounds of the loops.
+    blocks, sequence, lane_size = _sequence(unknowns, layout, passing, kinds, passing.end + 3, stages)
+    tip = TipPlaces(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.held))
+    looking = element_kinds(unknowns, layout, passing, weight=weight, tip=tip)
+    look, look_sequence, size = _sequence(unknowns, layout, passing, looking, tip.end, stages, tip)
+    tables |= {f"TABLE_{kind.number}": tuple(kind.table) for kind in kinds if kind.table}
+    for name, column in zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True):
+        tables[name] = tuple(column)
+    tables["AT_TIP"] = tuple(at for _, at, _, _ in look_sequence)
+    bounds = {"FIRST": passing.end + 1, "COUNT": passing.end + 2, "N_ELEMENTS": len(sequence)}
+    frame = _frame(unknowns, layout, passing, len(sequence), weight=weight)
+    look = tip_frame(unknowns, layout, passing, tip, weight=weight) + look
+    return LongProgram(frame + blocks, look, tables, bounds | tip.constants(), lane_size, size, tip, stages)
+
+
+def _sequence(
+    unknowns: Unknowns,
+    layout: Layout,
+    passing: Passing,
+    kinds: list[Kind],
+    record: int,
+    stages: dict[str, list[tuple[int, str]]],
+    tip: TipPlaces | None = None,
+) -> tuple[list[Block], list[tuple[int, int, int, int]], int]:
+    """Put the elements in order, with the ends of held segments between them.
+
+    Args:
+        unknowns: The chain.
+        layout: The places in the workspace.
+        passing: Places of what elements pass on.
+        kinds: The kinds of elements.
+        record: Place of the first record.
+        stages: What is called for which kind; added to.
+        tip: For a look at the tip: its places.
+
+    Returns:
+        The straight-line functions; by step of a loop: kind, place of the record, of the table row, coordinate; and the first
+        place behind the records.
+    """
+    way, look, at = ("", "", "AT[i]") if tip is None else ("_tip", "tip_", "AT_TIP[i]")
+    enter, leave, take = (stages.setdefault(one + way, []) for one in _WAYS)
+    steps: dict[int, tuple[int, int, int, int]] = {}  # by element
     for kind in kinds:
         for place, row in enumerate(kind.rows):
             steps[row] = (kind.number, record, place * kind.width, _coordinate(unknowns, layout, row))
             record += kind.record
-        if kind.table:
-            tables[f"TABLE_{kind.number}"] = tuple(kind.table)
-        for stage in stages:
-            stages[stage].append((kind.number, f"{stage}_{kind.number}(w, AT[i], ROW[i], PLACE[i])"))
+        for name, calls in (("enter", enter), ("leave", leave), ("take", take)):
+            calls.append((kind.number, f"{name}_{look}{kind.number}(w, {at}, ROW[i], PLACE[i])"))
     blocks = [block for kind in kinds for block in kind.blocks]
     sequence = [steps[row] for row in sorted(steps)]
     ends = list(zip(range(len(unknowns.segment_spans)), unknowns.segment_spans, strict=True))
     for segment, (first, last) in reversed(ends):
-        made, size = segment_blocks(unknowns, passing, segment)
+        made, size = segment_blocks(unknowns, passing, segment, tip)
         blocks += made
-        base, tip = len(kinds) + 2 * segment, len(kinds) + 2 * segment + 1
+        base, end = len(kinds) + 2 * segment, len(kinds) + 2 * segment + 1
         leading = unknowns.leading_motors
-        sequence.insert(last + 1 - leading, (tip, 0, 0, 0))
+        sequence.insert(last + 1 - leading, (end, 0, 0, 0))
         sequence.insert(first - leading, (base, record, 0, 0))
         record += size
-        stages["leave"] += [(tip, f"hold_{segment}(w)"), (base, f"release_{segment}(w, AT[i])")]
-        stages["take"].append((base, f"let_go_{segment}(w, AT[i])"))
-    for name, column in zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True):
-        tables[name] = tuple(column)
-    frame = _frame(unknowns, layout, passing, len(sequence), weight=weight)
-    return LongProgram(frame + blocks, tables, bounds | {"N_ELEMENTS": len(sequence)}, record, stages)
+        leave += [(end, f"hold_{look}{segment}(w)"), (base, f"release_{look}{segment}(w, {at})")]
+        take.append((base, f"let_go_{look}{segment}(w, {at})"))
+    return blocks, sequence, record
 
 
 def _coordinate(unknowns: Unknowns, layout: Layout, row: int) -> int:

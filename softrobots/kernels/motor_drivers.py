@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from softrobots.kernels.drivers import descend, go_to_start
 from softrobots.kernels.intrinsics import Array, fabs, where
-from softrobots.kernels.settings import LEAST_SIZE, OBSERVABLE, PASSES, SEARCH_STEPS, TOLERANCE
+from softrobots.kernels.settings import HIDDEN, LARGEST_SIZE, LEAST_SIZE, OBSERVABLE, PASSES, SEARCH_STEPS, TOLERANCE
 
 # Made for each robot.
 UNKNOWN: int
@@ -59,6 +59,8 @@ def goal(w: Array, varied: int) -> float:
     total = 0.0
     for i in range(N_MOTORS):
         total += w[TORQUES + i] * w[TORQUES + i]
+    if total > LARGEST_SIZE * LARGEST_SIZE:
+        return -1.0  # never
     if total > size:
         size = total
     return TOLERANCE * TOLERANCE * size
@@ -129,7 +131,7 @@ def search(w: Array, varied: int, count: int) -> int:
                 damping = 1e-6 * REACH
     if status > 0:
         return status
-    if varied > 0 and estimated(w) > 0:
+    if varied > 0 and estimated(w) > 0 and w[MISSING] * TOLERANCE * TOLERANCE <= HIDDEN * HIDDEN * goal(w, varied):
         return 5
     if not w[MISSING] <= goal(w, varied):
         return 6  # no force explains the torques, or the target is not reached

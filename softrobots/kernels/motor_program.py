@@ -9,6 +9,7 @@ force unknown, or the tip be at its target, with the motors unknown. The strains
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +18,11 @@ from softrobots.kernels.elements import Vector, constants, vector
 from softrobots.kernels.expressions import Scalar, absolute, if_less, larger, square_root
 from softrobots.kernels.layout import Layout
 from softrobots.kernels.passes import go_on
-from softrobots.kernels.settings import LARGEST_STEP, LEAST_SIZE, LEAST_SOFTNESS, TIGHT
+from softrobots.kernels.settings import BLUR, LARGEST_SIZE, LARGEST_STEP, LEAST_SIZE, LEAST_SOFTNESS, TIGHT
 from softrobots.kernels.short_chain import Evaluation, evaluate
 from softrobots.kernels.short_program import numbers, store_tip
 from softrobots.kernels.small_systems import smallest_square, solve_small
-from softrobots.kernels.tip_motion import step_with_motors, tip_motion
+from softrobots.kernels.tip_motion import TipMotion, step_with_motors, tip_motion
 from softrobots.kernels.unknowns import Unknowns
 
 
@@ -80,37 +81,50 @@ def _force_step(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluat
     motion = tip_motion(unknowns, point)
     measured = vector(block.loads(layout.torques, layout.motors))
     felt = motion.jacobian.T
-    change = solve_small(felt, measured - motion.motor_torques - motion.torque_change)
-    explained = felt @ change
+    left = measured - motion.motor_torques
+    change = solve_small(felt, left - motion.torque_change)
+    missing = _explicable(felt, left - motion.torque_change, unknowns)
     step = _with_columns(unknowns, point, change)
     values = numbers(unknowns, layout, block, point)
-    settled_to = larger(measured @ measured, LEAST_SIZE**2) * TIGHT**2
-    settled = if_less(explained @ explained, settled_to, _balanced(values, unknowns), 0.0)
+    size = measured @ measured
+    settled_to = if_less(size, LARGEST_SIZE**2, larger(size, LEAST_SIZE**2) * TIGHT**2, -1.0)
+    settled = if_less(missing @ missing, settled_to, _balanced(values, unknowns), 0.0)
     mode, share = _mode(block, layout, values, settled, step, starts=starts)
     rest = [float(unknowns.chain.rest[strain]) for strain in unknowns.strains]
     here = rest if starts else block.loads(layout.unknown, layout.unknowns)
     force = constants(np.zeros(3)) if starts else vector(block.loads(layout.force, 3))
     _go(block, layout.unknown, here, step, mode, share)
     _go(block, layout.force, force, point.base_axes @ change, mode, share)
-    block.store(layout.single("missing"), explained @ explained)
-    block.store(layout.single("observed"), smallest_square(motion.jacobian))
+    _store_torques(block, layout, motion, left, missing)
     store_tip(block, layout, point)
 
 
 def _look_for_force(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
     motion = tip_motion(unknowns, point)
-    missing = vector(block.loads(layout.torques, layout.motors)) - motion.motor_torques
+    left = vector(block.loads(layout.torques, layout.motors)) - motion.motor_torques
     felt = motion.jacobian.T
-    plain = felt @ solve_small(felt, missing)
-    damped = _damped(felt, block.load(layout.single("damping")), missing)
+    damped = _damped(felt, block.load(layout.single("damping")), left)
     block.store_all(layout.ahead, (vector(block.loads(layout.force, 3)) + point.base_axes @ damped).tolist())
     ahead = [
         one + by
         for one, by in zip(block.loads(layout.unknown, layout.unknowns), _with_columns(unknowns, point, damped), strict=True)
     ]
     block.store_all(layout.ahead + max(layout.motors, 3), ahead)
-    block.store(layout.single("missing"), plain @ plain if layout.motors > 3 else missing @ missing)
-    block.store(layout.single("observed"), smallest_square(motion.jacobian))
+    _store_torques(block, layout, motion, left, _explicable(felt, left, unknowns))
+
+
+def _explicable(felt: Any, torques: Vector, unknowns: Unknowns) -> Vector:
+    """What a force can do about torques: of more than three motors, the part that a force can give."""
+    if len(torques) <= 3:
+        return torques
+    return felt @ _damped(felt, BLUR * float(unknowns.chain.reach), torques)
+
+
+def _store_torques(block: Block, layout: Layout, motion: TipMotion, left: Vector, missing: Vector) -> None:
+    """Write what is left of the torques, and how strongly the motors feel a force; fewer than three never feel all of it."""
+    block.store(layout.single("missing"), missing @ missing)
+    block.store(layout.single("unexplained"), left @ left)
+    block.store(layout.single("observed"), smallest_square(motion.jacobian) if layout.motors >= 3 else 0.0)
 
 
 def _target_step(step: Block, lane: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:

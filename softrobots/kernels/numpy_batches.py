@@ -90,7 +90,7 @@ class NumpyBatches:
             unknowns[rows] = self._taken(w, layout.unknown, unknowns.shape[1], count)
             forces[rows] = self._taken(w, layout.force, 3, count)
             residuals[rows] = self._root(w, "error", count)
-            unexplained[rows] = self._root(w, "missing", count)
+            unexplained[rows] = self._root(w, "unexplained", count)
 
     def reach_batch(
         self,

@@ -78,7 +78,7 @@ def decide(
     error, length, energy = point["error"], point["length"], point["energy"]
     settled_to = larger(point["size"] * TIGHT**2, spring_rounding**2)
     all_signs = if_less(absolute(point["negatives"] - float(held)), 0.5, 1.0, 0.0)
-    stable = if_less(LEAST_SOFTNESS, point["softest"], all_signs, 0.0)
+    stable = if_less(LEAST_SOFTNESS, point["softest"], if_less(point["size"], 1e300, all_signs, 0.0), 0.0)
     going = if_less(energy, bound, 2.0 - 2.0 * stable, 2.0)
     new_mode = if_less(1.5, mode, 2.0, if_less(error, settled_to, 2.0 - stable, going))
     share = LARGEST_STEP / square_root(larger(length, LARGEST_STEP**2))

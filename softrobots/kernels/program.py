@@ -14,6 +14,7 @@ from softrobots.kernels.blocks import Block
 from softrobots.kernels.layout import Layout
 from softrobots.kernels.long_program import long_program
 from softrobots.kernels.motor_program import force_blocks, target_blocks
+from softrobots.kernels.passing import TipPlaces
 from softrobots.kernels.short_program import equilibrium_blocks
 from softrobots.kernels.unknowns import Unknowns
 
@@ -30,6 +31,8 @@ class Program:
     """Places in the workspace."""
     size: int
     """Size of the workspace of one case."""
+    tip: TipPlaces | None
+    """Places of what a look at the tip finds; None for short chains, which have no such look."""
     entry_points: tuple[str, ...]
     """Functions that solve a case, and the places in the workspace that a caller needs."""
 
@@ -47,18 +50,21 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
     layout = Layout(unknowns.chain.n_motors, len(unknowns.strains))
     functions, lane_functions = [*drivers.FUNCTIONS], [*lane_drivers.FUNCTIONS]
     tables: dict[str, object] = {}
-    loops, lane_loops = [], []
+    loops, lane_loops, entries, names = [], [], ["settle", "settle_from"], [*layout.constants(), "WORKSPACE_SIZE"]
+    tip = None
     if unknowns.is_short:
         blocks, size = equilibrium_blocks(unknowns, layout, weight=weight)
-        lanes = blocks[1:3]
+        lanes, lane_size = blocks[1:3], size
     else:
         parts = long_program(unknowns, layout, weight=weight)
-        blocks, size, lanes = parts.blocks, parts.size, parts.blocks
+        blocks, size, lanes, lane_size = parts.blocks + parts.look, parts.size, parts.blocks, parts.lane_size
         tables |= {**parts.places, **parts.tables}
+        tip, entries, names = parts.tip, [*entries, "look_at_tip"], [*names, *parts.tip.constants()]
         loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
     if unknowns.moved_by_motors:
         by_force, size = force_blocks(unknowns, layout, size, weight=weight)
         by_target = target_blocks(unknowns, layout, weight=weight)
+        lane_size, entries = size, [*entries, "estimate", "reach", "follow"]
         blocks = blocks + by_force + by_target
         lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
         functions += motor_drivers.FUNCTIONS
@@ -66,7 +72,7 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
     title = f'"""Statics of {unknowns.chain.name}{", with gravity" if weight else ", weightless"}: generated code."""'
     text = "\n\n\n".join(
         [
-            title + "\n\n" + _constants(unknowns, layout, size, tables),
+            title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
             *_texts(trigonometry.FUNCTIONS),
             *(block.text() for block in blocks),
             *loops,
@@ -75,8 +81,7 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
     )
     lane_texts = [lane_block(block).text(lanes=True) for block in lanes]
     lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *_texts(lane_functions)])
-    entries = ["settle", "settle_from", *(("estimate", "reach", "follow") if unknowns.moved_by_motors else ())]
-    return Program(text + "\n", lane_text + "\n", layout, size, (*entries, *layout.constants(), "WORKSPACE_SIZE"))
+    return Program(text + "\n", lane_text + "\n", layout, size, tip, (*entries, *names))
 
 
 def _lanes(size: int) -> int:
@@ -92,14 +97,15 @@ def lane_block(block: Block) -> Block:
     return Block(f"{block.name}_lanes", block.purpose, block.parameters, block.trace, block.stores)
 
 
-def _constants(unknowns: Unknowns, layout: Layout, size: int, tables: dict[str, object]) -> str:
+def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, tables: dict[str, object]) -> str:
     chain, strains = unknowns.chain, unknowns.strains
     softest = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
     group = {strain: row for row, one in enumerate(chain.held) for strain in one}
     made: dict[str, object] = dict(layout.constants())
     made |= {
         "WORKSPACE_SIZE": size,
-        "LANES": _lanes(size),
+        "LANE_SIZE": lane_size,
+        "LANES": _lanes(lane_size),
         "HELD": len(chain.held),
         "TOLERANCE": settings.TOLERANCE,
         "TIGHT": settings.TIGHT,
@@ -111,6 +117,8 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, tables: dict[str, 
         "SEARCH_STEPS": settings.SEARCH_STEPS,
         "LEAST_SIZE": settings.LEAST_SIZE,
         "OBSERVABLE": settings.OBSERVABLE,
+        "HIDDEN": settings.HIDDEN,
+        "LARGEST_SIZE": settings.LARGEST_SIZE,
         "REACH": float(chain.reach),
         "N_VARIED": max(layout.motors, 3),
         "LOWER": tuple(np.maximum(chain.limits[: layout.motors, 0], -1e300).tolist()),
@@ -120,7 +128,8 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, tables: dict[str, 
         "SOFTNESS": tuple((softest / float(chain.stiffness[strain])) ** 0.5 for strain in strains),
         "GROUP": tuple(group.get(strain, -1) for strain in strains),
     }
-    return "\n".join(f"{name} = {value!r}" for name, value in (made | tables).items())
+    # A table has at least one number, also where nothing reads it: without motor joints, or without springs.
+    return "\n".join(f"{name} = {(0.0,) if value == () else value!r}" for name, value in (made | tables).items())
 
 
 def _texts(functions: Iterable[Callable[..., object]]) -> Sequence[str]:

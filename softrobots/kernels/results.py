@@ -76,7 +76,7 @@ class CompiledLoadEstimate(CompiledEquilibrium):
     @property
     def unexplained(self) -> float:
         """Norm of the motor torques that the force does not explain [N m]."""
-        return self._root("missing")
+        return self._root("unexplained")
 
     @property
     def observability(self) -> float:

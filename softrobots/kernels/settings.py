@@ -11,6 +11,9 @@ TIGHT = 1e-12
 LEAST_SIZE = 1e-3
 """Least size of a load [N m]."""
 
+LARGEST_SIZE = 1e31
+"""Largest size of motor torques [N m]; above it squares would soon overflow."""
+
 LEAST_SOFTNESS = 1e-9
 """Smallest pivot that counts as positive, relative to the springs' own stiffness."""
 
@@ -23,17 +26,23 @@ ARMIJO = 1e-4
 ROUNDING = 1e-14
 """Energies this close, relative to their terms, cannot be told apart."""
 
-LANES = 128
+LANES = 16
 """Most cases that are worked on side by side."""
 
 FEWEST_LANES = 8
 """Fewest: two vectors of four numbers, so that one is computed while the other waits."""
 
-LANE_MEMORY = 262_144
+LANE_MEMORY = 65_536
 """Workspace of all lanes together [bytes]."""
 
 OBSERVABLE = 1e-3
 """Smallest singular value of the elastostatic Jacobian at which the motors feel every force, relative to the reach."""
+
+BLUR = 1e-6
+"""Singular value of the elastostatic Jacobian that counts as none, relative to the reach."""
+
+HIDDEN = 0.05
+"""Share of the motor torques that may stay unexplained where the motors do not feel every force."""
 
 PASSES = 10
 """Newton passes before a case is left to the descent or the search."""
@@ -45,4 +54,4 @@ SEARCH_STEPS = 100
 """Most steps of a search for a force or for motors."""
 
 LONGEST_LINE = 24
-"""Most joints of a robot that is traced in one straight line; longer ones get loops."""
+"""Most joints of a robot that is traced in one straight line; longer ones and those with muscles get loops."""

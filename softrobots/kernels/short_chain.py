@@ -14,11 +14,11 @@ import numpy as np
 
 from softrobots.kernels.blocks import Block
 from softrobots.kernels.elements import Load, Vector, constants, turned, vector
-from softrobots.kernels.elimination import Beyond, Eliminated, release
+from softrobots.kernels.elimination import Beyond
 from softrobots.kernels.expressions import Scalar
 from softrobots.kernels.layout import Layout
 from softrobots.kernels.recursion import Balance, Entered, Left, TracedElement, enter, leave
-from softrobots.kernels.unknowns import Unknowns, softness_of
+from softrobots.kernels.unknowns import Unknowns
 
 
 @dataclass
@@ -28,13 +28,11 @@ class Evaluation:
     left: list[Left]
     """What is known of each element, the leading motors included."""
     turns: list[list[Vector]]
-    """By element and right-hand side: the turn of all that is nearer to the base, with the multipliers."""
+    """By element and right-hand side: the turn of all that is nearer to the base."""
     steps: list[list[Vector]]
     """By element and right-hand side: its part of the solution; the first side is the Newton step."""
     gradient: list[Scalar]
-    """Derivative of the energy with respect to the unknowns."""
-    residual: list[Scalar]
-    """Their out-of-balance torque; without held sums the same."""
+    """Derivative of the energy with respect to the unknowns: their out-of-balance torque."""
     step: list[Scalar]
     """Newton step of the unknowns."""
     balance: Balance
@@ -86,7 +84,7 @@ def evaluate(
             row,
             lambda motor: block.load(motor),
             lambda place: rest[place] if at_rest else block.load(layout.unknown + place),
-            lambda place: block.load(layout.pull + place) if unknowns.pulled else 0.0,
+            lambda _: 0.0,
         )
         for row in range(len(chain.elements))
     ]
@@ -103,56 +101,40 @@ def evaluate(
     loads = [Load(*one) for one in zip(forces, levers, shares, strict=False)]
     guard = block.load(layout.single("guard")) if guarded else 0.0
 
-    way_out = _backwards(elements[:leading]) + way_out
+    way_out = seen_backwards(elements[:leading]) + way_out
     beyond, balance = Beyond.tip(4 if tip_columns else 1), Balance()
     left: list[Left | None] = [None] * len(elements)
-    released: dict[int, Eliminated] = {}
     energy: Scalar = 0.0
     tip = loads[0].lever
     for row in reversed(range(len(elements))):
-        for segment, (_, last) in enumerate(unknowns.segment_spans):
-            if row == last:
-                beyond = beyond.with_multipliers(len(softness_of(unknowns, segment)))
         one = leave(elements[row], way_out[row], loads, beyond, balance, tip_columns=tip_columns, guard=guard)
         left[row], loads, beyond = one, one.loads, one.beyond
-        for segment, (first, _) in enumerate(unknowns.segment_spans):
-            if row == first:
-                softness = softness_of(unknowns, segment)
-                released[row], beyond = release(beyond, len(softness), softness)
         if row == leading:
             tip = loads[0].lever
             energy = balance.energy - sum(load.force @ load.lever for load in loads)
     return _solved(
         unknowns,
         [one for one in left if one is not None],
-        released,
         4 if tip_columns else 1,
-        Evaluation([], [], [], [], [], [], balance, beyond, energy, tip, base_axes, base, force),
+        Evaluation([], [], [], [], [], balance, beyond, energy, tip, base_axes, base, force),
     )
 
 
-def _solved(unknowns: Unknowns, left: list[Left], released: dict[int, Eliminated], sides: int, made: Evaluation) -> Evaluation:
+def _solved(unknowns: Unknowns, left: list[Left], sides: int, made: Evaluation) -> Evaluation:
     """Find the steps on the second way out."""
     turns = [constants(np.zeros(3)) for _ in range(sides)]
-    by_strain: dict[int, tuple[Scalar, Scalar, Scalar]] = {}
+    by_strain: dict[int, tuple[Scalar, Scalar]] = {}
     for row, one in enumerate(left):
-        if row in released:
-            turns = [np.concatenate([turn, released[row].steps(side, turn)]) for side, turn in enumerate(turns)]
         made.turns.append(list(turns))
         steps: list[Vector] = [constants(np.zeros(0))] * sides
         if one.eliminated is not None:
             steps = [one.eliminated.steps(side, turn) for side, turn in enumerate(turns)]
-            multipliers = turns[0][3:]
             for place, strain in enumerate(unknowns.moving(row)):
-                held = unknowns.multiplier.get(strain)
-                residual = one.gradient[place] if held is None else one.gradient[place] + multipliers[held[1]]
-                by_strain[strain] = (one.gradient[place], residual, steps[0][place])
+                by_strain[strain] = (one.gradient[place], steps[0][place])
             turns = [turn + one.twists @ step for turn, step in zip(turns, steps, strict=True)]
         made.steps.append(steps)
-        if any(row == last for _, last in unknowns.segment_spans):
-            turns = [turn[:3] for turn in turns]
     made.left = left
-    made.gradient, made.residual, made.step = ([by_strain[strain][kind] for strain in unknowns.strains] for kind in range(3))
+    made.gradient, made.step = ([by_strain[strain][kind] for strain in unknowns.strains] for kind in range(2))
     return made
 
 
@@ -160,7 +142,7 @@ def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[
     """Solve for the unknowns with another right-hand side.
 
     Args:
-        unknowns: A chain without held sums.
+        unknowns: The chain.
         point: Its evaluation.
         sides: Gradient of the unknowns of each element.
 
@@ -197,7 +179,7 @@ def place_base(leading: list[TracedElement]) -> tuple[Any, Vector]:
     return axes, origin
 
 
-def _backwards(leading: list[TracedElement]) -> list[Entered]:
+def seen_backwards(leading: list[TracedElement]) -> list[Entered]:
     """The leading motors as seen from behind the last of them."""
     axes, made = constants(np.eye(3)), []
     for element in reversed(leading):

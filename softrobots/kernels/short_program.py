@@ -40,7 +40,7 @@ def equilibrium_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> t
     count = hoist([newton_pass, point], prepare, varying, layout.prepared)
     first_pass = Block("first_pass", "Prepare, evaluate the robot at its start, and go on from there.", trace=trace)
     first_pass.stores = list(prepare.stores)
-    relaxed = evaluate(unknowns, first_pass, layout, weight=weight, at_rest=not unknowns.chain.held)
+    relaxed = evaluate(unknowns, first_pass, layout, weight=weight, at_rest=True)
     _advance(first_pass, layout, unknowns, relaxed, starts=True)
     return [prepare, first_pass, newton_pass, point], layout.prepared + count
 
@@ -49,11 +49,9 @@ def numbers(unknowns: Unknowns, layout: Layout, block: Block, made: Evaluation) 
     """The single numbers of an evaluation."""
     force = block.loads(layout.force, 3)
     load = sum((one * one for one in force), 0.0) * unknowns.chain.reach**2 + made.balance.weight
-    if unknowns.pulled:
-        load = load + sum((one * one for one in block.loads(layout.pull, layout.unknowns)), 0.0)
     return point_numbers(
         slope=dot(made.gradient, made.step),
-        error=dot(made.residual, made.residual),
+        error=dot(made.gradient, made.gradient),
         length=dot(made.step, made.step),
         energy=made.energy,
         elastic=made.balance.energy,
@@ -76,12 +74,12 @@ def _advance(block: Block, layout: Layout, unknowns: Unknowns, made: Evaluation,
         block,
         layout,
         numbers(unknowns, layout, block, made),
-        held=len(unknowns.chain.held),
+        held=0,
         spring_rounding=unknowns.spring_rounding,
         mode=0.0 if starts else block.load(layout.single("mode")),
         bound=1e300 if starts else block.load(layout.single("bound")),
     )
-    here: Sequence[Scalar] = rest if starts and not unknowns.chain.held else block.loads(layout.unknown, layout.unknowns)
+    here: Sequence[Scalar] = rest if starts else block.loads(layout.unknown, layout.unknowns)
     for place, (one, step) in enumerate(zip(here, made.step, strict=True)):
         block.store(layout.unknown + place, go_on(mode, one, share, step))
     store_tip(block, layout, made)

@@ -31,15 +31,19 @@ def solve_small(matrix: Any, right: Vector) -> Vector:
 
 
 def inverse_small(matrix: Any) -> Any:
-    """Inverse by cofactors, shape (n, n) with n up to three."""
+    """Inverse by cofactors, shape (n, n) with n up to three; huge but finite where there is none."""
     n = len(matrix)
     if n == 1:
-        return np.array([[1.0 / matrix[0, 0]]], dtype=object)
+        return np.array([[_reciprocal(matrix[0, 0])]], dtype=object)
     if n == 2:
         (a, b), (c, d) = matrix
-        return np.array([[d, -b], [-c, a]], dtype=object) * (1.0 / (a * d - b * c))
+        return np.array([[d, -b], [-c, a]], dtype=object) * _reciprocal(a * d - b * c)
     rows = [cross(matrix[:, 1], matrix[:, 2]), cross(matrix[:, 2], matrix[:, 0]), cross(matrix[:, 0], matrix[:, 1])]
-    return np.array(rows, dtype=object) * (1.0 / (matrix[:, 0] @ rows[0]))
+    return np.array(rows, dtype=object) * _reciprocal(matrix[:, 0] @ rows[0])
+
+
+def _reciprocal(value: Scalar) -> Scalar:
+    return 1.0 / (value + 1e-300)  # plain floats raise at zero
 
 
 def smallest_square(matrix: Any) -> Scalar:

@@ -27,10 +27,12 @@ class Unknowns:
     """Section strains that keep their rest value; of `strain_chain.STRAINS`."""
 
     def __post_init__(self) -> None:
-        """Refuse names that are no strains, and strains that muscle lengths hold."""
+        """Refuse names that are no strains, strains that muscle lengths hold, and all four at once."""
         for name in self.locked:
             if name not in STRAINS:
                 raise NameNotFound("section strain", name, STRAINS)
+        if set(self.locked) == set(STRAINS):
+            raise ParameterError("locked_strains", self.locked, "three strains at most: with all four a section is rigid")
         held = {strain for group in self.chain.held for strain in group}
         clash = sorted({STRAINS[(strain - self._first_section) % 4] for strain in held & self._locked_strains})
         if clash:
@@ -139,14 +141,14 @@ class Unknowns:
 
     @property
     def is_short(self) -> bool:
-        """Whether the whole chain is traced in one straight line: no sections, and few joints."""
+        """Whether the whole chain is traced in one straight line: few joints, no sections and no muscles."""
         sections = any(isinstance(element, ChainSection) for element in self.chain.elements)
-        return not sections and len(self.chain.elements) <= LONGEST_LINE
+        return not sections and len(self.chain.muscle_rest) == 0 and len(self.chain.elements) <= LONGEST_LINE
 
     @property
     def moved_by_motors(self) -> bool:
-        """Whether all actuators are motor joints of a short chain, and there is at least one."""
-        return self.is_short and self.chain.n_motors > 0 and len(self.chain.muscle_rest) == 0
+        """Whether the actuators are motor joints of a short chain, and there is at least one."""
+        return self.is_short and self.chain.n_motors > 0
 
     @property
     def spring_rounding(self) -> float:

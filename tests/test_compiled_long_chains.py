@@ -1,0 +1,244 @@
+"""Compiled solvers of long chains: against Pinocchio's path, and beyond its size against elastic rods in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.kernels import Status
+from softrobots.kernels.compiled_model import CompiledModel
+from tests.rods import Rod, elastica_tip, rod_tip
+
+GRAVITY = np.array(sr.EARTH_GRAVITY)
+EI, LENGTH = 1.5, 1.0
+UNEVEN = {"segment_lengths": (0.5, 0.4), "bending_stiffness": (1.9, 1.2)}
+ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
+    "sections": lambda: sr.load_model(sr.PccArm(**UNEVEN, elastic_sections=3)),
+    "sections_forces": lambda: sr.load_model(sr.PccArm(**UNEVEN, elastic_sections=3), muscles="forces"),
+    "lumped": lambda: sr.load_model(sr.PccArm(**UNEVEN, chain="lumped", hinges=5)),
+    "lumped_forces": lambda: sr.load_model(sr.PccArm(**UNEVEN, chain="lumped", hinges=5), muscles="forces"),
+    "no_twist": lambda: sr.load_model(sr.PccArm(**UNEVEN, chain="lumped", hinges=5, torsion=False), muscles="forces"),
+    "helix": lambda: sr.load_model(sr.HelixTube(elastic_sections=8)),
+    "helix_lumped": lambda: sr.load_model(sr.HelixTube(chain="lumped", hinges=8)),
+    "stiff_and_soft": lambda: sr.load_model(
+        sr.PccArm(
+            segment_lengths=(0.3, 0.3, 0.3),
+            bending_stiffness=(300.0, 0.5, 20.0),
+            torsional_stiffness=(200.0, 0.4, 20.0),
+            axial_stiffness=(1e5, 500.0, 1e4),
+            elastic_sections=2,
+        ),
+        muscles="forces",
+    ),
+    "arm_and_sections": lambda: sr.load_model(sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(elastic_sections=2))),
+}
+
+
+@cache
+def compiled(name: str) -> CompiledModel:
+    return sr.compile(ROBOTS[name](), backend="python")
+
+
+def actuated(model: sr.SoftModel, rng: np.random.Generator, count: int) -> np.ndarray:
+    """Motors up to a radian; muscles up to 8 % longer or shorter, or up to 40 N."""
+    motors = np.tile(np.array(model.relaxed_motors), (count, 1))
+    muscles, joints = len(model.muscles), model.n_motors - len(model.muscles)
+    motors[:, :joints] = rng.uniform(-1.0, 1.0, (count, joints))
+    if model.muscle_input == "forces":
+        motors[:, joints:] = rng.uniform(0.0, 40.0, (count, muscles))
+    else:
+        motors[:, joints:] *= 1.0 + rng.uniform(-0.08, 0.08, (count, muscles))
+    return motors
+
+
+def forces_of(rng: np.random.Generator, count: int, largest: float) -> np.ndarray:
+    forces = rng.normal(size=(count, 3))
+    return np.asarray(forces * rng.uniform(0.02, 1.0, (count, 1)) * largest / np.linalg.norm(forces, axis=1)[:, None])
+
+
+@pytest.mark.parametrize("gravity", [None, GRAVITY], ids=["weightless", "heavy"])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_long_chains_equal_the_pinocchio_path(name: str, gravity: Any, rng: np.random.Generator) -> None:
+    solver, count = compiled(name), 6
+    motors = actuated(solver.model, rng, count)
+    forces = forces_of(rng, count, 0.3 if name.startswith("helix") else 6.0)
+    found = solver.equilibria(motors, forces, gravity=gravity)
+    for row in range(count):
+        expected = sr.solve_equilibrium(solver.model, motors[row], forces[row], gravity=gravity, tolerance=1e-13)
+        assert found.certified[row] == expected.stable
+        size = np.linalg.norm(expected.q_springs)
+        # 1e-10 of the load is what an answer promises; soft springs beside stiff ones make ten times that of it.
+        assert np.linalg.norm(found.q_springs[row] - expected.q_springs) < 1e-9 * size
+        assert np.linalg.norm(found.tip_positions[row] - expected.tip_position) < 1e-9
+        single = solver.equilibrium(motors[row], forces[row], gravity=gravity)
+        assert np.linalg.norm(single.q_springs - found.q_springs[row]) < 1e-9 * size
+        assert np.linalg.norm(single.tip_position - found.tip_positions[row]) < 1e-9
+
+
+@pytest.mark.parametrize("name", ["sections", "sections_forces", "arm_and_sections"])
+def test_no_failure_touches_another(name: str, rng: np.random.Generator) -> None:
+    solver = compiled(name)
+    motors, forces = actuated(solver.model, rng, 30), forces_of(rng, 30, 6.0)
+    clean = solver.equilibria(motors, forces)
+    evil_motors, evil_forces = motors.copy(), forces.copy()
+    evil_motors[[0, 4], -1] = np.nan, 1e40
+    evil_forces[[7, 29], 1] = np.inf, np.nan
+    evil_forces[11], evil_forces[12] = 1e5, -1e20
+    found = solver.equilibria(evil_motors, evil_forces)
+    good = np.setdiff1d(np.arange(30), [0, 4, 7, 11, 12, 29])
+    for field, value in vars(found).items():
+        assert np.array_equal(np.asarray(value)[good], np.asarray(getattr(clean, field))[good]), field
+        assert not np.any(np.isnan(np.asarray(value, dtype=float))), field
+        assert not value.flags.writeable
+    assert np.all(found.status[[0, 4, 7, 29]] == Status.NOT_A_NUMBER)
+    assert found.status[12] != Status.CERTIFIED
+    order = rng.permutation(30)
+    shuffled = solver.equilibria(motors[order], forces[order])
+    assert np.array_equal(shuffled.q_springs, clean.q_springs[order])
+
+
+def test_muscle_lengths_that_no_shape_has() -> None:
+    solver = compiled("sections")
+    with pytest.raises(sr.ParameterError):
+        solver.equilibrium(np.full(6, -1.0))
+    motors = np.tile(np.array(solver.model.relaxed_motors), (3, 1))
+    motors[1] = -1.0
+    found = solver.equilibria(motors, (0.0, 0.5, 0.0))
+    assert found.status.tolist() == [Status.CERTIFIED, Status.NOT_A_NUMBER, Status.CERTIFIED]
+
+
+@pytest.mark.parametrize("name", ["sections", "sections_forces"])
+def test_pushed_straight(name: str) -> None:
+    """EI of 1.9 and 1.2 N m^2 over 0.9 m buckle below 5 N, unless muscles hold them straight; what is certified is stable."""
+    solver = compiled(name)
+    model = solver.model
+    for push in (1.0, 8.0, 20.0):
+        force = np.array([0.0, 0.0, -push])
+        found = solver.equilibria(model.relaxed_motors, force[None])
+        checked = sr.solve_equilibrium(model, model.relaxed_motors, force, q_springs0=found.q_springs[0], tolerance=1e-9)
+        assert checked.iterations == 0
+        assert np.allclose(checked.tip_position, found.tip_positions[0], rtol=0.0, atol=1e-12)
+        assert found.status[0] == (Status.CERTIFIED if checked.stable else Status.UNSTABLE)
+        # A bow of an arm that is equally soft in all directions can turn freely: neutral, so not certified.
+        bowed = name == "sections_forces" and push > 5.0
+        assert (found.status[0] == Status.UNSTABLE) == bowed
+        assert (np.linalg.norm(found.tip_positions[0, :2]) > 0.1) == bowed
+        if bowed:
+            with pytest.raises(sr.EquilibriumNotFound, match="in balance, but not stable") as caught:
+                solver.equilibrium(model.relaxed_motors, force)
+            assert np.all(np.isfinite(caught.value.best.q_springs))
+            assert caught.value.residual == caught.value.best.residual
+
+
+# --- Rods
+
+
+@cache
+def rod(count: int, chain: str, locked: tuple[str, ...] = (), stiff: float = 1.0) -> CompiledModel:
+    """A cantilever of sections or hinges, straight along z."""
+    arm = sr.PccArm(
+        segment_lengths=(LENGTH,),
+        offset=0.0,
+        bending_stiffness=EI,
+        torsional_stiffness=1.1 * stiff,
+        axial_stiffness=800.0 * stiff,
+        chain=chain,
+        **({"elastic_sections": count} if chain == "sections" else {"hinges": count, "torsion": False, "extension": False}),
+    )
+    return sr.compile(sr.load_model(arm, muscles="forces"), backend="python", locked_strains=locked)
+
+
+@pytest.mark.parametrize(("chain", "counts"), [("sections", (13, 52)), ("lumped", (16, 32))])
+def test_convergence_to_the_elastica(chain: str, counts: tuple[int, ...]) -> None:
+    """52 sections are 312 joints. An inextensible rod in closed form; the error is of second order."""
+    locked = ("twist", "stretch") if chain == "sections" else ()
+    errors = []
+    for count in counts:
+        solver = rod(count, chain, locked)
+        found = solver.equilibrium(solver.model.relaxed_motors, (3.0, 0.0, 0.0))
+        x, z, _ = elastica_tip(EI, LENGTH, 3.0)
+        errors.append(np.linalg.norm(found.tip_position - (x, 0.0, z)))
+        assert found.residual <= 1e-10 * 3.0
+    steps = np.diff(np.log(errors)) / np.diff(np.log(counts))
+    assert np.all(np.abs(steps + 2.0) < 0.15)
+    assert errors[-1] < (2e-4 if chain == "sections" else 2e-3)
+
+
+def test_convergence_to_a_rod_in_space() -> None:
+    """Bent, twisted and stretched by its weight and a force aside: Kirchhoff's equations as a boundary-value problem."""
+    force, weight = np.array([0.9, 0.7, -0.4]), np.array([0.6 * 1.2, 0.0, 0.6 * -2.0])  # 0.6 kg/m
+    expected, _ = rod_tip(Rod(LENGTH, EI, 1.1, 800.0), np.r_[force, 0.0, 0.0, 0.0], gravity_load=weight)
+    errors = []
+    for count in (15, 30):
+        solver = rod(count, "sections")
+        found = solver.equilibrium(solver.model.relaxed_motors, force, gravity=weight / 0.6)
+        errors.append(np.linalg.norm(found.tip_position - expected))
+    assert errors[1] < 2e-4
+    assert 3.5 < errors[0] / errors[1] < 4.5  # second order
+
+
+def test_locked_strains_are_the_limit_of_stiff_ones() -> None:
+    """Twist and stretch a million times as stiff move a millionth as much."""
+    bending, stiff, soft = rod(15, "sections", ("twist", "stretch")), rod(15, "sections", stiff=1e6), rod(15, "sections")
+    force = (1.0, 2.0, -1.0)
+    tips = [one.equilibrium(one.model.relaxed_motors, force).tip_position for one in (bending, stiff, soft)]
+    assert np.linalg.norm(tips[0] - tips[1]) < 3e-6 * np.linalg.norm(tips[0] - tips[2]) + 1e-9
+    assert np.linalg.norm(tips[0] - tips[2]) > 1e-4
+    springs = bending.equilibrium(bending.model.relaxed_motors, force).q_springs.reshape(15, -1)
+    assert np.all(np.count_nonzero(springs, axis=1) == 2)  # twist and elongation stay at rest
+
+
+def test_strains_that_lengths_hold_cannot_be_locked() -> None:
+    with pytest.raises(sr.ParameterError, match="muscle lengths hold it"):
+        sr.compile(compiled("sections").model, locked_strains=("stretch",))
+    sr.compile(compiled("sections").model, locked_strains=("twist",))
+
+
+# --- Load estimation and inverse kinematics
+
+
+def test_estimates_and_targets_of_a_long_chain(rng: np.random.Generator) -> None:
+    """A force from given muscle lengths and the tensions they need; and lengths that put the tip at a target."""
+    solver = compiled("sections")
+    motors, forces = actuated(solver.model, rng, 4), forces_of(rng, 4, 3.0)
+    settled = [sr.solve_equilibrium(solver.model, q, f, tolerance=1e-13) for q, f in zip(motors, forces, strict=True)]
+    torques = np.array([one.motor_torques for one in settled])
+    estimates = solver.estimate_loads(motors, torques)
+    well = estimates.observability > 1e-3
+    assert np.all(estimates.certified[well])
+    assert np.max(np.abs(estimates.forces - forces)[well], initial=0.0) < 1e-6
+    targets = np.array([one.tip_position for one in settled])
+    found = solver.inverse_kinematics(targets, forces, q_motors0=motors * 1.01)
+    assert np.all(found.certified)
+    for row in range(4):
+        checked = sr.solve_equilibrium(solver.model, found.q_motors[row], forces[row], q_springs0=found.q_springs[row])
+        assert checked.stable
+        assert np.linalg.norm(checked.tip_position - targets[row]) < 1.1e-9
+    far = solver.inverse_kinematics(targets * 5.0, forces, q_motors0=motors)
+    assert not np.any(far.certified)
+    path = targets[0] + np.linspace(0.0, 0.02, 5)[:, None] * (1.0, 0.0, 0.0)
+    followed = solver.follow(path, forces[0], q_motors0=motors[0])
+    assert np.all(followed.certified)
+    assert np.max(followed.tip_error) <= 1e-9
+
+
+def test_given_tensions_feel_no_load() -> None:
+    solver = compiled("sections_forces")
+    for estimate in (solver.estimate_load, solver.estimate_loads):
+        with pytest.raises(sr.ParameterError, match="feel no load"):
+            estimate(np.zeros(6), np.zeros(6))
+
+
+def test_robots_without_actuators() -> None:
+    solver = compiled("helix")
+    with pytest.raises(sr.ParameterError, match="model"):
+        solver.estimate_load(np.zeros(0), np.zeros(0))
+    with pytest.raises(sr.ParameterError, match="model"):
+        solver.inverse_kinematics(np.zeros((1, 3)))
+    with pytest.raises(sr.ParameterError, match="model"):
+        solver.follow(np.zeros((1, 3)))
