@@ -64,16 +64,20 @@ def write_pictures(results: Results, folder: Path, *, overwrite: bool) -> list[P
     return [plots.write_png(picture(results, name), folder / f"benchmark_{name}.png", overwrite=overwrite) for name in names]
 
 
+def read_page(checkout: Path, name: str) -> str:
+    """The text of a page."""
+    try:
+        return (checkout / name).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise sr.FileFormatError(f"cannot read {checkout / name}: {error}") from error
+
+
 def write_docs(results: Results, checkout: Path) -> list[Path]:
     """Write results, pictures and tables into a checkout; return the files."""
     require_whole(results, list(JOBS))
     texts = {}
     for name, targets_only in PAGES.items():
-        try:
-            text = (checkout / name).read_text(encoding="utf-8")
-        except (OSError, ValueError) as error:
-            raise sr.FileFormatError(f"cannot read {checkout / name}: {error}") from error
-        texts[name] = marked(text, name, BEGIN, END, document(results, targets_only=targets_only))
+        texts[name] = marked(read_page(checkout, name), name, BEGIN, END, document(results, targets_only=targets_only))
     files = write_pictures(results, checkout / "docs" / "images", overwrite=True)
     files.append(write_text(checkout / "docs" / "benchmark.json", as_json(results), overwrite=True))
     return files + [write_text(checkout / name, text, overwrite=True) for name, text in texts.items()]
@@ -90,6 +94,11 @@ def run(arguments: argparse.Namespace) -> None:
         plots.require_matplotlib()  # tells at once what is missing
     if arguments.json is not None:
         new_file(arguments.json, overwrite=False)
+    if arguments.docs is not None and arguments.saved is None:  # tells at once what keeps the pages from being written
+        if arguments.quick or not arguments.cpp or set(arguments.only) != set(JOBS):
+            raise sr.ParameterError("--docs", str(arguments.docs), "given with --cpp, for all jobs, without --quick")
+        for name in PAGES:
+            marked(read_page(arguments.docs, name), name, BEGIN, END, "")
     results = measure(settings, arguments.only) if arguments.saved is None else read_results(arguments.saved)
     print(f"\n{document(results, targets_only=False)}")
     written = []

@@ -19,7 +19,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from eigenpy import LDLT
+from eigenpy import LDLT, ComputationInfo
 
 from softrobots.blas_threads import one_blas_thread
 from softrobots.checks import FloatArray
@@ -197,12 +197,20 @@ def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool, factors
     if not math.isfinite(np.vdot(part, part)):  # Eigen takes a NaN for positive
         return False
     factors = LDLT(len(part)) if factors is None else factors
-    if factors.compute(part - model.springs.least_tangent).isPositive():
+    if positive(factors, part - model.springs.least_tangent):
         return True
     if symmetric:
         return False
     with one_blas_thread(len(tangent)):
         return bool(np.all(np.linalg.eigvals(scaled(tangent, model.stiffness)).real > POSITIVE))
+
+
+def positive(factors: Any, matrix: FloatArray) -> bool:
+    """Factorise a symmetric matrix; whether no pivot is negative.
+
+    Eigen calls a matrix positive, too, whose diagonal vanishes before it is done, but then it tells of a numerical issue.
+    """
+    return bool(factors.compute(matrix).isPositive() and factors.info() == ComputationInfo.Success)
 
 
 def norm(vector: FloatArray) -> float:
@@ -263,7 +271,7 @@ def _newton_step(state: ElasticState, stiffness: FloatArray, factors: Any) -> Fl
     keeps its share.
     """
     length = 0.0
-    if factors.compute(state.tangent).isPositive():
+    if positive(factors, state.tangent):
         step = factors.solve(-state.residual).ravel()  # Eigen answers one row with a matrix
         length = norm(step)
     if length == 0.0:  # also where a pivot is zero, and the residual in its direction

@@ -76,7 +76,11 @@ class WorkspaceMap:
 
     @property
     def wrinkled(self) -> BoolArray:
-        """Whether the target is reached with a link that needs more than its own pressure, shape (..., n_loads)."""
+        """Whether the target is reached with a link that needs more than its own pressure, shape (..., n_loads).
+
+        In the posture that is kept, which needs the least pressure. Where links differ in pressure, another posture may still
+        carry the load: `payload` counts that one.
+        """
         own = np.array([group.pressure for group in self.model.spring_groups])
         springs = self.q_springs.reshape(-1, self.model.n_springs)
         lacking = (required_pressures(self.model, springs) > own + CLOSE).any(axis=1)
@@ -124,12 +128,16 @@ def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, field
     reached = np.asarray(fields["reached"])
     if reached.shape != cases or reached.dtype != np.bool_:
         raise ParameterError("reached", reached, f"truth values of shape {cases}")
-    required = np.array(fields["required_pressure"], dtype=np.float64)
-    if required.shape != cases or not np.array_equal(required < np.inf, reached) or (required < 0.0).any():
-        raise ParameterError("required_pressure", required, f"of shape {cases}, zero or above, infinite where not reached [Pa]")
+    required = np.array(fields["required_pressure"])
+    if required.dtype.kind not in "fiu" or required.shape != cases:
+        raise ParameterError("required_pressure", required, f"numbers of shape {cases} [Pa]")
+    if not np.array_equal(required < np.inf, reached) or (required < 0.0).any():
+        raise ParameterError("required_pressure", required, "zero or above, infinite where not reached [Pa]")
     payload = finite_array("payload", fields["payload"], grid.shape, "N")
     if payload.min() < 0.0 or payload.max() > loads[-1]:
         raise ParameterError("payload", payload, f"between 0 and {loads[-1]} N")
+    if ((loads <= payload[..., None]) & ~reached)[payload > 0.0].any():
+        raise ParameterError("payload", payload, "0, or such that the target is reached at every load up to it")
     made = WorkspaceMap(
         model=model,
         grid=grid,
@@ -138,7 +146,7 @@ def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, field
         gravity=gravity,
         tolerance=positive_number("tolerance", finite_number("tolerance", fields["tolerance"]), "m"),
         reached=reached,
-        required_pressure=required,
+        required_pressure=required.astype(np.float64),
         payload=payload,
         q_motors=finite_array("q_motors", fields["q_motors"], (*cases, model.n_motors), "rad"),
         q_springs=finite_array("q_springs", fields["q_springs"], (*cases, model.n_springs), "rad"),

@@ -458,6 +458,13 @@ def test_the_script_runs_end_to_end(tool: Callable, stand_in: list, tmp_path: Pa
     assert "exists" in capsys.readouterr().err
     assert load_script().main(["--from", str(target), "--docs", str(tmp_path)]) == 2
     assert "whole benchmark" in capsys.readouterr().err
+    assert load_script().main(["--quick", "--docs", str(tmp_path)]) == 2  # before anything is measured
+    assert "--cpp" in capsys.readouterr().err
+    told = json.loads(target.read_text(encoding="utf-8"))
+    del told["machine"]["processor"]
+    (tmp_path / "foreign.json").write_text(json.dumps(told), encoding="utf-8")
+    assert load_script().main(["--from", str(tmp_path / "foreign.json")]) == 2
+    assert "holds no results" in capsys.readouterr().err
     assert load_script().main(["--rounds", "0"]) == 2
     assert "--rounds = 0" in capsys.readouterr().err
 

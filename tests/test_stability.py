@@ -61,6 +61,9 @@ def test_pivots_tell_the_sign_of_the_smallest_eigenvalue(arm: sr.SoftModel, rng:
         tangent = np.sqrt(k)[:, None] * (0.5 * (unit + unit.T)) * np.sqrt(k)
         assert is_stable(arm, tangent, symmetric=True) == (least > 1e-9)
     assert not is_stable(arm, np.zeros((n, n)), symmetric=True)
+    shifted = np.array(arm.springs.least_tangent)  # what is left has a diagonal of zeros: Eigen calls that positive
+    shifted[0, 1] = shifted[1, 0] = 50.0
+    assert not is_stable(arm, shifted, symmetric=True)
 
 
 def scan(arm: sr.SoftModel, motors: tuple, direction: np.ndarray, forces: np.ndarray) -> list[sr.Equilibrium]:

@@ -395,7 +395,7 @@ def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
         (["--shown-load", "nan"], "shown"),
         (["--output", "map.png"], "ends in .npz"),
         (["--docs", "--no-plots"], "--docs"),
-        (["--scheduler", "nowhere"], "scheduler nowhere"),
+        (["--scheduler", "nowhere"], "scheduler = 'nowhere'"),
     ],
 )
 def test_the_script_refuses_bad_options(

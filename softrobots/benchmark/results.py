@@ -105,9 +105,36 @@ def read_results(path: Path) -> Results:
     try:
         rows = tuple(Row(**{name: value for name, value in row.items() if name != "met"}) for row in read["rows"])
         curves = tuple(Curve(c["picture"], c["label"], tuple(c["sizes"]), tuple(c["seconds"])) for c in read["curves"])
-        return Results(dict(read["machine"]), dict(read["settings"]), rows, curves, tuple(read["notes"]))
+        results = Results(dict(read["machine"]), dict(read["settings"]), rows, curves, tuple(map(str, read["notes"])))
+        _check(results)
+        return results
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise FileFormatError(f"{path} holds no results of this benchmark") from error
+
+
+def _check(results: Results) -> None:
+    """Refuse what tables and pictures cannot be made of.
+
+    Raises:
+        KeyError: If the machine or the number of rounds is not told.
+        TypeError: If a figure is no number, or a text is none.
+        ValueError: If a figure is not finite, or a curve has not a cost for every size.
+    """
+    texts = [results.machine["processor"], results.machine["system"], *results.machine.values()]
+    figures = [results.settings["rounds"]]
+    for row in results.rows:
+        texts += [row.job, row.ours, row.baseline, row.unit, row.bound, row.clock, row.skipped]
+        told = (row.value, row.low, row.high, row.target, row.our_seconds, row.baseline_seconds)
+        figures += [number for number in told if number is not None]
+    for curve in results.curves:
+        texts += [curve.picture, curve.label]
+        figures += [*curve.sizes, *curve.seconds]
+        if len(curve.sizes) != len(curve.seconds):
+            raise ValueError("a curve has a cost for every size")
+    if not all(isinstance(text, str) for text in texts):
+        raise TypeError("names are texts")
+    if not all(map(math.isfinite, figures)):
+        raise ValueError("figures are finite")
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
@@ -29,6 +30,9 @@ from softrobots.workspace_map import WorkspaceMap
 
 BLOCK = 512
 """Targets of a block."""
+
+MOST_CASES = 10**8
+"""Most cases of a map; each takes 65 bytes, of an arm with four springs."""
 
 DOWN = (0.0, 0.0, -1.0)
 """Direction of a weight."""
@@ -79,6 +83,7 @@ def map_workspace(
         raise ParameterError("grid", grid, "a TargetGrid")
     sizes = increasing("loads", non_negative_array("loads", finite_array("loads", loads, (None,), "N"), "N"), "N")
     positive_integer("number of loads", len(sizes), 100_000)
+    positive_integer("number of cases", math.prod(grid.shape) * len(sizes), MOST_CASES)
     along = unit_vector("direction", direction)
     weight = Load.of(model, gravity=gravity).gravity
     case = SweepCase.of(

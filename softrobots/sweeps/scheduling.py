@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pkgutil import resolve_name
 from typing import Any, TypeVar
 
-from softrobots.errors import ClusterError, MissingDependency, SoftRobotsError
+from softrobots.errors import ClusterError, MissingDependency, ParameterError, SoftRobotsError
 from softrobots.sweeps.load_case import package_version
 
 Block = TypeVar("Block")
@@ -35,6 +35,7 @@ def run_blocks(
 
     Raises:
         MissingDependency: If a scheduler is given and distributed is not installed.
+        ParameterError: If the address of the scheduler is none.
         ClusterError: If the scheduler does not answer, has no workers, or gives a block up.
         SoftRobotsError: What `work` raises.
     """
@@ -57,8 +58,13 @@ def _on_cluster(work: Callable[[Block], Answer], blocks: Sequence[Block], addres
     try:
         from distributed import Client
         from distributed import as_completed as as_completed_there
+        from distributed.comm.addressing import parse_host_port
     except ImportError as error:
         raise MissingDependency("distributed", "cluster") from error
+    try:
+        parse_host_port(address)
+    except (AttributeError, TypeError, ValueError) as error:  # a client of such an address takes a minute to go
+        raise ParameterError("scheduler", address, "an address with a port, e.g. 'tcp://127.0.0.1:8786'") from error
     client: Any = None
     try:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
