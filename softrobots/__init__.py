@@ -1,5 +1,7 @@
 """Soft robots as rigid-body robot descriptions, with certified statics and inverse kinematics on Pinocchio."""
 
+from typing import TYPE_CHECKING, Any
+
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.composition import mount
 from softrobots.equilibrium import Equilibrium, solve_equilibrium
@@ -26,7 +28,6 @@ from softrobots.errors import (
 from softrobots.growth import grown_coordinates
 from softrobots.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
 from softrobots.inverse_kinematics import IkSolution, solve_ik
-from softrobots.kernels.compiled_model import compile_model as compile  # noqa: F401  (in __all__ it would hide the builtin)
 from softrobots.load_estimation import LoadEstimate, estimate_load
 from softrobots.loader import load_model
 from softrobots.loads import EARTH_GRAVITY, distributed_force
@@ -39,6 +40,9 @@ from softrobots.time_law import Path3D, quintic, read_waypoints, straight_line, 
 from softrobots.trajectory import Trajectory, follow_trajectory
 from softrobots.viewer import Viewer, view
 from softrobots.workspace import Workspace, sample_workspace
+
+if TYPE_CHECKING:
+    from softrobots.kernels.compiled_model import compile_model as compile  # noqa: F401  (in __all__ it would hide the builtin)
 
 __version__ = "0.1.0"
 
@@ -103,3 +107,13 @@ __all__ = [
     "view",
     "waypoints",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the compiled solvers when they are asked for: a fifth of all other imports."""
+    if name != "compile":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from softrobots.kernels.compiled_model import compile_model
+
+    globals()["compile"] = compile_model
+    return compile_model

@@ -350,7 +350,8 @@ class SoftModel:
         """The robot as a serial chain from base to tip, for compiled solvers; made on first use, without Pinocchio's workspace.
 
         Raises:
-            DescriptionError: If a joint is not between base and tip, or a link has a largest moment.
+            DescriptionError: If a joint is not between base and tip, or neither turns nor slides, or if a link has a largest
+                moment.
         """
         if self._chain is None:
             self._chain = read_chain(self._pin, self._structure, self._springs, self.frame_id(self._tip), self._reach)

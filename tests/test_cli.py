@@ -19,6 +19,7 @@ from softrobots.interop import packages
 from softrobots.interop.packages import PACKAGES, Package, PackageState
 from softrobots.interop.tools import TOOLS
 from softrobots.interop.urdf_rules import RULES
+from softrobots.kernels.machines import available_backend, cache_folder
 from softrobots.paths import urdf_folder, xacro_folder
 from tests.conftest import CHECKOUT, missing
 from tests.foreign import BRANCHED, SPRINGS
@@ -317,6 +318,7 @@ def test_doctor_finds_this_installation_well(told) -> None:
     assert out.endswith("\nall well\n")
     assert f"softrobots {sr.__version__}, Python " in out
     assert f"  xacro    {xacro_folder()}\n" in out
+    assert f"  cache    {cache_folder()} (compiled solvers, by {available_backend()})\n" in out
     for name in sr.ROBOTS:
         assert re.search(rf"^  {name}\.urdf +the same$", out, re.M)
         assert re.search(rf"^  {name} +yourdfpy +\S+ +\d\.\de-1\d m +\d\.\de-1\d rad", out, re.M)
@@ -396,7 +398,7 @@ def test_the_packages_are_those_of_pyproject() -> None:
     listed, place = {}, ""
     for line in text[text.index("dependencies = [") : text.index("[project.scripts]")].splitlines():
         place = re.match(r"([\w-]+) = \[", line)[1] if re.match(r"([\w-]+) = \[", line) else place
-        for name, least in re.findall(r'"([\w-]+)>=([\d.]+)', line):
+        for name, least in re.findall(r'"([\w-]+)(?:\[\w+\])?>=([\d.]+)', line):
             listed[name] = ("" if place == "dependencies" else place, least)
     ours = {package.name: (package.extra, package.minimum) for package in PACKAGES}
     assert {name: ours[name] for name in ours} == {name: listed[name] for name in ours}

@@ -162,20 +162,23 @@ def test_muscles(folder: Path, rng: np.random.Generator) -> None:
     for input_ in ("lengths", "forces"):
         solver = sr.compile(sr.load_model(sr.PccArm(elastic_sections=2), muscles=input_), backend="python")
         in_c = Controller(solver, folder, gravity=False, name=f"pcc_{input_}")
-        count = in_c.place["N"]
+        assert in_c.place["N_MUSCLES"] == 6
         for _ in range(20):
             size = 0.524 * rng.uniform(0.93, 1.07, 6) if input_ == "lengths" else rng.uniform(0.0, 30.0, 6)
             force = rng.uniform(-3.0, 3.0, 3)
             expected = solver.equilibrium(size, force)
             in_c.clear()
             in_c.put("FORCE", force)
-            run = solver._run(False)
-            prepared = run.workspace()
-            solver._actuation.put(run, prepared, size)
-            for name in ("PULL", "START"):
-                in_c.put(name, prepared[in_c.place[name] : in_c.place[name] + count])
+            in_c.call("put_muscles", (ctypes.c_double * 6)(*size))
             assert in_c.call("settle") == Status.CERTIFIED
             assert np.allclose(in_c.get("TIP", 3), expected.tip_position, rtol=0.0, atol=1e-11)
+            assert np.array_equal(expected.q_motors, size)
+        in_c.call("look_at_tip")  # of the last case
+        run = solver._run(False)
+        jacobian = solver._actuation.jacobian(run, list(in_c.w))
+        settled = sr.solve_equilibrium(solver.model, size, force, q_springs0=expected.q_springs)
+        slope = sr.elastostatic_jacobian(solver.model, settled)
+        assert np.allclose(jacobian, slope, rtol=0.0, atol=1e-9 * np.abs(slope).max())
 
 
 def test_nothing_is_left_to_a_library(controller: tuple[Controller, Any], folder: Path) -> None:

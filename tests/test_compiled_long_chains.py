@@ -20,9 +20,7 @@ UNEVEN = {"segment_lengths": (0.5, 0.4), "bending_stiffness": (1.9, 1.2)}
 ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
     "sections": lambda: sr.load_model(sr.PccArm(**UNEVEN, elastic_sections=3)),
     "sections_forces": lambda: sr.load_model(sr.PccArm(**UNEVEN, elastic_sections=3), muscles="forces"),
-    "lumped": lambda: sr.load_model(sr.PccArm(**UNEVEN, chain="lumped", hinges=5)),
     "lumped_forces": lambda: sr.load_model(sr.PccArm(**UNEVEN, chain="lumped", hinges=5), muscles="forces"),
-    "no_twist": lambda: sr.load_model(sr.PccArm(**UNEVEN, chain="lumped", hinges=5, torsion=False), muscles="forces"),
     "helix": lambda: sr.load_model(sr.HelixTube(elastic_sections=8)),
     "helix_lumped": lambda: sr.load_model(sr.HelixTube(chain="lumped", hinges=8)),
     "stiff_and_soft": lambda: sr.load_model(
@@ -197,48 +195,3 @@ def test_strains_that_lengths_hold_cannot_be_locked() -> None:
     with pytest.raises(sr.ParameterError, match="muscle lengths hold it"):
         sr.compile(compiled("sections").model, locked_strains=("stretch",))
     sr.compile(compiled("sections").model, locked_strains=("twist",))
-
-
-# --- Load estimation and inverse kinematics
-
-
-def test_estimates_and_targets_of_a_long_chain(rng: np.random.Generator) -> None:
-    """A force from given muscle lengths and the tensions they need; and lengths that put the tip at a target."""
-    solver = compiled("sections")
-    motors, forces = actuated(solver.model, rng, 4), forces_of(rng, 4, 3.0)
-    settled = [sr.solve_equilibrium(solver.model, q, f, tolerance=1e-13) for q, f in zip(motors, forces, strict=True)]
-    torques = np.array([one.motor_torques for one in settled])
-    estimates = solver.estimate_loads(motors, torques)
-    well = estimates.observability > 1e-3
-    assert np.all(estimates.certified[well])
-    assert np.max(np.abs(estimates.forces - forces)[well], initial=0.0) < 1e-6
-    targets = np.array([one.tip_position for one in settled])
-    found = solver.inverse_kinematics(targets, forces, q_motors0=motors * 1.01)
-    assert np.all(found.certified)
-    for row in range(4):
-        checked = sr.solve_equilibrium(solver.model, found.q_motors[row], forces[row], q_springs0=found.q_springs[row])
-        assert checked.stable
-        assert np.linalg.norm(checked.tip_position - targets[row]) < 1.1e-9
-    far = solver.inverse_kinematics(targets * 5.0, forces, q_motors0=motors)
-    assert not np.any(far.certified)
-    path = targets[0] + np.linspace(0.0, 0.02, 5)[:, None] * (1.0, 0.0, 0.0)
-    followed = solver.follow(path, forces[0], q_motors0=motors[0])
-    assert np.all(followed.certified)
-    assert np.max(followed.tip_error) <= 1e-9
-
-
-def test_given_tensions_feel_no_load() -> None:
-    solver = compiled("sections_forces")
-    for estimate in (solver.estimate_load, solver.estimate_loads):
-        with pytest.raises(sr.ParameterError, match="feel no load"):
-            estimate(np.zeros(6), np.zeros(6))
-
-
-def test_robots_without_actuators() -> None:
-    solver = compiled("helix")
-    with pytest.raises(sr.ParameterError, match="model"):
-        solver.estimate_load(np.zeros(0), np.zeros(0))
-    with pytest.raises(sr.ParameterError, match="model"):
-        solver.inverse_kinematics(np.zeros((1, 3)))
-    with pytest.raises(sr.ParameterError, match="model"):
-        solver.follow(np.zeros((1, 3)))

@@ -261,6 +261,9 @@ def test_only_sections_have_strains_to_lock(plain: CompiledModel) -> None:
         sr.compile(plain.model, locked_strains=("twist",))
     with pytest.raises(sr.NameNotFound, match="shear"):
         sr.compile(plain.model, locked_strains=("shear",))
+    for no_tuple in ("twist", 5):
+        with pytest.raises(sr.ParameterError, match="a tuple of names, of bend_x"):
+            sr.compile(plain.model, locked_strains=no_tuple)
 
 
 # --- Lanes

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,14 +11,9 @@ import pytest
 
 import softrobots as sr
 from softrobots.kernels import Status
-from softrobots.kernels.actuation import Actuation
 from softrobots.kernels.chain_search import ChainSearch
 from softrobots.kernels.compiled_model import CompiledModel
-from softrobots.kernels.machines import make_run
-from softrobots.kernels.program import make_program
-from softrobots.kernels.unknowns import Unknowns
 from tests.oracles import central_difference
-from tests.test_c_source import compiled
 
 GRAVITY = (0.4, -1.0, -9.7)  # [m/s^2]
 EIGHT_LINKS: dict[str, Any] = {"link_lengths": (0.15,) * 8, "hinge_offset": 0.01, "rest_side": 0.02, "rest_up": -0.01}
@@ -55,9 +48,11 @@ def solver(name: str) -> CompiledModel:
     return sr.compile(robot(name), backend="python")
 
 
-def searching(model: sr.SoftModel, locked: tuple[str, ...] = (), *, gravity: bool = False) -> ChainSearch:
-    unknowns = Unknowns(model.chain(), locked)
-    return ChainSearch(model, Actuation(model, unknowns), make_run(make_program(unknowns, weight=gravity), "python"))
+@cache
+def searching(name: str, locked: tuple[str, ...] = (), *, gravity: bool = False) -> ChainSearch:
+    """The searches of a robot, with the code that its solver has already."""
+    c = sr.compile(robot(name), backend="python", locked_strains=locked) if locked else solver(name)
+    return c._search(c._run(gravity))
 
 
 def drawn(model: sr.SoftModel, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +77,7 @@ def nearby(model: sr.SoftModel, motors: np.ndarray, rng: np.random.Generator, si
 def test_jacobian_and_loads_are_those_of_the_pinocchio_path(name: str, gravity: Any, rng: np.random.Generator) -> None:
     """The same equilibrium on both sides: 1e-9 relative leaves room for the condition of the tangent stiffness."""
     model = robot(name)
-    search, down = searching(model, gravity=gravity is not None), np.zeros(3) if gravity is None else np.array(gravity)
+    search, down = searching(name, gravity=gravity is not None), np.zeros(3) if gravity is None else np.array(gravity)
     for _ in range(3):
         motors, force = drawn(model, rng)
         status, state = search.settle(motors, force, down, model.rest)
@@ -102,7 +97,7 @@ def test_locked_strains_stay_where_they_are(name: str, locked: tuple[str, ...], 
     model = robot(name)
     if name == "on_an_arm":
         locked = ("twist",)  # lengths hold the elongation
-    search, down = searching(model, locked, gravity=True), np.array(GRAVITY)
+    search, down = searching(name, locked, gravity=True), np.array(GRAVITY)
     motors, force = drawn(model, rng)
     _, here = search.settle(motors, force, down, model.rest)
     jacobian, scale = search.jacobian(here.w), model.motor_scale
@@ -128,18 +123,6 @@ def test_locked_strains_stay_where_they_are(name: str, locked: tuple[str, ...], 
 def test_locking_all_strains_of_sections_is_refused() -> None:
     with pytest.raises(sr.ParameterError, match="locked_strains"):
         sr.compile(robot("tube_on_an_arm"), locked_strains=("bend_x", "bend_y", "twist", "stretch"))
-
-
-def test_c_code_looks_at_the_tip(tmp_path: Path, rng: np.random.Generator) -> None:
-    model = robot("lumped")
-    library = ctypes.CDLL(str(compiled(tmp_path, solver("lumped").c_source(prefix="arm"), "look")))
-    search, (motors, force) = searching(model), drawn(model, rng)
-    _, state = search.settle(motors, force, np.zeros(3), model.rest)
-    w = (ctypes.c_double * len(state.w))(*state.w)
-    expected = search.jacobian(state.w)
-    library.arm_look_at_tip(w)
-    # Sine and cosine of the C code differ by an ulp.
-    assert np.abs(search.actuation.jacobian(search.run, list(w)) - expected).max() < 1e-12
 
 
 # --- Load estimation

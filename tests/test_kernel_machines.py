@@ -42,7 +42,7 @@ def test_generated_text_is_in_the_kernel_language(kind: str, weight: bool) -> No
     """Read, and with every function and place that a caller needs; the statements are read by the translation to C."""
     program = program_of(ROBOTS[kind](), weight=weight)
     module = read_module(program.text)
-    assert module.docstring.endswith(("with gravity: generated code.",) if weight else ("weightless: generated code.",))
+    assert module.docstring.splitlines()[0].endswith(f"{'with gravity' if weight else 'weightless'}: generated code.")
     assert all(name in module.functions or name in module.constants for name in program.entry_points)
     assert all(function.docstring for function in module.functions.values())
     assert module.constants["WORKSPACE_SIZE"] == program.size

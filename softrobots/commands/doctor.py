@@ -17,6 +17,7 @@ from softrobots.interop.checks import row_problems
 from softrobots.interop.kinematics import KinematicsRow, compare_kinematics
 from softrobots.interop.packages import package_states
 from softrobots.interop.tools import installed_tools
+from softrobots.kernels.machines import available_backend, cache_folder
 from softrobots.paths import urdf_folder, xacro_folder
 from softrobots.robots import ROBOTS
 
@@ -58,6 +59,7 @@ def _folders(trouble: list[str]) -> Path | None:
     except ViewerError as error:
         browser = f"none, so no pictures of the viewer: {error}"
     places = {"package": Path(softrobots.__file__).parent, "xacro": xacro, "URDF": urdf, "browser": browser}
+    places |= {"cache": f"{cache_folder()} (compiled solvers, by {available_backend()})"}
     _table([(what, str(where)) for what, where in places.items()])
     return urdf
 

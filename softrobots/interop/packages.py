@@ -33,6 +33,7 @@ PACKAGES = (
     Package("matplotlib", "3.8", "plot", "plots"),
     Package("scipy", "1.13", "helix", "actuators that vary along the tube"),
     Package("numba", "0.60", "fast", "compiled solvers"),
+    Package("dask", "2024.8", "cluster", "sweeps on many machines"),
     Package("example-robot-data", "6", "robots", "third-party robots"),
     Package("pin-pink", "4.4", "bench", "rigid inverse kinematics, to compare with"),
     Package("daqp", "0.11", "bench", "its quadratic programmes"),

@@ -67,7 +67,7 @@ class Actuation:
 
     def unknowns(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Unknown strains of one case from its elastic coordinates, shape (n,)."""
-        return np.asarray(self._model.structure.strains(motors, elastic)[self._strains])
+        return np.asarray(self.of_elastic(motors[None], elastic[None])[0])
 
     def of_elastic(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Unknown strains of many cases, shape (n, n_unknowns)."""

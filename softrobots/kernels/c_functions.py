@@ -44,11 +44,16 @@ def comment(lines: Iterable[str]) -> str:
 
 
 def wrapped(line: str) -> list[str]:
-    """A line of C in lines that are not too long; C takes a new line wherever it takes a space."""
+    """A line of C in lines that are not too long; C takes a new line wherever it takes a space, a reader not before an `*`."""
     indent = line[: len(line) - len(line.lstrip())]
-    return textwrap.wrap(
-        line, WIDTH, subsequent_indent=indent + 2 * _INDENT, break_long_words=False, break_on_hyphens=False
-    ) or [line]
+    made = textwrap.wrap(
+        line.replace("double *", "double\0*"),
+        WIDTH - 3,  # declarations stand in comments, too
+        subsequent_indent=indent + 2 * _INDENT,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [one.replace("\0", " ") for one in made] or [line]
 
 
 class FunctionWriter:

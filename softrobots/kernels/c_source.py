@@ -103,7 +103,7 @@ def _about(module: Module, prefix: str, exported: Iterable[str], heads: dict[str
     lines += [*sizes, ""] if sizes else []
     for name, head in heads.items():
         lines += [
-            f"    {head};",
+            *wrapped(f"    {head};"),
             *(f"        {line}" if line else "" for line in module.functions[name].docstring.splitlines()),
             "",
         ]

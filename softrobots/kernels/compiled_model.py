@@ -6,6 +6,8 @@ opt-in: nothing else calls it.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,7 @@ from softrobots.kernels.statuses import Status
 from softrobots.kernels.unknowns import Unknowns
 from softrobots.load_estimation import check_feels
 from softrobots.model import SoftModel, check_model
+from softrobots.strain_chain import STRAINS
 from softrobots.tip_search import POSITION_TOLERANCE
 
 _NO_FORCE = read_only(np.zeros(3))
@@ -49,13 +52,15 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
         Its solvers. Code is made for each job when it is first asked for.
 
     Raises:
-        ParameterError: If the model is none, the back end is unknown, or a strain cannot be locked.
+        ParameterError: If the model is none, the back end is unknown, or strains cannot be locked.
         NameNotFound: If a strain to lock is none.
         DescriptionError: If the robot is no serial chain with linear springs.
         MissingDependency: If numba is asked for and not installed.
     """
     check_model(model)
     chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
+    if isinstance(locked_strains, str) or not isinstance(locked_strains, Iterable):
+        raise ParameterError("locked_strains", locked_strains, f"a tuple of names, of {', '.join(STRAINS)}")
     return CompiledModel(model, chosen, tuple(locked_strains))
 
 
@@ -110,8 +115,9 @@ class CompiledModel:
     def c_source(self, *, gravity: bool = False, prefix: str = "softrobots") -> str:
         """The generated code as freestanding C99: one file without libraries, allocation or state, for a control loop.
 
-        Every function works on an array of doubles that the caller owns; the head of the file tells its size and what stands
-        where.
+        Every function works on an array of doubles that the caller owns; the head of the file is its manual: what comes in and
+        out, where it stands, in which unit, and what a status says. Equilibria are there for every robot; `estimate`, `reach`
+        and `follow` for chains that are traced in one straight line.
 
         Args:
             gravity: That for robots with weight.
@@ -122,6 +128,8 @@ class CompiledModel:
         """
         from softrobots.kernels.c_source import to_c
 
+        if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
+            raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
         program = self._run(gravity).program
         return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
 
@@ -175,7 +183,7 @@ class CompiledModel:
             start = run.layout.unknown
             w[start : start + run.layout.unknowns] = self._actuation.unknowns(motors, springs)
             status = run.settle_from(w)
-        found = CompiledEquilibrium(w, run.layout, self._actuation)
+        found = CompiledEquilibrium(w, run.layout, self._actuation, motors)
         if status != Status.CERTIFIED:
             raise EquilibriumNotFound(
                 f"no certified equilibrium at motors {motors.tolist()} under {found.force.tolist()} N: "
@@ -268,7 +276,7 @@ class CompiledModel:
             status = run.estimate(w)
         else:
             status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
-        found = CompiledLoadEstimate(w, run.layout, self._actuation)
+        found = CompiledLoadEstimate(w, run.layout, self._actuation, motors)
         if status != Status.CERTIFIED:
             raise LoadNotFound(
                 f"no unique force explains the motor torques {torques.tolist()} N m: {Status(status).explanation}; "
@@ -432,8 +440,8 @@ class CompiledModel:
             batch, spent = self._search(run).follow(points, load, down, motors, tolerance)
         if batch.status[0] != Status.CERTIFIED:
             raise TargetUnreachable(
-                f"waypoint 1 of {len(points)}: {Status(batch.status[0]).explanation}; the tip comes to "
-                f"{batch.tip_error[0]:.3g} m of it",
+                f"waypoint 1 of {len(points)} is not reached from motors {motors.tolist()}: the tip comes within "
+                f"{batch.tip_error[0]:.3g} m of it ({Status(batch.status[0]).name})",
                 best=batch.q_motors[0],
                 residual=float(batch.tip_error[0]),
                 iterations=spent,

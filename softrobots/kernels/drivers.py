@@ -11,7 +11,12 @@ from collections.abc import Callable
 from softrobots.kernels.intrinsics import Array, sqrt
 from softrobots.kernels.settings import ARMIJO, DESCENT_STEPS, LARGEST_STEP, LEAST_SOFTNESS, PASSES, TIGHT, TOLERANCE
 
-# Made for each robot: places in the workspace, counts, tolerances, and straight-line code.
+# Made for each robot: statuses, places in the workspace, counts, tolerances, and straight-line code.
+CERTIFIED: int
+UNSTABLE: int
+UNSETTLED: int
+OUT_OF_RANGE: int
+NOT_A_NUMBER: int
 START: int
 UNKNOWN: int
 STEP: int
@@ -85,14 +90,14 @@ def leave_saddle(w: Array) -> None:
 def outcome(w: Array) -> int:
     """Return the status of the point that was evaluated last."""
     if w[ENERGY] - w[ENERGY] != 0.0 or not w[SIZE] < 1e300:
-        return 4  # infinite, or no number; of a load whose square is infinite every residual is a small part
+        return NOT_A_NUMBER  # infinite, too: of a load whose square is infinite every residual is a small part
     if w[ROOM] < 0.0:
-        return 3  # a section beyond its range
+        return OUT_OF_RANGE
     if not is_settled(w, TOLERANCE):
-        return 2  # not in balance
+        return UNSETTLED
     if not is_stable(w):
-        return 1  # in balance, but not stable
-    return 0
+        return UNSTABLE
+    return CERTIFIED
 
 
 def search_line(w: Array) -> bool:
@@ -175,7 +180,7 @@ def settle(w: Array) -> int:
             break
         newton_pass(w)
     if w[MODE] > 0.5 and w[MODE] < 1.5:
-        return 0
+        return CERTIFIED
     go_to_start(w)
     return descend(w)
 

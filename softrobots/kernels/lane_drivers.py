@@ -15,6 +15,7 @@ from softrobots.kernels.motor_drivers import estimate, estimated, reach, within_
 from softrobots.kernels.settings import PASSES
 
 # Made for each robot.
+CERTIFIED: int
 FORCE: int
 GRAVITY: int
 PULL: int
@@ -95,7 +96,7 @@ def settle_batch(
                 for j in range(3):
                     tips[row, j] = lanes[(TIP + j) * LANES + lane]
                 residuals[row] = sqrt(lanes[ERROR * LANES + lane])
-                statuses[row] = 0
+                statuses[row] = CERTIFIED
             else:
                 for j in range(UNKNOWN):
                     case[j] = lanes[j * LANES + lane]
@@ -193,8 +194,8 @@ def reach_batch(
             mode = lanes[MODE * LANES + lane]
             for j in range(LANE_SIZE):
                 case[j] = lanes[j * LANES + lane]
-            statuses[row] = 0
-            if mode < 0.5 or mode > 1.5 or within_limits(case, 0) != 0:
+            statuses[row] = CERTIFIED
+            if mode < 0.5 or mode > 1.5 or within_limits(case, 0) != CERTIFIED:
                 for j in range(N_MOTORS):
                     case[j] = motors[row, j]
                 for j in range(N):

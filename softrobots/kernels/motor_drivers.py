@@ -9,10 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from softrobots.kernels.drivers import descend, go_to_start
-from softrobots.kernels.intrinsics import Array, fabs, where
+from softrobots.kernels.intrinsics import Array
 from softrobots.kernels.settings import HIDDEN, LARGEST_SIZE, LEAST_SIZE, OBSERVABLE, PASSES, SEARCH_STEPS, TOLERANCE
 
 # Made for each robot.
+CERTIFIED: int
+UNSTABLE: int
+UNOBSERVABLE: int
+NOT_REACHED: int
+BEYOND_LIMITS: int
 UNKNOWN: int
 ERROR: int
 FORCE: int
@@ -26,8 +31,6 @@ TARGET: int
 FOLLOWING: int
 AHEAD: int
 BEFORE: int
-FORESEEN: int
-CORRECTION: int
 N: int
 N_MOTORS: int
 N_VARIED: int
@@ -81,6 +84,22 @@ def go_ahead(w: Array, varied: int, count: int) -> None:
         w[UNKNOWN + i] = w[AHEAD + N_VARIED + i]
 
 
+def remember(w: Array) -> None:
+    """Keep motors and unknowns as the point before."""
+    for i in range(N_MOTORS):
+        w[BEFORE + i] = w[i]
+    for i in range(N):
+        w[BEFORE + N_VARIED + i] = w[UNKNOWN + i]
+
+
+def leap(w: Array) -> None:
+    """Go where the last step to a target leads."""
+    for i in range(N_MOTORS):
+        w[i] = w[AHEAD + i]
+    for i in range(N):
+        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i]
+
+
 def go_back(w: Array, varied: int, count: int) -> None:
     """Go back to the point before."""
     for i in range(count):
@@ -92,8 +111,8 @@ def go_back(w: Array, varied: int, count: int) -> None:
 def estimated(w: Array) -> int:
     """Return the status of a force that explains the motor torques."""
     if w[OBSERVED] < OBSERVABLE * OBSERVABLE * REACH * REACH:
-        return 5  # a direction of the force is not felt by the motors
-    return 0
+        return UNOBSERVABLE
+    return CERTIFIED
 
 
 def search(w: Array, varied: int, count: int) -> int:
@@ -107,7 +126,7 @@ def search(w: Array, varied: int, count: int) -> int:
     for _ in range(SEARCH_STEPS):
         w[DAMPING] = damping
         look(w, varied)
-        if status > 1 or w[MISSING] <= goal(w, varied) or damping > 1e3 * REACH:
+        if status > UNSTABLE or w[MISSING] <= goal(w, varied) or damping > 1e3 * REACH:
             break
         if w[OBSERVED] < OBSERVABLE * OBSERVABLE * REACH * REACH:
             least = OBSERVABLE * REACH
@@ -116,7 +135,7 @@ def search(w: Array, varied: int, count: int) -> int:
         prepare(w)
         status = descend(w)
         look(w, varied)
-        if status == 0 and w[MISSING] < missing:
+        if status == CERTIFIED and w[MISSING] < missing:
             damping *= 0.1
             if damping < 1e-7 * REACH:
                 damping = 0.0
@@ -129,12 +148,12 @@ def search(w: Array, varied: int, count: int) -> int:
             damping *= 10.0
             if damping < 1e-6 * REACH:
                 damping = 1e-6 * REACH
-    if status > 0:
+    if status != CERTIFIED:
         return status
-    if varied > 0 and estimated(w) > 0 and w[MISSING] * TOLERANCE * TOLERANCE <= HIDDEN * HIDDEN * goal(w, varied):
-        return 5
+    if varied > 0 and estimated(w) != CERTIFIED and w[MISSING] * TOLERANCE * TOLERANCE <= HIDDEN * HIDDEN * goal(w, varied):
+        return UNOBSERVABLE
     if not w[MISSING] <= goal(w, varied):
-        return 6  # no force explains the torques, or the target is not reached
+        return NOT_REACHED
     return within_limits(w, varied)
 
 
@@ -143,8 +162,8 @@ def within_limits(w: Array, varied: int) -> int:
     if varied == 0:
         for i in range(N_MOTORS):
             if w[i] < LOWER[i] - 1e-9 or w[i] > UPPER[i] + 1e-9:
-                return 7  # a motor is beyond its limits
-    return 0
+                return BEYOND_LIMITS
+    return CERTIFIED
 
 
 def estimate(w: Array) -> int:
@@ -170,7 +189,7 @@ def step_to_target(w: Array) -> bool:
         if w[MODE] > 0.5:
             break
         leap(w)
-    return w[MODE] > 0.5 and w[MODE] < 1.5 and within_limits(w, 0) == 0
+    return w[MODE] > 0.5 and w[MODE] < 1.5 and within_limits(w, 0) == CERTIFIED
 
 
 def reach(w: Array) -> int:
@@ -179,140 +198,23 @@ def reach(w: Array) -> int:
     for i in range(3):
         w[FOLLOWING + i] = w[TARGET + i]
     if step_to_target(w):
-        return 0
+        return CERTIFIED
     go_back(w, 0, N_MOTORS)
     return search(w, 0, N_MOTORS)
-
-
-def near(w: Array) -> bool:
-    """Tell whether no motor has gone further than a radian from the point before: another elbow or turn would be."""
-    furthest = 0.0
-    for i in range(N_MOTORS):
-        if fabs(w[i] - w[BEFORE + i]) > furthest:
-            furthest = fabs(w[i] - w[BEFORE + i])
-    return furthest <= 1.0
-
-
-def remember(w: Array) -> None:
-    """Keep motors and unknowns as the point before."""
-    for i in range(N_MOTORS):
-        w[BEFORE + i] = w[i]
-    for i in range(N):
-        w[BEFORE + N_VARIED + i] = w[UNKNOWN + i]
-
-
-def leap(w: Array) -> None:
-    """Go where the last step to a target leads."""
-    for i in range(N_MOTORS):
-        w[i] = w[AHEAD + i]
-    for i in range(N):
-        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i]
-
-
-def foresee(w: Array) -> None:
-    """Go where the last step leads, corrected by what the step before it was short of: then it is right to third order."""
-    for i in range(N_MOTORS):
-        w[FORESEEN + i] = w[AHEAD + i]
-        w[i] = w[AHEAD + i] + w[CORRECTION + i]
-    for i in range(N):
-        w[FORESEEN + N_VARIED + i] = w[AHEAD + N_VARIED + i]
-        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i] + w[CORRECTION + N_VARIED + i]
-
-
-def correct(w: Array, share: float) -> None:
-    """Remember what the last step was short of, or nothing."""
-    for i in range(N_MOTORS):
-        w[CORRECTION + i] = share * (w[i] - w[FORESEEN + i])
-    for i in range(N):
-        w[CORRECTION + N_VARIED + i] = share * (w[UNKNOWN + i] - w[FORESEEN + N_VARIED + i])
-
-
-def step_in_parts(w: Array, targets: Array, row: int) -> bool:
-    """Go from the waypoint before to this one through points between; tell whether it arrived."""
-    for doubling in range(1, 7):
-        parts = 1
-        for _ in range(doubling):
-            parts *= 2
-        go_back(w, 0, N_MOTORS)
-        arrived = True
-        for part in range(1, parts + 1):
-            for i in range(3):
-                last = targets[3 * (row - 1) + i]
-                w[TARGET + i] = last + (targets[3 * row + i] - last) * part / parts
-                w[FOLLOWING + i] = w[TARGET + i]
-            if not step_to_target(w):
-                arrived = False
-                break
-        if arrived and near(w):
-            return True
-    return False
-
-
-def follow(
-    w: Array, targets: Array, count: int, motors: Array, unknowns: Array, residuals: Array, errors: Array, statuses: Array
-) -> int:
-    """Move the tip through `count` targets, each from the last; return how many it reached.
-
-    Motors and unknowns in the workspace are the start. Results of each waypoint go into the arrays: `N_MOTORS` motors, `N`
-    unknowns, the squared residual, the squared distance from the target, the status.
-    """
-    reached = 0
-    for row in range(count):
-        following = row + 1
-        if following == count:
-            following = row
-        for i in range(3):
-            w[TARGET + i] = targets[3 * row + i]
-            w[FOLLOWING + i] = targets[3 * following + i]
-        if row == 0:
-            status = reach(w)
-            target_step(w)
-            correct(w, 0.0)
-        else:
-            status = 0
-            if step_to_target(w) and near(w):
-                correct(w, where(row > 1, 1.0, 0.0))
-            else:
-                correct(w, 0.0)
-                if not step_in_parts(w, targets, row):
-                    status = 6
-                    go_back(w, 0, N_MOTORS)
-                for i in range(3):
-                    w[TARGET + i] = targets[3 * row + i]
-                    w[FOLLOWING + i] = targets[3 * following + i]
-                w[MODE] = 0.0
-                target_step(w)
-        for i in range(N_MOTORS):
-            motors[N_MOTORS * row + i] = w[i]
-        for i in range(N):
-            unknowns[N * row + i] = w[UNKNOWN + i]
-        residuals[row] = w[ERROR]
-        errors[row] = w[MISSING]
-        statuses[row] = status
-        if status == 0:
-            reached += 1
-            remember(w)
-            foresee(w)
-    return reached
 
 
 FUNCTIONS: tuple[Callable[..., object], ...] = (
     look,
     goal,
     go_ahead,
+    remember,
+    leap,
     go_back,
     within_limits,
     estimated,
     search,
     estimate,
-    leap,
     step_to_target,
-    remember,
     reach,
-    near,
-    foresee,
-    correct,
-    step_in_parts,
-    follow,
 )
 """All of them, each behind those that it uses."""

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softrobots.kernels import drivers, lane_drivers, motor_drivers, settings, trigonometry
+from softrobots.kernels import drivers, lane_drivers, motor_drivers, muscle_drivers, path_drivers, settings, trigonometry
 from softrobots.kernels.blocks import Block
 from softrobots.kernels.layout import Layout
 from softrobots.kernels.long_program import long_program
+from softrobots.kernels.manual import manual, public_names
 from softrobots.kernels.motor_program import force_blocks, target_blocks
 from softrobots.kernels.passing import TipPlaces
 from softrobots.kernels.short_program import equilibrium_blocks
+from softrobots.kernels.statuses import Status
 from softrobots.kernels.unknowns import Unknowns
 
 
@@ -50,8 +52,12 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
     layout = Layout(unknowns.chain.n_motors, len(unknowns.strains))
     functions, lane_functions = [*drivers.FUNCTIONS], [*lane_drivers.FUNCTIONS]
     tables: dict[str, object] = {}
-    loops, lane_loops, entries, names = [], [], ["settle", "settle_from"], [*layout.constants(), "WORKSPACE_SIZE"]
+    loops, lane_loops, entries, names = [], [], ["settle", "settle_from"], ["WORKSPACE_SIZE", "N", "N_MOTORS"]
     tip = None
+    if len(unknowns.chain.muscle_rest):
+        tables |= _muscle_tables(unknowns, layout)
+        functions += muscle_drivers.FUNCTIONS
+        entries, names = [*entries, "put_muscles"], [*names, "N_MUSCLES"]
     if unknowns.is_short:
         blocks, size = equilibrium_blocks(unknowns, layout, weight=weight)
         lanes, lane_size = blocks[1:3], size
@@ -59,7 +65,7 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         parts = long_program(unknowns, layout, weight=weight)
         blocks, size, lanes, lane_size = parts.blocks + parts.look, parts.size, parts.blocks, parts.lane_size
         tables |= {**parts.places, **parts.tables}
-        tip, entries, names = parts.tip, [*entries, "look_at_tip"], [*names, *parts.tip.constants()]
+        tip, entries = parts.tip, [*entries, "look_at_tip"]
         loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
     if unknowns.moved_by_motors:
         by_force, size = force_blocks(unknowns, layout, size, weight=weight)
@@ -67,9 +73,10 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         lane_size, entries = size, [*entries, "estimate", "reach", "follow"]
         blocks = blocks + by_force + by_target
         lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
-        functions += motor_drivers.FUNCTIONS
+        functions += motor_drivers.FUNCTIONS + path_drivers.FUNCTIONS
         lane_functions += lane_drivers.MOTOR_FUNCTIONS
-    title = f'"""Statics of {unknowns.chain.name}{", with gravity" if weight else ", weightless"}: generated code."""'
+    names += [*public_names(unknowns, layout, tip, weight=weight), *Status.__members__]
+    title = f'"""{manual(unknowns, layout, tip, weight=weight)}\n"""'
     text = "\n\n\n".join(
         [
             title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
@@ -107,6 +114,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "LANE_SIZE": lane_size,
         "LANES": _lanes(lane_size),
         "HELD": len(chain.held),
+        **{status.name: status.value for status in Status},
         "TOLERANCE": settings.TOLERANCE,
         "TIGHT": settings.TIGHT,
         "LEAST_SOFTNESS": settings.LEAST_SOFTNESS,
@@ -130,6 +138,22 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
     }
     # A table has at least one number, also where nothing reads it: without motor joints, or without springs.
     return "\n".join(f"{name} = {(0.0,) if value == () else value!r}" for name, value in (made | tables).items())
+
+
+def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
+    """What `muscle_drivers` needs: lengths put the unknowns where they have them, tensions load them."""
+    chain, strains = unknowns.chain, list(unknowns.strains)
+    if unknowns.pulled:
+        slope, base, rest = -chain.muscle_matrix[:, strains].T, np.zeros(len(strains)), np.zeros(len(chain.muscle_rest))
+    else:
+        slope, base, rest = chain.spread[strains], (chain.free @ chain.elastic @ chain.rest)[strains], chain.muscle_rest
+    return {
+        "N_MUSCLES": len(rest),
+        "MUSCLE_PLACE": layout.pull if unknowns.pulled else layout.start,
+        "MUSCLE_REST": tuple(rest.tolist()),
+        "MUSCLE_BASE": tuple(base.tolist()),
+        "MUSCLE_SLOPE": tuple((slope + 0.0).ravel().tolist()),
+    }
 
 
 def _texts(functions: Iterable[Callable[..., object]]) -> Sequence[str]:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray, read_only
+from softrobots.kernels.actuation import Actuation
+from softrobots.kernels.layout import Layout
 from softrobots.kernels.statuses import Status
 
 
@@ -19,13 +21,14 @@ class CompiledEquilibrium:
     `softrobots.solve_equilibrium(..., q_springs0=...)`, which then only checks them.
     """
 
-    __slots__ = ("_actuation", "_layout", "_workspace")
+    __slots__ = ("_actuation", "_layout", "_motors", "_workspace")
 
-    def __init__(self, workspace: Any, layout: Any, actuation: Any) -> None:
-        """Keep the workspace of the solver; it is the caller's own."""
+    def __init__(self, workspace: Any, layout: Layout, actuation: Actuation, motors: FloatArray | None = None) -> None:
+        """Keep the workspace of the solver, and the actuators where they are not all in it; both are the caller's own."""
         self._workspace = workspace
         self._layout = layout
         self._actuation = actuation
+        self._motors = motors
 
     def __repr__(self) -> str:
         """Elastic coordinates and residual."""
@@ -33,8 +36,8 @@ class CompiledEquilibrium:
 
     @property
     def q_motors(self) -> FloatArray:
-        """Positions of the motor joints, shape (n_motor_joints,) [rad or m], read-only."""
-        return self._part(0, self._layout.motors)
+        """Actuator coordinates, motor joints and then muscles, shape (n_motors,) [rad, m or N], read-only."""
+        return self._part(0, self._layout.motors) if self._motors is None else read_only(np.array(self._motors))
 
     @property
     def force(self) -> FloatArray:

@@ -17,7 +17,7 @@ class Status(IntEnum):
     OUT_OF_RANGE = 3
     """A section is bent or twisted to the end of its range."""
     NOT_A_NUMBER = 4
-    """The input is not finite, or too large to compute with."""
+    """The input is not finite or too large to compute with, or muscle lengths that no shape has."""
     UNOBSERVABLE = 5
     """The force explains the motor torques, but so do others: the motors do not feel one of its directions here."""
     NOT_REACHED = 6
