@@ -18,9 +18,10 @@ from softrobots.elastostatics import elastic_state
 from softrobots.kernels.actuation import Actuation
 from softrobots.kernels.blocks import Block
 from softrobots.kernels.elements import constants
-from softrobots.kernels.elimination import FLOOR, Beyond, Eliminated, eliminate, release
+from softrobots.kernels.elimination import Beyond, Eliminated, eliminate, release
 from softrobots.kernels.layout import Layout
 from softrobots.kernels.program import make_program
+from softrobots.kernels.settings import LEAST_GUARD as FLOOR
 from softrobots.kernels.short_chain import Evaluation, evaluate, solve_again
 from softrobots.kernels.small_systems import inverse_small, smallest_square, solve_small
 from softrobots.kernels.tip_motion import step_with_motors, tip_motion
@@ -143,7 +144,7 @@ def test_guarded_steps_go_downhill(sizes: list[int], seed: int, stiff: float) ->
     """The matrix that they invert is positive definite; where all pivots are large enough anyway, it is the same matrix."""
     parts = parts_of(np.random.default_rng(seed), sizes, stiff)
     gradient = np.concatenate([part.sides[0] for part in parts])
-    eliminated, beyond = go_back(parts, guard=1.0)
+    eliminated, beyond = go_back(parts, guard=FLOOR)
     plain, same = go_back(parts)
     for one, part in zip(eliminated, parts, strict=True):
         assert np.all(floats(one.inverse_pivots) > 0.0)
@@ -160,7 +161,7 @@ def test_guarded_steps_go_downhill(sizes: list[int], seed: int, stiff: float) ->
 
 def test_a_zero_pivot_is_guarded() -> None:
     part = Part(np.zeros((3, 1)), np.zeros((3, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.full(1, 5.0))
-    (one,), beyond = go_back([part], guard=1.0)
+    (one,), beyond = go_back([part], guard=FLOOR)
     assert one.inverse_pivots == [1.0 / (5.0 * FLOOR)]
     assert (beyond.softest, beyond.negatives) == (0.0, 1.0)
 
@@ -302,7 +303,7 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
         assert found.room > 0.0
         assert np.abs(found.tip - frame_placement(model, state.q, model.tip).translation).max() < 1e-13
         offsets.append((found.energy - state.energy, abs(state.energy) + 1.0))
-        guarded = evaluated(run, unknown, guard=1.0)
+        guarded = evaluated(run, unknown, guard=FLOOR)
         assert guarded.slope < 0.0
         if guarded.negatives == held and guarded.softest > FLOOR:  # with multipliers, stable springs may have negative pivots
             assert guarded.step.tolist() == found.step.tolist()

@@ -9,7 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from softrobots.kernels.intrinsics import Array, sqrt
-from softrobots.kernels.settings import ARMIJO, DESCENT_STEPS, LARGEST_STEP, LEAST_SOFTNESS, PASSES, TIGHT, TOLERANCE
+from softrobots.kernels.settings import (
+    ARMIJO,
+    DESCENT_STEPS,
+    LARGEST_GUARD,
+    LARGEST_STEP,
+    LEAST_GUARD,
+    LEAST_SOFTNESS,
+    PASSES,
+    TIGHT,
+    TOLERANCE,
+)
 
 # Made for each robot: statuses, places in the workspace, counts, tolerances, and straight-line code.
 CERTIFIED: int
@@ -129,10 +139,12 @@ def search_line(w: Array) -> bool:
 def descend(w: Array) -> int:
     """Newton descent on the energy from the unknowns in the workspace; return the status.
 
-    Where pivots are not positive they are made so, and a step that does not lower the energy is halved. It ends in a stable
-    equilibrium unless there is none, a section comes to the end of its range, or the steps are spent.
+    Where pivots are not positive they are made so: by turns hardly, which is quick near a neutral equilibrium, and by the
+    springs' own stiffness, as pivots behind a tiny one are huge. A step that does not lower the energy is halved. It ends in a
+    stable equilibrium unless there is none, a section comes to the end of its range, or the steps are spent.
     """
     saddles = 0
+    strong = 0
     w[GUARD] = 0.0
     w[SPENT] = 0.0
     evaluate(w)
@@ -147,7 +159,10 @@ def descend(w: Array) -> int:
             evaluate(w)
         else:
             if not stable:
-                w[GUARD] = 1.0
+                w[GUARD] = LEAST_GUARD
+                if strong > 0:
+                    w[GUARD] = LARGEST_GUARD
+                strong = 1 - strong
                 evaluate(w)
                 w[GUARD] = 0.0
             if not search_line(w):

@@ -25,9 +25,6 @@ import numpy as np
 from softrobots.kernels.elements import constants
 from softrobots.kernels.expressions import Scalar, absolute, if_less, larger, smaller
 
-FLOOR = 1e-3
-"""Least pivot of a guarded step, relative to the spring's own stiffness."""
-
 
 @dataclass
 class Beyond:
@@ -104,7 +101,7 @@ def eliminate(
         stiffness: Second derivatives of the energy within the element, shape (k, k).
         right_hand_sides: Gradient of each right-hand side (k).
         scales: The coordinates' own stiffness (k), to compare pivots with.
-        guard: Above 0.5: pivots that are not clearly positive are made so.
+        guard: Where positive, pivots are made so, and at least this in terms of the spring's own stiffness.
         multipliers: Whether the coordinates are multipliers, whose pivots are negative and never guarded.
 
     Returns:
@@ -127,7 +124,7 @@ def eliminate(
         softest = smaller(absolute(relative), softest)
         negatives = negatives + if_less(0.0, relative, 0.0, 1.0)
         if not multipliers:
-            pivot = if_less(0.5, guard, larger(absolute(pivot), scales[j] * FLOOR), pivot)
+            pivot = if_less(0.0, guard, larger(absolute(pivot), guard * scales[j]), pivot)
         inverse.append(1.0 / pivot)
         for i in range(j + 1, k):
             lower[i, j] = block[j, i] * inverse[j]

@@ -12,7 +12,7 @@ from typing import Any
 from softrobots.kernels.drivers import go_to_start, settle_from
 from softrobots.kernels.intrinsics import Array, sqrt, zeros
 from softrobots.kernels.motor_drivers import estimate, estimated, reach, within_limits
-from softrobots.kernels.settings import PASSES
+from softrobots.kernels.settings import FORCE_PASSES, PASSES
 
 # Made for each robot.
 CERTIFIED: int
@@ -134,7 +134,7 @@ def estimate_batch(
             for j in range(3):
                 lanes[(GRAVITY + j) * LANES + lane] = gravity[j]
         first_force_pass_lanes(lanes)
-        for _ in range(PASSES):
+        for _ in range(FORCE_PASSES):
             if not running(lanes):
                 break
             force_pass_lanes(lanes)

@@ -270,7 +270,7 @@ def _finish(unknowns: Unknowns, layout: Layout, passing: Passing, *, weight: boo
 
 def _decide(unknowns: Unknowns, layout: Layout, passing: Passing) -> Block:
     block = Block("decide", "Decide what becomes of the case.")
-    names = ("energy", "slope", "error", "length", "size", "rounding", "softest", "negatives")
+    names = ("energy", "slope", "error", "length", "size", "rounding", "softest", "negatives", "room")
     point: dict[str, Scalar] = {name: block.load(layout.single(name)) for name in names}
     mode, share = decide(
         block,

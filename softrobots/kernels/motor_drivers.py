@@ -10,7 +10,16 @@ from collections.abc import Callable
 
 from softrobots.kernels.drivers import descend, go_to_start
 from softrobots.kernels.intrinsics import Array
-from softrobots.kernels.settings import HIDDEN, LARGEST_SIZE, LEAST_SIZE, OBSERVABLE, PASSES, SEARCH_STEPS, TOLERANCE
+from softrobots.kernels.settings import (
+    FORCE_PASSES,
+    HIDDEN,
+    LARGEST_SIZE,
+    LEAST_SIZE,
+    OBSERVABLE,
+    PASSES,
+    SEARCH_STEPS,
+    TOLERANCE,
+)
 
 # Made for each robot.
 CERTIFIED: int
@@ -169,7 +178,7 @@ def within_limits(w: Array, varied: int) -> int:
 def estimate(w: Array) -> int:
     """Find the force that explains the motor torques in the workspace; return the status."""
     first_force_pass(w)
-    for _ in range(PASSES):
+    for _ in range(FORCE_PASSES):
         if w[MODE] > 0.5:
             break
         force_pass(w)

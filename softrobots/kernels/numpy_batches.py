@@ -13,7 +13,7 @@ import numpy as np
 
 from softrobots.checks import FloatArray
 from softrobots.kernels.program import Program
-from softrobots.kernels.settings import OBSERVABLE, PASSES
+from softrobots.kernels.settings import FORCE_PASSES, OBSERVABLE, PASSES
 from softrobots.kernels.statuses import Status
 
 BLOCK = 4096
@@ -83,7 +83,7 @@ class NumpyBatches:
         for rows in self._blocks(first, last):
             count = rows.stop - rows.start
             w = self._workspace(count, [(0, motors[rows]), (layout.torques, torques[rows]), (layout.gravity, gravity)])
-            for lane in self._run(w, rows, statuses, "first_force_pass", "force_pass"):
+            for lane in self._run(w, rows, statuses, "first_force_pass", "force_pass", FORCE_PASSES):
                 statuses[rows.start + lane] = self._alone(w, lane, self._module.estimate)
             observed[rows] = self._root(w, "observed", count)
             hidden = (statuses[rows] == Status.CERTIFIED) & (observed[rows] < OBSERVABLE * self._module.REACH)
@@ -143,12 +143,12 @@ class NumpyBatches:
             else:
                 w[place + column][lane] = values[lane, column]
 
-    def _run(self, w: list[Any], rows: slice, statuses: Any, first: str, then: str) -> Any:
+    def _run(self, w: list[Any], rows: slice, statuses: Any, first: str, then: str, most: int = PASSES) -> Any:
         """Do the passes; return the lanes that they do not settle."""
         mode = self._layout.single("mode")
         with np.errstate(all="ignore"):  # cases that overflow are told by their numbers
             self._functions[first](w)
-            for _ in range(PASSES):
+            for _ in range(most):
                 if not np.any(w[mode] < 0.5):
                     break
                 self._functions[then](w)

@@ -60,8 +60,8 @@ def decide(
 ) -> tuple[Scalar, Scalar]:
     """Decide what becomes of a case.
 
-    Mode 0 goes on, 1 is settled and stable, 2 is left to the descent: where pivots are not positive, the energy does not fall
-    as it should, or a number is none.
+    Mode 0 goes on, 1 is settled and stable, 2 is left to the descent: where pivots are not positive, a section is beyond its
+    range, the energy does not fall as it should, or a number is none.
 
     Args:
         block: The block that the pass is traced in.
@@ -78,7 +78,8 @@ def decide(
     error, length, energy = point["error"], point["length"], point["energy"]
     settled_to = larger(point["size"] * TIGHT**2, spring_rounding**2)
     all_signs = if_less(absolute(point["negatives"] - float(held)), 0.5, 1.0, 0.0)
-    stable = if_less(LEAST_SOFTNESS, point["softest"], if_less(point["size"], 1e300, all_signs, 0.0), 0.0)
+    sound = if_less(point["size"], 1e300, if_less(point["room"], 0.0, 0.0, all_signs), 0.0)
+    stable = if_less(LEAST_SOFTNESS, point["softest"], sound, 0.0)
     going = if_less(energy, bound, 2.0 - 2.0 * stable, 2.0)
     new_mode = if_less(1.5, mode, 2.0, if_less(error, settled_to, 2.0 - stable, going))
     share = LARGEST_STEP / square_root(larger(length, LARGEST_STEP**2))

@@ -26,12 +26,12 @@ N_VARIED: int
 target_step: Callable[[Array], None]
 
 
-def near(w: Array) -> bool:
-    """Tell whether no motor has gone further than a radian from the point before: another elbow or turn would be."""
+def near(w: Array, place: int) -> bool:
+    """Tell whether no motor has gone further than a radian from those kept at a place: another elbow or turn would be."""
     furthest = 0.0
     for i in range(N_MOTORS):
-        if fabs(w[i] - w[BEFORE + i]) > furthest:
-            furthest = fabs(w[i] - w[BEFORE + i])
+        if fabs(w[i] - w[place + i]) > furthest:
+            furthest = fabs(w[i] - w[place + i])
     return furthest <= 1.0
 
 
@@ -53,23 +53,30 @@ def correct(w: Array, share: float) -> None:
         w[CORRECTION + N_VARIED + i] = share * (w[UNKNOWN + i] - w[FORESEEN + N_VARIED + i])
 
 
-def step_in_parts(w: Array, targets: Array, row: int) -> bool:
-    """Go from the waypoint before to this one through points between; tell whether it arrived."""
+def step_in_parts(w: Array, targets: Array, last: int, row: int) -> bool:
+    """Go from the last waypoint that was reached to this one through points between; tell whether it arrived.
+
+    `FORESEEN` keeps the motors at the last point between.
+    """
     for doubling in range(1, 7):
         parts = 1
         for _ in range(doubling):
             parts *= 2
         go_back(w, 0, N_MOTORS)
+        for i in range(N_MOTORS):
+            w[FORESEEN + i] = w[i]
         arrived = True
         for part in range(1, parts + 1):
             for i in range(3):
-                last = targets[3 * (row - 1) + i]
-                w[TARGET + i] = last + (targets[3 * row + i] - last) * part / parts
+                begin = targets[3 * last + i]
+                w[TARGET + i] = begin + (targets[3 * row + i] - begin) * part / parts
                 w[FOLLOWING + i] = w[TARGET + i]
-            if not step_to_target(w):
+            if not step_to_target(w) or not near(w, FORESEEN):
                 arrived = False
                 break
-        if arrived and near(w):
+            for i in range(N_MOTORS):
+                w[FORESEEN + i] = w[i]
+        if arrived:
             return True
     return False
 
@@ -84,6 +91,8 @@ def follow(
     the squared residual, the squared distance from the target, the status.
     """
     reached = 0
+    last = 0
+    foreseen = 0
     for row in range(count):
         following = row + 1
         if following == count:
@@ -97,11 +106,12 @@ def follow(
             correct(w, 0.0)
         else:
             status = CERTIFIED
-            if step_to_target(w) and near(w):
-                correct(w, where(row > 1, 1.0, 0.0))
+            if step_to_target(w) and near(w, BEFORE):
+                correct(w, where(foreseen > 1, 1.0, 0.0))
             else:
                 correct(w, 0.0)
-                if not step_in_parts(w, targets, row):
+                if not step_in_parts(w, targets, last, row):
+                    foreseen = 0
                     status = NOT_REACHED
                     go_back(w, 0, N_MOTORS)
                 for i in range(3):
@@ -118,6 +128,8 @@ def follow(
         statuses[row] = status
         if status == CERTIFIED:
             reached += 1
+            foreseen += 1
+            last = row
             remember(w)
             foresee(w)
     return reached

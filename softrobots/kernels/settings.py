@@ -17,6 +17,12 @@ LARGEST_SIZE = 1e31
 LEAST_SOFTNESS = 1e-9
 """Smallest pivot that counts as positive, relative to the springs' own stiffness."""
 
+LEAST_GUARD = 1e-3
+"""Least pivot of a guarded step, relative to the spring's own stiffness; every second guarded step has the larger one."""
+
+LARGEST_GUARD = 3.0
+"""The larger one."""
+
 LARGEST_STEP = 0.5
 """Largest Newton step, as a norm [rad]."""
 
@@ -46,6 +52,10 @@ HIDDEN = 0.05
 
 PASSES = 10
 """Newton passes before a case is left to the descent or the search."""
+
+FORCE_PASSES = 5
+"""The same in load estimation. Cases that take more are near a pose in which the motors do not feel every force, and plain
+Newton may find one far from zero; the damped search finds the one that `softrobots.estimate_load` does."""
 
 DESCENT_STEPS = 200
 """Most steps of a descent."""
