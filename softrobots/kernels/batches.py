@@ -63,7 +63,7 @@ def unusable(*arrays: FloatArray) -> Any:
     """Which rows hold a number that is not finite or too large to compute with, truth values."""
     made = np.zeros(len(arrays[0]), dtype=bool)
     for array in arrays:
-        if array.size and not (-LARGEST <= array.min() and array.max() <= LARGEST):  # rarely; both are NaN if a number is
+        if array.size and not (array.min() >= -LARGEST and array.max() <= LARGEST):  # rarely; both are NaN if a number is
             made |= ~np.all(np.abs(array) <= LARGEST, axis=1)
     return made
 

@@ -233,6 +233,9 @@ class CompiledModel:
     def estimate_load(self, q_motors: Any, motor_torques: Any, *, gravity: Any = None) -> CompiledLoadEstimate:
         """Find the force on the tip from the motor torques.
 
+        Near poses in which the motors hardly feel one direction of the force, several forces can explain the same torques, and
+        this finds another one than `softrobots.estimate_load` in a few cases of a thousand; see `observability` of the answer.
+
         Args:
             q_motors: Motor coordinates, shape (n_motors,) [rad or m].
             motor_torques: Load on each motor, shape (n_motors,) [N m or N], with the sign of `Equilibrium.motor_torques`.

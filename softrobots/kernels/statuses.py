@@ -13,9 +13,9 @@ class Status(IntEnum):
     UNSTABLE = 1
     """In balance, but not stable: neutral, or a saddle that the descent did not leave."""
     UNSETTLED = 2
-    """Not in balance within the steps."""
+    """Not in balance within the steps; also where a load presses a section to the end of its range."""
     OUT_OF_RANGE = 3
-    """A section is bent or twisted to the end of its range."""
+    """A section is bent or twisted beyond its range."""
     NOT_A_NUMBER = 4
     """The input is not finite or too large to compute with, or muscle lengths that no shape has."""
     UNOBSERVABLE = 5
