@@ -38,7 +38,8 @@ CONSTANTS = (0.0, 1.0, -1.0, 2.0, -0.75)
 
 
 # Text like `a + b + c` is put together from left to right, whatever was written: rounding may differ, values may not. So all
-# is computed with 90 digits. What is a double exactly may be a constant in the code; its functions come from libm.
+# is computed with 90 digits. What is a double exactly may be a constant in the code; its functions come from libm, and sums of
+# constants are rounded to doubles where they fold: nine digits are asked for.
 
 
 def with_digits(plain: Callable[[float], float], exact: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -60,9 +61,9 @@ def function(name: str, value: Any) -> Any:
 
 
 def less(one: Any, other: Any, then: Any, otherwise: Any) -> Any:
-    """`if_less`; what differs by the 60th digit only is not compared."""
+    """`if_less`; what differs by the tenth digit only is not compared."""
     if isinstance(one, mp.mpf) or isinstance(other, mp.mpf):
-        assume(one == other or abs(one - other) > 1e-60)
+        assume(one == other or abs(one - other) > 1e-9)
         return then if one < other else otherwise
     return if_less(one, other, then, otherwise)
 
@@ -126,9 +127,9 @@ def exactly(inputs: Sequence[float]) -> list[Any]:
 
 
 def same(found: Sequence[Any], expected: Sequence[Any]) -> bool:
-    """Whether numbers agree to 50 digits of the largest that comes up."""
+    """Whether numbers agree to nine digits of the largest that comes up."""
     largest = 1 + max(abs(one) for one in expected)
-    return all(abs(one - other) < 1e-50 * largest for one, other in zip(found, expected, strict=True))
+    return all(abs(one - other) < 1e-9 * largest for one, other in zip(found, expected, strict=True))
 
 
 def moderate(numbers: Sequence[Any]) -> bool:
