@@ -19,9 +19,10 @@ from softrobots import plots
 from softrobots.benchmark.jobs import JOBS, measure
 from softrobots.benchmark.pictures import PICTURES, picture
 from softrobots.benchmark.race import Settings, quick_settings
-from softrobots.benchmark.results import Results, as_json, marked, read_results, require_whole, table
+from softrobots.benchmark.results import Results, as_json, read_results, require_whole, table
 from softrobots.command_line import exit_status
 from softrobots.files import make_folder, new_file, write_text
+from softrobots.marked_text import marked
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"

@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,6 +33,7 @@ from softrobots.interop.kinematics import KinematicsRow, compare_kinematics
 from softrobots.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
 from softrobots.interop.springs_read import FORMATS, springs_read
 from softrobots.interop.tools import TOOLS
+from softrobots.marked_text import marked
 from softrobots.paths import urdf_folder
 
 ROBOTS = {"inflatable_arm": "inflatable arm", "pcc_arm_lumped": "arm of muscles", "helix_tube_lumped": "helical tube"}
@@ -207,10 +207,7 @@ def readme_with(text: str, results: Results) -> str:
     Raises:
         FileFormatError: If it does not have each mark once, in order.
     """
-    pattern = re.compile(f"{re.escape(BEGIN)}\n.*?{re.escape(END)}\n", re.DOTALL)
-    if len(pattern.findall(text)) != 1 or text.count(BEGIN) + text.count(END) != 2:
-        raise sr.FileFormatError(f"the README must have the lines {BEGIN} and {END} once each")
-    return pattern.sub(lambda _: f"{BEGIN}\n\n{document(results)}\n\n{END}\n", text)
+    return marked(text, "the README", BEGIN, END, document(results))
 
 
 def figure(results: Results) -> Any:

@@ -34,11 +34,19 @@ METHODS = ("newton", "fixed_point")
 TOLERANCE = 1e-10
 """Default residual tolerance, relative to the scale of the load."""
 
-_MOMENT_FLOOR = 1e-3  # [N m], scale of the residual for vanishing loads
-_LARGEST_STEP = 0.5  # [rad], norm of one Newton step; the linear model of a revolute chain says little beyond
-_DESCENT = 1e-4  # share of the predicted decrease that a step must reach (Armijo)
+MOMENT_FLOOR = 1e-3
+"""Least scale of the residual, for vanishing loads [N m]."""
+
+LARGEST_STEP = 0.5
+"""Norm of the largest Newton step [rad]; the linear model of a revolute chain says little beyond."""
+
+ARMIJO = 1e-4
+"""Share of the predicted decrease of the energy that a step must reach."""
+
+ENERGY_ROUNDING = 1e-14
+"""Energies this close, relative to their terms, cannot be told apart."""
+
 _SHORTEST = 1e-12  # share of a Newton step below which it is not halved again
-_ROUNDING = 1e-14  # energies this close, relative to their terms, cannot be told apart
 
 
 class ElasticState(NamedTuple):
@@ -136,7 +144,7 @@ def largest_residual(model: SoftModel, scale: float, tolerance: float) -> float:
         scale: Size of the load, `ElasticState.scale` [N m].
         tolerance: Relative tolerance.
     """
-    return max(tolerance * max(scale, _MOMENT_FLOOR), model.rounding)
+    return max(tolerance * max(scale, MOMENT_FLOOR), model.rounding)
 
 
 class _Case:
@@ -175,7 +183,7 @@ class _Case:
 
     def rounding(self, state: ElasticState) -> float:
         """Rounding of the energy: its terms are as large as this even where they cancel (a tip folded back to the base) [J]."""
-        return _ROUNDING * (state.scale + float(self.model.stiffness.dot(state.q_springs * state.q_springs)))
+        return ENERGY_ROUNDING * (state.scale + float(self.model.stiffness.dot(state.q_springs * state.q_springs)))
 
 
 def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool, factors: Any = None) -> bool:
@@ -251,7 +259,7 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
         scale = 1.0
         trial = case.state(state.q_springs + step)
         spent += 1
-        while case.too_high(trial, state, _DESCENT * scale * slope) and spent < most and scale > _SHORTEST:
+        while case.too_high(trial, state, ARMIJO * scale * slope) and spent < most and scale > _SHORTEST:
             scale *= 0.5
             trial = case.state(state.q_springs + scale * step)
             spent += 1
@@ -280,7 +288,7 @@ def _newton_step(state: ElasticState, stiffness: FloatArray, factors: Any) -> Fl
         values = np.maximum(np.abs(values), 1e-3)
         step = -softness * (vectors @ ((vectors.T @ (softness * state.residual)) / values))
         length = norm(step)
-    return np.asarray(step if length <= _LARGEST_STEP else step * (_LARGEST_STEP / length))
+    return np.asarray(step if length <= LARGEST_STEP else step * (LARGEST_STEP / length))
 
 
 def _escape(state: ElasticState, stiffness: FloatArray) -> FloatArray | None:
@@ -327,7 +335,7 @@ def newton(
     *,
     tolerance: float = TOLERANCE,
     max_iterations: int = 20,
-    largest_step: float = _LARGEST_STEP,
+    largest_step: float = LARGEST_STEP,
 ) -> tuple[ElasticState | None, int]:
     """Undamped Newton; gives up at a singular tangent or a step too long to trust. It goes to unstable equilibria too.
 

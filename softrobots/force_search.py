@@ -7,12 +7,14 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from softrobots.checks import FloatArray
+from softrobots.elastostatics import MOMENT_FLOOR, TOLERANCE
 
 OBSERVABLE = 1e-3
 """A direction counts as unobservable when its singular value is below this share of the reach."""
 
-_TOLERANCE = 1e-10  # of the torque equation, relative to the torques
-_MOMENT_FLOOR = 1e-3  # [N m], scale of the residual for vanishing torques
+HIDDEN = 0.05
+"""Share of the motor torques that may stay unexplained where the motors do not feel every direction of the force."""
+
 _FIRST_DAMPING = 0.03  # of the first step, relative to the reach: keeps the force small where it is barely felt
 _LAST_DAMPING = 1e-7
 
@@ -62,7 +64,7 @@ class Measurement(Protocol[State]):
 
 def torque_tolerance(torques: FloatArray) -> float:
     """Largest part of motor torques that may stay unexplained [N m]."""
-    return _TOLERANCE * max(float(np.linalg.norm(torques)), _MOMENT_FLOOR)
+    return TOLERANCE * max(float(np.linalg.norm(torques)), MOMENT_FLOOR)
 
 
 def search_force(problem: Measurement[State], state: State, most: int) -> tuple[FloatArray, State, int]:

@@ -18,7 +18,7 @@ from softrobots.checks import FloatArray, choice, finite_array, positive_integer
 from softrobots.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, settled
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import LoadNotFound, ParameterError
-from softrobots.force_search import OBSERVABLE, Directions, search_force, torque_tolerance
+from softrobots.force_search import HIDDEN, OBSERVABLE, Directions, search_force, torque_tolerance
 from softrobots.kinematics import frame_jacobian
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
@@ -200,7 +200,7 @@ def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None)
     left, values, _, keep = problem.directions(state)
     missing = left.T @ problem.unexplained(state)
     scatter = 0.0 if noise is None else 5.0 * float(np.linalg.norm(noise))
-    hidden = 0.05 * float(np.linalg.norm(problem.torques)) + OBSERVABLE * problem.model.stiffest
+    hidden = HIDDEN * float(np.linalg.norm(problem.torques)) + OBSERVABLE * problem.model.stiffest
     felt, surplus = missing[: len(values)], missing[len(values) :]
     allowed = max(problem.tolerance, scatter) if keep.all() else hidden + scatter
     return bool(np.linalg.norm(felt) <= allowed and (noise is None or np.linalg.norm(surplus) <= max(allowed, scatter)))

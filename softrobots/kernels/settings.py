@@ -1,20 +1,22 @@
-"""Tolerances of the compiled solvers; those of `softrobots.elastostatics`, where it has them."""
+"""Tolerances of the compiled solvers: those of the solvers on Pinocchio, where they have them, and their own."""
 
 from __future__ import annotations
 
-TOLERANCE = 1e-10
+from softrobots import elastostatics, force_search, springs
+
+TOLERANCE = elastostatics.TOLERANCE
 """Largest residual of an answer, relative to the size of the load."""
 
 TIGHT = 1e-12
 """Residual at which Newton stops; reached from one below `TOLERANCE` in one step."""
 
-LEAST_SIZE = 1e-3
+LEAST_SIZE = elastostatics.MOMENT_FLOOR
 """Least size of a load [N m]."""
 
 LARGEST_SIZE = 1e31
 """Largest size of motor torques [N m]; above it squares would soon overflow."""
 
-LEAST_SOFTNESS = 1e-9
+LEAST_SOFTNESS = springs.POSITIVE
 """Smallest pivot that counts as positive, relative to the springs' own stiffness."""
 
 LEAST_GUARD = 1e-3
@@ -23,13 +25,13 @@ LEAST_GUARD = 1e-3
 LARGEST_GUARD = 3.0
 """The larger one."""
 
-LARGEST_STEP = 0.5
+LARGEST_STEP = elastostatics.LARGEST_STEP
 """Largest Newton step, as a norm [rad]."""
 
-ARMIJO = 1e-4
+ARMIJO = elastostatics.ARMIJO
 """Share of the predicted fall of the energy that a step must reach."""
 
-ROUNDING = 1e-14
+ROUNDING = elastostatics.ENERGY_ROUNDING
 """Energies this close, relative to their terms, cannot be told apart."""
 
 LANES = 16
@@ -41,13 +43,13 @@ FEWEST_LANES = 8
 LANE_MEMORY = 65_536
 """Workspace of all lanes together [bytes]."""
 
-OBSERVABLE = 1e-3
+OBSERVABLE = force_search.OBSERVABLE
 """Smallest singular value of the elastostatic Jacobian at which the motors feel every force, relative to the reach."""
 
 BLUR = 1e-6
 """Singular value of the elastostatic Jacobian that counts as none, relative to the reach."""
 
-HIDDEN = 0.05
+HIDDEN = force_search.HIDDEN
 """Share of the motor torques that may stay unexplained where the motors do not feel every force."""
 
 PASSES = 10
