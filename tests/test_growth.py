@@ -16,7 +16,7 @@ from softrobots.body import body_at
 from softrobots.growth import SHORTEST, grown_coordinates
 from softrobots.scene import Scene
 from softrobots.viewer import view
-from tests.test_viewer import browser, picture_of  # noqa: F401 - a fixture
+from tests.test_viewer import browser, pictures_of  # noqa: F401 - a fixture
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +164,7 @@ def test_the_page_shows_the_tube_growing(browser: object, tmp_path: Path) -> Non
     text = page.read_text(encoding="utf-8")
     assert "wall that has not come out" in text
     assert "wrinkling" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)  # nothing is loaded
-    shots = [picture_of(browser, page.as_uri(), share) for share in (0.2, 1.0)]
+    shots = pictures_of(browser, page.as_uri(), 0.2, 1.0)
     yellow = [int(np.count_nonzero(shot[200:, :, 0] - shot[200:, :, 2] > 25)) for shot in shots]  # the wall that is out
     assert yellow[0] > 100
     assert yellow[1] > 2.0 * yellow[0]

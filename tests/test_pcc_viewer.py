@@ -10,7 +10,7 @@ import pytest
 import softrobots as sr
 from softrobots.body import body
 from softrobots.viewer import Viewer, view
-from tests.test_viewer import browser, picture_of  # noqa: F401 - a fixture
+from tests.test_viewer import browser, pictures_of  # noqa: F401 - a fixture
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
 
@@ -38,7 +38,7 @@ def test_page_shows_pulling_and_pushing_muscles(browser: object, pcc: sr.SoftMod
     assert "muscle that pushes" in text
     assert "same muscle lengths" in text
     assert "path of the tip" not in text  # none is drawn
-    shot = picture_of(browser, page.as_uri(), 0.0)
+    (shot,) = pictures_of(browser, page.as_uri(), 0.0)
     assert min(muscles(shot)) > 300
 
 
@@ -47,7 +47,7 @@ def test_animation_bends_the_tube(browser: object, pcc: sr.SoftModel, tmp_path: 
     trajectory = sr.follow_trajectory(pcc, path.positions, (0, 0, -3), times=path.times)
     with view(pcc, trajectory) as viewer:
         address = viewer.write_html(tmp_path / "a.html").as_uri()
-    start, again, end = (picture_of(browser, address, share) for share in (0.0, 0.0, 1.0))
+    start, end, again = pictures_of(browser, address, 0.0, 1.0, 0.0)
     assert np.array_equal(start, again)
     assert np.count_nonzero(np.abs(start - end).max(axis=2) > 30) > 5000
     # One body at a time: as much of it at the end as at the start, not two.

@@ -77,7 +77,8 @@ def coloured(picture: np.ndarray) -> int:
     return int(np.count_nonzero(scene[..., 0] - scene[..., 2] > 60))
 
 
-def picture_of(browser: object, page_address: str, share: float) -> np.ndarray:
+def pictures_of(browser: object, page_address: str, *shares: float) -> list[np.ndarray]:
+    """Pictures of a page at shares of its animation, in this order."""
     page = browser.new_page(viewport={"width": 800, "height": 600})
     messages: list[str] = []
     page.on("console", lambda message: messages.append(message.text) if message.type == "error" else None)
@@ -85,12 +86,14 @@ def picture_of(browser: object, page_address: str, share: float) -> np.ndarray:
     page.on("request", lambda request: None if request.url.startswith("data:") else requests.append(request.url))
     page.on("pageerror", lambda error: messages.append(str(error)))
     page.goto(page_address)
-    show_share(page, share)
-    shot = pixels(page.screenshot())
+    shots = []
+    for share in shares:
+        show_share(page, share)
+        shots.append(pixels(page.screenshot()))
     page.close()
     assert messages == []
     assert set(requests) == {page_address}  # self-contained: no file but its own is asked for
-    return shot
+    return shots
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -151,7 +154,7 @@ def test_the_page_draws_the_robot_and_the_animation_moves_it(
 ) -> None:
     with view(arm, trajectory) as viewer:
         address = viewer.write_html(tmp_path / "a.html").as_uri()
-    start, again, end = (picture_of(browser, address, share) for share in (0.0, 0.0, 1.0))
+    start, end, again = pictures_of(browser, address, 0.0, 1.0, 0.0)
     assert coloured(start) > 3000
     assert coloured(end) > 3000
     assert np.array_equal(start, again)  # the same pose gives the same picture

@@ -27,11 +27,11 @@ class Actuation:
     def put(self, run: Any, w: Any, motors: FloatArray) -> None:
         """Write one case into a workspace, with its start."""
         layout = run.layout
-        w[: self._count] = run.flat(motors[: self._count])
+        run.put(w, 0, motors[: self._count])
         if self._tensions:
-            w[layout.pull : layout.pull + layout.unknowns] = run.flat(self._pulls(motors[None]))
+            run.put(w, layout.pull, self._pulls(motors[None]))
         if self._lengths:
-            w[layout.start : layout.start + layout.unknowns] = run.flat(self._starts(motors[None]))
+            run.put(w, layout.start, self._starts(motors[None]))
 
     def jacobian(self, run: Any, w: Any) -> FloatArray:
         """Elastostatic Jacobian of all actuators where a workspace has been looked at, shape (3, n_motors)."""

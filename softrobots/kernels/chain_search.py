@@ -48,9 +48,9 @@ class ChainSearch:
         run, layout = self.run, self.run.layout
         w = run.workspace()
         self.actuation.put(run, w, q_motors)
-        w[layout.force : layout.force + 3] = run.flat(force)
-        w[layout.gravity : layout.gravity + 3] = run.flat(gravity)
-        w[layout.unknown : layout.unknown + layout.unknowns] = run.flat(self.actuation.unknowns(q_motors, start))
+        run.put(w, layout.force, force)
+        run.put(w, layout.gravity, gravity)
+        run.put(w, layout.unknown, self.actuation.unknowns(q_motors, start))
         status = Status(run.settle_from(w))
         return status, ChainState(w, self.actuation.elastic(self.unknowns(w)))
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, choice, finite_array, positive_number, read_only
+from softrobots.checks import choice, finite_array, positive_number, read_only
 from softrobots.errors import EquilibriumNotFound, LoadNotFound, ParameterError, TargetUnreachable
 from softrobots.inverse_kinematics import solve_ik, start_motors
 from softrobots.kernels.actuation import Actuation
@@ -27,6 +27,7 @@ from softrobots.kernels.results import (
     LoadBatch,
     MotorBatch,
 )
+from softrobots.kernels.short_search import ShortSearch
 from softrobots.kernels.statuses import Status
 from softrobots.kernels.unknowns import Unknowns
 from softrobots.load_estimation import check_feels
@@ -173,15 +174,14 @@ class CompiledModel:
         run = self._run(gravity is not None)
         motors = self._model.checked_motors(q_motors)
         w = run.workspace()
-        w[run.layout.force : run.layout.force + 3] = finite_array("force", force, (3,), "N")
-        _put_gravity(run, w, gravity)
+        run.put(w, run.layout.force, finite_array("force", force, (3,), "N"))
+        run.put(w, run.layout.gravity, gravity_vector(gravity))
         self._actuation.put(run, w, motors)
         if q_springs0 is None:
             status = run.settle(w)
         else:
             springs = finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
-            start = run.layout.unknown
-            w[start : start + run.layout.unknowns] = self._actuation.unknowns(motors, springs)
+            run.put(w, run.layout.unknown, self._actuation.unknowns(motors, springs))
             status = run.settle_from(w)
         found = CompiledEquilibrium(w, run.layout, self._actuation, motors)
         if status != Status.CERTIFIED:
@@ -271,14 +271,7 @@ class CompiledModel:
         run = self._run(gravity is not None)
         motors = self._model.checked_motors(q_motors)
         torques = finite_array("motor_torques", motor_torques, self._shape, "N m")
-        if self._unknowns.is_short:
-            w = run.workspace()
-            w[: self._motors] = motors
-            w[self._torques : self._torques + self._motors] = torques
-            _put_gravity(run, w, gravity)
-            status = run.estimate(w)
-        else:
-            status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
+        status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
         found = CompiledLoadEstimate(w, run.layout, self._actuation, motors)
         if status != Status.CERTIFIED:
             raise LoadNotFound(
@@ -436,11 +429,7 @@ class CompiledModel:
             motors = solve_ik(self._model, points[0], load, gravity=gravity, tolerance=tolerance).q_motors
         else:
             motors = self._model.checked_motors(q_motors0, "q_motors0")
-        down = gravity_vector(gravity)
-        if self._unknowns.is_short:
-            batch, spent = self._follow(run, points, load, down, motors, tolerance)
-        else:
-            batch, spent = self._search(run).follow(points, load, down, motors, tolerance)
+        batch, spent = self._search(run).follow(points, load, gravity_vector(gravity), motors, tolerance)
         if batch.status[0] != Status.CERTIFIED:
             raise TargetUnreachable(
                 f"waypoint 1 of {len(points)} is not reached from motors {motors.tolist()}: the tip comes within "
@@ -451,39 +440,13 @@ class CompiledModel:
             )
         return batch
 
-    def _follow(
-        self, run: Any, points: FloatArray, load: FloatArray, gravity: FloatArray, motors: FloatArray, tolerance: float
-    ) -> tuple[MotorBatch, int]:
-        """Follow a path by generated code; what `ChainSearch.follow` is to other chains."""
-        w, layout, count = run.workspace(), run.layout, len(points)
-        w[: self._motors] = run.flat(motors)
-        w[layout.force : layout.force + 3] = run.flat(load)
-        w[layout.gravity : layout.gravity + 3] = run.flat(gravity)
-        w[layout.unknown : layout.unknown + layout.unknowns] = run.flat(self._actuation.unknowns(motors, self._model.rest))
-        w[layout.single("tolerated")] = float(tolerance)
-        found, unknowns = run.array(count * self._motors), run.array(count * layout.unknowns)
-        residuals, errors, statuses = run.array(count), run.array(count), run.array(count)
-        run.follow(w, run.flat(points), count, found, unknowns, residuals, errors, statuses)
-        batch = MotorBatch(
-            read_only(self._actuation.elastic(np.reshape(unknowns, (count, layout.unknowns)))),
-            statuses_of(np.asarray(statuses, dtype=np.uint8)),
-            read_only(np.sqrt(residuals)),
-            read_only(np.reshape(found, (count, self._motors))),
-            read_only(np.sqrt(errors)),
-        )
-        return batch, int(w[layout.single("spent")])
-
-    def _search(self, run: Any) -> Any:
+    def _search(self, run: Any) -> ShortSearch | ChainSearch:
         """Who does load estimation and inverse kinematics: generated code, or searches in Python on top of it."""
-        return run if self._unknowns.is_short else ChainSearch(self._model, self._actuation, run)
+        kind = ShortSearch if self._unknowns.is_short else ChainSearch
+        return kind(self._model, self._actuation, run)
 
     def _run(self, weight: bool) -> Any:
         run = self._runs.get(weight)
         if run is None:
             run = self._runs[weight] = make_run(make_program(self._unknowns, weight=weight), self._backend)
         return run
-
-
-def _put_gravity(run: Any, w: Any, gravity: Any) -> None:
-    if gravity is not None:
-        w[run.layout.gravity : run.layout.gravity + 3] = gravity_vector(gravity)

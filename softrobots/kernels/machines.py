@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.checks import FloatArray
 from softrobots.errors import MissingDependency
 from softrobots.kernels import intrinsics
 from softrobots.kernels.numpy_batches import NumpyBatches
@@ -76,6 +77,10 @@ class Run:
     def flat(self, values: Any) -> Any:
         """Numbers one after the other."""
         return np.ascontiguousarray(values, dtype=np.float64).ravel()
+
+    def put(self, w: Any, place: int, values: FloatArray) -> None:
+        """Write numbers into a workspace, from a place on."""
+        w[place : place + values.size] = self.flat(values)
 
 
 class PythonRun(Run):
