@@ -247,12 +247,12 @@ def _fixed_point(case: _Case, start: FloatArray, most: int) -> tuple[ElasticStat
 def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, int, bool]:
     """Newton descent on the energy, out of unstable equilibria too."""
     stiffness, factors = case.model.stiffness, LDLT(len(start))
-    state, spent = case.state(start), 0
+    state, spent, stalled = case.state(start), 0, False
     while spent < most:
         settled = case.settled(state)
         if settled and case.stable(state, factors):
             return state, spent, True
-        step = _escape(state, stiffness) if settled else _newton_step(state, stiffness, factors)
+        step = _escape(state, stiffness) if settled or stalled else _newton_step(state, stiffness, factors)
         if step is None:  # neutral equilibrium: balanced, neither stable nor unstable
             break
         slope = float(state.residual.dot(step))
@@ -266,9 +266,12 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
         if not math.isfinite(trial.energy):  # a section is at the end of its range, and the load presses it on
             break
         # Below rounding the energy says nothing; there the residual must shrink.
-        if not settled and trial.error >= state.error and -slope < case.rounding(state):
-            break
-        state = trial
+        if not settled and not stalled and trial.error >= state.error and -slope < case.rounding(state):
+            if case.stable(state, factors):
+                break
+            stalled = True  # beside a saddle, where Newton's step leads away from the balance: leave it downhill
+            continue
+        state, stalled = trial, False
     return state, spent, case.stable(state)
 
 

@@ -180,3 +180,17 @@ def test_one_blas_thread_is_given_back() -> None:
     assert counts() == before
     with one_blas_thread(4):
         assert counts() == before
+
+
+@pytest.mark.parametrize("force", [(0.0, 10.0, -20.0), (1.0, 10.0, -20.0)])
+def test_the_descent_leaves_a_saddle_that_it_cannot_settle_on(pcc: sr.SoftModel, force: tuple[float, float, float]) -> None:
+    """Beside this saddle rounding keeps the residual above the tolerance; below it there is a stable equilibrium."""
+    found = sr.solve_equilibrium(pcc, pcc.relaxed_motors, force, gravity=sr.EARTH_GRAVITY)
+    assert found.stable
+    assert found.residual <= found.tolerance
+    assert np.linalg.eigvalsh(found.tangent_stiffness)[0] > 0.0
+
+
+def test_no_critical_load_is_sought_of_an_arm_that_has_no_equilibrium_before(pcc: sr.SoftModel) -> None:
+    with pytest.raises(sr.ParameterError, match=r"gravity.*stable before it is pushed"):
+        sr.critical_load(pcc, pcc.relaxed_motors, (0, 0, -1), gravity=(3e4, 3e4, 0))
