@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from softrobots.errors import MissingDependency, ViewerError
-from softrobots.files import as_path, new_file
+import numpy as np
+
+from softrobots.checks import positive_integer, positive_number
+from softrobots.errors import MissingDependency, ParameterError, ViewerError
+from softrobots.files import as_path, new_file, write_atomically
+from softrobots.progress import with_progress
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
+_FREQUENT = 96  # of 256 colours of a moving picture
 _OPTIONS = (
     "--no-sandbox",  # needed as root; only pages of this project are opened
     "--use-angle=swiftshader",
@@ -48,7 +54,7 @@ def open_browser() -> Iterator[Any]:
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
-        raise MissingDependency("playwright", "dev") from error
+        raise MissingDependency("playwright", "pictures") from error
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(_OPTIONS))
         try:
@@ -75,17 +81,88 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
         OutputError: If the picture cannot be written.
         MissingDependency: If Playwright is not installed.
     """
+    with _photographed(html, png, width, height) as (page, target):
+        show_share(page, share)
+        page.screenshot(path=str(target))
+    return target
+
+
+def take_animation(
+    html: str | Path,
+    gif: str | Path,
+    *,
+    width: int = 720,
+    height: int = 400,
+    seconds: float = 5.0,
+    frames: int = 100,
+    progress: bool | str = False,
+) -> Path:
+    """Take a moving picture of a self-contained viewer page: its animation once, then again from the start.
+
+    Args:
+        html: The page.
+        gif: File to write; an existing one is replaced.
+        width: Width [px].
+        height: Height [px].
+        seconds: Time of the moving picture [s]; the animation of the page may be faster or slower.
+        frames: Number of pictures in it, at least two.
+        progress: Show a progress bar on stderr; a text is its label.
+
+    Returns:
+        The path of the moving picture.
+
+    Raises:
+        ParameterError: If the time is not positive, or there are fewer than two frames.
+        ViewerError: If the page is no file or no Chromium is installed.
+        OutputError: If the file cannot be written.
+        MissingDependency: If Playwright or Pillow is not installed.
+    """
+    positive_number("seconds", seconds, "s")
+    if positive_integer("frames", frames) < 2:
+        raise ParameterError("frames", frames, "at least 2")
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise MissingDependency("pillow", "pictures") from error
+    with _photographed(html, gif, width, height) as (page, target):
+        shots = []
+        for number in with_progress(range(frames), progress, label="frames", unit="frame"):
+            show_share(page, number / frames)
+            shots.append(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+    palette = _palette(shots[::4])
+    drawn = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]
+    options: dict[str, Any] = {"save_all": True, "append_images": drawn[1:], "loop": 0, "optimize": False}
+    interval = 1000.0 * seconds / frames
+    write_atomically(target, lambda file: drawn[0].save(file, format="GIF", duration=interval, **options))
+    return target
+
+
+def _palette(shots: list[Any]) -> Any:
+    """One palette for all frames, or colours would flicker: the most frequent colours, and the others by their variety."""
+    from PIL import Image
+
+    pixels = np.concatenate([np.asarray(shot).reshape(-1, 3) for shot in shots])
+    shades, counts = np.unique(pixels, axis=0, return_counts=True)
+    frequent = shades[np.argsort(-counts, kind="stable")[:_FREQUENT]]
+    varied = Image.fromarray(np.unique(shades & 0xFC, axis=0)[None].astype(np.uint8))  # each once: the robot is small
+    others = varied.quantize(256 - len(frequent), Image.Quantize.MEDIANCUT).getpalette()
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*frequent.ravel().tolist(), *(others or [])])
+    return palette
+
+
+@contextlib.contextmanager
+def _photographed(html: str | Path, picture: str | Path, width: int, height: int) -> Iterator[tuple[Any, Path]]:
+    """A page in a window of a size [px], without what is there to be clicked, and the file of its picture."""
     page_file = as_path("html", html)
     if not page_file.is_file():
         raise ViewerError(f"{page_file} is no file; a page written by Viewer.write_html is required")
-    target = new_file(png, overwrite=True)
+    target = new_file(picture, overwrite=True)
     with open_browser() as browser:
         page = browser.new_page(viewport={"width": width, "height": height})
         page.goto(page_file.resolve().as_uri())
-        show_share(page, share)
-        page.evaluate("() => { viewer.gui.domElement.style.display = 'none'; }")
-        page.screenshot(path=str(target))
-    return target
+        page.add_style_tag(content="#softrobots-hint, .dg { display: none !important; }")
+        yield page, target
 
 
 def show_share(page: Any, share: float) -> None:
@@ -95,8 +172,11 @@ def show_share(page: Any, share: float) -> None:
     page.evaluate(_TWO_FRAMES)
 
 
-# The commands of a page arrive one after the other: settled is when no object has been added for ten looks, 50 ms apart.
+# A page in a file is there when it names its viewer. The commands of a server arrive one after the other: settled is when no
+# object has been added for ten looks, 50 ms apart.
 _SETTLED = """async () => {
+  while (!window.viewer) await new Promise(done => setTimeout(done, 20));
+  if (document.getElementById('softrobots-scene')) return true;
   const count = () => { let n = 0; viewer.scene.traverse(() => n++); return n; };
   const robot = () => viewer.scene_tree.find(['meshcat', 'softrobots', 'deformed']).object.children.length;
   for (let last = -1, same = 0; same < 10; last = count()) {

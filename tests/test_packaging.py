@@ -169,5 +169,49 @@ def test_a_missing_extra_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(sr.MissingDependency, match=r"matplotlib is not installed.*pip install 'softrobots\[plot\]'"):
         plots.require_matplotlib()
     if shutil.which("chromium"):
-        with pytest.raises(sr.MissingDependency, match=r"playwright is not installed.*softrobots\[dev\]"), open_browser():
+        with pytest.raises(sr.MissingDependency, match=r"playwright is not installed.*softrobots\[pictures\]"), open_browser():
             pass
+
+
+def extras() -> dict[str, set[str]]:
+    """Packages of each extra in pyproject.toml; no tomllib in Python 3.10."""
+    text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
+    part = text[text.index("[project.optional-dependencies]") : text.index("[project.scripts]")]
+    found: dict[str, set[str]] = {}
+    for line in part.splitlines():
+        head = re.match(r"([\w-]+) = \[", line)
+        if head:
+            found[name := head[1]] = set()
+        for package in re.findall(r'"([\w-]+)(?:\[[\w,-]+\])?(?:[>"])', line):
+            found[name].add(package)
+    return found
+
+
+def test_the_extra_that_an_error_names_holds_the_package() -> None:
+    """Every `MissingDependency(package, extra)` of the source with words for both."""
+    known, seen = extras(), 0
+    for file in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "MissingDependency":
+                words = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
+                if len(words) == 2:
+                    seen += 1
+                    packages = {word for word in words[0].split() if word != "with"}
+                    assert {"dask" if word == "distributed" else word for word in packages} <= known[words[1]], (file, words)
+    assert seen >= 10
+
+
+def test_dev_holds_every_extra() -> None:
+    text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
+    named = re.search(r'"softrobots\[([\w,-]+)\]"', text)
+    assert named is not None
+    assert set(named[1].split(",")) == set(extras()) - {"dev"}
+
+
+def test_the_version_stands_in_one_place() -> None:
+    """The package says it; the citation and the newest entry of the changelog are that version."""
+    assert 'path = "softrobots/__init__.py"' in (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
+    citation = (CHECKOUT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^version: (.*)$", citation, flags=re.MULTILINE) == [sr.__version__]
+    changelog = (CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## \[(.*?)\]", changelog, flags=re.MULTILINE)[0] == sr.__version__

@@ -7,7 +7,7 @@ from pathlib import Path
 import pinocchio as pin
 
 from softrobots.checks import positive_integer
-from softrobots.errors import SoftRobotsError
+from softrobots.errors import DescriptionError, SoftRobotsError
 from softrobots.interop.kinematics import KinematicsRow, as_file, compare_kinematics
 from softrobots.interop.urdf_rules import Finding, check_rules
 from softrobots.loader import load_model
@@ -99,8 +99,15 @@ def _in_softrobots(urdf: str, label: str) -> str:
     tags = read_tags(urdf, label)
     if not tags.springs and not tags.sections:
         return "no springs; load_model needs springs={joint: stiffness}"
-    model = load_model(urdf)
-    return f"loads: {model.n_motors} motors, {model.n_springs} elastic coordinates, tip {model.tip}"
+    how = "loads"
+    try:
+        model = load_model(urdf)
+    except DescriptionError as error:
+        if not tags.muscles:
+            raise
+        model = load_model(urdf, muscles="forces")  # e.g. one chamber of a finger: its length alone fixes no shape
+        how = f"loads if tensions are given, muscles='forces', because {str(error).partition(';')[0]}"
+    return f"{how}: {model.n_motors} motors, {model.n_springs} elastic coordinates, tip {model.tip}"
 
 
 def _valid_in_yourdfpy(source: Robot | Path | str) -> Finding:
