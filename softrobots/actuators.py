@@ -51,6 +51,8 @@ class Actuators:
         """Change of each that moves the robot about as much as a radian, shape (n_motors,) [rad, m or N]."""
         self.turning = np.array([*turning, *(False for _ in muscles)], dtype=bool)
         """Which of them turn rather than slide or pull, shape (n_motors,), truth values."""
+        self.units = (*("rad" if turns else "m" for turns in turning), *("m" if lengths else "N" for _ in muscles))
+        """Unit of each."""
         self.basis = read_only(np.diag(self.scale) if held is None else held.basis(self.scale))
         """Independent changes, shape (n_motors, n), each about a radian's worth of motion."""
         self.independent = self.basis.shape[0] == self.basis.shape[1]

@@ -9,30 +9,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import numpy as np
-
-from softrobots.animation_frames import FRAME_RATE, Frame, even_frames, growth_frames, waypoint_frames
-from softrobots.body import body, body_at
 from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number
 from softrobots.equilibrium import Equilibrium, check_same_model
 from softrobots.errors import ParameterError, ViewerError
 from softrobots.files import new_file, write_text
-from softrobots.kinematics import backbone, frame_placement
-from softrobots.meshcat_arrows import ArrowDrawing
-from softrobots.meshcat_body import BodyDrawing
-from softrobots.meshcat_chain import ChainDrawing
-from softrobots.meshcat_server import connect, end_server, start_server
-from softrobots.meshcat_shapes import (
-    FORCE_COLOUR,
-    PATH_COLOUR,
-    RIGID_COLOUR,
-    floor_lines,
-    with_legend,
-    wrinkling_rows,
-)
+from softrobots.inverse_kinematics import IkSolution
+from softrobots.meshcat_view.inline_page import InlinePage
+from softrobots.meshcat_view.page_text import page_text
+from softrobots.meshcat_view.robot import RobotDrawing
+from softrobots.meshcat_view.server import connect, end_server, start_server
+from softrobots.meshcat_view.stage import Stage
 from softrobots.model import SoftModel, check_model
 from softrobots.robots import HelixTube
-from softrobots.scene import Scene, wrinkling_level
+from softrobots.scene import Scene
 from softrobots.trajectory import Trajectory
 
 
@@ -41,35 +30,30 @@ class Viewer:
 
     The deformed robot is opaque; the rigid one, with the same motors and relaxed springs, is translucent. Inflated links are
     coloured by the share of the wrinkling moment that is left. Segments with sections are drawn as smooth translucent tubes,
-    with their muscles (blue pulls, orange pushes) and the equivalent chain inside.
+    with their muscles (blue pulls, orange pushes) and the equivalent chain inside. As the last expression of a cell of a
+    notebook it is shown there, as it is at that moment.
     """
 
-    def __init__(self, model: SoftModel) -> None:
-        """Start a server on the first free loopback port from 7000 and draw the robot at rest.
+    def __init__(self, model: SoftModel, *, port: int | None = None) -> None:
+        """Start a server on loopback and draw the robot at rest.
 
         Args:
             model: The robot.
+            port: Port of the page; by default the first free one from 7000.
 
         Raises:
-            ViewerError: If the server does not start or the robot has shapes that cannot be drawn.
+            ParameterError: If it is no model or no port.
+            ViewerError: If the server does not start, e.g. on a port that is taken, or a shape cannot be drawn.
         """
         self._model = check_model(model)
         scene = Scene(model)
-        self._server, zmq_url, self._url = start_server()
+        self._server, zmq_url, self._url = start_server(None if port is None else positive_integer("port", port, 65535))
         try:
             self._page = connect(zmq_url, self._url)
-            self._root = self._page["softrobots"]
-            self._start, self._size = _extent(model)
-            self._arrows = ArrowDrawing(self._root["load"], self._size)
-            self._ghost = _ghost(model)
-            self._loaded = self._traced = False
-            self._segments = bool(model.structure.section_table)
-            self._chain = ChainDrawing(self._root, model, scene)
-            self._body = BodyDrawing(self._root["body"])
-            ground = scene.ground()
-            self._prepare(-0.15 * self._size if ground is None else ground)
-            self.show_configuration(model.configuration(model.relaxed_motors))
-            self._body.draw(body_at(model, model.relaxed_motors, model.rest), {})
+            root = self._page["softrobots"]
+            self._stage = Stage(self._page, root, model)
+            self._robot = RobotDrawing(root, model, scene, self._stage.size)
+            self._stage.prepare(scene.ground())
         except BaseException:
             self.close()
             raise
@@ -97,6 +81,11 @@ class Viewer:
         """Command to type on another machine to see the page there, at the same address."""
         return f"ssh -L {self.port}:127.0.0.1:{self.port} {socket.gethostname()}"
 
+    @property
+    def serving(self) -> bool:
+        """Whether the server runs."""
+        return self._server.poll() is None
+
     def show(self, equilibrium: Equilibrium) -> None:
         """Show a loaded robot: deformed and rigid, its forces as arrows, its links coloured.
 
@@ -108,12 +97,7 @@ class Viewer:
             ViewerError: If the viewer is closed.
         """
         self._check(equilibrium)
-        self._chain.show_sections(True)
-        self._chain.place(equilibrium.q, self._model.configuration(equilibrium.q_motors))
-        self._chain.colour(_levels(equilibrium) or [])
-        self._body.draw(body(equilibrium), _tensions(equilibrium))
-        self._arrows.draw(equilibrium)
-        self._ghost, self._loaded = _ghost(self._model), True
+        self._robot.show(equilibrium)
 
     def show_configuration(self, q: FloatArray) -> None:
         """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling, the chain alone.
@@ -123,12 +107,7 @@ class Viewer:
         """
         q = finite_array("q", q, (self._model.pinocchio.nq,))
         self._check_open()
-        self._chain.show_sections(True)
-        self._chain.place(q, q)
-        self._chain.colour([0] * len(self._model.spring_groups))
-        self._body.clear()
-        self._arrows.clear()
-        self._ghost, self._loaded = _ghost(self._model), False
+        self._robot.show_configuration(q)
 
     def trace(self, points: Any) -> None:
         """Draw a path as dots.
@@ -140,15 +119,21 @@ class Viewer:
             ParameterError: If the shape differs or a number is not finite.
             ViewerError: If the viewer is closed.
         """
-        import meshcat.geometry as geometry
-
         self._check_open()
-        positions = finite_array("points", points, (None, 3), "m")
-        rgb = np.array([PATH_COLOUR >> 16 & 255, PATH_COLOUR >> 8 & 255, PATH_COLOUR & 255]) / 255.0
-        colours = np.tile(rgb[:, None], (1, len(positions)))
-        cloud = geometry.PointCloud(positions.T.astype(np.float32), colours.astype(np.float32), size=0.012)
-        self._root["path"].set_object(cloud)
-        self._traced = True
+        self._robot.trace(finite_array("points", points, (None, 3), "m"))
+
+    def mark(self, target: Any) -> None:
+        """Draw a cross at a target, in place of the last one.
+
+        Args:
+            target: Where, shape (3,) [m]; None: no cross.
+
+        Raises:
+            ParameterError: If the shape differs or a number is not finite.
+            ViewerError: If the viewer is closed.
+        """
+        self._check_open()
+        self._robot.mark(None if target is None else finite_array("target", target, (3,), "m"))
 
     def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1000) -> None:
         """Play a trajectory as a meshcat animation, path and forces included; it starts by itself and can be scrubbed.
@@ -162,30 +147,14 @@ class Viewer:
         Raises:
             ParameterError: If it belongs to another robot, or the duration is not positive.
         """
-        import meshcat.animation
-
         if not isinstance(trajectory, Trajectory):
             raise ParameterError("trajectory", trajectory, "a Trajectory")
         self._check(trajectory.equilibria[0])
         span = float(trajectory.times[-1] - trajectory.times[0])
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
         positive_integer("repetitions", repetitions)
-        self.show(trajectory.equilibria[0])
-        self.look_at(trajectory.tip_positions.mean(axis=0))
-        self.trace(trajectory.tip_positions)
-        animation = meshcat.animation.Animation(default_framerate=FRAME_RATE)
-        frames = even_frames(trajectory, seconds) if self._segments else waypoint_frames(trajectory, seconds)
-        for frame in frames:
-            self._add_frame(animation, frame)
-        if self._segments:
-            self._body.animate(
-                animation,
-                {
-                    frame.number: (body_at(self._model, frame.q_motors, frame.q_springs, 6), _tensions(frame.equilibrium))
-                    for frame in frames
-                },
-            )
-        self._page.set_animation(animation, play=True, repetitions=repetitions)
+        self._stage.look_at(trajectory.tip_positions.mean(axis=0))
+        self._page.set_animation(self._robot.animation(trajectory, seconds), play=True, repetitions=repetitions)
 
     def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
         """Play the growth of a helical tube: it everts at its tip, and the helix forms behind the tip.
@@ -202,23 +171,11 @@ class Viewer:
             ParameterError: If the tube is not that of the viewer's model, or an argument is out of range.
             ViewerError: If the viewer is closed.
         """
-        import meshcat.animation
-
         self._check_open()
         if not isinstance(tube, HelixTube) or tube.urdf() != self._model.urdf:
             raise ParameterError("tube", tube, "the HelixTube that the viewer's model was loaded from")
-        frames = growth_frames(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
-        self.show_configuration(self._model.configuration((), self._model.rest))
-        self._ghost = "the whole tube"
-        self._chain.show_sections(False)  # the links of sections that have not come out would stick out of the tip
-        whole = body_at(self._model, frames[-1].q_motors, self._model.rest)
-        middle = np.concatenate([segment.backbone for segment in whole])
-        self.look_at(middle.max(axis=0) + middle.min(axis=0))
-        animation = meshcat.animation.Animation(default_framerate=FRAME_RATE)
-        for frame in frames:
-            self._add_frame(animation, frame)
-        bodies = {f.number: (body_at(self._model, f.q_motors, f.q_springs, 3), _tensions(None)) for f in frames}
-        self._body.animate(animation, bodies, everting={frame.number: frame.grown for frame in frames})
+        animation, along = self._robot.growth(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
+        self._stage.look_at(along.max(axis=0) + along.min(axis=0))
         self._page.set_animation(animation, play=True, repetitions=1000)
 
     def look_at(self, tip: FloatArray) -> None:
@@ -229,11 +186,7 @@ class Viewer:
         Args:
             tip: Where the tip is, or is on average, shape (3,) [m].
         """
-        along, middle = tip - self._start, 0.5 * (self._start + tip)
-        azimuth = np.arctan2(along[1], along[0]) - np.deg2rad(78.0)
-        size = max(self._size, 0.95 * float(np.linalg.norm(along)))  # a robot that is bent at rest may be stretched out here
-        away = 0.94 * size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
-        self.look_from(middle + away, middle)
+        self._stage.look_at(tip)
 
     def look_from(self, eye: Any, centre: Any) -> None:
         """Put the camera somewhere.
@@ -245,16 +198,7 @@ class Viewer:
         Raises:
             ParameterError: If a shape differs, a number is not finite, or both are the same point.
         """
-        middle = finite_array("centre", centre, (3,), "m")
-        away = finite_array("eye", eye, (3,), "m") - middle
-        if not away.any():
-            raise ParameterError("eye", eye, "another point than the centre")
-        shift = np.eye(4)
-        shift[:3, 3] = -middle
-        self._root.set_transform(shift)
-        x, y, z = away.tolist()
-        # meshcat's camera has y up: (x, z, -y) of the scene.
-        self._page["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
+        self._stage.look_from(eye, centre)
 
     def html(self, title: str = "softrobots") -> str:
         """Return the page as one self-contained HTML text that works offline, with its animation.
@@ -266,16 +210,7 @@ class Viewer:
             ViewerError: If the viewer is closed.
         """
         self._check_open()
-        return with_legend(self._page.static_html(), title, self._legend())
-
-    def _legend(self) -> list[tuple[tuple[float, ...] | int, str]]:
-        """Colour and meaning of what is drawn."""
-        entries: list[tuple[tuple[float, ...] | int, str]] = [(RIGID_COLOUR, self._ghost)] * self._chain.has_rigid
-        if self._segments and not self._model.spring_groups:
-            entries += [(colour, "equivalent rigid chain") for colour in self._chain.section_colours[:1]]
-        entries += [(colour, text) for text, colour in self._body.entries.items()]
-        entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
-        return entries + (list(wrinkling_rows()) if self._model.spring_groups and self._loaded else [])
+        return page_text(self._page.static_html(), title, self._robot.legend())
 
     def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
         """Write `html` to a file.
@@ -294,10 +229,27 @@ class Viewer:
         new_file(path, overwrite=overwrite)  # tells at once
         return write_text(path, self.html(title), overwrite=overwrite)
 
+    def inline(self, height: int = 480, *, title: str = "softrobots") -> InlinePage:
+        """The page as it is now, for a cell of a notebook; stays there when the viewer is closed.
+
+        Args:
+            height: Height in the notebook [px].
+            title: Title of the page.
+
+        Raises:
+            ParameterError: If the height is no positive integer, at most 10000.
+            ViewerError: If the viewer is closed.
+        """
+        return InlinePage(self.html(title), positive_integer("height", height, 10_000))
+
+    def _repr_html_(self) -> str:
+        """What Jupyter shows of a viewer: `inline`."""
+        return self.inline()._repr_html_()
+
     def wait(self) -> None:
         """Serve until Ctrl-C or until the server ends."""
         with contextlib.suppress(KeyboardInterrupt):
-            while self._server.poll() is None:
+            while self.serving:
                 time.sleep(0.2)
 
     def close(self) -> None:
@@ -312,88 +264,37 @@ class Viewer:
         self._check_open()
 
     def _check_open(self) -> None:
-        if self._server.poll() is not None:
+        if not self.serving:
             raise ViewerError("the viewer is closed, or its server has ended; open a new one")
 
-    def _prepare(self, ground: float) -> None:
-        """White background, floor at a height [m], and the camera; meshcat's camera looks at the origin, so the scene moves."""
-        import meshcat.geometry as geometry
 
-        size = self._size
-        self._page["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
-        self._page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
-        self._page["/Axes"].set_property("visible", False)
-        self._page["/Grid"].set_property("visible", False)
-        q = self._model.configuration(self._model.relaxed_motors)
-        tip = np.array(frame_placement(self._model, q, self._model.tip).translation)
-        upright = np.hypot(*(tip - self._start)[:2]) < 0.1 * size
-        self.look_at(tip + [0.3 * size if upright else -0.1 * size, 0.0, 0.0 if upright else 0.2 * size])
-        along = floor_lines(size, ground)
-        ends = np.concatenate([along, along[:, [1, 0, 2]]])
-        lines = geometry.PointsGeometry(ends.T.astype(np.float32))
-        self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
-
-    def _add_frame(self, animation: Any, frame: Frame) -> None:
-        deformed = self._model.embed(self._model.coordinates.at(frame.q_motors, frame.q_springs).joints)
-        rigid = self._model.embed(self._model.coordinates.at(frame.q_motors, self._model.rest).joints)
-        self._chain.add_frame(animation, frame.number, deformed, rigid, _levels(frame.equilibrium))
-        if frame.equilibrium is not None:
-            self._arrows.add_frame(animation, frame.number, frame.equilibrium, deformed)
-
-
-def view(model: SoftModel, result: Equilibrium | Trajectory | None = None) -> Viewer:
+def view(model: SoftModel, result: Equilibrium | IkSolution | Trajectory | None = None, *, port: int | None = None) -> Viewer:
     """Open a viewer and show a result in it.
 
     Args:
         model: The robot.
-        result: An equilibrium to show or a trajectory to play; the robot at rest by default.
+        result: An equilibrium to show, a solution of the inverse kinematics to show with its target, or a trajectory to play;
+            the robot at rest by default.
+        port: Port of the page; by default the first free one from 7000.
 
     Returns:
         The viewer; print its `url` and `tunnel`, and `close` it at the end (or use it in a `with` statement).
 
     Raises:
-        ParameterError: If the result is something else or belongs to another robot.
+        ParameterError: If the result is something else or belongs to another robot, or it is no port.
         ViewerError: If the server does not start.
     """
-    viewer = Viewer(model)
+    viewer = Viewer(model, port=port)
     try:
         if isinstance(result, Trajectory):
             viewer.animate(result)
         elif result is not None:
-            viewer.show(result)
-            viewer.look_at(result.tip_position)
+            shown = result.equilibrium if isinstance(result, IkSolution) else result
+            viewer.show(shown)
+            viewer.look_at(shown.tip_position)
+            if isinstance(result, IkSolution):
+                viewer.mark(result.target)
     except BaseException:
         viewer.close()
         raise
     return viewer
-
-
-def _extent(model: SoftModel) -> tuple[FloatArray, float]:
-    """Where the camera takes the base to be, shape (3,) [m], and the largest distance of the chain from its start at rest [m].
-
-    The distance is the scale of the picture; of a straight robot it is its reach.
-    """
-    points = backbone(model, model.configuration(model.relaxed_motors))
-    size = max(float(np.linalg.norm(points - points[0], axis=1).max()), 0.05 * model.reach)
-    return points[0] if float(np.linalg.norm(points[0])) > size else np.zeros(3), size
-
-
-def _ghost(model: SoftModel) -> str:
-    """What the translucent robot is."""
-    if not model.muscles:
-        return "rigid arm, same motor angles" if model.n_motors else "without load"
-    return "without load, same muscle lengths" if model.muscle_input == "lengths" else "straight, at rest"
-
-
-def _tensions(equilibrium: Equilibrium | None) -> dict[str, float]:
-    if equilibrium is None:
-        return {}
-    names = (muscle.name for muscle in equilibrium.model.muscles)
-    return dict(zip(names, equilibrium.muscle_forces.tolist(), strict=True))
-
-
-def _levels(equilibrium: Equilibrium | None) -> list[int] | None:
-    """Level of wrinkling of each inflated link; None without load."""
-    if equilibrium is None:
-        return None
-    return [wrinkling_level(equilibrium, link) for link in range(len(equilibrium.model.spring_groups))]

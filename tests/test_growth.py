@@ -11,9 +11,9 @@ import pytest
 from scipy.linalg import expm
 
 import softrobots as sr
-from softrobots.animation_frames import growth_frames
 from softrobots.body import body_at
 from softrobots.growth import SHORTEST, grown_coordinates
+from softrobots.meshcat_view.animation_frames import growth_frames
 from softrobots.scene import Scene
 from softrobots.viewer import view
 from tests.test_viewer import browser, pictures_of  # noqa: F401 - a fixture

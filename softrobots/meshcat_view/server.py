@@ -1,4 +1,4 @@
-"""The meshcat server on loopback only; run as `python -m softrobots.meshcat_server` by the viewer.
+"""The meshcat server on loopback only; run as `python -m softrobots.meshcat_view.server [PORT]` by the viewer.
 
 Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds 127.0.0.1 and ends
 when its standard input closes, which happens however the parent ends.
@@ -21,17 +21,29 @@ _REPLY_TIME = 30_000  # [ms], longest wait for an answer of the server
 
 
 def main() -> None:
-    """Serve until standard input closes; print `zmq_url=` and `web_url=` first."""
+    """Serve until standard input closes; print `zmq_url=` and `web_url=` first. A word is the port; by default a free one."""
     from meshcat.servers.zmqserver import ZMQWebSocketBridge
-    from tornado.web import Application
+    from tornado.web import Application, RequestHandler
 
     listen = Application.listen
 
     def listen_on_loopback(self: Any, port: int, address: str | None = None, **options: Any) -> Any:
         return listen(self, port, address=LOOPBACK, **options)
 
+    class NoIcon(RequestHandler):  # type: ignore[misc]
+        """What browsers ask for of themselves; without an answer they tell an error."""
+
+        def get(self) -> None:
+            """Answer with nothing."""
+            self.set_status(204)
+
     Application.listen = listen_on_loopback
-    bridge = ZMQWebSocketBridge()
+    port = int(sys.argv[1]) if len(sys.argv) > 1 else None
+    try:
+        bridge = ZMQWebSocketBridge(port=port)
+    except OSError as error:
+        sys.exit(f"port {port}: {error.strerror}")
+    bridge.app.add_handlers(".*", [(r"/favicon\.ico", NoIcon)])
     print(f"zmq_url={bridge.zmq_url}\nweb_url={bridge.web_url}", flush=True)  # noqa: T201
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, sys.stdout.fileno())  # nobody reads on, and a full pipe would block the server
@@ -45,17 +57,21 @@ def _end_with_parent() -> None:
     os._exit(0)
 
 
-def start_server() -> tuple[subprocess.Popen[bytes], str, str]:
+def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str, str]:
     """Start a server process.
+
+    Args:
+        port: Port of the page; by default the first free one from 7000.
 
     Returns:
         The process, its ZeroMQ address and its web address.
 
     Raises:
-        ViewerError: If it ends before it serves.
+        ViewerError: If it ends before it serves, e.g. because the port is taken.
     """
+    wish = [] if port is None else [str(port)]
     server = subprocess.Popen(
-        [sys.executable, "-u", "-m", "softrobots.meshcat_server"],
+        [sys.executable, "-u", "-m", "softrobots.meshcat_view.server", *wish],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

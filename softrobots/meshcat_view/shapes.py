@@ -1,9 +1,7 @@
-"""Shapes, colours and the legend of the browser view, in meshcat's terms."""
+"""Shapes and colours of the browser view, in meshcat's terms."""
 
 from __future__ import annotations
 
-import html
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -49,14 +47,6 @@ def material(rgba: tuple[float, ...]) -> Any:
     )
 
 
-def _css(colour: tuple[float, ...] | int) -> str:
-    if isinstance(colour, int):
-        return f"#{colour:06x}"
-    red, green, blue = (round(255 * value) for value in colour[:3])
-    opacity = min(1.0, 2.0 * colour[3]) if len(colour) == 4 and colour[3] < 1.0 else 1.0  # faint things show better so
-    return f"rgba({red},{green},{blue},{opacity:g})"
-
-
 def floor_lines(reach: float, height: float) -> FloatArray:
     """Ends of floor lines along x at a height [m], a sixth of the reach apart, shape (2 n, 3) [m]."""
     offsets = np.linspace(-1.0, 1.0, 13) * reach
@@ -65,7 +55,7 @@ def floor_lines(reach: float, height: float) -> FloatArray:
 
 
 def wrinkling_rows() -> list[tuple[tuple[float, ...], str]]:
-    """Colour and meaning of each level of wrinkling, for `with_legend`."""
+    """Colour and meaning of each level of wrinkling, for the legend of a page."""
     rows: list[tuple[tuple[float, ...], str]] = []
     above = 1.0
     for least, rgb in WRINKLING_COLOURS:
@@ -73,28 +63,3 @@ def wrinkling_rows() -> list[tuple[tuple[float, ...], str]]:
         rows.append((rgb, text))
         above = least
     return rows
-
-
-def with_legend(page: str, title: str, entries: Sequence[tuple[tuple[float, ...] | int, str]]) -> str:
-    """Give a meshcat page a title and an explanation of what is drawn.
-
-    Args:
-        page: The page.
-        title: Its title.
-        entries: Colour (red, green, blue and perhaps opacity in [0, 1], or a number as in HTML) and meaning of each thing.
-
-    Returns:
-        The page.
-    """
-    rows = [(_css(colour), text) for colour, text in entries]
-    boxes = "".join(
-        f'<div><span style="display:inline-block;width:1.1em;height:0.8em;margin-right:0.5em;background:{colour};'
-        f'border:1px solid #888"></span>{html.escape(text)}</div>'
-        for colour, text in rows
-    )
-    legend = (
-        '<div id="softrobots-legend" style="position:absolute;left:12px;top:10px;z-index:1;pointer-events:none;'
-        f'font:13px/1.5 sans-serif;color:#222"><div style="font-weight:bold">{html.escape(title)}</div>{boxes}</div>'
-    )
-    page = page.replace("<title>MeshCat</title>", f"<title>{html.escape(title)}</title>", 1)
-    return page.replace("<body>", "<body>" + legend, 1)

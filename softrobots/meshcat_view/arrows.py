@@ -9,10 +9,10 @@ import numpy as np
 from softrobots.checks import FloatArray
 from softrobots.equilibrium import Equilibrium
 from softrobots.kinematics import frame_placement
-from softrobots.meshcat_shapes import FORCE_COLOUR
+from softrobots.meshcat_view.shapes import FORCE_COLOUR
 
 ARROW_LENGTH = 0.2
-"""Length of the arrow of the largest force, relative to the size of the robot; other arrows are shorter in proportion."""
+"""Length of the arrow of a certain force, relative to the size of the robot; other arrows are in proportion."""
 
 _NO_FORCE = 1e-12  # [N], forces below have no arrow
 
@@ -20,9 +20,9 @@ _NO_FORCE = 1e-12  # [N], forces below have no arrow
 class ArrowDrawing:
     """One arrow a force under one node of a meshcat page."""
 
-    def __init__(self, root: Any, size: float) -> None:
-        """Draw under `root` for a robot of a size [m]."""
-        self._root, self._size = root, size
+    def __init__(self, root: Any, size: float, unit: float | None = None) -> None:
+        """Draw under `root` for a robot of a size [m]. A force of `unit` [N], by default the largest, is drawn that long."""
+        self._root, self._size, self._unit = root, size, unit
         self.names: set[str] = set()
         """Frames whose force is drawn."""
 
@@ -35,9 +35,9 @@ class ArrowDrawing:
         }
         self.clear(self.names - wanted.keys())
         self.names = set(wanted)
-        largest = max((float(np.linalg.norm(force)) for force in wanted.values()), default=1.0)
+        unit = self._unit or max((float(np.linalg.norm(force)) for force in wanted.values()), default=1.0)
         for name, force in wanted.items():
-            length = ARROW_LENGTH * self._size * float(np.linalg.norm(force)) / largest
+            length = ARROW_LENGTH * self._size * float(np.linalg.norm(force)) / unit
             width = 0.009 * self._size
             green = geometry.MeshLambertMaterial(color=FORCE_COLOUR)
             node = self._root[name]

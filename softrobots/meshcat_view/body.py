@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.body import SegmentBody, tube
-from softrobots.meshcat_shapes import material
+from softrobots.meshcat_view.shapes import material
 
 TUBE_COLOUR = (0.85, 0.74, 0.50, 0.32)
 """Red, green, blue, opacity of the tube; the chain inside shows through."""
@@ -72,15 +72,17 @@ class BodyDrawing:
                 node.set_property("visible", False)  # first body, which is visible anyway, must not be told so again then
             segments, tensions = frames[number]
             if everting is None:
-                self._draw(node, segments, tensions)
+                self._draw(node, segments, tensions, 16)
             else:
                 short = [segment.thinned(0.1 * segment.radius) for segment in segments]
                 self._draw(node, short, tensions, 14)
                 self._draw_eversion(node, short[-1], everting[number])
             # All tracks last as long as the animation: meshcat starts a shorter one anew when it is sought beyond its end.
-            for when in sorted({numbers[0], number, numbers[min(place + 1, len(numbers) - 1)], numbers[-1]}):
-                shown = when == number
-                animation.at_frame(node, when).set_property("visible", "boolean", shown)
+            # They change half a frame early: the chain inside, which moves in between, is never far from them.
+            last = place == len(numbers) - 1
+            begin, end = number - 0.5 * (place > 0), numbers[-1] + 1 if last else numbers[place + 1] - 0.5
+            for when in sorted({numbers[0], begin, min(end, numbers[-1]), numbers[-1]}):
+                animation.at_frame(node, when).set_property("visible", "boolean", begin <= when < end)
 
     def _draw(self, node: Any, segments: Sequence[SegmentBody], tensions: dict[str, float], sides: int = 24) -> None:
         for segment in segments:
@@ -97,7 +99,7 @@ class BodyDrawing:
                 self._draw_line(at["lines"][name], segment, name, PULL_COLOUR)
 
     def _draw_line(self, node: Any, segment: SegmentBody, name: str, colour: tuple[float, ...]) -> None:
-        node.set_object(_mesh(*segment.muscle_surface(name, _MUSCLE_RADIUS * segment.radius)), material((*colour, 1.0)))
+        node.set_object(_mesh(*segment.muscle_surface(name, _MUSCLE_RADIUS * segment.radius, 6)), material((*colour, 1.0)))
 
     def _draw_eversion(self, node: Any, segment: SegmentBody, share: float) -> None:
         """The round tip, and the wall that comes forward inside at twice the speed of the tip, with marks on it."""

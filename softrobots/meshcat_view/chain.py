@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from softrobots.checks import FloatArray
-from softrobots.meshcat_shapes import RIGID_COLOUR, material, meshcat_geometry
+from softrobots.meshcat_view.shapes import RIGID_COLOUR, material, meshcat_geometry
 from softrobots.model import SoftModel
 from softrobots.scene import WRINKLING_COLOURS, Scene
 

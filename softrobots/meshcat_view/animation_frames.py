@@ -16,7 +16,7 @@ from softrobots.trajectory import Trajectory
 FRAME_RATE = 30
 """Frames a second."""
 
-_MOST_BODIES = 60  # shapes of a continuous body that an animation goes through
+_MOST_BODIES = 90  # shapes of a continuous body that an animation goes through
 _MOST_FRAMES = 2**31 - 1  # of any animation; numbers of frames are integers of a browser
 
 
