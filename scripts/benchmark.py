@@ -19,7 +19,7 @@ from softrobots import plots
 from softrobots.benchmark.jobs import JOBS, measure
 from softrobots.benchmark.pictures import PICTURES, picture
 from softrobots.benchmark.race import Settings, quick_settings
-from softrobots.benchmark.results import Results, as_json, read_results, require_whole, table
+from softrobots.benchmark.results import Results, as_json, machine_text, read_results, require_whole, table
 from softrobots.command_line import exit_status
 from softrobots.files import make_folder, new_file, write_text
 from softrobots.marked_text import marked
@@ -51,11 +51,8 @@ def parser() -> argparse.ArgumentParser:
 def document(results: Results, *, targets_only: bool) -> str:
     """What a page shows of the results: machine, table and notes."""
     rows = [row for row in results.rows if row.target is not None or not targets_only]
-    named = {name: value for name, value in results.machine.items() if name not in ("processor", "system")}
-    told = ", ".join([results.machine["processor"], results.machine["system"], *map(" ".join, named.items())])
-    machine = f"Medians of {results.settings['rounds']} rounds on: {told}."
     notes = [] if targets_only else ["\n".join(f"- {note}" for note in results.notes)]
-    return "\n\n".join(part for part in [machine, table(rows), *notes] if part)
+    return "\n\n".join(part for part in [machine_text(results), table(rows), *notes] if part)
 
 
 def write_pictures(results: Results, folder: Path, *, overwrite: bool) -> list[Path]:

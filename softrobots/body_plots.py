@@ -61,9 +61,9 @@ def shape(equilibrium: Equilibrium) -> Any:
         for pose in segment.poses[:: max(1, len(segment.poses) // rings)]:
             axes.plot(*_circle(pose, segment.radius).T, color="0.7", lw=0.8)
         axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label=label("end of a segment"))
-    force_arrow(axes, equilibrium)
+    arrow = force_arrow(axes, equilibrium)
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Shape under load")
-    equal_box(axes, np.concatenate([segment.backbone for segment in (*segments, *unloaded)]))
+    equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
     axes.legend(loc="upper left", fontsize=9)
     return figure
 
@@ -85,7 +85,8 @@ def workspace(samples: Workspace) -> Any:
         raise ParameterError("samples", samples, "a Workspace")
     figure = new_figure((13.0, 4.4))
     tips, order = samples.tip_positions, np.argsort(samples.manipulability)
-    scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 5, "linewidths": 0, "rasterized": True}
+    scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 7, "rasterized": True}
+    scale |= {"linewidths": 0.2, "edgecolors": "0.35"}  # or the lightest are lost on white
     all_axes = figure.subplots(1, 3)
     centre, half = 0.5 * (tips.max(0) + tips.min(0)), 0.55 * max(float(np.ptp(tips, axis=0).max()), 1e-3)
     for axes, (one, two) in zip(all_axes, ((0, 2), (1, 2), (0, 1)), strict=True):

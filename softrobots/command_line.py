@@ -29,6 +29,10 @@ class Served(Protocol):
         """Its address."""
 
     @property
+    def port(self) -> int:
+        """Its port."""
+
+    @property
     def tunnel(self) -> str:
         """The command that makes it reachable from another machine."""
 
@@ -76,9 +80,14 @@ def tell_written(folder: Path) -> None:
     sys.stdout.write(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}\n")
 
 
+def address_lines(page: Served) -> tuple[str, str]:
+    """Where a page is, from this machine and from another one."""
+    return f"serving {page.url} (Ctrl-C ends)", f"from another machine: {page.tunnel}"
+
+
 def serve(page: Served) -> None:
     """Print where a page is, and serve it until Ctrl-C: what `--meshcat` asks for."""
-    sys.stdout.write(f"\nserving {page.url} (Ctrl-C ends)\nfrom another machine: {page.tunnel}\n")
+    sys.stdout.write("".join(f"{line}\n" for line in ("", *address_lines(page))))
     sys.stdout.flush()
     page.wait()
 

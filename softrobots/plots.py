@@ -22,6 +22,22 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # 
 """Line colours that colour-blind people can tell apart."""
 MARKERS = ("o", "s", "^", "D", "v", "P")
 """Markers that tell lines apart in grey."""
+LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
+"""Styles of lines that tell them apart where they cross."""
+
+
+def line_style(number: int) -> dict[str, Any]:
+    """Colour, style and marker of a line among others, for matplotlib; they repeat after six lines.
+
+    Args:
+        number: Number of the line, from 0.
+    """
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "ls": LINES[number % len(LINES)],
+        "marker": MARKERS[number % len(MARKERS)],
+        "ms": 5,
+    }
 
 
 def require_matplotlib() -> Any:
@@ -73,9 +89,8 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
             label="loaded arm, later is darker" if first else None,
         )
         everything.append(loaded)
-    axes.plot(*trajectory.tip_positions.T, color=COLOURS[1], lw=2.0, label="path of the tip")
-    end = trajectory.equilibria[-1]
-    force_arrow(axes, end)
+    axes.plot(*trajectory.tip_positions.T, color=COLOURS[1], lw=2.0, ls="--", label="path of the tip")
+    everything.append(force_arrow(axes, trajectory.equilibria[-1]))
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Loaded arm along the path")
     equal_box(axes, np.vstack(everything))
     axes.legend(loc="upper left", fontsize=9)
@@ -136,12 +151,9 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
         axes.semilogy(
             moments,
             np.maximum(error, 1e-16) * 1e3,
-            color=COLOURS[number % 6],
-            ls=("-", "--", "-.", ":")[number % 4],
-            marker=MARKERS[number % 6],
             markevery=every,
-            ms=5,
             label=label,
+            **line_style(number),
         )
     axes.set(xlabel="time [s]", ylabel="tip error [mm]", title="Distance of the loaded tip from its target")
     axes.grid(alpha=0.3)
@@ -167,14 +179,9 @@ def link_moments(trajectory: Trajectory) -> Any:
     if moments is None:
         raise ParameterError("trajectory", trajectory.model, "of a robot with inflated links")
     axes = figure.add_subplot()
+    every = max(len(trajectory.times) // 10, 1)
     for number, moment in enumerate(moments.T):
-        axes.plot(
-            trajectory.times,
-            moment,
-            color=COLOURS[number % 6],
-            ls=("-", "--", "-.", ":")[number % 4],
-            label=f"link {number + 1}",
-        )
+        axes.plot(trajectory.times, moment, markevery=every, label=f"link {number + 1}", **line_style(number))
     limits = {(group.wrinkling_moment, group.pressure) for group in trajectory.model.spring_groups}
     for limit, pressure in sorted(limits):
         axes.axhline(limit, color="black", lw=1.0)
@@ -201,16 +208,20 @@ def equal_box(axes: Any, points: FloatArray) -> None:
     axes.view_init(elev=22, azim=-62)
 
 
-def force_arrow(axes: Any, equilibrium: Equilibrium) -> None:
-    """Draw the force at the tip, if there is one, as an arrow a fifth of the reach long."""
+def force_arrow(axes: Any, equilibrium: Equilibrium) -> FloatArray:
+    """Draw the force at the tip, if there is one, as an arrow a fifth of the reach long.
+
+    Returns:
+        Where the arrow ends, or nothing, shape (0 or 1, 3) [m]; for `equal_box`.
+    """
     tip = equilibrium.tip_position
     wrench = equilibrium.load.wrenches.get(equilibrium.model.tip)
     if wrench is None or not wrench[:3].any():
-        return
+        return np.zeros((0, 3))
     size = float(np.linalg.norm(wrench[:3]))
-    axes.quiver(
-        *tip, *(0.2 * equilibrium.model.reach * wrench[:3] / size), color=COLOURS[2], lw=2.0, label=f"force, {size:.1f} N"
-    )
+    arrow = 0.2 * equilibrium.model.reach * wrench[:3] / size
+    axes.quiver(*tip, *arrow, color=COLOURS[2], lw=2.0, label=f"force, {size:.1f} N")
+    return np.asarray(tip + arrow)[None]
 
 
 def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:

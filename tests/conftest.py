@@ -62,6 +62,21 @@ def bullet(tool: Callable[[str], ModuleType]) -> ModuleType:
     return tool("pybullet")
 
 
+@pytest.fixture
+def told(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run the command `softrobots` in this process: its status, what it printed, what it said on stderr."""
+    from softrobots.cli import main
+
+    def run(*words: str) -> tuple[int, str, str]:
+        try:
+            status = main(words)
+        except SystemExit as ended:  # argparse's way out
+            status = int(ended.code or 0)
+        return status, *capsys.readouterr()
+
+    return run
+
+
 @pytest.fixture(scope="session")
 def arm() -> sr.SoftModel:
     """The paper's arm: two links, three motors, four springs."""

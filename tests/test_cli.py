@@ -2,40 +2,30 @@
 
 from __future__ import annotations
 
+import argparse
+import dataclasses
+import json
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import softrobots as sr
-from softrobots.cli import main
+from softrobots.cli import main, parser
 from softrobots.commands import COMMANDS
 from softrobots.commands.robot_parameters import make_robot, robot_parameters, xacro_parameters
 from softrobots.description import expand
-from softrobots.interop import packages
-from softrobots.interop.packages import PACKAGES, Package, PackageState
 from softrobots.interop.tools import TOOLS
 from softrobots.interop.urdf_rules import RULES
-from softrobots.kernels.machines import available_backend, cache_folder
 from softrobots.paths import urdf_folder, xacro_folder
-from tests.conftest import CHECKOUT, missing
+from tests.conftest import missing
 from tests.foreign import BRANCHED, SPRINGS
 
 ARM = urdf_folder() / "inflatable_arm.urdf"
-
-
-@pytest.fixture
-def told(capsys: pytest.CaptureFixture):
-    """Run the command and return its status, what it printed, and what it said on stderr."""
-
-    def run(*words: str) -> tuple[int, str, str]:
-        status = main(words)
-        return status, *capsys.readouterr()
-
-    return run
 
 
 # --- The command
@@ -48,11 +38,38 @@ def test_help_lists_every_command_with_a_line(capsys: pytest.CaptureFixture) -> 
     out = capsys.readouterr().out
     for command in COMMANDS:
         name = command.__name__.rpartition(".")[2]
-        assert re.search(rf"^    {name} +\w+", out, re.M), name
+        assert re.search(rf"^    {name}\s+\w+", out, re.M), name
         with pytest.raises(SystemExit) as ended:
             main([name, "--help"])
         assert ended.value.code == 0
         assert f"usage: softrobots {name}" in capsys.readouterr().out
+
+
+def actions(parser: argparse.ArgumentParser) -> Iterator[tuple[argparse.Action, bool]]:
+    """Arguments of a parser and of its subcommands, and whether they, or one of several, must be given."""
+    needed = [action for group in parser._mutually_exclusive_groups if group.required for action in group._group_actions]
+    for action in parser._actions:
+        yield action, action.required or action in needed
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                yield from actions(inner)
+
+
+def test_every_option_tells_what_it_is_with_unit_and_default() -> None:
+    """A number has its unit in square brackets; what may be left out has its default in round ones."""
+    numbers = 0
+    for action, required in actions(parser()):
+        words = (action.option_strings, action.dest)
+        if isinstance(action, argparse._SubParsersAction):
+            continue
+        assert action.help, words
+        if action.type is float:
+            numbers += 1
+            assert re.search(r"\[[^\]]+\]", action.help), words
+        takes_values = action.nargs != 0 and action.option_strings and not required
+        if takes_values and (action.type in (int, float) or action.choices):
+            assert re.search(r"\(.+\)", action.help) or "by default" in action.help.lower(), words
+    assert numbers > 30
 
 
 def test_version(capsys: pytest.CaptureFixture) -> None:
@@ -66,12 +83,22 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
     ("words", "message"),
     [
         ([], "required: COMMAND"),
-        (["nothing"], "invalid choice: 'nothing'"),
+        (["nothing"], "invalid choice: 'nothing'; choose from urdf, export, solve, load, ik, "),
+        (["slove"], "invalid choice: 'slove' (did you mean 'solve'?)"),
+        (["solve", "inflatable_arm", "--method", "newtn"], "invalid choice: 'newtn' (did you mean 'newton'?)"),
         (["urdf", "inflatable_arm", "--nothing"], "unrecognized arguments: --nothing"),
         (["urdf", "inflatable_arm", "-o"], "expected one argument"),
-        (["urdf", "inflatable_arm", "--check", "three"], "unrecognized arguments: three"),
+        (["urdf", "inflatable_arm", "--check", "three"], "unrecognized arguments: three\n"),
+        (["urdf", "inflatable_arm", "--chekc"], "unrecognized arguments: --chekc (did you mean '--check'?)"),
+        (["urdf", "inflatable_arm", "--over"], "unrecognized arguments: --over"),  # options in full
+        (["urdf", "inflatable_arm", "radius=3"], "radius=3; parameters of the robot stand behind --set: --set NAME=VALUE"),
+        (["export", "inflatable_arm", "-o", "arm.xml", "radius=3"], "stand behind --set"),
+        (["urdf", "inflatable_arm", "--set", "radius"], "'radius': NAME=VALUE is required"),
+        (["urdf", "--set", "radius=3", "inflatable_arm"], "'inflatable_arm': NAME=VALUE is required, and ROBOT before --set"),
+        (["urdf", "inflatable_arm", "--set", "=3"], "'=3': NAME=VALUE is required"),
+        (["urdf", "inflatable_arm", "--set"], "expected at least one argument"),
         (["doctor", "--nothing"], "unrecognized arguments: --nothing"),
-        (["doctor", "radius=3"], "unrecognized arguments: radius=3"),
+        (["doctor", "radius=3"], "unrecognized arguments: radius=3\n"),
     ],
 )
 def test_words_that_argparse_refuses(words: list[str], message: str, capsys: pytest.CaptureFixture) -> None:
@@ -112,7 +139,7 @@ def test_output_may_be_cut_off_by_whoever_reads_it() -> None:
 def test_the_command_imports_no_tool_before_it_needs_it() -> None:
     code = "import softrobots.cli, sys; softrobots.cli.parser(); print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
-    heavy = {"matplotlib", "trimesh", "xacro", "tqdm", "meshcat", "scipy"} | {tool.module for tool in TOOLS.values()}
+    heavy = {"matplotlib", "trimesh", "xacro", "tqdm", "meshcat", "scipy", "shtab"} | {tool.module for tool in TOOLS.values()}
     assert not loaded & heavy
 
 
@@ -124,9 +151,10 @@ def test_urdf_prints_what_is_shipped(name: str, told) -> None:
     assert told("urdf", name) == (0, (urdf_folder() / f"{name}.urdf").read_text(encoding="utf-8"), "")
 
 
-def test_urdf_takes_parameters_before_and_behind_options(told, tmp_path: Path) -> None:
+def test_urdf_takes_parameters_in_several_places(told, tmp_path: Path) -> None:
     file = tmp_path / "new" / "arm.urdf"
-    words = ("urdf", "inflatable_arm", "link_lengths=[0.5,0.4]", "-o", str(file), "stiffness=(200, 150)", "rest_up:=-0.1")
+    sets = (("--set", "link_lengths=[0.5,0.4]"), ("--set", "stiffness=(200, 150)", "rest_up:=-0.1"))
+    words = ("urdf", "inflatable_arm", *sets[0], "-o", str(file), *sets[1])
     assert told(*words) == (0, f"{file}: written\n", "")
     expected = sr.InflatableArm(link_lengths=(0.5, 0.4), stiffness=(200.0, 150.0), rest_up=-0.1)
     assert file.read_text(encoding="utf-8") == expected.urdf()
@@ -179,12 +207,12 @@ def test_listed_defaults_are_those_of_the_robot_and_units_those_of_the_xacro_fil
 
 def test_urdf_expands_any_xacro_file(told, tmp_path: Path) -> None:
     file = xacro_folder() / "inflatable_arm.urdf.xacro"
-    assert told("urdf", str(file), "radius=0.05") == (0, expand(file, {"radius": "0.05"}), "")
+    assert told("urdf", str(file), "--set", "radius=0.05") == (0, expand(file, {"radius": "0.05"}), "")
     status, out, _ = told("urdf", str(file), "--list")
     assert status == 0
     assert "stiffness=172.71\n" in out
     assert "[N m/rad]" in out
-    status, out, err = told("urdf", str(file), "radios=0.05")
+    status, out, err = told("urdf", str(file), "--set", "radios=0.05")
     assert status == 2
     assert "(did you mean 'radius'?)" in err
     assert "\n  motor_effort=50.0 [N m]" in err
@@ -212,6 +240,31 @@ def test_translations_follow_the_rules_that_files_of_ours_follow(write, arm: sr.
     file.write_text(write(arm), encoding="utf-8")
     status, out, err = told("urdf", str(file), "--check")
     assert (status, err) == (0, ""), out
+
+
+def test_urdf_answers_machines(told, tmp_path: Path) -> None:
+    status, out, _ = told("urdf", "--list", "--json")
+    assert status == 0
+    assert list(json.loads(out)["robots"]) == list(sr.ROBOTS)
+    status, out, _ = told("urdf", "helix_tube", "--list", "--json")
+    assert status == 0
+    listed = json.loads(out)
+    assert listed["robot"] == "helix_tube"
+    assert [row["name"] for row in listed["parameters"]] == [field.name for field in dataclasses.fields(sr.HelixTube)]
+    assert all(row.keys() == {"name", "default", "unit", "text"} for row in listed["parameters"])
+    made = tmp_path / "arm.urdf"
+    status, out, _ = told("urdf", "inflatable_arm", "--check", "-o", str(made), "--json")
+    assert status == 0
+    answer = json.loads(out)
+    assert (answer["ok"], answer["written"]) == (True, str(made))
+    assert [row["what"] for row in answer["findings"]][1 : 1 + len(RULES)] == list(RULES)
+    broken = tmp_path / "broken.urdf"
+    broken.write_text(made.read_text(encoding="utf-8").replace('mass value="', 'mass value="-'), encoding="utf-8")
+    status, out, _ = told("urdf", str(broken), "--check", "--json")
+    assert status == 1
+    answer = json.loads(out)
+    assert not answer["ok"]
+    assert any("mass -" in text for row in answer["findings"] for text in row["problems"])
 
 
 def test_urdf_checks_files_robots_and_xacro_files(told) -> None:
@@ -253,28 +306,27 @@ FILE = "FILE"  # stands for a URDF file
     [
         ([], "ROBOT must be one of inflatable_arm, pcc_arm, pcc_arm_lumped, helix_tube, helix_tube_lumped, or a file"),
         (["inflatable_leg"], "no robot or file is called 'inflatable_leg' (did you mean 'inflatable_arm'?)"),
-        (["inflatable_arm", "radius"], "of the form field=value"),
-        (["inflatable_arm", "=3"], "of the form field=value"),
-        (["inflatable_arm", "radios=3"], "no parameter of inflatable_arm is called 'radios' (did you mean 'radius'?)"),
-        (["inflatable_arm", "radios=3"], "\n  stiffness=172.71 [N m/rad]\n"),
-        (["inflatable_arm", "radios=3"], "\n  link_lengths=[0.6,0.6] [m]\n"),
-        (["inflatable_arm", "radius=0.05", "radius=0.04"], "radius must be given once"),
-        (["inflatable_arm", "radius=-1"], "above 0.0 [m]"),
-        (["inflatable_arm", "radius=wide"], "a number or a list of numbers [m]"),
-        (["inflatable_arm", "radius=[0.05,0.04,0.03]"], "one for each of the 2 links"),
-        (["inflatable_arm", "radius=" + "(" * 300], "radius"),
-        (["pcc_arm", "chain=rope"], "one of 'sections', 'lumped'"),
-        (["pcc_arm", "torsion=2"], "True or False"),
-        (["helix_tube", "contraction=0.5", "angle=0.02"], "the tube runs into itself"),
-        (["inflatable_arm", "hinge_offset=1e-5"], "too light"),
+        (["inflatable_arm", "--set", "radios=3"], "no parameter of inflatable_arm is called 'radios' (did you mean 'radius'?)"),
+        (["inflatable_arm", "--set", "radios=3"], "\n  stiffness=172.71 [N m/rad]\n"),
+        (["inflatable_arm", "--set", "radios=3"], "\n  link_lengths=[0.6,0.6] [m]\n"),
+        (["inflatable_arm", "--set", "radius=0.05", "radius=0.04"], "radius must be given once"),
+        (["inflatable_arm", "--set", "radius=-1"], "above 0.0 [m]"),
+        (["inflatable_arm", "--set", "radius=wide"], "a number or a list of numbers [m]"),
+        (["inflatable_arm", "--set", "radius=[0.05,0.04,0.03]"], "one for each of the 2 links"),
+        (["inflatable_arm", "--set", "radius=" + "(" * 300], "radius"),
+        (["pcc_arm", "--set", "chain=rope"], "one of 'sections', 'lumped'"),
+        (["pcc_arm", "--set", "torsion=2"], "True or False"),
+        (["helix_tube", "--set", "contraction=0.5", "angle=0.02"], "the tube runs into itself"),
+        (["inflatable_arm", "--set", "hinge_offset=1e-5"], "too light"),
         ([FILE], "a URDF file can only be checked, with --check"),
         ([FILE, "-o", "x.urdf"], "a URDF file can only be checked, with --check"),
         ([FILE, "-o", "x.urdf", "--check"], "a URDF file can only be checked, with --check"),
-        ([FILE, "radius=0.05", "--check"], "is no xacro file"),
+        ([FILE, "--set", "radius=0.05", "--check"], "is no xacro file"),
+        (["inflatable_arm", "--json"], "--json must be given with --list, --check or -o FILE"),
         (["inflatable_arm", "--overwrite"], "given together with -o FILE"),
-        (["inflatable_arm", "--list", "--check"], "--list must be given without"),
-        (["inflatable_arm", "radius=0.05", "--list"], "--list must be given without"),
-        (["inflatable_arm", "-o", "x.urdf", "--list"], "--list must be given without"),
+        (["inflatable_arm", "--list", "--check"], "--list must be given without --set, -o and --check"),
+        (["inflatable_arm", "--set", "radius=0.05", "--list"], "--list must be given without --set, -o and --check"),
+        (["inflatable_arm", "-o", "x.urdf", "--list"], "--list must be given without --set, -o and --check"),
         (["nobody", "--list"], "no robot or file is called 'nobody'"),
         (["inflatable_arm", "-o", "."], "is a folder; a file name is required"),
     ],
@@ -296,9 +348,6 @@ def test_urdf_refuses_files_that_are_no_robot(told, tmp_path: Path) -> None:
         assert err.startswith("error: ")
 
 
-# --- softrobots doctor
-
-
 @pytest.mark.parametrize("words", [["urdf", "--check"], ["export", "-o", "made.xml"]])
 @pytest.mark.parametrize("name", ["robot.urdf", "robot.urdf.xacro"])
 def test_files_that_are_no_text_are_refused(
@@ -310,110 +359,6 @@ def test_files_that_are_no_text_are_refused(
     assert (status, out) == (2, "")
     assert err.startswith("error: cannot read")
     assert name in err
-
-
-def test_doctor_finds_this_installation_well(told) -> None:
-    status, out, err = told("doctor")
-    assert status == 0
-    assert out.endswith("\nall well\n")
-    assert f"softrobots {sr.__version__}, Python " in out
-    assert f"  xacro    {xacro_folder()}\n" in out
-    assert f"  cache    {cache_folder()} (compiled solvers, by {available_backend()})\n" in out
-    for name in sr.ROBOTS:
-        assert re.search(rf"^  {name}\.urdf +the same$", out, re.M)
-        assert re.search(rf"^  {name} +yourdfpy +\S+ +\d\.\de-1\d m +\d\.\de-1\d rad", out, re.M)
-    assert "MuJoCo" not in out
-    assert "5/5" in err  # a progress bar
-
-
-def test_doctor_asks_every_tool_if_told(told, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On one file, which is enough to see that they are asked; all of them are in tests/test_interop.py."""
-    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", {"inflatable_arm": sr.InflatableArm})
-    status, out, _ = told("doctor", "--all")
-    assert status == 0
-    for name, tool in TOOLS.items():
-        if tool.version is not None:
-            assert re.search(rf"^  inflatable_arm +{name} +{re.escape(tool.version)} ", out, re.M), name
-
-
-def test_doctor_tells_what_is_missing_and_what_to_type(told, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A missing package of an extra is no trouble; a required one that is missing or too old is."""
-    versions = {"meshcat": None, "numpy": "1.26.4", "mujoco": None, "scipy": "1.2"}
-    original = packages.installed_version
-    monkeypatch.setattr(packages, "installed_version", lambda name: versions[name] if name in versions else original(name))
-    status, out, _ = told("doctor")
-    assert status == 1
-    assert "missing: pip install 'meshcat>=0.3.2'" in out
-    assert "1.26.4 is older than 2.0: pip install -U 'numpy>=2.0'" in out
-    assert "missing: pip install 'softrobots[interop]'" in out
-    assert "1.2 is older than 1.13: pip install -U 'softrobots[helix]'" in out
-    wrong = out[out.index("\nwrong:\n") :]
-    assert "numpy" in wrong
-    assert "meshcat" in wrong
-    assert "mujoco" not in wrong
-    assert "scipy" not in wrong
-
-
-def test_doctor_sees_files_that_differ_and_kinematics_that_do_not_agree(
-    told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    for file in urdf_folder().glob("*.urdf"):
-        (tmp_path / file.name).write_bytes(file.read_bytes())
-    text = ARM.read_text(encoding="utf-8")
-    (tmp_path / ARM.name).write_text(text.replace('xyz="0.0 -1.0 0.0"', 'xyz="0.0 -2.0 0.0"'), encoding="utf-8")
-    (tmp_path / "pcc_arm.urdf").write_text("<robot", encoding="utf-8")
-    monkeypatch.setattr("softrobots.commands.doctor.urdf_folder", lambda: tmp_path)
-    monkeypatch.setattr("softrobots.commands.doctor.installed_tools", lambda: ("ikpy",))
-    some = {name: sr.ROBOTS[name] for name in ("inflatable_arm", "pcc_arm")}  # the others agree, as the tests above see
-    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", some)
-    status, out, _ = told("doctor", "--all")
-    assert status == 1
-    assert re.search(r"inflatable_arm\.urdf +differs", out)
-    wrong = out[out.index("\nwrong:\n") :]
-    assert "inflatable_arm.urdf is not what xacro generates" in wrong
-    assert "pcc_arm.urdf is not well-formed XML" in wrong
-    assert re.search(r"inflatable_arm: ikpy is within \d\.\de\+?-?\d+ m", wrong)  # it takes the axis as it stands
-
-
-def test_doctor_goes_on_without_browser_and_stops_without_folders(told, monkeypatch: pytest.MonkeyPatch) -> None:
-    def nowhere() -> Path:
-        raise sr.DescriptionError("softrobots was installed without its folder urdf/; install it again")
-
-    monkeypatch.setattr("shutil.which", lambda name: None)
-    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", {"inflatable_arm": sr.InflatableArm})
-    status, out, _ = told("doctor")
-    assert status == 0
-    assert "browser  none, so no pictures of the viewer: no browser found" in out
-    monkeypatch.setattr("softrobots.commands.doctor.urdf_folder", nowhere)
-    status, out, _ = told("doctor")
-    assert status == 1
-    assert "Packages" in out
-    assert "kinematics at" not in out
-    assert "without its folder urdf/" in out
-
-
-def test_the_packages_are_those_of_pyproject() -> None:
-    """Required ones and those of each extra, with the same oldest versions."""
-    text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
-    listed, place = {}, ""
-    for line in text[text.index("dependencies = [") : text.index("[project.scripts]")].splitlines():
-        place = re.match(r"([\w-]+) = \[", line)[1] if re.match(r"([\w-]+) = \[", line) else place
-        for name, least in re.findall(r'"([\w-]+)(?:\[\w+\])?>=([\d.]+)', line):
-            listed[name] = ("" if place == "dependencies" else place, least)
-    ours = {package.name: (package.extra, package.minimum) for package in PACKAGES}
-    assert {name: ours[name] for name in ours} == {name: listed[name] for name in ours}
-    used_in_development = {"build", "hatchling", "hypothesis", "mpmath", "mypy", "pillow", "pytest", "pytest-xdist", "ruff"}
-    assert set(listed) - set(ours) <= used_in_development
-
-
-@pytest.mark.parametrize(
-    ("version", "minimum", "ok"),
-    [("2.0", "2.0", True), ("2.10.1", "2.9", True), ("1.26.4", "2.0", False), ("2.0rc1", "2.0", True), (None, "1", False)],
-)
-def test_versions_are_compared_by_their_numbers(version: str | None, minimum: str, ok: bool) -> None:
-    state = PackageState(Package("p", minimum, "", ""), version)
-    assert state.ok == ok
-    assert bool(state.advice) != ok
 
 
 # --- softrobots export
@@ -428,6 +373,33 @@ def test_export_takes_springs_of_somebodys_robot(told, tmp_path: Path) -> None:
     assert "2 springs, 3 actuators" in out
     model = sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
     assert made.read_text(encoding="utf-8") == sr.export.to_sdf(model)
+
+
+def test_export_answers_machines(told, tmp_path: Path) -> None:
+    made = tmp_path / "pcc.xml"
+    words = ("pcc_arm_lumped", "--set", "hinges=2", "--muscles", "forces", "--motors", *"200001", "--welded")
+    status, out, _ = told("export", *words, "-o", str(made), "--json")
+    assert status == 0
+    counts = {"sections": 0, "springs": 16, "actuators": 6, "welded": True}  # two segments of two hinges, four springs each
+    assert json.loads(out) == {"written": str(made), "robot": "pcc_arm", "format": "mjcf", **counts}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["inflatable_arm", "--motors", "1", "2"], "--motors must be 3 numbers: motor_1 [rad], motor_2 [rad], motor_3 [rad]"),
+        (["pcc_arm", "--motors", "1"], "--motors must be 6 numbers: muscle_1_1 [m], "),
+        (["helix_tube", "--motors", "1"], "--motors must be left out: it has no motors"),
+        (["inflatable_arm", "--motors", "0", "0", "nan"], "--motors must be an array of shape (3,) of finite numbers [rad]"),
+        (["inflatable_arm", "--spring", "motor_1=3", "--spring", "motor_1=4"], "--spring must be given once for each joint"),
+        (["a" * 5000], "no robot or file is called"),
+    ],
+)
+def test_export_refuses(words: list[str], message: str, told, tmp_path: Path) -> None:
+    status, out, err = told("export", *words, "-o", str(tmp_path / "made.json"))
+    assert (status, out) == (2, "")
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("word", ["wrist", "wrist=", "wrist=soft", "=20", "wrist=20,far"])

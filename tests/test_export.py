@@ -714,14 +714,15 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], arm: s
     made.write_text(sr.InflatableArm(stiffness=200).urdf(), encoding="utf-8")
     assert cli.main(["export", str(made), "--format", "sdf", "-o", str(tmp_path / "a"), "--damping", "file"]) == 0
     assert (tmp_path / "a").read_text(encoding="utf-8") == to_sdf(sr.load_model(made), damping="file")
-    assert cli.main(["export", "inflatable_arm", "stiffness=200", "-o", str(tmp_path / "b.sdf"), "--damping", "file"]) == 0
+    changed = ["--set", "stiffness=200"]
+    assert cli.main(["export", "inflatable_arm", *changed, "-o", str(tmp_path / "b.sdf"), "--damping", "file"]) == 0
     assert (tmp_path / "b.sdf").read_bytes() == (tmp_path / "a").read_bytes()
     for refused, told in (
         (["helix_tube", "-o", "h.xml"], 'chain="lumped"'),
         (["inflatable_arm", "-o", "h.py"], "format must be said"),
         (["no_such_robot", "-o", "h.xml"], "no robot or file"),
         (["inflatable_arm", "-o", "h.sdf", "--gravity"], "formats that have it"),
-        (["inflatable_arm", "-o", "h.xml", "--motors", "1"], "q_motors"),
+        (["inflatable_arm", "-o", "h.xml", "--motors", "1"], "--motors must be 3 numbers"),
     ):
         assert cli.main(["export", *refused[:2], str(tmp_path / refused[2]), *refused[3:]]) == 2
         assert told in capsys.readouterr().err

@@ -20,6 +20,7 @@ from softrobots.kernels.blocks import Block
 from softrobots.kernels.elements import constants
 from softrobots.kernels.elimination import Beyond, Eliminated, eliminate, release
 from softrobots.kernels.layout import Layout
+from softrobots.kernels.machines import Run
 from softrobots.kernels.program import make_program
 from softrobots.kernels.settings import LEAST_GUARD as FLOOR
 from softrobots.kernels.short_chain import Evaluation, evaluate, solve_again
@@ -261,7 +262,7 @@ def program_at(
     w[program.layout.force : program.layout.force + 3] = force.tolist()
     if gravity is not None:
         w[program.layout.gravity : program.layout.gravity + 3] = gravity.tolist()
-    actuation.put(SimpleNamespace(layout=program.layout, flat=lambda values: np.ravel(values).tolist()), w, motors)
+    actuation.put(Run(program, None), w, motors)
     return program, functions(program.text), actuation, w
 
 

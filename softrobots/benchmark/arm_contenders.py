@@ -145,15 +145,24 @@ def pinocchio_calls(
 
 
 def add_python(race: Race, few: LoadCases, expected: FloatArray) -> None:
-    """What one writes in Python over Pinocchio, and our own general solver."""
+    """What one writes in Python over Pinocchio, with SciPy too, and our own general solver."""
+    add_pinocchio(race, few, expected)
     robot = PinocchioArm(arm())
-    named: dict[str, Solver] = {FIXED_POINT: fixed_point, PLAIN_FIXED_POINT: plain_fixed_point}
-    named |= {newton_name(name): solve for name, solve in NEWTON.items()}
     try:
-        named |= {scipy_name(name): solve for name, solve in solvers().items()}
+        named = {scipy_name(name): solve for name, solve in solvers().items()}
     except SoftRobotsError as error:
         for name in ("root", "least_squares"):
             race.leave_out(scipy_name(name), str(error))
+        return
+    for name, solve in named.items():
+        race.add(name, partial(pinocchio_calls, name, robot, solve, few, expected))
+
+
+def add_pinocchio(race: Race, few: LoadCases, expected: FloatArray) -> None:
+    """What one writes in Python over Pinocchio alone, and our own general solver."""
+    robot = PinocchioArm(arm())
+    named: dict[str, Solver] = {FIXED_POINT: fixed_point, PLAIN_FIXED_POINT: plain_fixed_point}
+    named |= {newton_name(name): solve for name, solve in NEWTON.items()}
     for name, solve in named.items():
         race.add(name, partial(pinocchio_calls, name, robot, solve, few, expected))
     race.add(GENERAL, lambda: one_by_one(GENERAL, partial(solve_equilibrium, arm()), few, expected, read=_springs))

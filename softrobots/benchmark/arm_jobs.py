@@ -16,6 +16,7 @@ from softrobots.benchmark.arm_contenders import (
     MUJOCO_BARE,
     PLAIN_FIXED_POINT,
     add_compiled,
+    add_pinocchio,
     add_python,
     batch_name,
     compiled_batch,
@@ -76,6 +77,22 @@ def equilibria(settings: Settings) -> tuple[list[Row], list[str]]:
         race.costlier("equilibrium, one checked call", GENERAL, _barest(race), AT_MOST, 2.0),
     ]
     return rows, notes
+
+
+def without_extras(settings: Settings) -> tuple[list[Row], list[str]]:
+    """Equilibria of the arm, weightless, against what needs no package beyond the required ones: the short job."""
+    race = Race(settings, "equilibria")
+    cases = standard_cases(settings.batch)
+    few = cases.first(settings.singles)
+    expected = expected_springs(few, None)
+    add_compiled(race, cases, few, expected, None)
+    add_pinocchio(race, few, expected)
+    race.add(ARRAYS, lambda: together(ARRAYS, ArrayArm(arm()).equilibria, cases, expected))
+    race.run()
+    batch, single = "equilibrium, batch", "equilibrium, one checked call"
+    rows = [race.cheaper(batch, batch_name(backend), name) for backend in BACKENDS for name in (PLAIN_FIXED_POINT, ARRAYS)]
+    rows += [race.cheaper(single, single_name(backend), PLAIN_FIXED_POINT) for backend in BACKENDS]
+    return [*rows, race.costlier(single, GENERAL, _barest(race))], []
 
 
 def two_threads(settings: Settings) -> tuple[list[Row], list[str]]:

@@ -1,4 +1,4 @@
-"""Every job of the benchmark, by the name that scripts/benchmark.py knows it by."""
+"""Every job of the benchmark, by the name that scripts/benchmark.py and `softrobots bench` know it by."""
 
 from __future__ import annotations
 
@@ -79,13 +79,16 @@ JOBS: Mapping[str, Callable[[Settings], Outcome]] = {
 }
 """The jobs."""
 
+PLAIN = "plain"
+"""The job of `softrobots bench` if nothing is said: equilibria, short, against baselines that need no extras."""
+
 
 def measure(settings: Settings, jobs: Sequence[str]) -> Results:
     """Run jobs, in their order.
 
     Args:
         settings: How much is measured.
-        jobs: Names of the jobs, of `JOBS`.
+        jobs: Names of the jobs, of `JOBS`, or `PLAIN`.
 
     Returns:
         The results; what cannot be measured here is in them, with the reason.
@@ -93,8 +96,10 @@ def measure(settings: Settings, jobs: Sequence[str]) -> Results:
     rows: list[Row] = []
     curves: list[Curve] = []
     notes: list[str] = []
-    for name in (name for name in JOBS if name in jobs):
-        more = JOBS[name](settings)
+    every = {PLAIN: _rows(arm_jobs.without_extras), **JOBS}
+    chosen = [name for name in every if name in jobs]
+    for name in chosen:
+        more = every[name](settings)
         rows, curves, notes = rows + more[0], curves + more[1], notes + more[2]
-    told = dataclasses.asdict(settings) | {"jobs": [name for name in JOBS if name in jobs]}
+    told = dataclasses.asdict(settings) | {"jobs": chosen}
     return Results(machine(), told, tuple(rows), tuple(curves), tuple(notes))

@@ -8,12 +8,13 @@ from softrobots import plots
 from softrobots.benchmark.results import Results
 
 PICTURES = {
-    "sizes": ("Equilibrium of a rod under a tip force", "sections, or pairs of hinges", "CPU time of one call [us]"),
-    "batches": ("Equilibria of the inflatable arm", "cases in a batch", "CPU time a case [us]"),
+    "sizes": ("Equilibrium of a rod under a tip force", "sections, or pairs of hinges", "CPU time of one call [$\\mu$s]"),
+    "batches": ("Equilibria of the inflatable arm", "cases in a batch", "CPU time a case [$\\mu$s]"),
 }
 """Title and axes by the name of a picture."""
 
 _MARKED = (10, 50)  # numbers of sections between which the growth has a limit
+_MARKS = "the growth between these has a limit"
 
 
 def picture(results: Results, name: str) -> Any:
@@ -35,13 +36,12 @@ def picture(results: Results, name: str) -> Any:
     curves = [curve for curve in results.curves if curve.picture == name]
     for number, curve in enumerate(curves):
         axes.loglog(
-            curve.sizes, [1e6 * seconds for seconds in curve.seconds], color=plots.COLOURS[number % 6],
-            marker=plots.MARKERS[number % 6], ls=("-", "--", "-.", ":")[number % 4], ms=5, label=curve.label,
+            curve.sizes, [1e6 * seconds for seconds in curve.seconds], label=curve.label, **plots.line_style(number),
         )  # fmt: skip
     if name == "sizes":
         largest = max((size for curve in curves for size in curve.sizes), default=0)
-        for marked in (some for some in _MARKED if some <= largest):
-            axes.axvline(marked, color="0.6", lw=0.8, ls=":")
+        for number, marked in enumerate(some for some in _MARKED if some <= largest):
+            axes.axvline(marked, color="0.4", lw=1.2, ls=":", label=None if number else _MARKS)
         sizes = sorted({some for curve in curves for some in curve.sizes})
         axes.set_xticks(sizes, [str(some) for some in sizes], minor=False)
         axes.set_xticks([], minor=True)

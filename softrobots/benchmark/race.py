@@ -47,6 +47,14 @@ class Settings:
     """Whether to compile C++."""
 
 
+def short_settings(rounds: int, progress: bool) -> Settings:
+    """Sizes that are done in seconds, and yet say how fast this machine is."""
+    return Settings(
+        rounds, batch=20_000, singles=50, waypoints=50, sections=20, memory=200_000, starts=2, sizes=(2, 5, 10),
+        batches=(1, 100, 10_000), progress=progress,
+    )  # fmt: skip
+
+
 def quick_settings(rounds: int, progress: bool, cpp: bool) -> Settings:
     """Small sizes that run through everything; the figures mean nothing."""
     return Settings(

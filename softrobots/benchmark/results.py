@@ -139,16 +139,28 @@ def _check(results: Results) -> None:
 
 def table(rows: Sequence[Row]) -> str:
     """The rows as Markdown: what is compared, both costs, the figure and its target."""
-    lines = [
-        "| job | ours | against | ours costs | it costs | figure | target | |",
-        "|---|---|---|---:|---:|---:|---:|---|",
-    ]
-    for row in rows:
-        verdict = "" if row.met is None else "met" if row.met else "**missed**"
-        cells = [row.job, row.ours, row.baseline or "-", _cost(row.our_seconds), _cost(row.baseline_seconds)]
-        cells += [_figure(row), _target(row), f"skipped: {row.skipped}" if row.skipped else verdict]
-        lines.append("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |")
+    lines = [f"| {' | '.join(HEAD)}|", "|---|---|---|---:|---:|---:|---:|---|"]
+    lines += ["| " + " | ".join(cell.replace("|", "/") for cell in cells(row)) + " |" for row in rows]
     return "\n".join(lines)
+
+
+HEAD = ("job", "ours", "against", "ours costs", "it costs", "figure", "target", "")
+"""What the cells of a row are."""
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """A row in words: what is compared, both costs, the figure, its target, and whether that is met or why nothing is told."""
+    verdict = "" if row.met is None else "met" if row.met else "**missed**"
+    costs = (_cost(row.our_seconds), _cost(row.baseline_seconds))
+    last = f"skipped: {row.skipped}" if row.skipped else verdict
+    return (row.job, row.ours, row.baseline or "-", *costs, _figure(row), _target(row), last)
+
+
+def machine_text(results: Results) -> str:
+    """What was measured on: processor, system, versions, in a sentence."""
+    named = {name: value for name, value in results.machine.items() if name not in ("processor", "system")}
+    told = ", ".join([results.machine["processor"], results.machine["system"], *map(" ".join, named.items())])
+    return f"Medians of {results.settings['rounds']} rounds on: {told}."
 
 
 def require_whole(results: Results, jobs: Sequence[str]) -> None:

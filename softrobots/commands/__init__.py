@@ -4,9 +4,9 @@ A module has `add_parser(subparsers)`, which adds its parser and sets `run` on i
 the job, raises errors of `softrobots.errors`, and returns None, or whether all that it looked at is well.
 """
 
-from softrobots.commands import doctor, export, urdf
+from softrobots.commands import bench, completion, doctor, export, helix, ik, load, pcc, solve, urdf, view
 
-COMMANDS = (urdf, export, doctor)
+COMMANDS = (urdf, export, solve, load, ik, pcc, helix, view, bench, doctor, completion)
 """Modules of the subcommands, in the order of the help."""
 
 __all__ = ["COMMANDS"]

@@ -92,7 +92,7 @@ def parse_parameters(words: Sequence[str], known: Sequence[RobotParameter], owne
         name, equals, value = word.partition("=")
         name = name.removesuffix(":").strip()
         if not equals or not name:
-            raise ParameterError("parameter", word, "of the form field=value")
+            raise ParameterError("parameter", word, "of the form NAME=VALUE")
         if name not in (parameter.name for parameter in known):
             names, lines = [parameter.name for parameter in known], [parameter.line for parameter in known]
             raise NameNotFound(f"parameter of {owner}", name, names, lines=lines)

@@ -202,6 +202,14 @@ def cache_folder() -> Path:
         return _temporary_folder()
 
 
+def cache_is_kept() -> bool:
+    """Whether `cache_folder` is there for the next process, and not a temporary one because no other can be written."""
+    try:
+        return cache_folder() == _chosen_folder()
+    except RuntimeError:  # a user without a home
+        return False
+
+
 def _chosen_folder() -> Path:
     chosen = os.environ.get("SOFTROBOTS_CACHE")
     if chosen:

@@ -1,0 +1,188 @@
+"""Which robot a command is about: `ROBOT`, `--set NAME=VALUE`, and what must be said about other people's files."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from softrobots.checks import FloatArray
+from softrobots.command_line import refuse_too_large
+from softrobots.commands.coordinate_units import motor_units
+from softrobots.commands.robot_parameters import make_robot, parse_parameters, xacro_parameters
+from softrobots.description import expand
+from softrobots.errors import NameNotFound, ParameterError
+from softrobots.interop.kinematics import is_urdf_file
+from softrobots.loader import load_model
+from softrobots.model import SoftModel
+from softrobots.muscles import MUSCLE_INPUTS
+from softrobots.robots import ROBOTS, HelixTube, PccArm, Robot
+from softrobots.sources import read_source
+
+
+def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """Give a parser `ROBOT` and `--set`; see `robot_source`.
+
+    Args:
+        parser: The parser.
+        optional: Whether `ROBOT` may be left out.
+    """
+    told = f"{', '.join(ROBOTS)}; or a URDF, xacro, MJCF or SDF file"
+    parser.add_argument("robot", nargs="?" if optional else None, metavar="ROBOT", help=told)
+    parser.add_argument(
+        "--set",
+        dest="parameters",
+        nargs="+",
+        action="extend",
+        type=assignment,
+        default=[],
+        metavar="NAME=VALUE",
+        help="parameters of the robot, or arguments of the xacro file; `softrobots urdf ROBOT --list` tells names, units and "
+        "defaults",
+    )
+
+
+def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """Give a parser `ROBOT`, `--set`, `--spring`, `--tip` and `--muscles`; see `model_of`.
+
+    Args:
+        parser: The parser.
+        optional: Whether `ROBOT` may be left out.
+    """
+    add_robot(parser, optional=optional)
+    told = "a spring of a joint of somebody's file, K [N m/rad or N/m], relaxed at REST [rad or m] (0); once for each joint"
+    parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=told)
+    parser.add_argument("--tip", metavar="LINK", help="the link that is the tip (as the file says, or its only end)")
+    told = "what is given of muscles, lengths [m] or tensions [N] (%(default)s)"
+    parser.add_argument("--muscles", choices=MUSCLE_INPUTS, default="lengths", help=told)
+
+
+def assignment(word: str) -> str:
+    """A word behind `--set`; argparse gives it all the words up to the next option."""
+    name, equals, _ = word.partition("=")
+    if not equals or not name.strip():
+        raise argparse.ArgumentTypeError(f"{word!r}: NAME=VALUE is required, and ROBOT before --set")
+    return word
+
+
+def spring(word: str) -> tuple[str, tuple[float, float]]:
+    """A spring as it is typed, JOINT=K or JOINT=K,REST: the joint, and stiffness and rest."""
+    joint, equals, numbers = word.rpartition("=")
+    stiffness, _, rest = numbers.partition(",")
+    try:
+        typed = float(stiffness), float(rest or 0.0)
+    except ValueError:
+        equals = ""
+    if not joint or not equals:
+        raise argparse.ArgumentTypeError(f"{word!r}: JOINT=K or JOINT=K,REST is required")
+    return joint, typed
+
+
+def robot_source(robot: str, parameters: Sequence[str]) -> Robot | Path | str:
+    """What the words stand for: a robot, the path of a URDF file, or the URDF text that another file expands or translates to.
+
+    Args:
+        robot: Name of a robot of `ROBOTS`, or a path.
+        parameters: Parameters of the robot or of the xacro file, each `name=value`.
+
+    Raises:
+        NameNotFound: If there is no such robot, file or parameter.
+        ParameterError: If a parameter is refused.
+        DescriptionError: If xacro refuses the file, or it is of no kind that can be read.
+        MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
+    """
+    if robot in ROBOTS:
+        return make_robot(robot, parameters)
+    file = robot_file(robot)
+    if file.suffix == ".xacro":
+        return expand(file, parse_parameters(parameters, xacro_parameters(file), file.name))
+    if parameters:
+        raise ParameterError("--set", " ".join(parameters), f"left out: {file} is no xacro file")
+    return file if is_urdf_file(file) else read_source(file)[0]
+
+
+def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = None) -> SoftModel:
+    """The model of the robot that the arguments of `add_model` name.
+
+    Args:
+        arguments: The arguments.
+        source: What `robot_source` made of them, if that is known.
+
+    Raises:
+        SoftRobotsError: Whatever `robot_source` and `load_model` raise.
+        ParameterError: If a joint is given two springs.
+    """
+    names = [joint for joint, _ in arguments.spring]
+    twice = next((joint for place, joint in enumerate(names) if joint in names[:place]), None)
+    if twice is not None:
+        raise ParameterError("--spring", twice, "given once for each joint")
+    if source is None:
+        source = robot_source(arguments.robot, arguments.parameters)
+    return load_model(source, springs=dict(arguments.spring) or None, tip=arguments.tip, muscles=arguments.muscles)
+
+
+def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
+    """The same model for a command that solves: a robot that is too large for that is refused before it is made.
+
+    Raises:
+        SoftRobotsError: Whatever `robot_source` and `load_model` raise.
+        ParameterError: If the robot has too many joints, or a joint is given two springs.
+    """
+    source = robot_source(arguments.robot, arguments.parameters)
+    if isinstance(source, PccArm | HelixTube):
+        refuse_too_large(source, "--set", " ".join(arguments.parameters))
+    return model_of(arguments, source)
+
+
+def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--motors") -> FloatArray:
+    """Actuator coordinates that an option gives, relaxed without it; the error names the actuators.
+
+    Args:
+        model: The robot.
+        words: What was typed, or None.
+        option: The option, for the error.
+
+    Returns:
+        Shape (n_motors,) [rad, m or N].
+
+    Raises:
+        ParameterError: If there are more or fewer numbers than actuators, or the robot cannot take them.
+    """
+    if words is None:
+        return np.array(model.relaxed_motors)
+    check_one_each(option, words, model.motor_joints, motor_units(model))
+    return model.checked_motors(words, option)
+
+
+def check_one_each(option: str, words: Sequence[float], names: Sequence[str], units: Sequence[str]) -> None:
+    """Refuse more or fewer numbers than there are actuators; the error names those.
+
+    Args:
+        option: The option, for the error.
+        words: What was typed.
+        names: Names of the actuators.
+        units: Unit of each number.
+
+    Raises:
+        ParameterError: If the counts differ.
+    """
+    if len(words) != len(names):
+        named = ", ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
+        raise ParameterError(option, list(words), f"{len(names)} numbers: {named}" if named else "left out: it has no motors")
+
+
+def robot_file(name: str) -> Path:
+    """The file of a robot.
+
+    Raises:
+        NameNotFound: If there is none; lists the robots.
+    """
+    try:
+        found = Path(name).is_file()
+    except OSError:  # a name too long for a file, or a folder that may not be looked into
+        found = False
+    if not found:
+        raise NameNotFound("robot or file", name, ROBOTS)
+    return Path(name)

@@ -1,0 +1,212 @@
+"""`softrobots doctor`: what it finds in this installation, and what it says where something is missing or wrong."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+from pathlib import Path
+
+import pytest
+
+import softrobots as sr
+from softrobots.interop import packages
+from softrobots.interop.packages import EXTRAS, PACKAGES, Package, PackageState, extra_states
+from softrobots.interop.tools import TOOLS
+from softrobots.kernels.machines import available_backend, cache_folder, cache_is_kept
+from softrobots.meshcat_view.server import end_server, start_server
+from softrobots.paths import urdf_folder, xacro_folder
+from tests.conftest import CHECKOUT
+
+ARM = urdf_folder() / "inflatable_arm.urdf"
+
+
+@pytest.fixture
+def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Look at one file, and at no page: all of them are looked at once, which is enough."""
+    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", {"inflatable_arm": sr.InflatableArm})
+    monkeypatch.setattr("softrobots.generated.ROBOTS", {"inflatable_arm": sr.InflatableArm})
+    monkeypatch.setattr("softrobots.commands.doctor._page", lambda report: None)
+
+
+def test_doctor_finds_this_installation_well(told) -> None:
+    status, out, err = told("doctor")
+    assert status == 0
+    assert out.endswith("\nall well\n")
+    assert f"softrobots {sr.__version__}, Python " in out
+    assert f"  xacro    {xacro_folder()}\n" in out
+    assert f"  cache    {cache_folder()} (compiled solvers, by {available_backend()})\n" in out
+    for name in sr.ROBOTS:
+        assert re.search(rf"^  {name}\.urdf +the same$", out, re.M)
+        assert re.search(rf"^  {name} +yourdfpy +\S+ +\d\.\de-1\d m +\d\.\de-1\d rad", out, re.M)
+    assert "MuJoCo" not in out
+    assert re.search(r"^  served  at http://127\.0\.0\.1:\d+/static/, and ended again$", out, re.M)
+    assert "5/5" in err  # a progress bar
+
+
+@pytest.mark.usefixtures("one_robot")
+def test_doctor_asks_every_tool_if_told_and_answers_machines(told) -> None:
+    """On one file, which is enough to see that they are asked; all of them are in tests/test_interop.py."""
+    status, out, _ = told("doctor", "--all", "--json")
+    assert status == 0
+    answer = json.loads(out)
+    asked = {row["tool"]: row["version"] for row in answer["kinematics"]}
+    assert asked == {name: tool.version for name, tool in TOOLS.items() if tool.version is not None}
+    assert max(row["position_error"] for row in answer["kinematics"]) < 1e-5  # single precision in PyBullet
+    assert (answer["ok"], answer["wrong"], answer["softrobots"]) == (True, [], sr.__version__)
+    assert {row["name"] for row in answer["packages"]} == {package.name for package in PACKAGES}
+    assert list(answer["extras"]) == list(EXTRAS)
+    assert answer["files"] == [{"file": str(ARM), "up_to_date": True}]
+
+
+def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A server that starts and ends, one that does not start, and one that serves something else."""
+    started, ended = [], []
+    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", {})
+    monkeypatch.setattr("softrobots.generated.ROBOTS", {})
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # nobody is there; loopback needs no proxy
+    monkeypatch.setattr("softrobots.commands.doctor.start_server", lambda: started.append(start_server()) or started[-1])
+    monkeypatch.setattr("softrobots.commands.doctor.end_server", lambda server: ended.append(end_server(server)))
+    status, out, _ = told("doctor", "--json")
+    assert (status, len(started), len(ended)) == (0, 1, 1)
+    process, _, url = started[0]
+    assert json.loads(out)["page"] == {"served": True, "url": url, "problem": ""}
+    assert process.poll() is not None
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", int(url.split(":")[2].split("/")[0])), timeout=5.0)
+
+    def no_server() -> None:
+        raise sr.ViewerError("the meshcat server ended before it served: no reason")
+
+    monkeypatch.setattr("softrobots.commands.doctor.start_server", no_server)
+    status, out, _ = told("doctor")
+    assert status == 1
+    assert "  not served  the meshcat server ended before it served: no reason" in out
+    assert "wrong:\n  the page of the viewer cannot be served: the meshcat server ended" in out
+
+    page = tmp_path / "page.html"
+    page.write_text("<p>nothing of ours</p>", encoding="utf-8")
+    monkeypatch.setattr("softrobots.commands.doctor.end_server", ended.append)
+    for url, told_of_it in (
+        (page.as_uri(), "answers with something else than"),
+        ("http://127.0.0.1:9/", "http://127.0.0.1:9/: "),
+    ):
+        monkeypatch.setattr("softrobots.commands.doctor.start_server", lambda url=url: ("a server", "", url))
+        status, out, _ = told("doctor")
+        assert status == 1
+        assert told_of_it in out
+    assert ended[1:] == ["a server", "a server"]
+
+
+def test_doctor_tells_what_is_missing_and_what_to_type(told, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A missing package of an extra is no trouble; a required one that is missing or too old is."""
+    versions = {"meshcat": None, "numpy": "1.26.4", "mujoco": None, "scipy": "1.2"}
+    original = packages.installed_version
+    monkeypatch.setattr(packages, "installed_version", lambda name: versions[name] if name in versions else original(name))
+    status, out, _ = told("doctor")
+    assert status == 1
+    assert "missing: pip install 'meshcat>=0.3.2'" in out
+    assert "1.26.4 is older than 2.0: pip install -U 'numpy>=2.0'" in out
+    assert "missing: pip install 'softrobots[interop]'" in out
+    assert "1.2 is older than 1.13: pip install -U 'softrobots[helix]'" in out
+    wrong = out[out.index("\nwrong:\n") :]
+    assert "numpy" in wrong
+    assert "meshcat" in wrong
+    assert "mujoco" not in wrong
+    assert "scipy" not in wrong
+    assert re.search(r"^  interop +lacks mujoco +simulators", out, re.M)
+    assert re.search(r"^  helix +lacks scipy +actuators", out, re.M)
+    assert re.search(r"^  plot +complete +plots", out, re.M)
+
+
+def test_an_extra_is_complete_without_what_cannot_be_had_for_this_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PyBullet has no wheels above Python 3.11; viser is part of two extras."""
+    states = [PackageState(package, None if package.name in ("pybullet", "viser") else "9999") for package in PACKAGES]
+    for version, lacking in (((3, 11), ("pybullet",)), ((3, 12), ())):
+        monkeypatch.setattr(packages.sys, "version_info", version)
+        found = {extra.name: extra.missing for extra in extra_states(states)}
+        assert found == {name: () for name in EXTRAS} | {
+            "interop": lacking,
+            "viser": ("viser",),
+            "interop-kinematics": ("viser",),
+        }
+
+
+def test_every_extra_is_told_and_holds_something() -> None:
+    assert set(EXTRAS) == {package.extra for package in PACKAGES} - {""}
+
+
+@pytest.mark.usefixtures("one_robot")
+def test_doctor_tells_of_a_cache_that_does_not_last(told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("SOFTROBOTS_CACHE", str(tmp_path / "cache"))
+    assert cache_is_kept()
+    in_the_way = tmp_path / "file"
+    in_the_way.touch()
+    monkeypatch.setenv("SOFTROBOTS_CACHE", str(in_the_way / "cache"))
+    assert not cache_is_kept()
+    status, out, _ = told("doctor")
+    assert status == 0
+    assert "for this process alone: the folder for caches cannot be written" in out
+
+
+@pytest.mark.usefixtures("one_robot")
+def test_doctor_sees_files_that_differ_and_kinematics_that_do_not_agree(
+    told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for file in urdf_folder().glob("*.urdf"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    text = ARM.read_text(encoding="utf-8")
+    (tmp_path / ARM.name).write_text(text.replace('xyz="0.0 -1.0 0.0"', 'xyz="0.0 -2.0 0.0"'), encoding="utf-8")
+    (tmp_path / "pcc_arm.urdf").write_text("<robot", encoding="utf-8")
+    monkeypatch.setattr("softrobots.commands.doctor.urdf_folder", lambda: tmp_path)
+    monkeypatch.setattr("softrobots.commands.doctor.installed_tools", lambda: ("ikpy",))
+    some = {name: sr.ROBOTS[name] for name in ("inflatable_arm", "pcc_arm")}  # the others agree, as the tests above see
+    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", some)  # the page is left out
+    status, out, _ = told("doctor", "--all")
+    assert status == 1
+    assert re.search(r"inflatable_arm\.urdf +differs", out)
+    wrong = out[out.index("\nwrong:\n") :]
+    assert "inflatable_arm.urdf is not what xacro generates" in wrong
+    assert "pcc_arm.urdf is not well-formed XML" in wrong
+    assert re.search(r"inflatable_arm: ikpy is within \d\.\de\+?-?\d+ m", wrong)  # it takes the axis as it stands
+
+
+@pytest.mark.usefixtures("one_robot")
+def test_doctor_goes_on_without_browser_and_stops_without_folders(told, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nowhere() -> Path:
+        raise sr.DescriptionError("softrobots was installed without its folder urdf/; install it again")
+
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    status, out, _ = told("doctor")
+    assert status == 0
+    assert "browser  none, so no pictures of the viewer: no browser found" in out
+    monkeypatch.setattr("softrobots.commands.doctor.urdf_folder", nowhere)
+    status, out, _ = told("doctor")
+    assert status == 1
+    assert "Packages" in out
+    assert "kinematics at" not in out
+    assert "without its folder urdf/" in out
+
+
+def test_the_packages_are_those_of_pyproject() -> None:
+    """Required ones and those of each extra, with the same oldest versions."""
+    text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
+    listed, place = {}, ""
+    for line in text[text.index("dependencies = [") : text.index("[project.scripts]")].splitlines():
+        place = re.match(r"([\w-]+) = \[", line)[1] if re.match(r"([\w-]+) = \[", line) else place
+        for name, least in re.findall(r'"([\w-]+)(?:\[\w+\])?>=([\d.]+)', line):
+            listed.setdefault(name, ("" if place == "dependencies" else place, least))  # an extra of its own comes first
+    ours = {package.name: (package.extra, package.minimum) for package in PACKAGES}
+    assert {name: ours[name] for name in ours} == {name: listed[name] for name in ours}
+    used_in_development = {"build", "hatchling", "hypothesis", "mpmath", "mypy", "pytest", "pytest-xdist", "ruff"}
+    assert set(listed) - set(ours) <= used_in_development
+
+
+@pytest.mark.parametrize(
+    ("version", "minimum", "ok"),
+    [("2.0", "2.0", True), ("2.10.1", "2.9", True), ("1.26.4", "2.0", False), ("2.0rc1", "2.0", True), (None, "1", False)],
+)
+def test_versions_are_compared_by_their_numbers(version: str | None, minimum: str, ok: bool) -> None:
+    state = PackageState(Package("p", minimum, "", ""), version)
+    assert state.ok == ok
+    assert bool(state.advice) != ok

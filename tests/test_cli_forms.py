@@ -1,0 +1,631 @@
+"""The commands of the closed forms, `softrobots pcc` and `softrobots helix`, and `softrobots bench`."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import softrobots as sr
+from softrobots import constant_curvature, helix, pcc_plots
+from softrobots.benchmark import compiled_solvers
+from softrobots.benchmark.jobs import JOBS, PLAIN
+from softrobots.benchmark.race import Settings, quick_settings, short_settings
+from softrobots.benchmark.results import Results, as_json, read_results
+from softrobots.cli import main
+from softrobots.commands import bench
+from tests.conftest import CHECKOUT
+
+LENGTHS = ("0.50", "0.53", "0.55", "0.54", "0.51", "0.52")
+"""Muscle lengths of the reference in theory.md, section 2.3; distance 0.04 m is the default."""
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture
+def answer(told):
+    """Run the command with --json and return the object that it prints."""
+
+    def run(*words: str) -> dict[str, Any]:
+        status, out, err = told(*words, "--json")
+        assert (status, err) == (0, "")
+        return json.loads(out)
+
+    return run
+
+
+def words_of(numbers: object) -> list[str]:
+    return [repr(float(number)) for number in np.ravel(numbers)]
+
+
+def numeric(value: object) -> bool:
+    entries = np.ravel(np.array(value, dtype=object)).tolist()
+    return all(isinstance(entry, int | float) and not isinstance(entry, bool) for entry in entries)
+
+
+# --- softrobots pcc
+
+
+@pytest.mark.parametrize(
+    ("frame", "tip"),
+    [
+        ("bending_plane", (0.41771528, -0.30235950, 0.87444230)),
+        ("torsion_free", (0.44957382, -0.31544214, 0.84384418)),
+    ],
+)
+def test_pcc_forward_gives_the_reference(frame: str, tip: tuple, answer) -> None:
+    found = answer("pcc", "forward", *LENGTHS, "--frame", frame)
+    assert found["arc_bending"][0] == pytest.approx(0.726483157, abs=5e-10)  # printed digits of theory.md
+    assert found["arc_azimuth"][0] == pytest.approx(-0.408637855, abs=5e-10)
+    assert np.allclose(found["tip_position"], tip, rtol=0.0, atol=5.1e-9)
+    assert np.array(found["muscle_lengths"]).ravel().tolist() == [float(word) for word in LENGTHS]
+    assert found["muscle_extension"][0][0] == pytest.approx(0.50 / 0.524 - 1.0, rel=1e-12)
+    assert (found["jacobian"], found["frame"], found["plot"]) == (None, frame, None)
+
+
+def test_pcc_tells_a_person_the_same(told) -> None:
+    status, out, err = told("pcc", "forward", *LENGTHS)
+    assert (status, err) == (0, "")
+    assert re.search(r"^1 +0\.526667 +0\.726483 +-0\.408638 +0\.500000 \(-4\.6 %\)", out, re.M)
+    pose = [[float(word) for word in line.split()] for line in out.splitlines()[-4:]]
+    assert np.allclose(np.array(pose)[:3, 3], (0.44957382, -0.31544214, 0.84384418), rtol=0.0, atol=5.1e-7)
+    assert "Jacobian" not in out
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.3, 0.8), st.floats(0.0, 2.0), st.floats(-3.0, 3.0), st.floats(-2.0, 2.0), st.floats(0.02, 0.06)),
+        min_size=1,
+        max_size=4,
+    ),
+    st.integers(3, 5),
+)
+@settings(max_examples=12)
+def test_pcc_inverse_and_forward_are_each_others_inverse_and_screw_motions(segments: list, count: int) -> None:
+    """The pose of a segment without twist is the exponential of its constant strain: by SciPy."""
+    linalg = pytest.importorskip("scipy.linalg")
+    azimuths = 0.3 + 2.0 * np.pi * np.arange(count) / count
+    offsets, distance = ([segment[place] for segment in segments] for place in (3, 4))
+    common = ["--azimuths", *words_of(azimuths), "--offsets", *words_of(offsets), "--distance", *words_of(distance)]
+    arcs = [word for length, bending, azimuth, *_ in segments for word in ("--arc", *words_of((length, bending, azimuth)))]
+    with pytest.MonkeyPatch.context() as patch:
+        made = _json_of(patch, ["pcc", "inverse", *arcs, *common])
+        back = _json_of(patch, ["pcc", "forward", *words_of(made["muscle_lengths"]), *common])
+    pose = np.eye(4)
+    for length, bending, azimuth, offset, _ in segments:
+        pose[:3, :2] = pose[:3, :2] @ [[math.cos(offset), -math.sin(offset)], [math.sin(offset), math.cos(offset)]]
+        x, y = -bending * math.sin(azimuth), bending * math.cos(azimuth)
+        pose = pose @ linalg.expm(np.array([[0, 0, y, 0], [0, 0, -x, 0], [-y, x, 0, length], [0, 0, 0, 0]], dtype=float))
+    for found in (made, back):
+        assert np.allclose(found["transforms"][-1], pose, rtol=0.0, atol=1e-12)
+    assert np.allclose(back["arc_bending"], made["arc_bending"], rtol=0.0, atol=1e-13)  # rounding of lengths over distance
+    assert np.allclose(back["arc_length"], made["arc_length"], rtol=1e-13)
+    for (length, bending, azimuth, _, apart), lengths in zip(segments, made["muscle_lengths"], strict=True):
+        assert np.allclose(lengths, length - bending * apart * np.cos(azimuth - azimuths), rtol=0.0, atol=1e-15)  # (20-22)
+
+
+def _json_of(patch: pytest.MonkeyPatch, words: list[str]) -> dict[str, Any]:
+    """What the command prints with --json, where fixtures of a function do not reach."""
+    import io
+
+    stream = io.StringIO()
+    patch.setattr("sys.stdout", stream)
+    assert main([*words, "--json"]) == 0
+    return json.loads(stream.getvalue())
+
+
+@pytest.mark.parametrize("frame", ["torsion_free", "bending_plane"])
+def test_pcc_jacobian_is_the_derivative_of_the_pose(frame: str, answer) -> None:
+    """Central differences of the commanded lengths; the angular rows by the rotation from one pose to the next."""
+    lengths, step = np.array(LENGTHS, dtype=float), 1e-5
+    exact = answer("pcc", "forward", *LENGTHS, "--frame", frame, "--jacobian")
+    for column in range(6):
+        shift = np.zeros(6)
+        shift[column] = step
+        after, before = (
+            np.array(answer("pcc", "forward", *words_of(lengths + sign * shift), "--frame", frame)["transforms"][-1])
+            for sign in (1.0, -1.0)
+        )
+        turn = (after - before)[:3, :3] @ np.array(exact["transforms"][-1])[:3, :3].T / (2.0 * step)
+        expected = [*((after - before)[:3, 3] / (2.0 * step)), turn[2, 1], turn[0, 2], turn[1, 0]]
+        # second order in the step: 1e-10 times third derivatives of some 1e4/m^2
+        assert np.allclose(np.array(exact["jacobian"])[:, column], expected, rtol=0.0, atol=1e-4)
+    assert set(exact["units"]["jacobian"].split()) >= {"m/m", "rad/m"}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        [],
+        ["--direction", "1", "0", "1"],
+        ["--azimuths", "0", "1.6", "3.1", "4.7", "--distance", "0.03", "0.04"],
+        ["--segments", "3", "--rest", "0.4"],
+        ["--rest", "0.5", "0.5", "0.3", "--offsets", "0", "0.2", "-0.4"],
+        ["--start", *LENGTHS],
+    ],
+)
+def test_pcc_reach_puts_the_tip_there(options: list[str], answer) -> None:
+    target = (0.44957382, -0.31544214, 0.84384418)
+    found = answer("pcc", "reach", *words_of(target), *options)
+    assert found["error"] <= 1e-9  # tolerance of the search
+    assert np.linalg.norm(np.subtract(found["tip_position"], target)) <= 1e-9
+    # The closed form of the commanded lengths agrees: the command forward is another path than the search.
+    shared = [word for name in ("--azimuths", "--distance", "--offsets") for word in _option(options, name)]
+    again = answer("pcc", "forward", *words_of(found["muscle_lengths"]), *shared)
+    assert np.linalg.norm(np.subtract(again["tip_position"], target)) <= 1e-9
+    assert np.abs(found["muscle_extension"]).max() <= 0.15 + 1e-12
+    if "--direction" in options:
+        assert np.allclose(found["tip_direction"], np.array((1, 0, 1)) / math.sqrt(2), rtol=0.0, atol=1e-8)
+    if "--start" in options:  # they reach it already, to the digits printed: nothing moves
+        assert np.allclose(np.ravel(found["muscle_lengths"]), np.array(LENGTHS, dtype=float), rtol=0.0, atol=1e-8)
+
+
+def _option(words: list[str], name: str) -> list[str]:
+    """An option with its numbers, if it is there."""
+    if name not in words:
+        return []
+    place = words.index(name)
+    rest = list(words[place + 1 :])
+    end = next((number for number, word in enumerate(rest) if word.startswith("--")), len(rest))
+    return [name, *rest[:end]]
+
+
+def test_pcc_reach_says_what_is_out_of_reach(told) -> None:
+    status, out, err = told("pcc", "reach", "0", "0.1", "2.5", "--segments", "1")
+    assert (status, out) == (1, "")
+    assert "cannot reach [0.0, 0.1, 2.5] m" in err
+
+
+def test_pcc_fits_more_than_three_muscles_within_a_tolerance(told) -> None:
+    words = ["pcc", "forward", "0.5", "0.52", "0.501", "0.48", "--azimuths", "0", "1.5708", "3.1416", "-1.5708"]
+    status, out, err = told(*words)
+    assert (status, out) == (2, "")
+    assert "those of an arc within 1e-06 m" in err
+    status, out, err = told(*words, "--tolerance", "1e-3")
+    assert (status, err) == (0, "")
+    # around a square the misses of an arc are all the same: a quarter of (l1 - l2 + l3 - l4)
+    assert "miss those of the arcs by up to 0.00025" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["forward", "0.5", "0.5"], "L must be a multiple of 3 numbers"),
+        (["forward", "0.5", "0.5", "-0.5"], "positive"),
+        (["forward", "0.5", "0.5", "nan"], "lengths"),
+        (["forward", "0.1", "0.1", "5", "--distance", "0"], "positive"),
+        (["forward", *LENGTHS, "--distance", "0.04", "0.04", "0.04"], "one for each of the 2 segments"),
+        (["forward", *LENGTHS, "--offsets", "0"], "offsets"),
+        (["forward", *LENGTHS, "--rest", "0.5", "0.5", "0.5"], "one for each of the 2 segments"),
+        (["forward", *LENGTHS, "--rest", "-1"], "--rest"),
+        (["forward", *LENGTHS, "--azimuths", "0", "1"], "at least three"),
+        (["forward", *LENGTHS, "--azimuths", "0", "1", "6.283185307179586"], "distinct modulo a turn"),
+        (["forward", *LENGTHS, "--tolerance", "-1"], "tolerance"),
+        (["forward", "0.5", "0.5", "0.5", "--frame", "bending_plane", "--jacobian"], "azimuth has no derivative"),
+        (["forward", *LENGTHS, "--plot", "arm.svg"], "--plot must be a file name that ends in .png"),
+        (["forward", *LENGTHS, "--plot", "."], ".png"),
+        (["inverse", "--arc", "-0.5", "1", "0"], "length"),
+        (["inverse", "--arc", "0.5", "-1", "0"], "bending"),
+        (["inverse", "--arc", "0.5", "1", "inf"], "azimuth"),
+        (["inverse", "--arc", "0.01", "3", "0"], "positive lengths"),
+        (["reach", "0", "0", "nan"], "target"),
+        (["reach", "0", "0", "1", "--segments", "0"], "--segments must be at least 1"),
+        (["reach", "0", "0", "1", "--segments", "51"], "at most 300 joints, not 306"),
+        (["reach", "0", "0", "1", "--segments", "2", "--rest", "0.5", "0.5", "0.5"], "one for each of the 2 segments"),
+        (["reach", "0", "0", "1", "--start", "0.5"], "q_motors0"),
+        (["reach", "0", "0", "1", "--start", *["0.7"] * 6], "within the motor limits"),
+        (["reach", "0", "0", "1", "--contraction", "1"], "muscle_contraction"),
+        (["reach", "0", "0", "1", "--extension", "-0.1"], "muscle_extension"),
+        (["reach", "0", "0", "1", "--direction", "0", "0", "0"], "orientation"),
+        (["reach", "0", "0.1", "0.4", "--segments", "1", "--direction", "0", "0", "1"], "orientation"),
+    ],
+)
+def test_pcc_refuses(words: list[str], message: str, told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = told("pcc", *words)
+    assert (status, out) == (2, "")
+    assert err.startswith("error: ")
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["pcc"], "required: FORM"),
+        (["pcc", "sideways"], "invalid choice: 'sideways'"),
+        (["pcc", "inverse"], "--arc"),
+        (["pcc", "inverse", "--arc", "1", "2"], "expected 3 arguments"),
+        (["pcc", "forward", "long"], "invalid float value: 'long'"),
+        (["pcc", "forward", "1", "--frame", "world"], "invalid choice: 'world'"),
+        (["pcc", "reach", "1", "2"], "required: Z"),
+        (["helix"], "required: FORM"),
+        (["helix", "inverse", "--outer-radius", "1", "--inner-radius", "0.5"], "--pitch --turn-height is required"),
+        (["helix", "inverse", "--outer-radius", "1", "--pitch", "1"], "--inner-radius"),
+        (["helix", "design"], "one of the arguments --antenna --grasp is required"),
+        (["helix", "design", "--antenna", "1", "1", "1", "--grasp", "1", "1", "1"], "not allowed with"),
+        (["helix", "forward", "--handedness", "both"], "invalid choice: 'both'"),
+        (["bench", "--only", "nothing"], "invalid choice: 'nothing'"),
+        (["bench", "--full", "--quick"], "not allowed with"),
+    ],
+)
+def test_words_that_argparse_refuses(words: list[str], message: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert message in err
+
+
+def test_pcc_draws_backbone_and_muscles_as_long_as_they_are() -> None:
+    """Lengths of the drawn lines, as sums of chords: below the arcs by bending^2 / 24 / 40^2, 1.4e-5 of them at most."""
+    lengths = np.array(LENGTHS, dtype=float).reshape(2, 3)
+    arcs = constant_curvature.arc_from_muscles(lengths, 0.04)
+    axes = pcc_plots.arm(arcs).axes[0]
+    drawn: dict[str, list[float]] = {}
+    for line in axes.lines:
+        points = np.array(line.get_data_3d()).T
+        drawn.setdefault(line.get_linestyle() + line.get_color(), []).append(
+            np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        )
+    lines = sorted(round(length, 3) for found in drawn.values() for length in found)
+    for expected in (*lengths.ravel(), *arcs.length):
+        assert round(expected, 3) in lines
+    backbones = [np.array(line.get_data_3d()).T for line in axes.lines if line.get_linewidth() == 3.0]
+    assert np.allclose(backbones[-1][-1], (0.44957382, -0.31544214, 0.84384418), rtol=0.0, atol=5.1e-9)
+    assert np.allclose(backbones[0][-1], backbones[1][0], rtol=0.0, atol=1e-15)
+    muscles = [line for line in axes.lines if str(line.get_label()).startswith("muscle")]
+    assert len({line.get_linestyle() for line in muscles}) == len({line.get_color() for line in muscles}) == 3
+    assert all("[m]" in label for label in (axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()))
+    assert all(
+        low <= value <= high
+        for value, (low, high) in zip(backbones[1][-1], (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()), strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda arcs: pcc_plots.arm(sr.constant_curvature.Arc(np.ones((2, 2)), 1.0, 0.0)), "those of one chain"),
+        (lambda arcs: pcc_plots.arm(arcs, (0.04, 0.04, 0.04)), "one for each of 2 segments"),
+        (lambda arcs: pcc_plots.arm(arcs, 0.0), "positive"),
+        (lambda arcs: pcc_plots.arm(arcs, azimuths=0.0), "azimuths"),
+        (lambda arcs: pcc_plots.arm(arcs, frame="world"), "frame"),
+    ],
+)
+def test_pictures_of_what_is_no_arm_are_refused(call, message: str) -> None:
+    with pytest.raises(sr.ParameterError, match=message):
+        call(sr.constant_curvature.Arc((0.5, 0.5), (1.0, 0.5), 0.0))
+
+
+@pytest.mark.parametrize(
+    "words", [["pcc", "inverse", "--arc", "0.5", "1", "0"], ["helix", "forward", "--length", "0.3"], ["helix", "limit"]]
+)
+def test_plots_are_written_once(words: list[str], told, tmp_path: Path) -> None:
+    picture = tmp_path / "new" / "picture.png"
+    status, out, err = told(*words, "--plot", str(picture))
+    assert (status, err) == (0, "")
+    assert out.endswith(f"\n{picture}: written\n")
+    assert picture.read_bytes().startswith(PNG)
+    picture.write_bytes(b"mine")
+    status, out, err = told(*words, "--plot", str(picture))
+    assert (status, out) == (2, "")
+    assert "exists; choose another name or allow overwriting" in err
+    assert picture.read_bytes() == b"mine"
+
+
+def test_plots_replace_a_file_if_told_and_say_what_is_missing(answer, told, tmp_path: Path, monkeypatch) -> None:
+    picture = tmp_path / "picture.png"
+    picture.write_bytes(b"mine")
+    words = ["pcc", "inverse", "--arc", "0.5", "1", "0", "--overwrite", "--plot", str(picture)]
+    assert answer(*words)["plot"] == str(picture)
+    assert picture.read_bytes().startswith(PNG)
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
+    status, out, err = told(*words)
+    assert (status, out) == (2, "")
+    assert "pip install 'softrobots[plot]'" in err
+
+
+# --- softrobots helix
+
+
+def test_helix_forward_gives_the_reference(answer) -> None:
+    """theory.md, section 3: 5 degrees, 0.66, 33.1 mm, which are the defaults."""
+    found = answer("helix", "forward")
+    assert found["angle"] == pytest.approx(math.radians(5.0), rel=1e-15)
+    assert found["outer_radius"] == pytest.approx(0.0854078008, abs=5e-11)
+    assert found["inner_radius"] == pytest.approx(0.0523078008, abs=5e-11)
+    assert found["pitch"] == pytest.approx(0.0279647090, abs=5e-11)
+    assert found["centre_curvature"] == pytest.approx(12.466512, abs=5e-7)
+    assert found["centre_torsion"] == pytest.approx(5.062932, abs=5e-7)
+    assert found["material_twist"] == pytest.approx(-1.0834, abs=5e-5)
+    assert found["centre_length"] / found["length"] == pytest.approx(0.830133, abs=5e-7)
+    assert found["contraction_limit"] == pytest.approx(0.3739, abs=5e-5)
+    assert found["touches"] is False
+    outer = 2.0 * math.pi * math.hypot(found["outer_radius"], found["pitch"])  # a turn of the line that keeps its length
+    assert found["turns"] == pytest.approx(found["length"] / (math.cos(found["angle"]) * outer), rel=1e-12)
+    assert found["height"] == pytest.approx(found["turns"] * 2.0 * math.pi * found["pitch"], rel=1e-12)
+    left = answer("helix", "forward", "--handedness", "left")
+    assert left["centre_torsion"] == -found["centre_torsion"]
+    assert left["centre_curvature"] == found["centre_curvature"]
+
+
+def test_helix_tells_a_person_the_same(told) -> None:
+    status, out, err = told("helix", "forward", "--pressure", "2e4")
+    assert (status, err) == (0, "")
+    assert re.search(r"^outer radius of the helix +0\.0854078 m$", out, re.M)
+    assert re.search(r"^pitch +0\.0279647 m/rad$", out, re.M)
+    assert re.search(r"^runs into itself +no$", out, re.M)
+    assert re.search(r"^turns +2\.66658$", out, re.M)
+
+
+def test_helix_tension_is_the_work_of_the_pressure(answer) -> None:
+    """T = P dV/dLa by central differences over the contraction, La = contraction times length / cos(angle)."""
+    step = 1e-5
+    volumes = [answer("helix", "forward", "--contraction", repr(0.66 + sign * step))["volume"] for sign in (1.0, -1.0)]
+    way = 2.0 * step * 1.5 / math.cos(math.radians(5.0))
+    expected = 1e4 * (volumes[0] - volumes[1]) / way
+    assert answer("helix", "forward")["actuator_tension"] == pytest.approx(expected, rel=1e-8)  # second order in the step
+
+
+@pytest.mark.parametrize("rise", ["--pitch", "--turn-height"])
+def test_helix_inverse_finds_the_actuator(rise: str, answer) -> None:
+    shape = ["--outer-radius", "0.0854078008", "--inner-radius", "0.0523078008"]
+    height = 0.0279647090 * (2.0 * math.pi if rise == "--turn-height" else 1.0)
+    found = answer("helix", "inverse", *shape, rise, repr(height))
+    # ten digits of the shape; the angle is more sensitive
+    assert found["contraction"] == pytest.approx(0.66, abs=1e-8)
+    assert found["angle"] == pytest.approx(math.radians(5.0), abs=1e-8)
+    assert found["diameter"] == pytest.approx(0.0331, abs=1e-12)
+
+
+@pytest.mark.parametrize("turns", [1.0, 0.5])
+def test_helix_measure_finds_shape_and_actuator(turns: float, answer) -> None:
+    """Arcs of a path of radius R are 2 pi sqrt(R^2 + b^2) a turn."""
+    outer, inner = (turns * 2.0 * math.pi * math.hypot(radius, 0.0279647090) for radius in (0.0854078008, 0.0523078008))
+    found = answer("helix", "measure", "--outer-arc", repr(outer), "--inner-arc", repr(inner), "--turns", repr(turns))
+    assert found["outer_radius"] == pytest.approx(0.0854078008, abs=1e-10)
+    assert found["pitch"] == pytest.approx(0.0279647090, abs=1e-9)
+    assert found["contraction"] == pytest.approx(0.66, abs=1e-8)
+
+
+def test_helix_design_of_an_antenna_is_written_and_makes_it(answer, told, tmp_path: Path) -> None:
+    files = {"-o": tmp_path / "antenna.json", "--template": tmp_path / "antenna.svg"}
+    words = [word for name, path in files.items() for word in (name, str(path))]
+    wish = ["helix", "design", "--antenna", "0.07", "0.18", "3", "--handedness", "left"]
+    found = answer(*wish, *words)
+    assert found["centre_radius"] == pytest.approx(0.07, rel=1e-12)
+    assert found["height"] == pytest.approx(0.54, rel=1e-12)
+    assert (found["radius_deviation"], found["turn_height_deviation"]) == (0.0, 0.0)
+    # what it says of the actuator makes that helix
+    again = answer("helix", "forward", *("--contraction", repr(found["contraction"])), "--angle", repr(found["angle"]))
+    assert again["centre_radius"] == pytest.approx(0.07, rel=1e-12)
+    assert again["turn_height"] == pytest.approx(0.18, rel=1e-12)
+    design = helix.HelixDesign.load(files["-o"])
+    assert (design.handedness, design.turns) == ("left", 3.0)
+    assert design.tube_length == found["length"]
+    assert ElementTree.parse(files["--template"]).getroot().get("width", "").endswith("mm")
+    assert (found["output"], found["template"]) == (str(files["-o"]), str(files["--template"]))
+    assert found["pinches"] * found["spacing"] == pytest.approx(found["length"] / math.cos(found["angle"]), rel=1e-12)
+    for name in files:
+        status, out, err = told(*wish, name, str(files[name]))
+        assert (status, out) == (2, "")
+        assert "exists; choose another name" in err
+
+
+def test_helix_design_of_a_grasp_and_the_nearest_that_can_be_made(answer, told) -> None:
+    held = answer("helix", "design", "--grasp", "0.02", "0.08", "1.5", "--squeeze", "0.002")
+    assert held["inner_radius"] == pytest.approx(0.018, rel=1e-12)
+    assert held["turn_height"] == pytest.approx(0.08, rel=1e-12)
+    wish = ["helix", "design", "--antenna", "0.07", "0.01", "1.5"]
+    status, out, err = told(*wish)
+    assert (status, out) == (2, "")
+    assert "runs into itself" in err
+    assert "--nearest takes" in err
+    found = answer(*wish, "--nearest")
+    assert found["touches"] is False
+    assert found["turn_height"] > 0.03  # about a diameter of 33.1 mm, where the wish is 10 mm
+    assert found["turn_height_deviation"] == pytest.approx(found["turn_height"] - 0.01, abs=1e-12)
+
+
+def test_helix_limits_are_those_of_theory(answer, told) -> None:
+    angles = words_of(np.radians((2.5, 5.0, 10.0)))
+    found = answer("helix", "limit", "--angle", *angles)
+    assert np.allclose(found["contraction_limit"], (0.4882, 0.3739, 0.2689), rtol=0.0, atol=5.1e-5)
+    assert np.allclose(found["simple_contraction_limit"], (0.4871, 0.3719, 0.2658), rtol=0.0, atol=5.1e-5)
+    for angle, limit in zip(angles, found["contraction_limit"], strict=True):  # contact on one side, none on the other
+        sides = [answer("helix", "forward", "--angle", angle, "--contraction", repr(limit + off)) for off in (1e-6, -1e-6)]
+        assert [side["touches"] for side in sides] == [False, True]
+    row = told("helix", "limit", "--angle", angles[0])[1].splitlines()[1].split()
+    assert [float(word) for word in row] == pytest.approx((math.radians(2.5), 0.4882, 0.4871), abs=5.1e-5)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["forward", "--contraction", "1.2"], "contraction"),
+        (["forward", "--contraction", "0"], "contraction"),
+        (["forward", "--contraction", "1", "--angle", "0"], "straight"),
+        (["forward", "--angle", "1.6"], "[0, pi/2) rad"),
+        (["forward", "--angle", "-0.1"], "[0, pi/2) rad"),
+        (["forward", "--diameter", "nan"], "diameter"),
+        (["forward", "--length", "0"], "length"),
+        (["forward", "--pressure", "-1"], "pressure"),
+        (["forward", "--length", "5", "--plot", "tube.png"], "at most 100 diameters"),
+        (["forward", "--plot", "tube.pdf"], "ends in .png"),
+        (["inverse", "--outer-radius", "0.05", "--inner-radius", "0.06", "--pitch", "0.02"], "inner_radius"),
+        (["inverse", "--outer-radius", "0.05", "--inner-radius", "0.02", "--pitch", "-0.02"], "pitch"),
+        (["inverse", "--outer-radius", "0.05", "--inner-radius", "0.02", "--turn-height", "inf"], "pitch"),
+        (["measure", "--outer-arc", "0.3", "--inner-arc", "0.4"], "at most the outer arc"),
+        (["measure", "--outer-arc", "0.56", "--inner-arc", "0.37", "--turns", "0"], "turns"),
+        (["measure", "--outer-arc", "5", "--inner-arc", "0.1"], "outer_arc"),
+        (["design", "--antenna", "-1", "0.18", "3"], "radius"),
+        (["design", "--antenna", "0.07", "0.18", "0"], "turns"),
+        (["design", "--antenna", "0.07", "0.18", "3", "--squeeze", "0.001"], "--squeeze must be left out without --grasp"),
+        (["design", "--grasp", "0.02", "0.08", "1", "--squeeze", "0.03"], "less than the radius of the object"),
+        (["design", "--antenna", "0.07", "0.18", "3", "--template", "a.svg", "--spacing", "0"], "spacing"),
+        (["limit", "--angle", "2"], "angle"),
+        (["limit", "--angle", "0", "--plot", "limit.png"], "angles"),
+    ],
+)
+def test_helix_refuses(words: list[str], message: str, told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = told("helix", *words)
+    assert (status, out) == (2, "")
+    assert err.startswith("error: ")
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["pcc", "forward", *LENGTHS, "--jacobian"],
+        ["pcc", "reach", "0.3", "0.2", "0.85"],
+        ["helix", "forward"],
+        ["helix", "forward", "--contraction", "1"],  # a straight tube has no neighbouring turns
+        ["helix", "design", "--antenna", "0.07", "0.18", "3"],
+        ["helix", "limit"],
+    ],
+)
+def test_every_number_in_json_has_a_unit(words: list[str], answer) -> None:
+    found = answer(*words)
+    units = found.pop("units")
+    assert set(units) == {name for name, value in found.items() if numeric(value)}
+    assert all(units.values())
+
+
+def test_defaults_are_those_of_the_robots(answer) -> None:
+    found, tube = answer("helix", "forward"), sr.HelixTube()
+    assert [found[name] for name in ("contraction", "angle", "diameter", "length", "handedness", "pressure")] == [
+        getattr(tube, name) for name in ("contraction", "angle", "diameter", "length", "handedness", "pressure")
+    ]
+    assert found["turns"] == pytest.approx(tube.turns, rel=1e-15)
+    arm = sr.PccArm()
+    model = sr.load_model(arm)
+    bent = sr.solve_equilibrium(model, [float(word) for word in LENGTHS])  # weightless: arcs of constant curvature
+    found = answer("pcc", "forward", *LENGTHS)
+    assert np.allclose(found["tip_position"], bent.tip_position, rtol=0.0, atol=1e-9)
+    straight = answer("pcc", "reach", "0", "0", repr(sum(arm.segment_lengths)))
+    assert np.allclose(straight["muscle_lengths"], 0.524, rtol=0.0, atol=1e-9)
+
+
+# --- softrobots bench
+
+
+@pytest.fixture
+def without_numba(monkeypatch: pytest.MonkeyPatch):
+    """As on a machine without the extra `fast`, whatever is installed here: nothing is compiled."""
+    original = compiled_solvers.compile_model
+
+    def compile_model(model: sr.SoftModel, *, backend: str, locked_strains: tuple) -> object:
+        if backend == "numba":
+            raise sr.MissingDependency("numba", "fast")
+        return original(model, backend=backend, locked_strains=locked_strains)
+
+    monkeypatch.setattr(compiled_solvers, "compile_model", compile_model)
+    compiled_solvers.compiled.cache_clear()
+    yield
+    compiled_solvers.compiled.cache_clear()
+
+
+def test_bench_measures_what_is_installed_and_names_what_is_not(without_numba, told, tmp_path: Path) -> None:
+    file = tmp_path / "bench.json"
+    words = ["bench", "--quick", "--rounds", "1", "-o", str(file)]
+    status, out, err = told(*words)
+    assert status == 0
+    assert "1/1" in err  # a progress bar
+    assert "skipped:\n" in out
+    assert "numba is not installed" in out
+    assert out.endswith(f"{file}: written\n")
+    results = read_results(file)
+    assert results.settings["jobs"] == [PLAIN]
+    assert results.machine["numpy"] == np.__version__
+    measured = [row for row in results.rows if not row.skipped]
+    assert {row.baseline for row in measured if row.job == "equilibrium, batch"} == {
+        "Python + Pinocchio, fixed point",
+        "NumPy, written plainly",
+    }
+    assert {row.ours for row in measured} == {"compiled, python, batch", "compiled, python, one call", "solve_equilibrium"}
+    for row in measured:
+        assert row.target is None  # small sizes on somebody's machine
+        quotient = row.baseline_seconds / row.our_seconds  # of one round
+        assert row.value == pytest.approx(1.0 / quotient if row.unit == "times as costly" else quotient, rel=1e-12)
+        assert row.ours in out
+    assert told(*words) == (2, "", f"error: {file} exists; choose another name or allow overwriting\n")
+    status, out, _ = told(*words, "--overwrite", "--json")
+    assert status == 0
+    assert json.loads(out) == json.loads(file.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("words", "settings", "jobs"),
+    [
+        ([], short_settings(5, progress=True), [PLAIN]),
+        (["--only", "rod", "fresh", "--rounds", "2"], short_settings(2, progress=True), ["rod", "fresh"]),
+        (["--full", "--cpp"], Settings(progress=True, cpp=True), list(JOBS)),
+        (["--full", "--rounds", "3", "--only", "gravity"], Settings(3, progress=True), ["gravity"]),
+        (["--quick"], quick_settings(5, progress=True, cpp=False), [PLAIN]),
+    ],
+)
+def test_bench_runs_the_jobs_in_the_sizes_asked_for(
+    words: list[str], settings: Settings, jobs: list[str], told, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorded = read_results(CHECKOUT / "docs" / "benchmark.json")
+    asked = []
+
+    def measure(settings: Settings, jobs: list[str]) -> Results:
+        asked.append((settings, jobs))
+        return recorded
+
+    monkeypatch.setattr(bench, "measure", measure)
+    status, out, err = told("bench", *words)
+    assert (status, err) == (0, "")
+    assert asked == [(settings, jobs)]
+    # what is told of recorded results is what they say
+    line = next(line for line in out.splitlines() if "NumPy, written plainly" in line)
+    row = next(row for row in recorded.rows if row.baseline == "NumPy, written plainly")
+    assert line.split()[-7:-3] == [f"{row.value:.3g}", "times", "cheaper", "at"]
+    assert line.endswith("met")
+    assert f"Medians of {recorded.settings['rounds']} rounds" in out
+    assert json.loads(as_json(recorded)) == json.loads(told("bench", *words, "--json")[1])
+
+
+def test_bench_short_sizes_are_smaller_in_everything_that_costs() -> None:
+    short, full = (dataclasses.asdict(made) for made in (short_settings(5, progress=False), Settings()))
+    for name in ("rounds", "batch", "singles", "waypoints", "sections", "memory", "starts"):
+        assert 0 < short[name] < full[name]
+    for name in ("sizes", "batches"):
+        assert max(short[name]) < max(full[name])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--rounds", "0"], "--rounds must be at least 1"),
+        (["--cpp"], "--cpp must be given with --full"),
+        (["-o", "."], "is a folder"),
+    ],
+)
+def test_bench_refuses(words: list[str], message: str, told, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "measure", None)  # nothing is measured before
+    status, out, err = told("bench", *words)
+    assert (status, out) == (2, "")
+    assert message in err
+
+
+def test_bench_says_where_the_other_bench_is(capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        main(["bench", "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    assert "scripts/ur5_bench.py" in told
+    assert all(job in told for job in JOBS)

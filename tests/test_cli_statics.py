@@ -1,0 +1,556 @@
+"""`softrobots solve`, `load` and `ik`: against the library called directly and the reference numbers of the papers' robots."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import softrobots as sr
+from softrobots.arm_plots import loaded_shape
+from softrobots.errors import NeutralEquilibrium
+from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+
+Told = Callable[..., tuple[int, str, str]]
+
+FORCE = ("--force", "0", "10", "-15")
+BENT = ("inflatable_arm", "--motors", "0.3", "0.6", "-0.8")
+PCC_LENGTHS = ("0.50", "0.53", "0.55", "0.54", "0.51", "0.52")
+BUCKLING = 114.0657  # [N], of the straight arm pushed along -x: k / ((a + c) / 2 + sqrt((a - c)^2 / 4 + c^2))
+
+
+@pytest.fixture
+def answer(told: Told) -> Callable[..., dict[str, Any]]:
+    """Run the command with `--json`, and return the object that it prints."""
+
+    def run(*words: str) -> dict[str, Any]:
+        status, out, err = told(*words, "--json")
+        assert status == 0, err
+        found = json.loads(out, parse_constant=pytest.fail)  # NaN and Infinity are no JSON
+        assert isinstance(found, dict)
+        return found
+
+    return run
+
+
+def same(found: dict[str, Any], equilibrium: sr.Equilibrium) -> None:
+    """An answer holds exactly the numbers of an equilibrium: JSON keeps all digits of a float."""
+    names = ("q_motors", "motor_torques", "q_springs", "spring_torques", "tip_position", "link_moments", "muscle_forces")
+    for name in names:
+        assert found[name] == getattr(equilibrium, name).tolist(), name
+    for name in ("stable", "conservative", "within_limits", "wrinkled", "residual", "tolerance", "iterations", "method"):
+        assert found[name] == getattr(equilibrium, name), name
+    assert found["transform_tip_to_world"] == equilibrium.transform_tip_to_world.homogeneous.tolist()
+
+
+# --- softrobots solve
+
+
+@pytest.mark.parametrize(
+    ("motors", "springs", "tip"),
+    [
+        ("0 0 0", (0.06696, -0.10022, 0.03264, -0.04858), (1.18654, 0.09618, -0.14450)),
+        ("0.3 0.6 -0.8", (0.05339, -0.09228, 0.03172, -0.04214), (1.01935, 0.38587, 0.09712)),
+        ("1.0 1.2 -2.0", (0.00966, -0.05706, 0.01722, -0.01067), (0.33278, 0.54150, 0.08904)),
+    ],
+)
+def test_solve_gives_the_reference_equilibria(motors: str, springs: object, tip: object, answer, arm: sr.SoftModel) -> None:
+    found = answer("solve", "inflatable_arm", "--motors", *motors.split(), *FORCE)
+    assert np.allclose(found["q_springs"], springs, rtol=0.0, atol=5.1e-6)  # five digits are given
+    assert np.allclose(found["tip_position"], tip, rtol=0.0, atol=5.1e-6)
+    same(found, sr.solve_equilibrium(arm, [float(word) for word in motors.split()], (0, 10, -15)))
+    assert found["motor_joints"] == ["motor_1", "motor_2", "motor_3"]
+    assert found["units"]["q_springs"] == "rad"
+    assert found["units"]["spring_torques"] == "N m"
+    assert found["load"] == {"wrenches": {"tip": [0.0, 10.0, -15.0, 0.0, 0.0, 0.0]}, "gravity": None}
+    assert found["wrinkling_margins"] == [
+        1.0 - moment / group.wrinkling_moment for moment, group in zip(found["link_moments"], arm.spring_groups, strict=True)
+    ]
+
+
+def test_solve_tells_a_person_the_same(told: Told, arm: sr.SoftModel) -> None:
+    status, out, err = told("solve", *BENT, *FORCE)
+    assert (status, err) == (0, "")
+    equilibrium = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15))
+    for name, position, load in zip(arm.spring_joints, equilibrium.q_springs, equilibrium.spring_torques, strict=True):
+        assert re.search(rf"^{name} +{position:.6f}  rad +{load:.6f}  N m$", out, re.M)
+    for name, position, load in zip(arm.motor_joints, equilibrium.q_motors, equilibrium.motor_torques, strict=True):
+        assert re.search(rf"^{name} +{position:.6f}  rad +{load:.6f}  N m$", out, re.M)
+    for line in (
+        r"robot +inflatable_arm \(tip: tip\)",
+        r"load on tip +force 0  10  -15 N",
+        r"gravity +none",
+        r"1 +18.413719 N m +20.525693 N m +10.3 %",
+        r"tip position +1.01935  0.385868  0.0971231 m",
+        r"tip roll, pitch, yaw +-0.0222051  0.33579  0.367135 rad",
+        r"stable +yes, certified",
+        r"within limits +yes",
+        r"wrinkled +no, at least 10.3 % of the wrinkling moment is left",
+        r"conservative +yes",
+        r"residual +\S+ N m \(\S+ N m allowed\), \d+ iterations by newton",
+    ):
+        assert re.search(rf"^{line}$", out, re.M), line
+    roll, pitch, yaw = (float(word) for word in re.search(r"yaw +(\S+)  (\S+)  (\S+) rad", out).groups())
+    turned = pin.rpy.rpyToMatrix(roll, pitch, yaw)
+    assert np.allclose(turned, equilibrium.transform_tip_to_world.rotation, rtol=0.0, atol=2e-6)  # six digits are told
+
+
+SEVERAL = [
+    word
+    for wrench in (("link_1", "0", "0", "-5", *"000"), ("tip", "0", "1", *"000", ".1"), ("link_1", "0", "0", "-1", *"000"))
+    for word in ("--wrench", *wrench)
+]
+LOADS = {
+    "gravity": (("--gravity",), {"gravity": sr.EARTH_GRAVITY}),
+    "gravity of the Moon": (("--gravity", "0", "0", "-1.62"), {"gravity": (0, 0, -1.62)}),
+    "moment": (("--moment", "0", "-1e0", ".5"), {"wrench": (0, 0, 0, 0, -1, 0.5)}),
+    "both": ((*FORCE, "--moment", "0", "0", "1"), {"wrench": (0, 10, -15, 0, 0, 1)}),
+    "elsewhere": ((*FORCE, "--moment", "1", "0", "0", "--frame", "link_1"), {"wrench": {"link_1": (0, 10, -15, 1, 0, 0)}}),
+    "several": ((*FORCE, *SEVERAL), {"wrench": {"tip": (0, 11, -15, 0, 0, 0.1), "link_1": (0, 0, -6, 0, 0, 0)}}),
+}
+
+
+@pytest.mark.parametrize("what", LOADS)
+def test_solve_takes_every_load(what: str, answer, arm: sr.SoftModel) -> None:
+    words, load = LOADS[what]
+    found, expected = answer("solve", *BENT, *words), sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), **load)
+    # The load is added up in another order, so that it may differ by rounding.
+    for name in ("q_springs", "motor_torques", "tip_position"):
+        assert np.allclose(found[name], getattr(expected, name), rtol=0.0, atol=1e-9), name
+    assert found["conservative"] == expected.conservative
+
+
+def test_solve_passes_its_other_options_on(answer, arm: sr.SoftModel) -> None:
+    start = ("--start", "0.1", "-0.1", "0", "0")
+    found = answer("solve", *BENT, *FORCE, *start, "--method", "fixed_point", "--tolerance", "1e-6", "--max-iterations", "99")
+    options = {"method": "fixed_point", "tolerance": 1e-6, "max_iterations": 99, "q_springs0": (0.1, -0.1, 0, 0)}
+    same(found, sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15), **options))
+    soft = sr.load_model(sr.InflatableArm(stiffness=100.0))
+    same(answer("solve", *BENT, *FORCE, "--set", "stiffness=100"), sr.solve_equilibrium(soft, (0.3, 0.6, -0.8), (0, 10, -15)))
+
+
+def test_solve_tells_of_muscles(answer, told: Told) -> None:
+    """The tip of the PCC paper's reference lengths, and a tension that is given instead."""
+    found = answer("solve", "pcc_arm", "--motors", *PCC_LENGTHS)
+    assert np.allclose(found["tip_position"], (0.44957382, -0.31544214, 0.84384418), rtol=0.0, atol=5.1e-9)  # of the theory
+    assert np.allclose(found["muscle_lengths"], [float(word) for word in PCC_LENGTHS], rtol=0.0, atol=1e-14)
+    assert (found["units"]["q_motors"], found["units"]["motor_torques"]) == ("m", "N")
+    rows = zip(found["spring_joints"], found["units"]["q_springs"].split(", "), strict=True)
+    assert all(unit == ("m" if "stretch" in name else "rad") for name, unit in rows)
+    status, out, _ = told("solve", "pcc_arm", "--muscles", "forces", "--motors", "20", *"00000")
+    assert status == 0
+    assert re.search(r"^muscle_1_1 +20.000000  N +20.000000  N$", out, re.M)
+    assert "wrinkled" not in out
+
+
+def test_solve_takes_somebodys_robot(told: Told, answer, tmp_path: Path) -> None:
+    file = tmp_path / "branched.urdf"
+    file.write_text(BRANCHED, encoding="utf-8")
+    words = (str(file), "--spring", "wrist=20,0.1", "--spring", "slider=800", "--tip", "finger", "--gravity")
+    model = sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
+    found = answer("solve", *words)
+    same(found, sr.solve_equilibrium(model, model.relaxed_motors, gravity=sr.EARTH_GRAVITY))
+    assert (found["units"]["q_springs"], found["units"]["spring_torques"]) == ("rad, m", "N m, N")
+    assert re.search(r"^slider +\S+  m +\S+  N$", told("solve", *words)[1], re.M)
+
+
+def test_solve_tells_compliance_and_critical_load(answer, told: Told, arm: sr.SoftModel) -> None:
+    found = answer("solve", *BENT, *FORCE, "--compliance")
+    equilibrium = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15))
+    assert found["compliance"] == sr.compliance(arm, equilibrium).tolist()
+    for direction, gravity in (("-1 0 0", ()), ("-2e0 0 0", ("--gravity", "0", "0", "0"))):
+        found = answer("solve", "inflatable_arm", "--critical-load", *direction.split(), *gravity)
+        assert found["critical_load"] == pytest.approx(BUCKLING, abs=5.1e-5)  # four digits are given
+    pulled = answer("solve", "inflatable_arm", "--critical-load", "1", "0", "0")
+    assert pulled["critical_load"] is None
+    assert pulled["stable_up_to"] > 10.0 * BUCKLING
+    status, out, _ = told("solve", "inflatable_arm", "--critical-load", "-1", "0", "0", "--compliance")
+    assert status == 0
+    assert re.search(r"^critical load +114.066 N along -1  0  0$", out, re.M)
+    assert re.search(r"^x +0.0000e\+00 ", out, re.M)  # a straight arm is stiff along itself
+    status, out, _ = told("solve", "inflatable_arm", "--critical-load", "1", "0", "0")
+    assert re.search(r"^critical load  none: the equilibrium stays stable up to ", out, re.M)
+    frame = answer("solve", "inflatable_arm", "--critical-load", "-1", "0", "0", "--frame", "link_2")
+    assert frame["critical_load"] == sr.critical_load(arm, (0, 0, 0), (-1, 0, 0), frame="link_2")
+
+
+def test_solve_says_that_a_neutral_equilibrium_has_no_compliance(told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> None:
+        raise NeutralEquilibrium("the tangent stiffness is singular")
+
+    monkeypatch.setattr("softrobots.commands.solve.compliance", none)
+    status, out, _ = told("solve", "inflatable_arm", "--compliance", "--json")
+    assert (status, json.loads(out)["compliance"]) == (0, None)
+    assert "compliance  none: the tangent stiffness is singular" in told("solve", "inflatable_arm", "--compliance")[1]
+
+
+def test_solve_tells_what_is_unstable_wrinkled_or_beyond_limits(told: Told) -> None:
+    """Above the buckling load the straight arm is an equilibrium, which the fixed point does not leave."""
+    words = ("solve", "inflatable_arm", "--force", "-120", "0", "0", "--method", "fixed_point")
+    status, out, _ = told(*words)
+    assert status == 0
+    assert re.search(r"^stable +NO: not certified$", out, re.M)
+    assert json.loads(told(*words, "--json")[1])["stable"] is False
+    status, out, _ = told("solve", "inflatable_arm", "--force", "0", "0", "-60", "--motors", "0", "4", "0", "--moment", *"001")
+    assert status == 0
+    assert re.search(r"^within limits +NO: ", out, re.M)
+    assert re.search(r"^wrinkled +YES: linear springs no longer hold$", out, re.M)
+    assert re.search(r"^conservative +no: a world-fixed moment has no potential$", out, re.M)
+    status, out, _ = told("solve", "inflatable_arm", "--set", "max_moment=20.6", "--motors", "0", "0", "0", "--force", *"000")
+    assert "plateau" not in out
+    without = json.loads(told("solve", "inflatable_arm", "--set", "pressure=0", "--json")[1])
+    assert without["wrinkling_margins"] == [None, None]
+
+
+def test_solve_ends_with_one_if_there_is_no_equilibrium(told: Told) -> None:
+    status, out, err = told("solve", *BENT, "--force", "0", "0", "-300", "--method", "fixed_point", "--json")
+    assert (status, out) == (1, "")
+    assert "error: no equilibrium by 'fixed_point'" in err
+    assert "method='newton' converges for larger loads" in err
+
+
+def test_solve_saves_and_draws_and_overwrites_nothing(told: Told, arm: sr.SoftModel, tool, tmp_path: Path) -> None:
+    tool("matplotlib")
+    file, picture = tmp_path / "new" / "sagging.npz", tmp_path / "arm.png"
+    words = ("solve", *BENT, *FORCE, "-o", str(file), "--plot", str(picture))
+    status, out, _ = told(*words)
+    assert status == 0
+    assert out.endswith(f"\n{file}: written\n{picture}: written\n")
+    loaded = sr.load_result(file)
+    assert loaded.model == arm
+    assert np.array_equal(loaded.q_springs, sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15)).q_springs)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    before = file.read_bytes(), picture.read_bytes()
+    for kept in (words, (*words[:-2],), (*words[:-4], "--plot", str(picture))):
+        status, out, err = told(*kept)
+        assert (status, out) == (2, "")
+        assert "exists; choose another name or allow overwriting" in err
+    assert (file.read_bytes(), picture.read_bytes()) == before
+    status, out, _ = told(*words[:-2], "--overwrite", "--json")
+    assert (status, json.loads(out)["files"]) == (0, [str(file)])
+
+
+def test_the_picture_shows_loaded_and_relaxed_arm(arm: sr.SoftModel, tool) -> None:
+    tool("matplotlib")
+    equilibrium = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15))
+    (axes,) = loaded_shape(equilibrium).axes
+    relaxed, loaded = (np.array(line.get_data_3d()).T for line in axes.lines)
+    assert np.allclose(loaded[-1], equilibrium.tip_position, rtol=0.0, atol=1e-12)
+    rigid = np.array([np.cos(0.3), np.sin(0.3), 1.0])  # the rigid arm lies in the plane of motor 1
+    along, up = 0.6 * np.cos(0.6) + 0.6 * np.cos(-0.2), 0.6 * np.sin(0.6) + 0.6 * np.sin(-0.2)
+    assert np.allclose(relaxed[-1], rigid * (along, along, up), rtol=0.0, atol=1e-12)
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "relaxed springs, same motors",
+        "loaded",
+        "force, 18.0 N",
+    ]
+    with pytest.raises(sr.ParameterError, match="an Equilibrium"):
+        loaded_shape(arm)
+
+
+# --- softrobots load
+
+
+def test_load_finds_the_force_that_the_motors_feel(answer, told: Told, arm: sr.SoftModel) -> None:
+    """The torques of the reference case give back its force."""
+    torques = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15)).motor_torques
+    words = (*BENT, "--torques", *map(repr, torques.tolist()))
+    found = answer("load", *words, "--torque-std", "0.05")
+    assert np.allclose(found["force"], (0, 10, -15), rtol=0.0, atol=1e-8)
+    estimate = sr.estimate_load(arm, (0.3, 0.6, -0.8), torques, torque_std=0.05)
+    same(found["equilibrium"], estimate.equilibrium)
+    for name in ("force", "singular_values", "covariance", "measured_torques", "torque_std"):
+        assert found[name] == getattr(estimate, name).tolist(), name
+    assert found["condition_number"] == estimate.condition_number
+    assert found["unobservable_directions"] == []
+    assert np.allclose(np.square(found["force_std"]), np.diag(estimate.covariance), rtol=1e-12, atol=0.0)
+    status, out, _ = told("load", *words, "--torque-std", "0.05", "0.1", "0.2")
+    assert status == 0
+    assert re.search(r"^force on tip +\S+  10  -15 N$", out, re.M)
+    noisy = sr.estimate_load(arm, (0.3, 0.6, -0.8), torques, torque_std=(0.05, 0.1, 0.2)).covariance
+    assert f"standard deviation  {'  '.join(f'{x:.6g}' for x in np.sqrt(np.diag(noisy)))} N" in out
+    assert re.search(r"^not felt along +no direction$", out, re.M)
+    assert "standard deviation" not in told("load", *words)[1]
+
+
+def test_load_names_the_direction_that_is_not_felt(answer, told: Told) -> None:
+    """A straight arm does not feel a pull along itself."""
+    words = ("inflatable_arm", "--motors", "0", "0", "0", "--torques", "0", "0", "0")
+    found = answer("load", *words)
+    assert np.allclose(np.abs(found["unobservable_directions"]), [(1, 0, 0)], rtol=0.0, atol=1e-12)
+    assert (found["condition_number"] or 1e9) > 1e6  # infinite is null
+    assert (found["force_std"], found["covariance"], found["torque_std"]) == (None, None, None)
+    status, out, _ = told("load", *words)
+    assert status == 0
+    assert re.search(r"^NOT FELT along +-?1  0  0$", out, re.M)
+
+
+def test_load_passes_its_other_options_on(answer, arm: sr.SoftModel, tmp_path: Path) -> None:
+    file = tmp_path / "estimate.npz"
+    words = (
+        "--torques",
+        "3",
+        "-8",
+        "-3",
+        "--frame",
+        "link_2",
+        "--gravity",
+        "--method",
+        "alternation",
+        "--max-iterations",
+        "500",
+    )
+    found = answer("load", *BENT, *words, "-o", str(file))
+    options = {"frame": "link_2", "gravity": sr.EARTH_GRAVITY, "method": "alternation", "max_iterations": 500}
+    estimate = sr.estimate_load(arm, (0.3, 0.6, -0.8), (3, -8, -3), **options)
+    assert found["force"] == estimate.force.tolist()
+    assert (found["frame"], found["method"], found["iterations"]) == ("link_2", "alternation", estimate.iterations)
+    assert sr.load_result(file).force.tolist() == estimate.force.tolist()
+
+
+def test_load_ends_with_one_if_no_force_explains_the_torques(told: Told) -> None:
+    words = ("--torques", "10", "-16", "-7", "--method", "alternation", "--max-iterations", "1")
+    status, out, err = told("load", *BENT, *words)
+    assert (status, out) == (1, "")
+    assert "error: no force explains the motor torques" in err
+
+
+# --- softrobots ik
+
+
+def test_ik_puts_the_loaded_tip_at_the_target(answer, told: Told, arm: sr.SoftModel, tmp_path: Path) -> None:
+    file = tmp_path / "solution.npz"
+    words = ("inflatable_arm", "--target", "0.9", "0.3", "0.2", *FORCE)
+    found = answer("ik", *words, "-o", str(file))
+    again = sr.solve_equilibrium(arm, found["q_motors"], (0, 10, -15))
+    assert np.allclose(again.tip_position, (0.9, 0.3, 0.2), rtol=0.0, atol=1e-9)  # the tolerance of the search
+    solution = sr.solve_ik(arm, (0.9, 0.3, 0.2), (0, 10, -15))
+    same(found["equilibrium"], solution.equilibrium)
+    assert found["alternatives"] == [other.tolist() for other in solution.alternatives]
+    assert (found["error"], found["orientation"]) == (solution.error, None)
+    assert np.array_equal(sr.load_result(file).q_motors, solution.q_motors)
+    status, out, _ = told("ik", *words)
+    assert status == 0
+    assert re.search(r"^target +0.9  0.3  0.2 m$", out, re.M)
+    assert re.search(rf"^motors +{'  '.join(f'{x:.6g}' for x in solution.q_motors)} rad$", out, re.M)
+    assert len(re.findall(r"^another solution  ", out, re.M)) == len(solution.alternatives) >= 1
+
+
+def test_ik_passes_its_other_options_on(answer, arm: sr.SoftModel) -> None:
+    words = (
+        "--elbow",
+        "up",
+        "--start",
+        "0.2",
+        "0.5",
+        "-0.5",
+        "--starts",
+        "3",
+        "--tolerance",
+        "1e-6",
+        "--method",
+        "fixed_point",
+    )
+    found = answer("ik", "inflatable_arm", "--target", "0.9", "0.3", "0.2", *FORCE, *words)
+    options = {"q_motors0": (0.2, 0.5, -0.5), "elbow": "up", "starts": 3, "tolerance": 1e-6, "method": "fixed_point"}
+    solution = sr.solve_ik(arm, (0.9, 0.3, 0.2), (0, 10, -15), **options)
+    assert found["q_motors"] == solution.q_motors.tolist()
+    assert found["iterations"] == solution.iterations
+
+
+def test_ik_turns_the_tip(answer) -> None:
+    """The direction of the tip of a robot that has the freedom."""
+    found = answer("ik", "pcc_arm", "--target", "0.3", "-0.2", "0.9", "--orientation", "0.5", "0", "1", "--gravity")
+    pose = np.array(found["equilibrium"]["transform_tip_to_world"])
+    assert np.allclose(pose[:3, 3], (0.3, -0.2, 0.9), rtol=0.0, atol=1e-9)
+    assert np.allclose(pose[:3, 2], np.array([0.5, 0, 1]) / np.sqrt(1.25), rtol=0.0, atol=1e-8)
+    assert found["orientation_error"] <= 1e-9  # the tolerance of the search
+
+
+def test_ik_turns_the_tip_as_roll_pitch_and_yaw_say(answer, told: Told, tmp_path: Path) -> None:
+    """Seven joints, one of them a spring: the pose of some motors under their weight is a target that can be reached."""
+    axes = ("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1", "0 1 0")
+    links = f'<link name="base">{INERTIAL}</link>'
+    names = ("base", *(f"l{number}" for number in range(7)))
+    joints = (joint(f"j{number}", names[number], names[number + 1], axis, xyz="0 0 0.2") for number, axis in enumerate(axes))
+    text = f'<robot name="seven">{links}{"".join(joints)}</robot>'
+    file = tmp_path / "seven.urdf"
+    file.write_text(text, encoding="utf-8")
+    model = sr.load_model(text, springs={"j1": 50.0})
+    pose = sr.solve_equilibrium(model, (0.3, 0.5, 0.2, -0.4, 0.6, 0.1), gravity=sr.EARTH_GRAVITY).transform_tip_to_world
+    place, turn = (map(repr, numbers.tolist()) for numbers in (pose.translation, pin.rpy.matrixToRpy(pose.rotation)))
+    words = ("ik", str(file), "--spring", "j1=50", "--target", *place, "--rpy", *turn, "--gravity", "--starts", "2")
+    found = answer(*words, "--start", "0.2", "0.4", "0.2", "-0.3", "0.5", "0.1")
+    assert np.allclose(found["equilibrium"]["transform_tip_to_world"], pose.homogeneous, rtol=0.0, atol=1e-8)
+    assert np.allclose(found["orientation"], pose.rotation, rtol=0.0, atol=1e-12)
+    told_text = told(*words, "--start", "0.2", "0.4", "0.2", "-0.3", "0.5", "0.1")[1]
+    assert re.search(r"^tip error +\S+ m, \S+ rad, \d+ steps$", told_text, re.M)
+
+
+def test_ik_ends_with_one_if_the_target_is_out_of_reach(told: Told) -> None:
+    status, out, err = told("ik", "inflatable_arm", "--target", "3", "0", "0", "--starts", "2", "--json")
+    assert (status, out) == (1, "")
+    assert "error: the tip cannot reach [3.0, 0.0, 0.0] m: the nearest of 2 starts" in err
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file of waypoints."""
+    file = tmp_path / "path.csv"
+    rows = "".join(f"{0.1 * i!r},0.9,{0.3 - 0.05 * i!r},0.2\n" for i in range(6))
+    file.write_text("t,x,y,z\n" + rows, encoding="utf-8")
+    return file
+
+
+def test_ik_follows_waypoints(told: Told, answer, arm: sr.SoftModel, path: Path, tool, tmp_path: Path) -> None:
+    tool("matplotlib")
+    words = ("ik", "inflatable_arm", "--waypoints", str(path), *FORCE, "--elbow", "up")
+    npz, csv, picture = tmp_path / "followed.npz", tmp_path / "followed.csv", tmp_path / "poses.png"
+    found = answer(*words, "-o", str(npz), "--plot", str(picture))
+    points = sr.read_waypoints(path)
+    followed = sr.follow_trajectory(arm, points.positions, (0, 10, -15), elbow="up", times=points.times)
+    for name in ("times", "targets", "q_motors", "q_springs", "tip_positions", "tip_error", "link_moments"):
+        assert found[name] == getattr(followed, name).tolist(), name
+    assert found["required_pressure"] == followed.required_pressure
+    assert found["wrinkling_margin"] == followed.wrinkling_margin
+    assert found["motor_torques"] == [equilibrium.motor_torques.tolist() for equilibrium in followed.equilibria]
+    assert (found["stable"], found["wrinkled"]) == ([True] * 6, [False] * 6)
+    assert np.array_equal(sr.load_result(npz).q_motors, followed.q_motors)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    status, out, err = told(*words, "-o", str(csv))
+    assert status == 0
+    assert "5/5" in err  # a progress bar, from waypoint to waypoint
+    assert csv.read_text(encoding="utf-8") == sr.save_csv(followed, tmp_path / "again.csv").read_text(encoding="utf-8")
+    motors = followed.q_motors
+    numbers = " +".join(f"{x:.6f}" for x in (motors[0, 2], motors[-1, 2], motors[:, 2].min(), motors[:, 2].max()))
+    assert re.search(rf"^motor_3 +{numbers}  rad +\S+  N m$", out, re.M)
+    for line in (
+        r"waypoints +6, 0.5 s, by newton",
+        r"largest tip error +\S+ m at waypoint \d",
+        r"stable +at every waypoint",
+        r"not wrinkled +at every waypoint",
+        rf"largest moment .* {100.0 * followed.wrinkling_margin:.1f} % of the wrinkling moment is left",
+        rf"required pressure +{followed.required_pressure:.6g} Pa",
+    ):
+        assert re.search(rf"^{line}$", out, re.M), line
+
+
+def test_ik_follows_as_the_paper_does_and_says_where_a_link_wrinkles(answer, told: Told, arm: sr.SoftModel, path: Path) -> None:
+    words = ("ik", "inflatable_arm", "--waypoints", str(path), *FORCE)
+    found = answer(*words, "--method", "paper", "--gain", "20")
+    points = sr.read_waypoints(path)
+    followed = sr.follow_trajectory(arm, points.positions, (0, 10, -15), times=points.times, method="paper", gain=20.0)
+    assert found["q_motors"] == followed.q_motors.tolist()
+    assert max(found["tip_error"]) > 1e-4  # it lags behind
+    status, out, _ = told(*words, "--set", "pressure=30e3")
+    assert status == 0
+    assert re.search(r"^not wrinkled +NO: not at 6 waypoints, first at waypoint 1$", out, re.M)
+    assert answer(*words, "--set", "pressure=0")["wrinkling_margin"] is None
+
+
+def test_ik_jumps_only_if_told(told: Told, answer, tmp_path: Path) -> None:
+    """Motors within +-2 rad, as in tests/test_trajectory.py: motor 1 blocks the way on."""
+    rows = "".join(f"{0.7 * math.cos(turn)},{0.7 * math.sin(turn)},0.3\n" for turn in (0.8, 1.2, 1.6, 1.9, 2.1))
+    path = tmp_path / "circle.csv"
+    path.write_text("x,y,z\n" + rows, encoding="utf-8")
+    words = ("ik", "inflatable_arm", "--waypoints", str(path), "--set", "motor_limit=2.0", "--elbow", "up")
+    status, out, err = told(*words)
+    assert (status, out) == (1, "")
+    assert "no continuous motion leads there" in err
+    assert max(answer(*words, "--allow-jumps")["tip_error"]) <= 1e-9
+
+
+# --- What is refused
+
+CSV = "CSV"  # stands for a file of waypoints
+TARGET = ("inflatable_arm", "--target", "0.9", "0.3", "0.2")
+
+REFUSED = [
+    (("solve",), "the following arguments are required: ROBOT"),
+    (("solve", "nobody"), "no robot or file is called 'nobody'"),
+    (("solve", "inflatable_arm", "--motors", "1"), "--motors must be 3 numbers: motor_1 [rad], motor_2 [rad], motor_3 [rad]"),
+    (("solve", "inflatable_arm", "--motors", "1", "2", "inf"), "--motors must be an array of shape (3,) of finite numbers"),
+    (("solve", "inflatable_arm", "--motors", "1", "2", "x"), "invalid float value: 'x'"),
+    (("solve", "helix_tube", "--motors", "1"), "--motors must be left out: it has no motors"),
+    (("solve", "inflatable_arm", "--force", "1", "2"), "expected 3 arguments"),
+    (("solve", "inflatable_arm", "--force", "1", "2", "nan"), "force must be an array of shape (3,) of finite numbers [N]"),
+    (("solve", "inflatable_arm", "--moment", "1", "2", "1e40"), "at most 1e+30 in size"),
+    (("solve", "inflatable_arm", "--gravity", "9.81"), "gravity must be an array of shape (3,)"),
+    (("solve", "inflatable_arm", "--frame", "tipp"), "no frame is called 'tipp' (did you mean 'tip'?)"),
+    (("solve", "inflatable_arm", "--wrench", "tipp", *"000000"), "no frame is called 'tipp'"),
+    (("solve", "inflatable_arm", "--wrench", *"0000000"), "no frame is called '0'"),
+    (("solve", "inflatable_arm", "--wrench", "tip", *"00000", "x"), "LINK FX FY FZ MX MY MZ: a link and six numbers"),
+    (("solve", "inflatable_arm", "--method", "descent"), "invalid choice: 'descent'"),
+    (("solve", "inflatable_arm", "--start", "1"), "--start must be an array of shape (4,)"),
+    (("solve", "inflatable_arm", "--tolerance", "0"), "tolerance must be positive"),
+    (("solve", "inflatable_arm", "--max-iterations", "0"), "max_iterations must be a positive integer"),
+    (("solve", "inflatable_arm", "--max-iterations", "1.5"), "invalid int value: '1.5'"),
+    (("solve", "inflatable_arm", "--critical-load", "0", "0", "0"), "direction must be different from zero"),
+    (("solve", "inflatable_arm", "--tip", "nobody"), "no frame is called 'nobody'"),
+    (("solve", "inflatable_arm", "--spring", "elbow=3"), "no movable joint is called 'elbow'"),
+    (("solve", "pcc_arm_lumped", "--set", "hinges=60"), "the chain has at most 300 joints, not 480"),
+    (("solve", "inflatable_arm", "-o", "x.txt"), "-o must be a file name that ends in .npz"),
+    (("solve", "inflatable_arm", "-o", "."), "-o must be a file name that ends in .npz"),
+    (("solve", "inflatable_arm", "--plot", "x.pdf"), "--plot must be a file name that ends in .png"),
+    (("load", "inflatable_arm"), "the following arguments are required: --torques"),
+    (
+        ("load", "inflatable_arm", "--torques", "1", "2"),
+        "--torques must be 3 numbers: motor_1 [N m], motor_2 [N m], motor_3 [N m]",
+    ),
+    (
+        ("load", "inflatable_arm", "--torques", "1", "2", "nan"),
+        "motor_torques must be an array of shape (3,) of finite numbers",
+    ),
+    (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "1", "2"), "--torque-std must be 3 numbers"),
+    (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "-1"), "torque_std"),
+    (("load", "inflatable_arm", "--torques", *"123", "--frame", "nobody"), "no frame is called 'nobody'"),
+    (("load", "inflatable_arm", "--torques", *"123", "-o", "x.csv"), "-o must be a file name that ends in .npz"),
+    (("load", "helix_tube", "--torques", "1"), "a robot with at least one motor"),
+    (("load", "pcc_arm", "--muscles", "forces", "--torques", "1"), "a robot whose muscle lengths are given"),
+    (("ik", "inflatable_arm"), "one of the arguments --target --waypoints is required"),
+    (("ik", *TARGET, "--waypoints", CSV), "not allowed with argument --target"),
+    (("ik", *TARGET, "--start", "1"), "--start must be 3 numbers"),
+    (("ik", *TARGET, "--start", "9", "0", "0"), "within the motor limits"),
+    (("ik", *TARGET, "--elbow", "left"), "invalid choice: 'left'"),
+    (("ik", *TARGET, "--orientation", "1", "0", "0"), "it has 3 freedoms, 5 are needed"),
+    (("ik", *TARGET, "--orientation", "0", "0", "0"), "a direction different from zero"),
+    (("ik", *TARGET, "--rpy", "0", "0", "0"), "it has 3 freedoms, 6 are needed"),
+    (("ik", *TARGET, "--rpy", "0", "0", "inf"), "--rpy must be an array of shape (3,) of finite numbers"),
+    (("ik", *TARGET, "--rpy", "0", "0", "0", "--orientation", *"001"), "not allowed with argument --rpy"),
+    (("ik", *TARGET, "--starts", "0"), "starts must be a positive integer"),
+    (("ik", *TARGET, "--tolerance", "-1"), "tolerance must be positive"),
+    (("ik", *TARGET, "--method", "paper"), "--method must be given with --waypoints"),
+    (("ik", *TARGET, "--gain", "3"), "--gain must be given with --method paper"),
+    (("ik", *TARGET, "--allow-jumps"), "--allow-jumps must be given with --waypoints"),
+    (("ik", *TARGET, "-o", "x.csv"), "-o must be a file name that ends in .npz"),
+    (("ik", "helix_tube", "--target", "0", "0", "1"), "a robot with at least one motor"),
+    (("ik", "inflatable_arm", "--waypoints", "nobody.csv"), "cannot read waypoints from nobody.csv"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "--orientation", *"001"), "--orientation must be given with --target"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "--rpy", *"000"), "--rpy must be given with --target"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "--starts", "3"), "--starts must be given with --target"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "--gain", "3"), "--gain must be given with --method paper"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "--method", "paper", "--tolerance", "1"), "another method than paper"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "--method", "paper", "--gain", "0"), "gain must be positive"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "-o", "x.txt"), "-o must be a file name that ends in .npz or .csv"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), REFUSED, ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
+def test_bad_input_is_refused(
+    words: tuple[str, ...], message: str, told: Told, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    status, out, err = told(*(str(path) if word is CSV else word for word in words))
+    assert (status, out) == (2, "")
+    assert message in err
+    assert "error: " in err
+    assert list(folder.iterdir()) == []
