@@ -262,16 +262,20 @@ def _draw_chain(axes: Any) -> None:
     surface.set_edgecolor("none")
     line = analytic(first, np.linspace(0.0, first.centre_length, 400))[:, :3, 3]
     axes.plot(*line.T, color="black", lw=1.3, label="analytic centre line")
+    axes_of_frames = (
+        (0, {"color": plots.COLOURS[3], "lw": 1.2}, "x axes of the sections, towards the helix axis"),
+        (2, {"color": plots.COLOURS[2], "lw": 3.0}, "z axes, along the tube"),
+    )
     for number, (tube, name) in enumerate(((first, FILES[0]), (second, FILES[1]))):
         frames = chain_frames(sr.load_model(urdf_folder() / f"{name}.urdf"), boundaries(tube))
         style = {"color": plots.COLOURS[number], "marker": "os"[number], "ms": 5.0 - number, "ls": "none"}
         axes.plot(*frames[:, :3, 3].T, label=f"{('ends of sections', 'hinges')[number]} ({name}.urdf)", **style)
         for frame in frames[:-1] if number == 0 else ():
-            for column, colour in ((0, plots.COLOURS[1]), (2, plots.COLOURS[2])):
+            for column, style, _ in axes_of_frames:
                 ends = np.array([frame[:3, 3], frame[:3, 3] + 0.03 * frame[:3, column]])
-                axes.plot(*ends.T, color=colour, lw=1.2)
-    axes.plot([], [], [], color=plots.COLOURS[1], lw=1.2, label="x axes of the sections, towards the helix axis")
-    axes.plot([], [], [], color=plots.COLOURS[2], lw=1.2, label="z axes, along the tube")
+                axes.plot(*ends.T, **style)
+    for _, style, told in axes_of_frames:
+        axes.plot([], [], [], label=told, **style)
     low, high = corners.min(axis=0), corners.max(axis=0)
     for axis, a, b in zip("xyz", low, high, strict=True):
         getattr(axes, f"set_{axis}lim")(a, b)

@@ -60,7 +60,7 @@ def moment_angle(pushes: Sequence[Push]) -> Any:
         ParameterError: If a law cannot be fitted.
     """
     figure = new_figure((8.0, 5.6))
-    axes = figure.add_subplot()
+    axes, ends = figure.add_subplot(), []
     for number, (row, run, measured) in enumerate(pushes):
         colour = COLOURS[number % len(COLOURS)]
         fit = inflated_beam.fit_characterisation(
@@ -73,12 +73,16 @@ def moment_angle(pushes: Sequence[Push]) -> Any:
         angles = np.linspace(0.0, max(float(measured.angle.max()), 0.0), 400)
         most = np.inf if fit.max_moment is None else fit.max_moment
         axes.plot(angles, np.minimum(fit.stiffness * angles, most), color=colour, lw=1.2)
-        axes.axhline(fit.wrinkling_moment, color=colour, lw=0.8, ls=":")
+        axes.axhline(fit.wrinkling_moment, color=colour, lw=1.2, ls=":")
+        ends.append((fit.wrinkling_moment, colour, MARKERS[number % len(MARKERS)]))
+    style = {"ms": 6, "mfc": "white", "ls": "", "transform": axes.get_yaxis_transform(), "clip_on": False, "zorder": 4}
+    for moment, colour, marker in ends:  # on the right edge, where no line is
+        axes.plot([1.0], [moment], color=colour, marker=marker, **style)
     axes.plot([], [], color="black", lw=1.2, label="fitted law")
-    axes.plot([], [], color="black", lw=0.8, ls=":", label="wrinkling moment (3)")
+    axes.plot([], [], color="black", lw=1.2, ls=":", marker="o", ms=6, mfc="white", label="wrinkling moment (3)")
     axes.set(xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title="Moment-angle law of the link")
     axes.set_xlim(0.0, None)
     axes.set_ylim(0.0, None)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=9, ncols=2, loc="lower right")
+    axes.legend(fontsize=9, ncols=2, loc="lower right", framealpha=1.0)
     return figure

@@ -19,8 +19,11 @@ from softrobots.errors import ParameterError
 from softrobots.plots import new_figure
 
 _SIDES = 24
-_WALL, _WALL_IN_CONTACT = (0.86, 0.87, 0.89), (0.97, 0.80, 0.42)
-_ACTUATOR, _OPPOSITE = (0.0, 0.33, 0.60), (0.93, 0.55, 0.38)
+WALL, WALL_IN_CONTACT = (0.86, 0.87, 0.89), (0.94, 0.72, 0.28)
+"""Red, green, blue of the wall of a tube, and of one that runs into itself."""
+ACTUATOR, OPPOSITE = (0.0, 0.33, 0.60), (0.88, 0.42, 0.16)
+"""Red, green, blue of the actuator, and of the line opposite."""
+
 _MOST_RINGS = 4000
 _COARSEST = 0.3  # turn from ring to ring: a side of the tube [rad]
 _ELEVATION = math.radians(25.0)
@@ -90,9 +93,9 @@ def draw(share: float, tilt: float, diameter: float, length: float, handedness: 
     corners, triangles = tube(rotations, centres, 0.5 * diameter, _SIDES)
     sides = triangles % _SIDES
     wall = np.all(triangles < rings * _SIDES, axis=1)
-    colours = np.tile(_WALL_IN_CONTACT if touches else _WALL, (len(triangles), 1))
-    colours[wall & np.any(sides == 0, axis=1)] = _ACTUATOR
-    colours[wall & np.any(sides == _SIDES // 2, axis=1)] = _OPPOSITE
+    colours = np.tile(WALL_IN_CONTACT if touches else WALL, (len(triangles), 1))
+    colours[wall & np.any(sides == 0, axis=1)] = ACTUATOR
+    colours[wall & np.any(sides == _SIDES // 2, axis=1)] = OPPOSITE
     at = corners[triangles]
     normals = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -172,8 +175,8 @@ def _key(axes: Any, scale: float, contact: bool) -> None:
     bar *= next(number for number in (5, 2, 1) if number * bar * scale <= 1.8)
     axes.plot([0.4, 0.4 + scale * bar], [0.38, 0.38], color="black", lw=3.0, solid_capstyle="butt")
     axes.text(0.4 + 0.5 * scale * bar, 0.32, f"{100 * bar:.3g} cm", ha="center", va="top", fontsize=9)
-    told = {"actuator, contracts": _ACTUATOR, "line opposite, keeps its length": _OPPOSITE}
+    told = {"actuator, contracts": ACTUATOR, "line opposite, keeps its length": OPPOSITE}
     if contact:
-        told["in contact: the tube runs into itself"] = _WALL_IN_CONTACT
+        told["in contact: the tube runs into itself"] = WALL_IN_CONTACT
     patches = [Patch(color=colour, label=text) for text, colour in told.items()]
     axes.legend(handles=patches, loc="lower right", ncols=2, fontsize=9, frameon=False)

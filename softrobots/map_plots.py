@@ -14,7 +14,8 @@ from softrobots.workspace_map import WorkspaceMap
 NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
 """What becomes of a target under a load: never reached, lost under the load, reached with a wrinkled link, carried."""
 
-_SHADES = ("#ffffff", "#7f7f7f", "#f3cc6b", "#17375e")  # apart in grey, too
+SHADES = ("#ffffff", "#7f7f7f", "#f3cc6b", "#17375e")
+"""Colour of each; apart in grey, too."""
 _LABELS = ("not reached", "reached with smaller loads only", "reached, a link wrinkles", "reached, no link wrinkles")
 
 
@@ -49,10 +50,10 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
     force = f"{result.loads[level]:.4g} N"
 
     outcomes = outcome(result, level)[:, middle]
-    shades = ListedColormap(_SHADES)
+    shades = ListedColormap(SHADES)
     _cells(reach_axes, result, outcomes, cmap=shades, norm=BoundaryNorm(np.arange(5) - 0.5, 4))
     shown = [number for number in (CARRIED, WRINKLED, LOST, NOT_REACHED) if (outcomes == number).any()]
-    handles = [Patch(facecolor=_SHADES[number], edgecolor="0.3", label=_LABELS[number]) for number in shown]
+    handles = [Patch(facecolor=SHADES[number], edgecolor="0.3", label=_LABELS[number]) for number in shown]
     figure.legend(handles=handles, loc="outside lower left", ncols=len(handles), title=f"reach with {force}", fontsize=9)
     reach_axes.set_title(f"Reach with {force} on the tip")
 
@@ -92,22 +93,31 @@ def _cells(axes: Any, result: WorkspaceMap, values: Any, **style: Any) -> Any:
 
 
 def _contours(axes: Any, result: WorkspaceMap, values: FloatArray, levels: set[float]) -> None:
-    """Lines of equal value with their numbers: some in white, or, thick and dashed, at given levels."""
+    """Lines of equal value with their numbers: some in white, or, thick and dashed, at given levels.
+
+    Their edges have the other shade, so that they stand out from light and from dark.
+    """
     finite = values[np.isfinite(values)]
     if not len(finite) or float(np.ptp(finite)) <= 0.0:
         return
+    from matplotlib.patheffects import withStroke
     from matplotlib.ticker import MaxNLocator
 
     own = sorted(level for level in levels if finite.min() < level < finite.max())
     plain = MaxNLocator(6).tick_values(finite.min(), finite.max())
     plain = [value for value in plain if finite.min() < value < finite.max() and value not in own]
-    for chosen, style, told in (
-        (plain, {"colors": "white", "linewidths": 0.8}, "{:g}"),
-        (own, {"colors": "black", "linewidths": 1.8, "linestyles": "--"}, "own: {:g}"),
+    for chosen, style, edge, told in (
+        (plain, {"colors": "white", "linewidths": 0.9}, "black", "{:g}"),
+        (own, {"colors": "black", "linewidths": 1.8, "linestyles": "--"}, "white", "own: {:g}"),
     ):
         if chosen:
             lines = axes.contour(result.grid.x, result.grid.z, values.T, levels=chosen, **style)
-            axes.clabel(lines, fmt=told.format, fontsize=8)
+            # One number a level, on its longest line: where the value falls off a cliff, many short ones lie together.
+            longest = [max(segments, key=len) for segments in lines.allsegs if segments]
+            places = [segment[len(segment) // 2] for segment in longest if len(segment) > 1]
+            for text in axes.clabel(lines, fmt=told.format, fontsize=9, manual=places):
+                text.set_path_effects([withStroke(linewidth=2.0, foreground=edge)])
+            lines.set_path_effects([withStroke(linewidth=1.6, foreground=edge)])
 
 
 def _told(vector: Any) -> str:

@@ -1,0 +1,47 @@
+"""Make the self-contained pages of the documentation, which turn robots and play animations in any browser, offline too.
+
+The same version makes the same bytes: a page that is made again shows no difference. ur5_bench needs the extra `robots`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from softrobots.command_line import exit_status
+from softrobots.files import new_file
+from softrobots.gallery import EXHIBITS
+
+PAGES = {
+    "helix_growth": "helix_growth",
+    "pcc_arm": "pcc_arm",
+    "inflatable_arm": "wrinkling_arm",
+    "ur5_bench": "ur5_bench",
+}
+"""Name of each page, and its exhibit."""
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Write each page."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    folder = Path(__file__).resolve().parent.parent / "docs" / "pages"
+    parser.add_argument(
+        "--output", type=Path, default=folder, metavar="FOLDER", help="folder of the pages, which are replaced (docs/pages)"
+    )
+    parser.add_argument("--only", nargs="+", choices=tuple(PAGES), default=tuple(PAGES), help="pages to make (all)")
+    arguments = parser.parse_args(argv)
+
+    def write() -> None:
+        targets = {name: new_file(arguments.output / f"{name}.html", overwrite=True) for name in arguments.only}
+        for name, target in targets.items():
+            exhibit = EXHIBITS[PAGES[name]]
+            with exhibit.make() as viewer:
+                page = viewer.write_html(target, title=exhibit.title, overwrite=True)
+            print(f"{page} ({page.stat().st_size / 1e6:.2f} MB)")
+
+    return exit_status(write)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,119 @@
+"""Colours of plots and pages stay apart for colour-blind people and in grey, or styles and markers tell what they tell.
+
+The oracle is the published simulation of [Machado 2009] at full severity, and CIE L*a*b*; the project holds neither.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+
+from softrobots import helix_sheet, map_plots, plots
+from softrobots.meshcat_view.body import PULL_COLOUR, PUSH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
+from softrobots.meshcat_view.shapes import FORCE_COLOUR, PATH_COLOUR
+from softrobots.scene import WRINKLING_COLOURS
+
+# G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A physiologically-based model for simulation of color vision deficiency,
+# IEEE Trans. Vis. Comput. Graph. 15(6), 2009: severity 1.0, on linear RGB.
+SIMULATIONS = {
+    "normal": np.eye(3),
+    "protanopia": np.array([
+        [0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998],
+    ]),
+    "deuteranopia": np.array([
+        [0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881],
+    ]),
+}  # fmt: skip
+TO_XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
+
+APART = 10.0
+"""Distance in CIE L*a*b* that is seen at a glance; 2.3 is just noticeable side by side."""
+APART_IN_GREY = 7.0
+"""Steps of lightness L*, from 0 to 100, that are told apart as areas."""
+
+
+def rgb(colour: object) -> np.ndarray:
+    """Red, green, blue in [0, 1] of what the package writes: HTML text, a number as in HTML, or a tuple."""
+    if isinstance(colour, str):
+        colour = int(colour.removeprefix("#"), 16)
+    if isinstance(colour, int):
+        colour = (colour >> 16 & 255, colour >> 8 & 255, colour & 255)
+        return np.array(colour) / 255.0
+    return np.array(colour[:3], dtype=float)
+
+
+def lab(colour: object, simulation: str = "normal") -> np.ndarray:
+    """CIE L*a*b* of an sRGB colour under daylight (D65), as someone with a deficiency sees it."""
+    value = rgb(colour)
+    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(SIMULATIONS[simulation] @ linear, 0.0, 1.0)
+    ratio = (TO_XYZ @ seen) / TO_XYZ.sum(axis=1)
+    root = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), ratio / (3 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116 * root[1] - 16, 500 * (root[0] - root[1]), 200 * (root[1] - root[2])])
+
+
+def nearest(colours: list[object], simulation: str) -> float:
+    return min(float(np.linalg.norm(lab(a, simulation) - lab(b, simulation))) for a, b in combinations(colours, 2))
+
+
+def lightness(colours: list[object]) -> list[float]:
+    return [float(lab(colour)[0]) for colour in colours]
+
+
+WRINKLING = [colour for _, colour in WRINKLING_COLOURS]
+PALETTES = {
+    "lines": list(plots.COLOURS),
+    "wrinkling": WRINKLING,
+    "page of a muscle arm": [PULL_COLOUR, PUSH_COLOUR, TUBE_COLOUR, PATH_COLOUR, FORCE_COLOUR],
+    "page of a growing tube": [PULL_COLOUR, TUBE_COLOUR, TAIL_COLOUR],
+    "maps": list(map_plots.SHADES),
+    "helices": [helix_sheet.WALL, helix_sheet.WALL_IN_CONTACT, helix_sheet.ACTUATOR, helix_sheet.OPPOSITE],
+}
+
+
+@pytest.mark.parametrize("simulation", SIMULATIONS)
+@pytest.mark.parametrize("palette", PALETTES)
+def test_colours_stay_apart(palette: str, simulation: str) -> None:
+    assert nearest(PALETTES[palette], simulation) > APART
+
+
+def test_the_oracle_knows_red_from_green() -> None:
+    """Published numbers of CIE L*a*b*, and a pair that people with deuteranopia mix up."""
+    assert np.allclose(lab((1.0, 1.0, 1.0)), [100.0, 0.0, 0.0], atol=0.02)  # the matrix has seven digits
+    assert np.allclose(lab((1.0, 0.0, 0.0)), [53.24, 80.09, 67.20], atol=0.02)
+    mixed = ["#a05000", "#5a7a00"]
+    assert nearest(mixed, "normal") > 3 * APART
+    assert nearest(mixed, "deuteranopia") < APART
+
+
+def test_wrinkling_goes_from_light_to_dark() -> None:
+    """In grey a link near wrinkling is darker than one that is not, and wrinkled is darkest."""
+    steps = -np.diff(lightness(WRINKLING))
+    assert steps.min() > APART_IN_GREY
+
+
+def test_areas_of_maps_and_helices_differ_in_grey() -> None:
+    for areas in (PALETTES["maps"], PALETTES["helices"], [PULL_COLOUR, PUSH_COLOUR]):
+        assert min(b - a for a, b in pairwise(sorted(lightness(areas)))) > APART_IN_GREY
+
+
+def test_lines_that_look_alike_in_grey_differ_in_style_and_marker() -> None:
+    """Six colours cannot be six greys: every line has a style and a marker of its own, over one round of the colours."""
+    styles = [plots.line_style(number) for number in range(len(plots.COLOURS))]
+    alike = [pair for pair in combinations(styles, 2) if abs(lab(pair[0]["color"])[0] - lab(pair[1]["color"])[0]) < 15.0]
+    assert alike
+    for one, other in alike:
+        assert one["ls"] != other["ls"]
+        assert one["marker"] != other["marker"]
+    assert plots.line_style(len(plots.COLOURS)) == styles[0]
+
+
+def test_lines_are_drawn_in_these_styles() -> None:
+    """Read back from figures: no two lines of one plot share colour, style and marker."""
+    times = np.linspace(0.0, 1.0, 30)
+    figure = plots.tip_errors({f"method {number}": np.full(30, 10.0**-number) for number in range(6)}, times)
+    drawn = {(line.get_color(), str(line.get_linestyle()), line.get_marker()) for line in figure.axes[0].lines}
+    assert len(drawn) == 6
+    assert len({marker for _, _, marker in drawn}) == 6
