@@ -64,7 +64,7 @@ class MuscleLengths:
             if np.linalg.matrix_rank(arms, tol=1e-9 * float(np.abs(arms).max())) < len(places):
                 raise DescriptionError(
                     f"the {len(rows)} muscles of segment {segment} do not fix its bending and elongation; "
-                    f"three or more at different azimuths are required"
+                    f"three or more at different azimuths are required, or their tensions, load_model(..., muscles='forces')"
                 )
             inverse = np.linalg.pinv(arms)
             self._misfit[np.ix_(rows, rows)] = np.eye(len(rows)) - arms @ inverse
