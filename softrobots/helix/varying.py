@@ -116,7 +116,7 @@ def bent_tube(
         diameter: Diameter `D` of the tube, positive [m].
         length: Length of the uninflated tube, positive [m].
         handedness: "right" or "left".
-        samples: How many samples, equally spaced with both ends, at least 2; or their increasing positions in [0, length] [m].
+        samples: How many samples, equally spaced with both ends, at least 2; or their increasing positions [m], in [0, length].
         tolerance: Error of one step of the integrator, in lengths as a share of the tube's and in rotations [rad], from 1e-13
             to 1e-3.
         breakpoints: Positions where a function jumps or has a kink, increasing, within the tube [m].

@@ -37,7 +37,7 @@ TABLE_3 = (
 """Characterisation of the prototype link, [Troise 2021] Table 3."""
 
 MEAN_STIFFNESS = 172.71
-"""Mean stiffness of the prototype link as printed in [Troise 2021] [N m/rad]; the six rows average 172.7117."""
+"""Mean stiffness of the prototype link [N m/rad], as printed in [Troise 2021]; the six rows average 172.7117."""
 
 
 def required_tabulated_pressure(moment: float, radius: float) -> float | None:

@@ -1,0 +1,144 @@
+"""What stands on which page of the API reference: for each page a title, a sentence, and the names in their order.
+
+A name of a package stands for everything that it exports, a name of a module for everything public in it; a test sees to it
+that no public name is left out.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+import softrobots
+
+
+class ApiPage(NamedTuple):
+    """One page."""
+
+    title: str
+    """Its heading."""
+    told: str
+    """What is there."""
+    names: tuple[str, ...]
+    """Full names: of things, or of modules of which everything public is shown."""
+
+
+PACKAGES = tuple(f"softrobots.{name}" for name in ("inflated_beam", "constant_curvature", "helix", "export", "sweeps"))
+"""Names that are packages: what they export, by module."""
+
+
+BEHIND_GUIDES = "---\nsearch:\n  boost: 0.5\n---\n\n"
+"""Makes a search find guides first."""
+
+
+def _top(*names: str) -> tuple[str, ...]:
+    return tuple(f"softrobots.{name}" for name in names)
+
+
+PAGES = {
+    "robots": ApiPage(
+        "Robots and models",
+        "Parameters of a robot, what is loaded of it, and one robot on another.",
+        (
+            *_top("InflatableArm", "PccArm", "HelixTube", "ROBOTS", "robots.Robot"),
+            *_top("load_model", "SoftModel", "SpringGroup", "grown_coordinates"),
+            *_top("mount", "composition.fix_joints", "third_party.robot_file", "__version__"),
+        ),
+    ),
+    "statics": ApiPage(
+        "Statics",
+        "Equilibria under loads, how the robot gives way, when it buckles, and which load it feels.",
+        (
+            *_top("solve_equilibrium", "Equilibrium", "distributed_force", "EARTH_GRAVITY"),
+            *_top("compliance", "elastostatic_jacobian", "critical_load", "estimate_load", "LoadEstimate"),
+            *_top("solve_imposed_displacement", "ImposedDisplacement"),
+        ),
+    ),
+    "kinematics": ApiPage(
+        "Inverse kinematics and paths",
+        "Motors that put the loaded tip where it is wanted, along a path too, and what the tip reaches.",
+        (
+            *_top("solve_ik", "IkSolution", "follow_trajectory", "Trajectory"),
+            *_top("Path3D", "quintic", "straight_line", "waypoints", "read_waypoints", "sample_workspace", "Workspace"),
+        ),
+    ),
+    "inflated_beam": ApiPage("inflated_beam", "One inflated link as a beam.", _top("inflated_beam")),
+    "constant_curvature": ApiPage(
+        "constant_curvature", "Segments of constant curvature in closed form.", _top("constant_curvature")
+    ),
+    "helix": ApiPage("helix", "Helical actuation of an inflated tube in closed form.", _top("helix")),
+    "export": ApiPage("export", "Robots in the formats of other tools.", _top("export")),
+    "compile": ApiPage(
+        "compile and sweeps",
+        "Compiled solvers, and sweeps over millions of cases. `softrobots.compile` is `compile_model` here; a star import "
+        "leaves it out, since it would hide the builtin.",
+        (
+            *_top("kernels.compiled_model.compile_model", "kernels.compiled_model.CompiledModel", "kernels.statuses.Status"),
+            *(f"softrobots.kernels.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
+            *(f"softrobots.kernels.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),
+            *_top("sweeps"),
+        ),
+    ),
+    "viewer": ApiPage(
+        "Viewer",
+        "The robot in a browser: as a page on loopback, as a file of its own, with sliders, or following commands.",
+        (
+            *_top("view", "Viewer", "meshcat_view.inline_page.InlinePage", "slider_page.SliderPage"),
+            *_top("live.loop.LiveView", "live.commands.Wanted", "live.commands.GRAMMAR", "live.keys.KEYS"),
+        ),
+    ),
+    "plots": ApiPage(
+        "Plots",
+        "Pictures with matplotlib (extra `plot`). Each function returns a figure; `savefig` writes it.",
+        tuple(f"softrobots.{path.stem}" for path in sorted(Path(softrobots.__file__).parent.glob("*plots.py"))),
+    ),
+    "results": ApiPage(
+        "Files and results", "Results as files, without pickle.", _top("save_result", "load_result", "save_csv")
+    ),
+    "errors": ApiPage(
+        "Errors", "Everything that is raised on purpose. `except softrobots.SoftRobotsError` catches it all.", _top("errors")
+    ),
+    "command_line": ApiPage(
+        "Command line",
+        "The command `softrobots` from Python, and what the scripts share.",
+        (*_top("cli.main", "cli.parser"), "softrobots.command_line"),
+    ),
+}
+"""The pages, by the name of their file."""
+
+
+def parts(package: str) -> dict[str, list[str]]:
+    """The public names of a package by the module that they come from, in the order of its imports."""
+    (init,) = importlib.import_module(package).__path__
+    tree = ast.parse((Path(init) / "__init__.py").read_text(encoding="utf-8"))
+    public = set(importlib.import_module(package).__all__)
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    found = {str(node.module): [alias.name for alias in node.names if alias.name in public] for node in imports}
+    return {module: names for module, names in found.items() if names}
+
+
+def page_text(page: ApiPage) -> str:
+    """A page as Markdown for mkdocstrings."""
+    blocks = [f"{BEHIND_GUIDES}# {page.title}\n\n{page.told}\n"]
+    for name in page.names:
+        if name in PACKAGES:
+            blocks.append(f"Everything here is imported as `{name}.NAME`.\n")
+            blocks += [_block(module, members=names) for module, names in parts(name).items()]
+        else:
+            blocks.append(_block(name))
+    return "\n".join(blocks)
+
+
+def _block(name: str, members: list[str] | None = None) -> str:
+    """One thing, or a module with some of its members."""
+    chosen = "" if members is None else f"    options:\n      members: {json.dumps(members)}\n"
+    return f"::: {name}\n{chosen}"
+
+
+def overview() -> str:
+    """The page that lists the others."""
+    rows = "\n".join(f"| [{page.title}]({name}.md) | {page.told} |" for name, page in PAGES.items())
+    return f"# API reference\n\nFrom the docstrings. SI units and radians everywhere.\n\n| page | |\n|---|---|\n{rows}\n"
