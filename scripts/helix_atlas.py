@@ -115,10 +115,7 @@ def limit_table(angles: Any) -> list[tuple[float, ...]]:
 
 def force_table(test: helix.GraspTest, pressure: float) -> list[tuple[float, ...]]:
     """Pressure, deflection, both bounds and the force, for five pressures up to the largest."""
-    found = helix.grasp_force(
-        (np.arange(6) / 5.0 * pressure)[:, None], object_radius=test.object_radius, deflection=test.deflections,
-        turn_height=test.turn_height, turns=test.turns, diameter=test.diameter,
-    )  # fmt: skip
+    found = test.force((np.arange(6) / 5.0 * pressure)[:, None])
     columns = (found.pressure, found.deflection, found.unwrapping, found.contact, found.force)
     return list(zip(*(column.ravel().tolist() for column in columns), strict=True))
 

@@ -19,9 +19,10 @@ from softrobots import inflated_beam, plots
 from softrobots.command_line import add_load, exit_status, gravity_of, serve, tell_written
 from softrobots.files import free_folder, make_folder
 from softrobots.loads import Load
+from softrobots.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 from softrobots.trajectory import METHODS
 
-LINE = {"start": (0.4, -0.5, 0.6), "end": (1.0, 0.2, 0.2), "duration": 2.0, "steps": 200}
+LINE = {"start": START, "end": END, "duration": DURATION, "steps": STEPS}
 """The default path."""
 
 
@@ -29,27 +30,32 @@ def parser() -> argparse.ArgumentParser:
     """Build the command line."""
     numbers = {"type": float, "nargs": 3}
     made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--start", **numbers, metavar=("X", "Y", "Z"), help="first tip position [m] (0.4 -0.5 0.6)")
-    made.add_argument("--end", **numbers, metavar=("X", "Y", "Z"), help="last tip position [m] (1.0 0.2 0.2)")
-    made.add_argument("--duration", type=float, help="time from start to end, quintic time law [s] (2.0)")
-    made.add_argument("--steps", type=int, help="intervals between start and end (200)")
+    made.add_argument("--start", **numbers, metavar=("X", "Y", "Z"), help=f"first tip position [m] ({_words(START)})")
+    made.add_argument("--end", **numbers, metavar=("X", "Y", "Z"), help=f"last tip position [m] ({_words(END)})")
+    made.add_argument("--duration", type=float, help=f"time from start to end, quintic time law [s] ({DURATION})")
+    made.add_argument("--steps", type=int, help=f"intervals between start and end ({STEPS})")
     made.add_argument(
         "--csv", type=Path, metavar="FILE", help="waypoints with columns t,x,y,z [s, m], instead of start and end"
     )
-    add_load(made, (0.0, 10.0, -15.0))
+    add_load(made, FORCE)
     made.add_argument(
         "--stiffness", type=float, default=inflated_beam.MEAN_STIFFNESS, help="of every spring [N m/rad] (%(default)s)"
     )
     made.add_argument("--pressure", type=float, default=50e3, help="gauge pressure in the links [Pa] (%(default)s)")
     made.add_argument("--elbow", choices=("up", "down"), default="up", help="side of the elbow at the start (%(default)s)")
     made.add_argument("--method", choices=METHODS, default="newton", help="how the path is followed (%(default)s)")
-    made.add_argument("--gain", type=float, default=50.0, help="gain of the paper's method [1/s] (%(default)s)")
+    made.add_argument("--gain", type=float, default=GAIN, help="gain of the paper's method [1/s] (%(default)s)")
     made.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder for the results (output/ik_trajectory_<time>)"
     )
     made.add_argument("--no-plots", action="store_true", help="do without the plots, which need matplotlib")
     made.add_argument("--meshcat", action="store_true", help="serve the animation on loopback until Ctrl-C")
     return made
+
+
+def _words(point: tuple[float, ...]) -> str:
+    """A point as it is typed."""
+    return " ".join(str(number) for number in point)
 
 
 def run(arguments: argparse.Namespace) -> Path:
@@ -81,9 +87,6 @@ def run(arguments: argparse.Namespace) -> Path:
 
     with sr.view(model, trajectory) as viewer:
         make_folder(folder)
-        results = {"trajectory": trajectory, "rigid": rigid, "uncompensated": uncompensated} | (
-            {} if paper is None else {"paper": paper}
-        )
         for name, result in results.items():
             sr.save_result(result, folder / f"{name}.npz")
         sr.save_csv(trajectory, folder / "trajectory.csv")

@@ -117,23 +117,23 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     depths = _row("deflections", test.deflections, "m")
     if len(depths) > len(COLOURS):
         raise ParameterError("deflections", test.deflections, f"at most {len(COLOURS)} numbers")
-    _grasp(test, most, depths)  # refuses what is out of range
+    test.force(most, depths)  # refuses what is out of range
     deepest = min(0.5 * test.diameter, test.object_radius, max(1.5 * float(depths.max()), 0.1 * test.diameter))
     pressures, range_of = np.linspace(0.0, most, 9), np.linspace(0.0, deepest, 300)
     figure = new_figure((11.5, 5.4))
     left, right = figure.subplots(1, 2, sharey=True)
     for number, depth in enumerate(depths):
-        found, colour = _grasp(test, pressures, depth), COLOURS[number]
+        found, colour = test.force(pressures, depth), COLOURS[number]
         style = {"color": colour, "marker": MARKERS[number], "ms": 7, "clip_on": False}
         left.plot(pressures / 1e3, found.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
         told = f"force, deflected by {1e3 * depth:.3g} mm"
         left.plot(pressures / 1e3, found.force, lw=2.2, ls=_STYLES[number % 3], markevery=(number, 3), label=told, **style)
         right.plot([1e3 * depth], [found.force[-1]], ls="none", zorder=4, **style)
-    bounds = _grasp(test, most, range_of)
+    bounds = test.force(most, range_of)
     right.plot(1e3 * range_of, bounds.force, color="0.75", lw=6.0, label="force, the smaller bound", zorder=1)
     right.plot(1e3 * range_of, bounds.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
     right.plot(1e3 * range_of, bounds.contact, color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b): the wall flattens")
-    found = _grasp(test, pressures, 0.0)
+    found = test.force(pressures, 0.0)
     left.plot(pressures / 1e3, found.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
     left.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), open marks: the wall flattens")
     left.set(xlabel="gauge pressure [kPa]", ylabel="grasp force [N]", xlim=(0.0, most / 1e3))
@@ -183,18 +183,6 @@ def _name_lines(figure: Any, axes: Any) -> None:
     black: dict[str, Any] = {"color": "black"}
     lines = [Line2D([], [], **(black | style)) for style in told.values()]
     figure.legend(angles + lines, names + list(told), loc="outside lower center", ncols=3, fontsize=9)
-
-
-def _grasp(test: helix.GraspTest, pressure: Any, deflection: Any) -> helix.GraspForce:
-    """Force in a test."""
-    return helix.grasp_force(
-        pressure,
-        object_radius=test.object_radius,
-        deflection=deflection,
-        turn_height=test.turn_height,
-        turns=test.turns,
-        diameter=test.diameter,
-    )
 
 
 def _row(name: str, values: Any, unit: str) -> FloatArray:

@@ -75,6 +75,8 @@ def volume_at_gap(gap: float, case: dict[str, Any]) -> float:
 def test_numbers_of_theory() -> None:
     grasp = grasp_force(10e3, deflection=PAPER_CYLINDER.deflections, **PAPER)
     np.testing.assert_allclose(grasp.volume, 313.9e-6, atol=0.05e-6)  # printed digits
+    assert np.array_equal(PAPER_CYLINDER.force(10e3).force, grasp.force)
+    assert PAPER_CYLINDER.force(10e3, 0.002).force == grasp.force[1]
     np.testing.assert_allclose(grasp.unwrapping, 11.17, atol=0.005)
     np.testing.assert_allclose(grasp.contact, [0.0, 11.22, 15.35], atol=0.005)
     np.testing.assert_allclose(grasp.force, [0.0, 11.17, 11.17], atol=0.005)

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.papers import arm_path, dh_tables, helix_equations, inflatable_arm, pcc_equations, rendering
+from softrobots.papers import dh_tables, helix_equations, inflatable_arm, pcc_equations, rendering
 from softrobots.papers.pictures import PICTURES
 from softrobots.papers.reproduction import PAPERS, reproduce
 from softrobots.papers.rows import (
@@ -30,6 +30,7 @@ from softrobots.papers.rows import (
     ERRATUM,
     MEASURED,
     OURS,
+    TAKEN,
     UNPUBLISHED,
     Row,
     absent,
@@ -37,6 +38,7 @@ from softrobots.papers.rows import (
     erratum,
     own,
     rounded,
+    taken,
     within,
 )
 from tests.conftest import CHECKOUT
@@ -58,8 +60,21 @@ def test_every_claim_holds(found: Found) -> None:
     assert rendering.failed(found) == []
     assert {name: len(rows) > 30 for name, rows in found.items()} == dict.fromkeys(PAPERS, True)
     verdicts = rendering.count(found)
-    assert verdicts[AGREES] > 70
-    assert set(verdicts) == {AGREES, ERRATUM, OURS, MEASURED, UNPUBLISHED, "unreadable"}
+    assert verdicts[AGREES] > 50
+    assert set(verdicts) == {AGREES, TAKEN, ERRATUM, OURS, MEASURED, UNPUBLISHED, "unreadable"}
+
+
+def test_what_ours_is_made_of_does_not_count_as_agreement(found: Found) -> None:
+    """Defaults of the robots, definitions, and what our model of the grasp cannot fail."""
+    places = [(row.place, row.quantity) for rows in found.values() for row in rows if row.kind == TAKEN]
+    for name in ("length L of a link", "radius r", "wall thickness t", "degrees of freedom", "length of a muscle", "segments"):
+        assert name in {quantity for _, quantity in places}
+    assert ("(2), (7)", "torques of the springs, tau_k = k q_k") in places
+    assert {quantity for place, quantity in places if place == "Figure 9"} == {
+        "force linear in the pressure, our model",
+        "no force where the radius is not deflected, our model",
+    }
+    assert not any("M_w" in quantity or "E from" in quantity for _, quantity in places)  # these are computed
 
 
 def test_rows_that_claim_nothing_say_why(found: Found) -> None:
@@ -229,11 +244,6 @@ def test_printed_forward_and_inverse_belong_together(share: float, angle: float,
     assert np.allclose(helix_equations.curvatures_torsions(share, angle, tube), [*outer, *inner], rtol=0.0, atol=allowed / tube)
 
 
-def test_the_path_is_that_of_the_script() -> None:
-    line = {"start": arm_path.START, "end": arm_path.END, "duration": arm_path.DURATION, "steps": arm_path.STEPS}
-    assert line == _script("ik_trajectory").LINE
-
-
 # --- What counts as agreement
 
 
@@ -251,6 +261,8 @@ def test_claims_hold_or_do_not() -> None:
     assert not within("4", "E", "136", 137.25, 1.0).holds
     assert equation("(5)", "tau", 1e-13).holds
     assert not equation("(5)", "tau", 1e-11).holds
+    assert taken(rounded("3", "radius", "55", 55.0, "mm")).verdict == "by construction"
+    assert taken(rounded("3", "radius", "55", 56.0, "mm")).verdict == "DISAGREES"  # the robot was changed
     assert erratum("(8)", "height", 0.3, 0.5).verdict == "erratum"
     assert erratum("(8)", "height", 0.5, 0.5).verdict == "NO ERRATUM"
     for row in (
@@ -273,6 +285,7 @@ def test_claims_hold_or_do_not() -> None:
         (lambda: equation("a", "b", math.nan), "difference = nan"),
         (lambda: own("a", "b", math.inf), "ours = inf"),
         (lambda: absent(AGREES, "a", "b"), "kind = 'agrees'"),
+        (lambda: taken(own("a", "b", 1.0)), "kind = 'ours alone'"),
         (lambda: Row(place="a", quantity="b", kind="right"), "kind = 'right'"),
         (lambda: Row(place="a", quantity="b", kind=AGREES, difference=0.0), "given with a tolerance"),
     ],
@@ -350,10 +363,10 @@ def test_the_comparison_of_pages_can_fail() -> None:
 # --- The script
 
 
-def _script(name: str = "reproduce_papers"):
+def _script():
     import importlib.util
 
-    spec = importlib.util.spec_from_file_location(name, CHECKOUT / "scripts" / f"{name}.py")
+    spec = importlib.util.spec_from_file_location("reproduce_papers", CHECKOUT / "scripts" / "reproduce_papers.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -10,20 +10,12 @@ import numpy as np
 from softrobots.checks import FloatArray, read_only
 from softrobots.loader import load_model
 from softrobots.model import SoftModel
+from softrobots.papers.arm_path import DURATION, END, START
 from softrobots.robots import InflatableArm, PccArm
 from softrobots.time_law import straight_line
 
 FORCE = 18.03
 """Size of the force of the standard set [N], that of (0, 10, -15) N."""
-
-PATH_FORCE = (0.0, 10.0, -15.0)
-"""Force along the path [N]."""
-
-PATH_START = (0.4, -0.5, 0.6)
-"""Where the path begins, that of scripts/ik_trajectory.py [m]."""
-
-PATH_END = (1.0, 0.2, 0.2)
-"""Where it ends [m]."""
 
 ROD_LENGTH, ROD_STIFFNESS = 0.524, 1.92
 """Length [m] and bending stiffness [N m^2] of the rods; under `ROD_STIFFNESS / ROD_LENGTH^2` f L^2/EI is 1."""
@@ -55,8 +47,8 @@ def standard_cases(count: int, seed: int = 0) -> LoadCases:
 
 
 def path_targets(count: int) -> FloatArray:
-    """Waypoints from `PATH_START` to `PATH_END`, shape (count, 3) [m]."""
-    return straight_line(PATH_START, PATH_END, 2.0, count - 1).positions
+    """Waypoints on the line of `softrobots.papers.arm_path`, shape (count, 3) [m]."""
+    return straight_line(START, END, DURATION, count - 1).positions
 
 
 @lru_cache(maxsize=1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.benchmark.arm_contenders import CHECKED, batch_name, one_by_one, single_name, together
-from softrobots.benchmark.cases import PATH_FORCE, LoadCases, arm, path_targets, standard_cases
+from softrobots.benchmark.cases import LoadCases, arm, path_targets, standard_cases
 from softrobots.benchmark.compiled_solvers import BACKENDS, compiled
 from softrobots.benchmark.measurement import Contender, require_agreement
 from softrobots.benchmark.pink_kinematics import PinkArm
@@ -20,6 +20,7 @@ from softrobots.equilibrium import solve_equilibrium
 from softrobots.inverse_kinematics import solve_ik
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.load_estimation import estimate_load
+from softrobots.papers.arm_path import FORCE
 
 ESTIMATE = "Python + Pinocchio, Newton 7x7"
 PINK, PINK_LIMITS = "Pink, rigid arm, without limits", "Pink, rigid arm"
@@ -64,7 +65,7 @@ def load_estimation(settings: Settings) -> tuple[list[Row], list[str]]:
 def trajectory(settings: Settings) -> tuple[list[Row], list[str]]:
     """Motor angles along a path: ours with the loaded, elastic arm, Pink with the rigid one."""
     race = Race(settings, "trajectory")
-    targets, force = path_targets(settings.waypoints), np.array(PATH_FORCE)
+    targets, force = path_targets(settings.waypoints), np.array(FORCE)
     loaded, rigid = (solve_ik(arm(), targets[0], some, elbow="up").q_motors for some in (force, None))
 
     def ours(backend: str) -> Contender:

@@ -48,6 +48,28 @@ class GraspTest(NamedTuple):
     diameter: float
     """Diameter of the tube [m]."""
 
+    def force(self, pressure: Any, deflection: Any = None) -> GraspForce:
+        """`grasp_force` of this test.
+
+        Args:
+            pressure: Gauge pressure [Pa].
+            deflection: Radius of the object less the natural inner radius [m]; by default `deflections`.
+
+        Returns:
+            The force and its bounds.
+
+        Raises:
+            ParameterError: If a number is out of range.
+        """
+        return grasp_force(
+            pressure,
+            object_radius=self.object_radius,
+            deflection=self.deflections if deflection is None else deflection,
+            turn_height=self.turn_height,
+            turns=self.turns,
+            diameter=self.diameter,
+        )
+
 
 PAPER_CYLINDER = GraspTest(object_radius=0.020, turn_height=0.080, turns=1.5, deflections=(0.0, 0.002, 0.004), diameter=0.0331)
 """[Blumenschein 2018] section III-C: a cylinder 4.0 cm thick. The text lets the helix radius go up to that number, where half

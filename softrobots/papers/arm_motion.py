@@ -11,10 +11,10 @@ from softrobots.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.load_estimation import estimate_load
 from softrobots.papers import dh_tables
-from softrobots.papers.arm_path import FORCE, GAIN, arm, movement
+from softrobots.papers.arm_path import DURATION, END, FORCE, GAIN, START, arm, movement
 from softrobots.papers.dh_tables import MOTORS, SPRINGS, TABLE_1, TABLE_2
 from softrobots.papers.inflatable_arm import HINGE, LENGTH, MEAN_STIFFNESS
-from softrobots.papers.rows import UNPUBLISHED, Row, absent, equation, own, rounded
+from softrobots.papers.rows import UNPUBLISHED, Row, absent, equation, own, rounded, taken
 
 _LENGTHS = {
     "L": 1e-3 * float(LENGTH),
@@ -32,8 +32,8 @@ def kinematics() -> list[Row]:
     """Tables 1 and 2, the degrees of freedom, and the Jacobian (4)."""
     model, random = arm(), np.random.default_rng(2021)
     rows = [
-        rounded("section 2.2", "degrees of freedom", "7", float(model.n_motors + model.n_springs)),
-        rounded("section 2.2", "of which motors", "3", float(model.n_motors)),
+        taken(rounded("section 2.2", "degrees of freedom", "7", float(model.n_motors + model.n_springs))),
+        taken(rounded("section 2.2", "of which motors", "3", float(model.n_motors))),
     ]
     postures = random.uniform(-np.pi / 2, np.pi / 2, (_POSTURES, 7))
     rigid = np.where(np.isin(np.arange(7), MOTORS), postures, 0.0)
@@ -109,15 +109,12 @@ def figures_10_and_11() -> list[Row]:
     ours = movement()
     told = "x_start, x_d, duration and gain are not published: Figures 10 and 11 cannot be repeated, only their kind"
     rows = [absent(UNPUBLISHED, "Figures 10, 11", "path of the tip and angles of the motors", note=told)]
-    path = "our path (0.4, -0.5, 0.6) to (1.0, 0.2, 0.2) m, 2 s, load (0, 10, -15) N"
+    path = f"our path {START} to {END} m, {DURATION:g} s, load (0, 10, -15) N"
     told = 'solved by Newton at every waypoint; the paper: "effectively follows"'
     reached = float(ours.loaded.tip_error.max())
     rows.append(equation("Figure 10", "distance of the loaded tip from the planned path", reached, "m", told, 2e-9))
-    sagging = [solve_equilibrium(arm(), q, FORCE) for q in ours.rigid.q_motors]
-    sag = max(
-        float(np.linalg.norm(found.tip_position - target)) for found, target in zip(sagging, ours.rigid.targets, strict=True)
-    )
-    rows.append(own("Figure 10", "largest sag without compensation", 1e3 * sag, "mm", path))
+    sag = 1e3 * float(ours.sagging.tip_error.max())
+    rows.append(own("Figure 10", "largest sag without compensation", sag, "mm", path))
     turned = np.abs(ours.loaded.q_motors - ours.rigid.q_motors).max(axis=0)
     for number, angle in zip((1, 2, 5), turned, strict=True):
         rows.append(own("Figure 11", f"largest correction of joint {number}", float(angle), "rad", path))

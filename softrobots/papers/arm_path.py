@@ -1,7 +1,7 @@
 """The movement that stands for Figures 10 and 11 of [Troise 2021]: a straight line of our own under the paper's load.
 
-The paper publishes neither start nor end. Ours are those of `scripts/ik_trajectory.py`; the largest moment at link 1 is near
-the paper's, which says nothing of the paper's path.
+The paper publishes neither start nor end. Ours are the default of `scripts/ik_trajectory.py` and the path of the benchmark,
+too; the largest moment at link 1 is near the paper's, which says nothing of the paper's path.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
+from softrobots.equilibrium import solve_equilibrium
 from softrobots.loader import load_model
 from softrobots.model import SoftModel
 from softrobots.robots import InflatableArm
@@ -29,12 +30,14 @@ GAIN = 50.0
 
 
 class Movement(NamedTuple):
-    """The same targets, followed in three ways."""
+    """The same targets, followed in several ways."""
 
     loaded: Trajectory
     """With the sag compensated at every waypoint, to rounding."""
     rigid: Trajectory
     """Rigid inverse kinematics: the arm without load."""
+    sagging: Trajectory
+    """The arm with the angles of `rigid` under the load: what sag does without compensation."""
     closed_loop: Trajectory
     """The recursion of [Troise 2021] Figure 6."""
 
@@ -53,4 +56,7 @@ def movement() -> Movement:
     def follow(force: tuple[float, float, float] | None, method: str) -> Trajectory:
         return follow_trajectory(arm(), path.positions, force, times=path.times, elbow="up", method=method, gain=GAIN)
 
-    return Movement(follow(FORCE, "newton"), follow(None, "newton"), follow(FORCE, "paper"))
+    rigid = follow(None, "newton")
+    settled = tuple(solve_equilibrium(arm(), q, FORCE) for q in rigid.q_motors)
+    sagging = Trajectory(path.times, path.positions, settled, "rigid")
+    return Movement(follow(FORCE, "newton"), rigid, sagging, follow(FORCE, "paper"))

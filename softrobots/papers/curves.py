@@ -68,13 +68,6 @@ def _radius_and_pitch() -> str:
 def _grasp() -> str:
     """[Blumenschein 2018] Figure 9, our model: force over pressure, one column a deflection."""
     test, pressure = helix.PAPER_CYLINDER, np.linspace(0.0, 10e3, 11)
-    found = helix.grasp_force(
-        pressure[:, None],
-        object_radius=test.object_radius,
-        deflection=test.deflections,
-        turn_height=test.turn_height,
-        turns=test.turns,
-        diameter=test.diameter,
-    )
+    found = test.force(pressure[:, None])
     names = ["pressure [Pa]", *(f"force at {1e3 * depth:g} mm [N]" for depth in test.deflections)]
     return csv_text(names, np.column_stack([pressure, found.force]).tolist())

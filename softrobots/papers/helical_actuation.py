@@ -18,7 +18,7 @@ from softrobots.helix import PAPER_CYLINDER
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from softrobots.papers import helix_equations as printed
 from softrobots.papers.helix_equations import Shape
-from softrobots.papers.rows import MEASURED, UNPUBLISHED, Row, absent, equation, erratum, own, rounded
+from softrobots.papers.rows import MEASURED, UNPUBLISHED, Row, absent, equation, erratum, own, rounded, taken
 
 TITLE = "Helical actuation [Blumenschein 2018]"
 """What the paper is called in tables."""
@@ -149,7 +149,8 @@ def measuring() -> list[Row]:
     )
     stopper, gap = np.random.default_rng(2).uniform(0.001, 0.02, (2, 100))
     apart = _most(helix.contraction_from_stoppers(stopper, gap) - stopper / (stopper + gap))
-    rows.append(equation("section III-A.2", "contraction from stoppers and gaps", apart, "", "stopper / (stopper + gap)"))
+    told = "stopper / (stopper + gap)"
+    rows.append(taken(equation("section III-A.2", "contraction from stoppers and gaps", apart, "", told)))
     return rows
 
 
@@ -163,7 +164,14 @@ def figures_5_to_7() -> list[Row]:
     for name in ("outer_radius", "inner_radius", "pitch"):
         ratio = getattr(large, name) / getattr(small, name)
         rows.append(
-            rounded("Figure 6", f"growth of {name.replace('_', ' ')}", SCALE, ratio, "", "D larger by 2.5, 5 degrees, 0.66")
+            rounded(
+                "Figure 6",
+                f"growth of {name.replace('_', ' ')}",
+                SCALE,
+                ratio,
+                "",
+                "D larger by 2.5, to which (12) is proportional; 5 degrees, 0.66",
+            )
         )
     for name, text in ERRORS.items():
         told = "mean difference of the test helices from (12): the measured arcs are not published"
@@ -195,25 +203,20 @@ def grasping() -> list[Row]:
         rounded(
             "section III-C", "height of the grasped cylinder", OBJECT_HEIGHT, 100.0 * test.turns * test.turn_height, "cm", told
         ),
-        rounded("section III-C", "diameter of the cylinder", OBJECT_DIAMETER, 200.0 * test.object_radius, "cm"),
+        taken(rounded("section III-C", "diameter of the cylinder", OBJECT_DIAMETER, 200.0 * test.object_radius, "cm")),
     ]
     told = "printed for radii of helices that grip a cylinder of 4.0 cm diameter: half of it must be meant"
     rows.append(erratum("section III-C", "largest inner radius", float(LARGEST_RADIUS), 100.0 * test.object_radius, "cm", told))
     pressures = np.linspace(0.0, 10e3, 6)[:, None]
-    found = helix.grasp_force(
-        pressures,
-        object_radius=test.object_radius,
-        deflection=test.deflections,
-        turn_height=test.turn_height,
-        turns=test.turns,
-        diameter=test.diameter,
-    )
+    found = test.force(pressures)
     apart = float(found.unwrapping[-1, 0]) - 10e3 * _volume_lost()
     told = "our V(L) by differences, 10 kPa; the paper gives no volume"
     rows.append(equation("(18)", "F = P dV/dL for bound (a) of our model", abs(apart), "N", told, 1e-6))
     apart = _most(found.force * pressures[-1] - found.force[-1] * pressures)
-    rows.append(equation("Figure 9", "force linear in the pressure, our model", apart / 10e3, "N", "0 to 10 kPa"))
-    rows.append(equation("Figure 9", "no force where the radius is not deflected, our model", _most(found.force[:, 0]), "N"))
+    rows.append(taken(equation("Figure 9", "force linear in the pressure, our model", apart / 10e3, "N", "0 to 10 kPa")))
+    told = "bound (b) of our model"
+    apart = _most(found.force[:, 0])
+    rows.append(taken(equation("Figure 9", "no force where the radius is not deflected, our model", apart, "N", told)))
     told = "our model, not the paper's; 10 kPa, D = 3.31 cm assumed. The paper's forces are not printed, and rise up to 4 mm"
     for depth, force in zip(test.deflections, found.force[-1], strict=True):
         rows.append(own("Figure 9", f"force, deflected by {1e3 * depth:g} mm", float(force), "N", told))

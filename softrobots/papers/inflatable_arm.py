@@ -17,7 +17,7 @@ from softrobots import inflated_beam
 from softrobots.equilibrium import solve_equilibrium
 from softrobots.inflated_beam import TABLE_3, BendingTest
 from softrobots.papers.arm_path import FORCE, arm
-from softrobots.papers.rows import MEASURED, Row, absent, equation, erratum, own, rounded, within
+from softrobots.papers.rows import MEASURED, Row, absent, equation, erratum, own, rounded, taken, within
 from softrobots.robots import InflatableArm
 
 TITLE = "Inflatable arm [Troise 2021]"
@@ -54,10 +54,10 @@ def sizes() -> list[Row]:
         "first wrinkle l1": (HINGE, robot.hinge_offset),
     }
     rows = [
-        rounded("section 3" if name[0] != "f" else "section 4", name, printed, 1e3 * float(np.ravel(value)[0]), "mm")
+        taken(rounded("section 3" if name[0] != "f" else "section 4", name, printed, 1e3 * float(np.ravel(value)[0]), "mm"))
         for name, (printed, value) in made.items()
     ]
-    rows.append(rounded("section 4", "distance h of the probe", PROBE, 1e3 * test.probe_distance, "mm"))
+    rows.append(taken(rounded("section 4", "distance h of the probe", PROBE, 1e3 * test.probe_distance, "mm")))
     litres = 1e3 * robot.tank_volume(TANK_PRESSURE)
     rows.append(
         own(
@@ -117,7 +117,7 @@ def table_3() -> list[Row]:
     told = "of the six printed k; those are measured"
     rows.append(rounded("section 4", "mean stiffness", MEAN_STIFFNESS, float(np.mean(stiffness)), "N m/rad", told))
     for name, text, value in zip(("smallest", "largest"), STIFFNESS_RANGE, (min(stiffness), max(stiffness)), strict=True):
-        rows.append(rounded("section 4", f"{name} stiffness", text, value, "N m/rad", told))
+        rows.append(taken(rounded("section 4", f"{name} stiffness", text, value, "N m/rad", told)))
     moments = {row.pressure: row.max_moment for row in TABLE_3 if row.max_moment is not None}
     share = min(moment / inflated_beam.wrinkling_moment(pressure, radius) for pressure, moment in moments.items())
     told = "above 1 in all five rows: the largest moment lies beyond the first wrinkle"
@@ -143,7 +143,7 @@ def springs() -> list[Row]:
     """Equations (2) and (7), and the pressure that the largest moment demands."""
     found = solve_equilibrium(arm(), (0.3, 0.6, -0.8), FORCE)
     apart = float(np.abs(found.spring_torques - float(MEAN_STIFFNESS) * found.q_springs).max())
-    rows = [equation("(2), (7)", "torques of the springs, tau_k = k q_k", apart, "N m", "posture (0.3, 0.6, -0.8) rad")]
+    rows = [taken(equation("(2), (7)", "torques of the springs, tau_k = k q_k", apart, "N m", "posture (0.3, 0.6, -0.8) rad"))]
     moment, radius = float(LARGEST_MOMENT), _TUBE["radius"]
     tabulated = inflated_beam.required_tabulated_pressure(moment, radius)
     if tabulated is not None:

@@ -13,7 +13,7 @@ from softrobots.checks import FloatArray
 from softrobots.constant_curvature import Arc, poses
 from softrobots.papers import pcc_equations as printed
 from softrobots.papers.pcc_equations import Segment
-from softrobots.papers.rows import UNPUBLISHED, UNREADABLE, Row, absent, equation, erratum, own, rounded
+from softrobots.papers.rows import UNPUBLISHED, UNREADABLE, Row, absent, equation, erratum, own, rounded, taken
 from softrobots.robots import PccArm
 
 TITLE = "Two-segment arm [PCC paper]"
@@ -40,11 +40,11 @@ def sizes() -> list[Row]:
     robot = PccArm()
     angles = np.degrees(np.sort(np.asarray(robot.muscle_azimuths)))
     return [
-        rounded("section 3", "length of a muscle", MUSCLE_LENGTH, 100.0 * robot.segment_lengths[0], "cm"),
-        rounded("section 3", "segments", SEGMENTS, float(len(robot.segment_lengths))),
-        rounded("section 3", "muscles of a segment", MUSCLES, float(len(angles))),
-        rounded("section 3", "angle between muscles", MUSCLE_ANGLE, float(np.diff(angles).max()), "degrees"),
-        rounded("section 3", "turn between the segments", OFFSET, float(np.degrees(poses.OFFSET)), "degrees"),
+        taken(rounded("section 3", "length of a muscle", MUSCLE_LENGTH, 100.0 * robot.segment_lengths[0], "cm")),
+        taken(rounded("section 3", "segments", SEGMENTS, float(len(robot.segment_lengths)))),
+        taken(rounded("section 3", "muscles of a segment", MUSCLES, float(len(angles)))),
+        taken(rounded("section 3", "angle between muscles", MUSCLE_ANGLE, float(np.diff(angles).max()), "degrees")),
+        taken(rounded("section 3", "turn between the segments", OFFSET, float(np.degrees(poses.OFFSET)), "degrees")),
         absent(UNPUBLISHED, "(20)", "distance d of the muscles from the backbone", note="0.04 m is assumed here"),
         absent(UNPUBLISHED, "section 5", "positions of the arm, measured or simulated", note="announced for another paper"),
     ]

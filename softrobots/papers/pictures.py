@@ -12,12 +12,11 @@ import numpy as np
 
 from softrobots import constant_curvature as cc
 from softrobots import helix, helix_plots, link_plots, plots
-from softrobots.equilibrium import solve_equilibrium
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from softrobots.helix_sheet import draw, sheet
 from softrobots.inflated_beam import TABLE_3
 from softrobots.papers import pcc_equations, pcc_two_segments
-from softrobots.papers.arm_path import FORCE, arm, movement
+from softrobots.papers.arm_path import GAIN, movement
 from softrobots.papers.inflatable_arm import RADIUS
 from softrobots.plots import COLOURS, equal_box, new_figure
 
@@ -41,10 +40,9 @@ def moment_angle_law() -> Any:
 def tracking() -> Any:
     """Distance of the loaded tip from its targets, for the paper's recursion, the exact solution and no compensation."""
     ours = movement()
-    sagging = [solve_equilibrium(arm(), q, FORCE).tip_position for q in ours.rigid.q_motors]
     errors = {
-        "rigid inverse kinematics, arm sags": np.linalg.norm(np.array(sagging) - ours.rigid.targets, axis=1),
-        "recursion of Figure 6, gain 50 1/s": ours.closed_loop.tip_error,
+        "rigid inverse kinematics, arm sags": ours.sagging.tip_error,
+        f"recursion of Figure 6, gain {GAIN:g} 1/s": ours.closed_loop.tip_error,
         "Newton at every waypoint": ours.loaded.tip_error,
     }
     return plots.tip_errors(errors, ours.loaded.times)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from softrobots.files import csv_text
 from softrobots.papers.reproduction import PAPERS
-from softrobots.papers.rows import AGREES, KINDS, Row
+from softrobots.papers.rows import ERRATUM, KINDS, Row
 
 Rows = Mapping[str, Sequence[Row]]
 """Rows by the name of their paper, as `reproduce` gives them."""
@@ -114,7 +114,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     unit = f" {row.unit}" if row.unit else ""
     printed = row.printed + (unit if row.printed and row.printed != "equation" and row.printed[0] in "-0123456789>" else "")
     ours = "" if row.ours is None else _number(row.ours, _decimals(row)) + unit
-    if row.printed == "equation" and row.kind == AGREES:
+    if row.printed == "equation" and row.kind != ERRATUM:
         ours = "the same" if row.holds else "not the same"
     return row.place, row.quantity, printed, ours, _difference(row), row.verdict
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from softrobots.checks import choice, finite_number
 from softrobots.errors import ParameterError
 
-AGREES, ERRATUM, OURS = "agrees", "erratum", "ours alone"
+AGREES, TAKEN, ERRATUM, OURS = "agrees", "by construction", "erratum", "ours alone"
 MEASURED, UNPUBLISHED, UNREADABLE = "measured", "not published", "unreadable"
 KINDS = {
     AGREES: "must agree: within the rounding of the printed digits, or within the tolerance that the row states",
+    TAKEN: "the same because ours is made of it: taken from the paper, or a definition; tells only that it still is so",
     ERRATUM: "the print is wrong: ours must differ from it",
     OURS: "the paper gives no number; this one is of this package",
     MEASURED: "measured in the laboratory, and the raw data are not published: cannot be computed",
@@ -62,21 +63,21 @@ class Row:
     @property
     def claims(self) -> bool:
         """Whether the row can be wrong."""
-        return self.kind in (AGREES, ERRATUM)
+        return self.kind in (AGREES, TAKEN, ERRATUM)
 
     @property
     def holds(self) -> bool:
         """Whether what the row claims is so; True where it claims nothing."""
         if not self.claims or self.difference is None or self.tolerance is None:
             return True
-        return (abs(self.difference) <= self.tolerance) == (self.kind == AGREES)
+        return (abs(self.difference) <= self.tolerance) == (self.kind != ERRATUM)
 
     @property
     def verdict(self) -> str:
         """The kind, or in capitals that its claim does not hold."""
         if self.holds:
             return self.kind
-        return "DISAGREES" if self.kind == AGREES else "NO ERRATUM"
+        return "NO ERRATUM" if self.kind == ERRATUM else "DISAGREES"
 
 
 def rounded(place: str, quantity: str, printed: str, ours: float, unit: str = "", note: str = "") -> Row:
@@ -107,6 +108,19 @@ def rounded(place: str, quantity: str, printed: str, ours: float, unit: str = ""
         decimals=decimals + 2,
         note=note,
     )
+
+
+def taken(row: Row) -> Row:
+    """The same row, said to agree by construction: ours is made of what the paper prints, or defined so.
+
+    Args:
+        row: A row that must agree.
+
+    Raises:
+        ParameterError: If it is of another kind.
+    """
+    choice("kind", row.kind, (AGREES,))
+    return replace(row, kind=TAKEN)
 
 
 def within(place: str, quantity: str, printed: str, ours: float, tolerance: float, unit: str = "", note: str = "") -> Row:
