@@ -83,7 +83,8 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
     """
     with _photographed(html, png, width, height) as (page, target):
         show_share(page, share)
-        page.screenshot(path=str(target))
+        shot = page.screenshot()
+    write_atomically(target, lambda file: file.write(shot))
     return target
 
 

@@ -3,28 +3,56 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import difflib
+import io
 import os
 import re
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from softrobots import __version__
 from softrobots.command_line import exit_status
 from softrobots.commands import COMMANDS
+from softrobots.commands.option_names import told_by_option
+from softrobots.errors import ParameterError
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
-    """Help whose description is filled, and whose examples stay as they are."""
+    """Help whose paragraphs are filled, and whose examples keep their lines unless one is too long."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        if text.startswith("examples:"):
-            return super()._fill_text(text, width, indent)
         return "\n\n".join(
-            textwrap.fill(part, width, initial_indent=indent, subsequent_indent=indent) for part in text.split("\n\n")
+            _examples(part, width)
+            if part.startswith("examples:")
+            else textwrap.fill(part, width, initial_indent=indent, subsequent_indent=indent)
+            for part in text.strip().split("\n\n")
         )
+
+
+def _examples(text: str, width: int) -> str:
+    """Examples that fit: comments stand above where they do not fit beside, and long commands go on as a shell reads them."""
+    head, *lines = text.split("\n")
+    if all(len(line) <= width for line in lines):
+        return text
+    told = [head]
+    for line in lines:
+        command, *comment = re.split(r" {3,}", line.strip())
+        told += [f"  # {words}" for words in comment]
+        parts = [f"  {command}"]
+        if len(parts[0]) > width:
+            parts = [""]
+            for words in re.split(r" (?=--?[a-z]|>)", command):  # an option with its values
+                longer = f"{parts[-1]} {words}" if parts[-1] else f"  {words}"
+                if len(longer) + 2 <= width:
+                    parts[-1] = longer
+                else:
+                    parts.append(f"      {words}")
+        told.append(" \\\n".join(parts))
+    return "\n".join(told)
 
 
 class Parser(argparse.ArgumentParser):
@@ -74,16 +102,38 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: Words of the command line; by default those of the process.
 
     Returns:
-        The exit status, as `command_line.exit_status` tells; 141 if nobody reads the output any more.
+        The exit status, as `command_line.exit_status` tells; 2 if the output cannot be written, 141 if nobody
+        reads it any more.
     """
+    for stream in ("stdout", "stderr"):
+        if getattr(sys, stream) is None:  # closed, as by >&-: nobody wants to read
+            setattr(sys, stream, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     arguments = parser().parse_args(argv)
     try:
-        status = exit_status(lambda: arguments.run(arguments))
+        status = exit_status(lambda: _run(arguments))
         sys.stdout.flush()
     except BrokenPipeError:  # whoever read the output has seen enough, e.g. head
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_output()
         return 141
+    except OSError as error:  # e.g. a full disk behind >; files that we write ourselves end in errors of ours
+        sys.stderr.write(f"error: {'' if error.filename else 'cannot write the answer: '}{error}\n")
+        _give_up_output()
+        return 2
     return status
+
+
+def _run(arguments: argparse.Namespace) -> object:
+    """Run a subcommand; what is wrong with an option is told by its name."""
+    try:
+        return arguments.run(arguments)
+    except ParameterError as error:
+        raise told_by_option(error, arguments) from error
+
+
+def _give_up_output() -> None:
+    """Let go what is not written yet, or Python would complain of it at its end."""
+    with contextlib.suppress(io.UnsupportedOperation):  # not a file at all
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _nearest(word: str, names: Iterable[str]) -> str:

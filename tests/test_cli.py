@@ -7,6 +7,7 @@ import dataclasses
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -136,6 +137,61 @@ def test_output_may_be_cut_off_by_whoever_reads_it() -> None:
     assert (cut.returncode, cut.stderr) == (141, "")  # as after SIGPIPE
 
 
+@pytest.mark.parametrize("words", [["urdf", "inflatable_arm"], ["urdf", "--list", "--json"]], ids=" ".join)
+def test_a_full_disk_behind_the_output_is_an_error_without_a_traceback(words: list[str]) -> None:
+    if not Path("/dev/full").exists():
+        missing("/dev/full is needed")
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        done = subprocess.run([*COMMAND_LINES["module"], *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "error: cannot write the answer: [Errno 28] No space left on device\n")
+
+
+def test_closed_streams_are_no_reason_to_fail() -> None:
+    command = " ".join(map(shlex.quote, COMMAND_LINES["module"]))
+    script = f"{command} urdf --list >&-; echo $?; {command} urdf nobody 2>&-; echo $?"
+    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("0\n2\n", "")
+
+
+@pytest.mark.parametrize("command", [command.__name__.rpartition(".")[2] for command in COMMANDS])
+def test_help_fits_80_columns_and_its_examples_stay_the_same_commands(
+    command: str, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = {}
+    for columns in ("80", "300"):
+        monkeypatch.setenv("COLUMNS", columns)
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        text = capsys.readouterr().out
+        if columns == "80":
+            assert max(map(len, text.splitlines())) <= 80
+        examples = text.partition("\nexamples:\n")[2].partition("\n\n")[0]
+        lines = [re.split(r" {3,}", line.strip())[0] for line in re.sub(r"\\\n +", "", examples).splitlines()]
+        told[columns] = [shlex.split(" ".join(line.split())) for line in lines if not line.startswith("#")]
+    assert command == "doctor" or told["80"]
+    assert told["80"] == told["300"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["solve", "inflatable_arm", "--critical-load", "0", "0", "0"], "--critical-load must be different from zero"),
+        (["solve", "inflatable_arm", "--moment", "nan", "0", "0"], "--moment must be an array"),
+        (["solve", "inflatable_arm", "--wrench", "tip", *"00000", "inf"], "--wrench must be an array"),
+        (["solve", "inflatable_arm", "--max-iterations", "0"], "--max-iterations must be a positive integer"),
+        (["solve", "inflatable_arm", "--spring", "spring_1_up=nan"], "--spring must be a finite number"),
+        (["solve", "inflatable_arm", "--set", "stiffness=-1"], "stiffness must be above 0"),  # a parameter, no option
+        (["ik", "inflatable_arm", "--target", "nan", "0", "0"], "--target must be an array"),
+        (["load", "inflatable_arm", "--torques", "nan", "0", "0"], "--torques must be an array"),
+        (["load", "helix_tube", "--torques", "1"], "ROBOT = 'helix_tube': ROBOT must be a robot with at least one motor"),
+    ],
+)
+def test_errors_name_the_option_that_was_typed(words: list[str], message: str, told) -> None:
+    status, out, err = told(*words)
+    assert (status, out) == (2, "")
+    assert message in err
+
+
 def test_the_command_imports_no_tool_before_it_needs_it() -> None:
     code = "import softrobots.cli, sys; softrobots.cli.parser(); print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
@@ -256,7 +312,7 @@ def test_urdf_answers_machines(told, tmp_path: Path) -> None:
     status, out, _ = told("urdf", "inflatable_arm", "--check", "-o", str(made), "--json")
     assert status == 0
     answer = json.loads(out)
-    assert (answer["ok"], answer["written"]) == (True, str(made))
+    assert (answer["ok"], answer["files"]) == (True, [str(made)])
     assert [row["what"] for row in answer["findings"]][1 : 1 + len(RULES)] == list(RULES)
     broken = tmp_path / "broken.urdf"
     broken.write_text(made.read_text(encoding="utf-8").replace('mass value="', 'mass value="-'), encoding="utf-8")
@@ -381,7 +437,7 @@ def test_export_answers_machines(told, tmp_path: Path) -> None:
     status, out, _ = told("export", *words, "-o", str(made), "--json")
     assert status == 0
     counts = {"sections": 0, "springs": 16, "actuators": 6, "welded": True}  # two segments of two hinges, four springs each
-    assert json.loads(out) == {"written": str(made), "robot": "pcc_arm", "format": "mjcf", **counts}
+    assert json.loads(out) == {"files": [str(made)], "robot": "pcc_arm", "format": "mjcf", **counts}
 
 
 @pytest.mark.parametrize(

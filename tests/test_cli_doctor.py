@@ -56,7 +56,7 @@ def test_doctor_asks_every_tool_if_told_and_answers_machines(told) -> None:
     assert (answer["ok"], answer["wrong"], answer["softrobots"]) == (True, [], sr.__version__)
     assert {row["name"] for row in answer["packages"]} == {package.name for package in PACKAGES}
     assert list(answer["extras"]) == list(EXTRAS)
-    assert answer["files"] == [{"file": str(ARM), "up_to_date": True}]
+    assert answer["urdf_files"] == [{"file": str(ARM), "up_to_date": True}]
 
 
 def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

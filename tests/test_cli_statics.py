@@ -174,7 +174,8 @@ def test_solve_tells_compliance_and_critical_load(answer, told: Told, arm: sr.So
     status, out, _ = told("solve", "inflatable_arm", "--critical-load", "-1", "0", "0", "--compliance")
     assert status == 0
     assert re.search(r"^critical load +114.066 N along -1  0  0$", out, re.M)
-    assert re.search(r"^x +0.0000e\+00 ", out, re.M)  # a straight arm is stiff along itself
+    assert re.search(r"^x +0\.000e\+00 ", out, re.M)  # a straight arm is stiff along itself
+    assert max(map(len, out.splitlines())) <= 80
     status, out, _ = told("solve", "inflatable_arm", "--critical-load", "1", "0", "0")
     assert re.search(r"^critical load  none: the equilibrium stays stable up to ", out, re.M)
     frame = answer("solve", "inflatable_arm", "--critical-load", "-1", "0", "0", "--frame", "link_2")
@@ -490,9 +491,9 @@ REFUSED = [
     (("solve", "inflatable_arm", "--method", "descent"), "invalid choice: 'descent'"),
     (("solve", "inflatable_arm", "--start", "1"), "--start must be an array of shape (4,)"),
     (("solve", "inflatable_arm", "--tolerance", "0"), "tolerance must be positive"),
-    (("solve", "inflatable_arm", "--max-iterations", "0"), "max_iterations must be a positive integer"),
+    (("solve", "inflatable_arm", "--max-iterations", "0"), "--max-iterations must be a positive integer"),
     (("solve", "inflatable_arm", "--max-iterations", "1.5"), "invalid int value: '1.5'"),
-    (("solve", "inflatable_arm", "--critical-load", "0", "0", "0"), "direction must be different from zero"),
+    (("solve", "inflatable_arm", "--critical-load", "0", "0", "0"), "--critical-load must be different from zero"),
     (("solve", "inflatable_arm", "--tip", "nobody"), "no frame is called 'nobody'"),
     (("solve", "inflatable_arm", "--spring", "elbow=3"), "no movable joint is called 'elbow'"),
     (("solve", "pcc_arm_lumped", "--set", "hinges=60"), "the chain has at most 300 joints, not 480"),
@@ -506,10 +507,10 @@ REFUSED = [
     ),
     (
         ("load", "inflatable_arm", "--torques", "1", "2", "nan"),
-        "motor_torques must be an array of shape (3,) of finite numbers",
+        "--torques must be an array of shape (3,) of finite numbers",
     ),
     (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "1", "2"), "--torque-std must be 3 numbers"),
-    (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "-1"), "torque_std"),
+    (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "-1"), "--torque-std must be positive"),
     (("load", "inflatable_arm", "--torques", *"123", "--frame", "nobody"), "no frame is called 'nobody'"),
     (("load", "inflatable_arm", "--torques", *"123", "-o", "x.csv"), "-o must be a file name that ends in .npz"),
     (("load", "helix_tube", "--torques", "1"), "a robot with at least one motor"),

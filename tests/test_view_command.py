@@ -280,7 +280,7 @@ def test_a_saved_result_becomes_a_page(arm: sr.SoftModel, tmp_path: Path, capsys
     assert page.read_bytes() == first
     assert main(["view", "--result", str(tmp_path / "solution.npz"), "--html", str(page), "--overwrite", "--json"]) == 0
     out, err = capsys.readouterr()
-    assert json.loads(out) == {"html": str(page), "picture": None}
+    assert json.loads(out) == {"files": [str(page)]}
     assert "exists" in err
     assert page.read_bytes() != first
 
@@ -359,6 +359,7 @@ BAD = {
     "view inflatable_arm --overwrite": "together with --html or --picture",
     "view inflatable_arm --html a.html --at 1": "together with --picture",
     "view inflatable_arm --picture a.png --at 1.5": "from 0 to 1",
+    "view inflatable_arm --picture a.jpg": "--picture must be a file name that ends in .png",
     "view inflatable_arm --port 0": "from 1 to 65535",
     "view inflatable_arm --target nan 0 0": "finite",
     "view inflatable_arm --live .": "a file, or the word keyboard",

@@ -192,6 +192,16 @@ def test_take_picture_writes_a_png(browser: object, arm: sr.SoftModel, tmp_path:
     assert pixels(shot.read_bytes()).shape == (300, 400, 3)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="no file can be made in /proc, not even by root")
+def test_a_picture_that_cannot_be_written_is_an_error_of_ours(browser: object, arm: sr.SoftModel, tmp_path: Path) -> None:
+    with Viewer(arm) as viewer:
+        page = viewer.write_html(tmp_path / "a.html")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("softrobots.browser.open_browser", lambda: _keep(browser))
+        with pytest.raises(sr.OutputError, match=r"cannot write /proc/a\.png"):
+            take_picture(page, "/proc/a.png")
+
+
 class _keep:
     """A context manager that leaves the browser open."""
 

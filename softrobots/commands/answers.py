@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, tuple | list):
         return [plain(item) for item in value]
     return value
+
+
+def written_lines(files: Sequence[Path]) -> list[str]:
+    """What is said at the end of the files that were written; nothing without files."""
+    return ["", *(f"{file}: written" for file in files)] if files else []
 
 
 def aligned(rows: Iterable[tuple[str, ...]], *, indent: str = "", right: Collection[int] = ()) -> list[str]:

@@ -43,7 +43,6 @@ def add_parser(subparsers: Any) -> None:
         description="How fast the solvers are on this machine: equilibria of the inflatable arm, one by one and in batches, "
         "against the same in plain Python with Pinocchio and in plain NumPy.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     told = "run these jobs, against everything that is installed (a short one of equilibria; with --full: all)"
     parser.add_argument("--only", nargs="+", choices=list(JOBS), metavar="JOB", help=told)

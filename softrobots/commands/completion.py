@@ -41,7 +41,6 @@ def add_parser(subparsers: Any) -> None:
         help="print the script that lets a shell complete this command",
         description="Print the script with which a shell completes commands, options, robots, choices and files.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=f"{', '.join(SHELLS[:-1])} or {SHELLS[-1]}")
     parser.set_defaults(run=run)

@@ -149,7 +149,7 @@ def _files(folder: Path, report: _Report) -> None:
     """The shipped URDF files against xacro."""
     from tqdm import tqdm
 
-    rows = report.answer["files"] = []
+    rows = report.answer["urdf_files"] = []
     for file in tqdm(generated_files(folder), total=len(ROBOTS), desc="xacro", unit="file", leave=False):
         rows.append({"file": file.path, "up_to_date": file.up_to_date})
         if not file.up_to_date:

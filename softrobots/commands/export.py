@@ -31,10 +31,9 @@ def add_parser(subparsers: Any) -> None:
         help="write a robot for a simulator, with its springs",
         description="Write a robot for another tool, with springs, damping and actuators: no tool reads springs from URDF.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_model(parser)
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="the file to write")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="the file to write (required)")
     told = "; ".join(f"{name} ({row.suffix}): {row.meaning}" for name, row in FORMATS.items())
     parser.add_argument("--format", choices=FORMATS, help=f"{told}. By default what the suffix of FILE says")
     parser.add_argument(
@@ -71,7 +70,7 @@ def run(arguments: argparse.Namespace) -> None:
     structure = model.structure
     counts = {"sections": 0 if structure.sections is None else len(structure.section_table)}
     counts |= {"springs": len(structure.spring_joints), "actuators": model.n_motors}
-    answer = {"written": path, "robot": model.pinocchio.name, "format": name, **counts, "welded": arguments.welded}
+    answer = {"files": [path], "robot": model.pinocchio.name, "format": name, **counts, "welded": arguments.welded}
     sections = f"{counts['sections']} sections, " if counts["sections"] else ""
     kept = f"{sections}{counts['springs']} springs, {model.n_motors}{' welded' if arguments.welded else ''} actuators"
     tell(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softrobots import helix
-from softrobots.commands.answers import add_json, aligned, tell
+from softrobots.commands.answers import add_json, aligned, tell, written_lines
 from softrobots.commands.facts import Fact, answer_of, lines_of
 from softrobots.commands.plot_option import add_plot, check_plot, write_plot
 from softrobots.commands.tube_facts import tube_facts
@@ -30,7 +30,9 @@ All lengths in m, all angles in rad (5 degrees are 0.0873 rad). Defaults are tho
 `softrobots solve helix_tube` knows its weight and loads; scripts/helix_tube.py makes all files of a tube at once.
 """
 
-_JSON = """With --json: one object with the facts by their names in the library, and their units under "units"."""
+_JSON = """With --json: one object with the facts by their names in the library, their units under "units", and the files
+that were written under "files".
+"""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -40,7 +42,6 @@ def add_parser(subparsers: Any) -> None:
         help="helical actuation of a tube in closed form: shape, inverse, measurement, design, limit",
         description="An inflated tube that an actuator around it bends into a helix, in closed form.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     forms = parser.add_subparsers(dest="form", metavar="FORM", required=True, title="forms")
 
@@ -133,7 +134,7 @@ def _forward(arguments: argparse.Namespace) -> None:
     check_plot(arguments)
     shape = helix.forward(arguments.contraction, arguments.angle, arguments.diameter)
     actuator = helix.Actuator(*map(np.asarray, (arguments.contraction, arguments.angle, arguments.diameter)))
-    _answer(arguments, tube_facts(shape, actuator, arguments.length, arguments.pressure, arguments.handedness), {})
+    _answer(arguments, tube_facts(shape, actuator, arguments.length, arguments.pressure, arguments.handedness))
 
 
 def _inverse(arguments: argparse.Namespace) -> None:
@@ -152,7 +153,7 @@ def _measure(arguments: argparse.Namespace) -> None:
 
 def _of_shape(arguments: argparse.Namespace, shape: helix.HelixShape) -> None:
     facts = tube_facts(shape, helix.inverse(shape), arguments.length, arguments.pressure, arguments.handedness)
-    _answer(arguments, facts, {})
+    _answer(arguments, facts)
 
 
 def _design(arguments: argparse.Namespace) -> None:
@@ -174,15 +175,15 @@ def _design(arguments: argparse.Namespace) -> None:
         off = (round(part, 12) + 0.0 for part in deviation[:2])  # rounding is not worth telling
         told = {"radius_deviation": "radius, less the wish", "turn_height_deviation": "rise of a turn, less the wish"}
         facts += [Fact(name, part, "m", text) for part, (name, text) in zip(off, told.items(), strict=True)]
-    files: dict[str, Path | None] = {"output": None, "template": None}
+    files: list[Path] = []
     if arguments.output is not None:
-        files["output"] = design.save(arguments.output, overwrite=arguments.overwrite)
+        files.append(design.save(arguments.output, overwrite=arguments.overwrite))
     if pattern is not None:
         facts += [
             Fact("pinches", pattern.count, "-", f"pieces on the template ({pattern.method})"),
             Fact("spacing", pattern.spacing, "m", "from one to the next along the actuator"),
         ]
-        files["template"] = write_template(pattern, arguments.template, overwrite=arguments.overwrite)
+        files.append(write_template(pattern, arguments.template, overwrite=arguments.overwrite))
     _answer(arguments, facts, files)
 
 
@@ -223,10 +224,10 @@ def _limit(arguments: argparse.Namespace) -> None:
     written = write_plot(arguments, draw)
     rows = [("angle [rad]", "smallest contraction [-]", "by the simple rule [-]")]
     rows += [tuple(f"{number:.6f}" for number in row) for row in zip(arguments.angle, exact, simple, strict=True)]  # type: ignore[misc]
-    tell(arguments, answer_of(facts) | {"plot": written[0] if written else None}, [*aligned(rows), *_written(written)])
+    tell(arguments, answer_of(facts) | {"files": written}, [*aligned(rows), *written_lines(written)])
 
 
-def _answer(arguments: argparse.Namespace, facts: list[Fact], files: dict[str, Path | None]) -> None:
+def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Path] = ()) -> None:
     """Print the facts, and draw the tube."""
     values = {fact.name: fact.value for fact in facts}
 
@@ -236,11 +237,5 @@ def _answer(arguments: argparse.Namespace, facts: list[Fact], files: dict[str, P
         tilt, share = [float(values["angle"])], [float(values["contraction"])]
         return helix_plots.grid(share, tilt, float(values["diameter"]), values["length"], values["handedness"])
 
-    written = write_plot(arguments, draw)
-    files = files | {"plot": written[0] if written else None}
-    made = [path for path in files.values() if path is not None]
-    tell(arguments, answer_of(facts) | files, [*lines_of(facts), *_written(made)])
-
-
-def _written(paths: list[Path]) -> list[str]:
-    return ["", *(f"{path}: written" for path in paths)] if paths else []
+    written = [*files, *write_plot(arguments, draw)]
+    tell(arguments, answer_of(facts) | {"files": written}, [*lines_of(facts), *written_lines(written)])

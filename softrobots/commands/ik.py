@@ -9,7 +9,7 @@ from typing import Any
 import pinocchio as pin
 
 from softrobots.checks import finite_array
-from softrobots.commands.answers import add_json, tell
+from softrobots.commands.answers import add_json, tell, written_lines
 from softrobots.commands.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
 from softrobots.commands.load_argument import add_loads, loads_of
 from softrobots.commands.plot_option import add_plot, check_plot, write_plot
@@ -43,13 +43,11 @@ def add_parser(subparsers: Any) -> None:
         "solutions found it tells the one that changes the start least, and the others. Exit status 0 if every target is "
         "reached, 1 if not, 2 after bad input.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_model(parser)
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument(
-        "--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help="position of the loaded tip, world axes [m]"
-    )
+    told = "position of the loaded tip, world axes [m] (this or --waypoints is required)"
+    what.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
     told = "CSV file of positions of the loaded tip, columns t, x, y, z [s, m]; without t 0.05 s apart"
     what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=told)
     how = parser.add_mutually_exclusive_group()
@@ -106,7 +104,7 @@ def run(arguments: argparse.Namespace) -> None:
         progress="waypoints",
     )
     files = save(arguments, found) + write_plot(arguments, lambda: _path_figure(found))
-    lines = [*trajectory_lines(found), *(f"{file}: written" for file in files)]
+    lines = [*trajectory_lines(found), *written_lines(files)]
     tell(arguments, {**trajectory_answer(found), "files": files}, lines)
 
 
@@ -117,7 +115,7 @@ def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, A
     starts = _STARTS if arguments.starts is None else arguments.starts
     found = solve_ik(model, arguments.target, orientation=wanted, starts=starts, **options)
     files = save(arguments, found) + write_plot(arguments, lambda: _figure(found.equilibrium))
-    lines = [*solution_lines(found), *(f"{file}: written" for file in files)]
+    lines = [*solution_lines(found), *written_lines(files)]
     tell(arguments, {**solution_answer(found), "files": files}, lines)
 
 

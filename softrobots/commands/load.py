@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.command_line import add_gravity, gravity_of
-from softrobots.commands.answers import add_json, aligned, tell
+from softrobots.commands.answers import add_json, aligned, tell, written_lines
 from softrobots.commands.coordinate_units import load_units, motor_units, together
 from softrobots.commands.equilibrium_report import equilibrium_answer, equilibrium_lines
 from softrobots.commands.facts import Fact, answer_of, spoken
@@ -32,12 +32,11 @@ def add_parser(subparsers: Any) -> None:
         "which the motors feel nothing are named. Exit status 0 if a force explains the torques, 1 if none does, 2 after bad "
         "input.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_model(parser)
     told = "motor joints, then muscles, base to tip [rad or m] (relaxed)"
     parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=told)
-    told = "load on each motor, minus what it exerts [N m or N]: the sign of motor_torques in the answer of softrobots solve"
+    told = "load on each motor, minus what it exerts, as motor_torques in the answer of softrobots solve [N m or N] (required)"
     parser.add_argument("--torques", type=float, nargs="+", metavar="TAU", required=True, help=told)
     told = "standard deviation of the torques, one for all or one for each [N m or N]: tells that of the force (unknown)"
     parser.add_argument("--torque-std", type=float, nargs="+", metavar="S", help=told)
@@ -74,7 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
         max_iterations=arguments.max_iterations,
     )
     files = save(arguments, found)
-    lines = [*equilibrium_lines(found.equilibrium), "", *_lines(found), *(f"{path}: written" for path in files)]
+    lines = [*equilibrium_lines(found.equilibrium), "", *_lines(found), *written_lines(files)]
     tell(arguments, {**_answer(found), "files": files}, lines)
 
 

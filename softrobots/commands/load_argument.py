@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.checks import finite_array
 from softrobots.command_line import add_load, gravity_of
 from softrobots.errors import ParameterError
 from softrobots.model import SoftModel
@@ -32,14 +33,15 @@ def loads_of(arguments: argparse.Namespace, model: SoftModel) -> dict[str, Any]:
         model: The robot.
 
     Raises:
-        ParameterError: If what follows a link is no number.
+        ParameterError: If what follows a link is no finite number, or the moment is not finite.
     """
     wrenches: dict[str, Any] = {}
     for link, *words in arguments.wrench:
-        wrenches[link] = wrenches.get(link, 0.0) + np.array(_numbers(words))
+        wrenches[link] = wrenches.get(link, 0.0) + finite_array("--wrench", _numbers(words), (6,), "N, N m")
     if arguments.moment is not None:
         at = model.tip if arguments.frame is None else arguments.frame
-        wrenches[at] = wrenches.get(at, 0.0) + np.array([0.0, 0.0, 0.0, *arguments.moment])
+        moment = finite_array("--moment", arguments.moment, (3,), "N m")
+        wrenches[at] = wrenches.get(at, 0.0) + np.array([0.0, 0.0, 0.0, *moment])
     return {
         "force": arguments.force,
         "wrench": wrenches or None,

@@ -11,7 +11,7 @@ import numpy as np
 from softrobots import constant_curvature
 from softrobots.checks import FloatArray, positive_array
 from softrobots.command_line import refuse_too_large
-from softrobots.commands.answers import add_json, aligned, tell
+from softrobots.commands.answers import add_json, aligned, tell, written_lines
 from softrobots.commands.facts import Fact, answer_of
 from softrobots.commands.plot_option import add_plot, check_plot, write_plot
 from softrobots.constant_curvature import Arc
@@ -38,7 +38,7 @@ All lengths in m, all angles in rad. Defaults are those of the robot pcc_arm. Th
 _JSON = """With --json: one object with these names, and their units under "units": muscle_lengths (segment, muscle),
 muscle_extension (length over rest length, less 1), muscle_residual (segment), arc_length, arc_bending, arc_azimuth (segment),
 transforms (segment, 4, 4; end of a segment to base), tip_position, tip_direction (its z axis), jacobian (6, muscles; of
-the tip, linear rows first; null without --jacobian), target and error with reach, frame, and plot.
+the tip, linear rows first; null without --jacobian), target and error with reach, frame, and files (those written).
 """
 
 
@@ -68,7 +68,6 @@ def add_parser(subparsers: Any) -> None:
         help="constant curvature in closed form: muscle lengths, arcs, poses, Jacobians",
         description="Segments of constant curvature in closed form, without load: any number of segments and muscles.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     forms = parser.add_subparsers(dest="form", metavar="FORM", required=True, title="forms")
 
@@ -80,6 +79,7 @@ def add_parser(subparsers: Any) -> None:
 
     inverse = _form(forms, "inverse", _inverse, "arcs -> muscle lengths and poses")
     told = "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once a segment, base to tip"
+    told += " (required)"
     names = ("LENGTH", "BENDING", "AZIMUTH")
     inverse.add_argument("--arc", type=float, nargs=3, action="append", required=True, dest="arcs", metavar=names, help=told)
 
@@ -118,7 +118,8 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], told
     else:
         told = "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
         parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=told)
-    parser.add_argument("--jacobian", action="store_true", help="also the Jacobian of the tip with respect to muscle lengths")
+    told = "also the Jacobian of the tip with respect to muscle lengths [m/m, rad/m] (not told)"
+    parser.add_argument("--jacobian", action="store_true", help=told)
     add_plot(parser, "the smooth backbone with its muscles")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -227,26 +228,30 @@ def _answer(arguments: argparse.Namespace, chain: Chain, facts: list[Fact]) -> N
         return pcc_plots.arm(chain.arcs, chain.distance, chain.azimuths, chain.offsets, chain.frame)
 
     written = write_plot(arguments, draw)
-    tell(arguments, answer_of(facts) | {"plot": written[0] if written else None}, [*_lines(facts), *_written(written)])
+    tell(arguments, answer_of(facts) | {"files": written}, [*_lines(facts), *written_lines(written)])
 
 
 def _lines(facts: list[Fact]) -> list[str]:
     """The answer for a person."""
     values = {fact.name: fact.value for fact in facts}
     arcs = zip(values["arc_length"], values["arc_bending"], values["arc_azimuth"], strict=True)
-    rows: list[tuple[str, ...]] = [
-        ("segment", "backbone [m]", "bending [rad]", "azimuth [rad]", "muscle lengths [m] (extension)")
-    ]
-    for number, (arc, lengths, shares) in enumerate(
-        zip(arcs, values["muscle_lengths"], values["muscle_extension"], strict=True), start=1
-    ):
+    rows: list[tuple[str, ...]] = [("segment", "backbone [m]", "bending [rad]", "azimuth [rad]")]
+    rows += [(str(number), *map(_six, arc)) for number, arc in enumerate(arcs, start=1)]
+    told: list[tuple[str, ...]] = [("segment", "muscle lengths [m] (extension)")]
+    for number, (lengths, shares) in enumerate(zip(values["muscle_lengths"], values["muscle_extension"], strict=True), start=1):
         muscles = (f"{length:.6f} ({100 * share:+.1f} %)" for length, share in zip(lengths, shares, strict=True))
-        rows.append((str(number), *map(_six, arc), "  ".join(muscles)))
+        told.append((str(number), "  ".join(muscles)))
     pose = values["transforms"][-1]
-    lines = [*aligned(rows), "", f"pose of the tip in the base, {values['frame'].replace('_', '-')} frames [-, m]"]
+    lines = [
+        *aligned(rows),
+        "",
+        *aligned(told),
+        "",
+        f"pose of the tip in the base, {values['frame'].replace('_', '-')} frames [-, m]",
+    ]
     lines += _matrix(pose)
     if values["jacobian"] is not None:
-        lines += ["", "Jacobian of the tip, a column a muscle: three rows linear [m/m], three rows angular [rad/m]"]
+        lines += ["", "Jacobian of the tip, a column a muscle: linear [m/m], then angular [rad/m]"]
         lines += _matrix(values["jacobian"])
     if "target" in values:
         lines += ["", f"misses the target by {values['error']:.1e} m"]
@@ -257,12 +262,9 @@ def _lines(facts: list[Fact]) -> list[str]:
 
 
 def _matrix(matrix: FloatArray) -> list[str]:
-    return ["  " + "  ".join(f"{_six(number):>12}" for number in row) for row in matrix]
+    rows = [tuple(map(_six, row)) for row in matrix]
+    return aligned(rows, indent="  ", right=range(len(rows[0])))
 
 
 def _six(number: float) -> str:
     return f"{round(float(number), 6) + 0.0:.6f}"
-
-
-def _written(written: list[Any]) -> list[str]:
-    return [f"\n{path}: written" for path in written]

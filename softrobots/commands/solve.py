@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from softrobots.checks import finite_array
-from softrobots.commands.answers import add_json, aligned, tell
+from softrobots.commands.answers import add_json, aligned, tell, written_lines
 from softrobots.commands.equilibrium_report import coordinate_lines, equilibrium_answer, summary_lines
 from softrobots.commands.facts import spoken
 from softrobots.commands.load_argument import add_loads, loads_of
@@ -39,7 +39,6 @@ def add_parser(subparsers: Any) -> None:
         "from the relaxed springs. Exit status 0 if one is found, also if it is not certified stable or a link is wrinkled: "
         "the answer says so. 1 if none is found, 2 after bad input.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_model(parser)
     told = "motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
@@ -88,7 +87,7 @@ def run(arguments: argparse.Namespace) -> None:
         _add_critical_load(model, found, arguments, answer, told)
     files = save(arguments, found) + write_plot(arguments, lambda: _figure(found))
     answer["files"] = files
-    tell(arguments, answer, [*lines, "", *told, *(f"{path}: written" for path in files)])
+    tell(arguments, answer, [*lines, "", *told, *written_lines(files)])
 
 
 def _add_compliance(model: SoftModel, found: Equilibrium, answer: dict[str, Any], lines: list[str]) -> None:
@@ -99,12 +98,12 @@ def _add_compliance(model: SoftModel, found: Equilibrium, answer: dict[str, Any]
         answer["compliance"] = None
         lines += ["", f"compliance  none: {error}"]
         return
-    rows = [(name, *(f"{number:.4e}" for number in row)) for name, row in zip(_MOTIONS, matrix, strict=True)]
-    lines += ["", "compliance of the tip: motion [m, rad] per force [N] and moment [N m]"]
+    rows = [(name, *(f"{number:.3e}" for number in row)) for name, row in zip(_MOTIONS, matrix, strict=True)]
+    lines += ["", "compliance of the tip: motion [m] and turn [rad] per force [N] and moment [N m]"]
     lines += aligned([("", *_WRENCH), *rows], right=range(1, 7))
 
 
-_MOTIONS = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
+_MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
 _WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
 
 

@@ -41,7 +41,6 @@ def add_parser(subparsers: Any) -> None:
         "against Pinocchio's, masses, limits, springs, and the rules that a file must follow to load everywhere. A URDF file "
         "can only be checked.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_robot(parser, optional=True)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the URDF there instead of printing it")
@@ -66,8 +65,8 @@ def run(arguments: argparse.Namespace) -> bool:
     well = all(finding.ok for finding in findings)
     lines, answer = _report(findings), _answer(findings) if arguments.check else {}
     if arguments.output is not None and well:
-        answer["written"] = write_text(arguments.output, read_source(source)[0], overwrite=arguments.overwrite)
-        lines.append(f"{answer['written']}: written")
+        answer["files"] = [write_text(arguments.output, read_source(source)[0], overwrite=arguments.overwrite)]
+        lines.append(f"{answer['files'][0]}: written")
     if answer:
         tell(arguments, answer, lines)
     else:
@@ -79,6 +78,7 @@ def _answer(findings: Sequence[Finding]) -> dict[str, Any]:
     return {
         "ok": all(finding.ok for finding in findings),
         "findings": [{**found._asdict(), "ok": found.ok} for found in findings],
+        "files": [],
     }
 
 

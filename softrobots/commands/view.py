@@ -58,7 +58,6 @@ def add_parser(subparsers: Any) -> None:
         description="Show a robot in the browser, served on this machine only, until Ctrl-C: loaded, at a target, as a saved "
         "result, growing, or following commands. Or write the page, which works offline, or a picture of it.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_model(parser, optional=True)
     told = "motor joints, then muscles, base to tip [rad, m or N]; with --target, where the search starts (relaxed)"
@@ -69,9 +68,7 @@ def add_parser(subparsers: Any) -> None:
     told = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
     parser.add_argument("--result", type=Path, metavar="FILE.npz", help=told)
     parser.add_argument("--growth", action="store_true", help="show how a helical tube grows, without load")
-    told = (
-        "follow commands: `keyboard` (single keys of a terminal, or lines of a pipe; ? lists them), or a file that is watched"
-    )
+    told = "follow commands (none): `keyboard`, single keys of a terminal or lines of a pipe (? lists them), or a watched file"
     parser.add_argument("--live", metavar="keyboard|FILE", help=told)
     parser.add_argument(
         "--sliders", action="store_true", help="a page with sliders for motors and load (needs viser, extra viser)"
@@ -90,6 +87,8 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Show the robot until Ctrl-C, or write what is asked for."""
     _refuse_contradictions(arguments)
+    if arguments.picture is not None and arguments.picture.suffix.lower() != ".png":
+        raise ParameterError("--picture", str(arguments.picture), "a file name that ends in .png")
     for file in (arguments.html, arguments.picture):
         if file is not None:
             new_file(file, overwrite=arguments.overwrite)  # tells at once
@@ -172,8 +171,8 @@ def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, told:
         page = viewer.write_html(file, title=str(model.pinocchio.name), overwrite=arguments.overwrite)
         if arguments.picture is not None:
             take_picture(page, arguments.picture, share=arguments.at or 0.0)
-    files = {"html": arguments.html, "picture": arguments.picture}
-    tell(arguments, files, [told, *(f"{file}: written" for file in files.values() if file is not None)])
+    files = [file for file in (arguments.html, arguments.picture) if file is not None]
+    tell(arguments, {"files": files}, [told, *(f"{file}: written" for file in files)])
 
 
 def _serve(arguments: argparse.Namespace, page: Served, told: str) -> None:
