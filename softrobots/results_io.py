@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -63,8 +64,12 @@ def load_result(path: str | Path) -> Result:
     """
     path = as_path("path", path)
     try:
-        with path.open("rb") as handle, np.load(handle, allow_pickle=False) as file:
-            fields = {name: file[name] for name in file.files}
+        with path.open("rb") as handle:
+            if not zipfile.is_zipfile(handle):  # NumPy would advise to allow pickle
+                raise FileFormatError("it is no NPZ archive")
+            handle.seek(0)
+            with np.load(handle, allow_pickle=False) as file:
+                fields = {name: file[name] for name in file.files}
         kind = str(fields["kind"])
         if int(fields["format"]) != _FORMAT or kind not in KINDS:
             raise FileFormatError(

@@ -163,8 +163,9 @@ def test_damaged_files_are_refused_or_harmless(results: dict, kind: str, tmp_pat
             refused += 1
     assert refused > 100
     bad.write_bytes(good[: len(good) // 2])
-    with pytest.raises(sr.FileFormatError):
+    with pytest.raises(sr.FileFormatError, match="it is no NPZ archive") as caught:
         sr.load_result(bad)
+    assert "pickle" not in str(caught.value)  # NumPy's advice for such a file
 
 
 def test_an_estimate_whose_force_was_changed_is_refused(results: dict, tmp_path: Path) -> None:
