@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
 
@@ -60,6 +61,20 @@ def bullet(tool: Callable[[str], ModuleType]) -> ModuleType:
     """The module pybullet, where it has wheels."""
     skip_without_bullet_wheels()
     return tool("pybullet")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    """A headless Chromium, one for all tests of a module; Playwright's synchronous API runs once at a time."""
+    from softrobots.browser import open_browser
+
+    with ExitStack() as stack:
+        try:
+            opened = stack.enter_context(open_browser())
+        except (sr.MissingDependency, sr.ViewerError) as error:
+            missing(str(error))
+            raise
+        yield opened
 
 
 @pytest.fixture

@@ -191,15 +191,21 @@ def test_doctor_goes_on_without_browser_and_stops_without_folders(told, monkeypa
 def test_the_packages_are_those_of_pyproject() -> None:
     """Required ones and those of each extra, with the same oldest versions."""
     text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
-    listed, place = {}, ""
+    listed: dict[str, set[tuple[str, str]]] = {}
+    place = ""
     for line in text[text.index("dependencies = [") : text.index("[project.scripts]")].splitlines():
-        place = re.match(r"([\w-]+) = \[", line)[1] if re.match(r"([\w-]+) = \[", line) else place
+        head = re.match(r"([\w-]+) = \[", line)
+        place = head[1] if head else place
         for name, least in re.findall(r'"([\w-]+)(?:\[\w+\])?>=([\d.]+)', line):
-            listed.setdefault(name, ("" if place == "dependencies" else place, least))  # an extra of its own comes first
-    ours = {package.name: (package.extra, package.minimum) for package in PACKAGES}
-    assert {name: ours[name] for name in ours} == {name: listed[name] for name in ours}
-    used_in_development = {"build", "hatchling", "hypothesis", "mpmath", "mypy", "pytest", "pytest-xdist", "ruff"}
-    assert set(listed) - set(ours) <= used_in_development
+            listed.setdefault(name, set()).add(("" if place == "dependencies" else place, least))
+    ours = {package.name: {(package.extra, package.minimum)} for package in PACKAGES}
+    for package in PACKAGES:
+        if package.also:
+            ours[package.name].add((package.also, package.minimum))
+    of_users = {name: {entry for entry in listed[name] if entry[0] != "dev"} for name in listed}
+    assert ours == {name: entries for name, entries in of_users.items() if entries}
+    alone = {name for name, entries in of_users.items() if not entries}
+    assert alone == {"build", "hypothesis", "mpmath", "mypy", "pytest", "pytest-xdist", "twine"}
 
 
 @pytest.mark.parametrize(

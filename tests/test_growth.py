@@ -16,7 +16,7 @@ from softrobots.growth import SHORTEST, grown_coordinates
 from softrobots.meshcat_view.animation_frames import growth_frames
 from softrobots.scene import Scene
 from softrobots.viewer import view
-from tests.test_viewer import browser, pictures_of  # noqa: F401 - a fixture
+from tests.test_viewer import pictures_of
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +156,7 @@ def test_the_viewer_colours_a_section_whatever_its_group_names(chain: str, names
     assert {shape.inflated_link for shape in shapes if shape.name.startswith("section_1_")} >= set(range(6))
 
 
-def test_the_page_shows_the_tube_growing(browser: object, tmp_path: Path) -> None:  # noqa: F811
+def test_the_page_shows_the_tube_growing(browser: object, tmp_path: Path) -> None:
     tube = sr.HelixTube(elastic_sections=6, length=0.6)
     with view(sr.load_model(tube)) as viewer:
         viewer.animate_growth(tube, duration=0.5)  # 15 frames: a light page

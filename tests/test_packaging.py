@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ast
 import builtins
+import functools
 import pickle
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -27,6 +29,7 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
     assert "pinocchio" in loaded
     heavy = {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "tqdm"}
     heavy |= {"mujoco", "pydrake", "pybullet", "urchin", "ikpy", "roboticstoolbox", "viser", "distributed", "dask"}
+    heavy |= {"playwright", "PIL", "shtab", "IPython", "example_robot_data"}
     assert not loaded & (heavy | {"urllib.request"})  # brings http, ssl and email along, an eighth of the whole
 
 
@@ -65,14 +68,21 @@ def test_every_error_crosses_to_another_process(arm: sr.SoftModel) -> None:
         assert twin.__dict__.keys() == error.__dict__.keys()
 
 
+@functools.cache
+def nodes_of(file: Path) -> tuple[ast.AST, ...]:
+    """Every node of a module."""
+    return tuple(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+
+
 def imports_of(file: Path) -> set[str]:
     found = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in nodes_of(file):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("softrobots"):
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     return found
 
 
+@functools.cache
 def import_graph() -> dict[str, set[str]]:
     """Which modules each module of the package imports, also inside functions."""
     files = {
@@ -93,17 +103,55 @@ def test_imports_point_one_way() -> None:
 
 
 def test_the_statics_knows_nothing_of_descriptions_arms_and_other_tools() -> None:
-    graph = import_graph()
-    reached = {
-        f"softrobots.{name}" for name in ("trajectory", "load_estimation", "imposed_displacement", "stability", "workspace")
-    }
-    assert reached < graph.keys()
-    while new := {needed for name in reached for needed in graph[name]} - reached:
-        reached |= new
-    assert "softrobots.elastostatics" in reached
-    roots = {name.split(".")[1] for name in reached}
+    reached = reached_from(["trajectory", "load_estimation", "imposed_displacement", "stability", "workspace"])
+    assert "elastostatics" in reached
+    roots = {name.split(".")[0] for name in reached}
     assert not roots & {"robots", "helix", "constant_curvature", "export", "readers", "interop", "commands", "composition"}
     assert not roots & {"description", "tag_reader", "rigid_tree", "rigid_tree_urdf", "sources", "loader", "scene", "viewer"}
+    assert not roots & {"papers", "live", "meshcat_view", "viser_view", "slider_page", "browser", "plots", "gallery"}
+
+
+def reached_from(names: Iterable[str]) -> set[str]:
+    """Modules that some modules, or all modules of a folder, import, directly or through others; with themselves."""
+    graph = import_graph()
+    starts = tuple(f"softrobots.{name}" for name in names)
+    reached = {name for name in graph if name in starts or name.startswith(tuple(f"{start}." for start in starts))}
+    assert all(any(name == start or name.startswith(f"{start}.") for name in reached) for start in starts)
+    while new := {needed for name in reached for needed in graph[name]} - reached:
+        reached |= new
+    return {name.removeprefix("softrobots.") for name in reached}
+
+
+@pytest.mark.parametrize(
+    ("names", "unknown"),
+    [
+        # Equations as the papers print them are what ours are compared with: they share nothing but the checks of input.
+        (["papers.dh_tables", "papers.helix_equations", "papers.pcc_equations"], None),
+        (["live"], ["viewer", "meshcat_view", "viser_view", "slider_page", "commands", "browser"]),
+        (["meshcat_view"], ["viewer", "viser_view", "slider_page", "live", "commands", "papers", "browser"]),
+        (["viewer"], ["viser_view", "slider_page", "live", "commands", "papers", "browser"]),
+        (["viser_view", "slider_page"], ["viewer", "live", "commands", "papers", "browser"]),
+        (["papers.reproduction"], ["plots", "commands", "viewer", "helix_sheet"]),
+        (["plots", "browser", "marked_text"], ["commands", "papers", "live", "viewer", "meshcat_view", "viser_view"]),
+    ],
+)
+def test_what_people_meet_is_made_of_parts_that_do_not_know_each_other(names: list[str], unknown: list[str] | None) -> None:
+    reached = reached_from(names)
+    if unknown is None:
+        assert reached == {*names, "checks", "errors"}
+    else:
+        assert all(reached_from([name]) for name in unknown)  # none of them is a name of old
+        assert not {name for name in reached if name in unknown or name.split(".")[0] in unknown}
+
+
+def test_nothing_but_the_command_line_imports_the_commands_and_only_papers_the_papers() -> None:
+    for name, needs in import_graph().items():
+        home = name.removeprefix("softrobots.")
+        if not home.startswith(("commands", "cli", "__main__")):
+            assert not {needed for needed in needs if needed.startswith(("softrobots.commands", "softrobots.cli"))}, name
+        if not home.startswith("papers"):
+            shared = {"softrobots.papers", "softrobots.papers.arm_path"}  # a path that scripts and benchmarks follow, too
+            assert not {needed for needed in needs - shared if needed.startswith("softrobots.papers")}, name
 
 
 def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
@@ -153,8 +201,7 @@ def test_xacro_and_urdf_hold_no_python() -> None:
 
 def test_no_assert_guards_input() -> None:
     for file in PACKAGE.rglob("*.py"):
-        tree = ast.parse(file.read_text(encoding="utf-8"))
-        assert not [node for node in ast.walk(tree) if isinstance(node, ast.Assert)], file
+        assert not [node for node in nodes_of(file) if isinstance(node, ast.Assert)], file
 
 
 def test_a_missing_extra_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,7 +238,7 @@ def test_the_extra_that_an_error_names_holds_the_package() -> None:
     """Every `MissingDependency(package, extra)` of the source with words for both."""
     known, seen = extras(), 0
     for file in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in nodes_of(file):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "MissingDependency":
                 words = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
                 if len(words) == 2:
@@ -206,6 +253,14 @@ def test_dev_holds_every_extra() -> None:
     named = re.search(r'"softrobots\[([\w,-]+)\]"', text)
     assert named is not None
     assert set(named[1].split(",")) == set(extras()) - {"dev"}
+
+
+def test_dev_installs_the_tools_of_the_gate() -> None:
+    gate = CHECKOUT / ".ci" / "run"
+    if not gate.is_file():
+        pytest.skip("a source distribution has no gate")
+    tools = set(re.findall(r"\.venv/bin/(?:python -m )?(?!python\b)(\w+)", gate.read_text(encoding="utf-8")))
+    assert {"ruff", "mypy", "build", "twine"} <= tools <= extras()["dev"]
 
 
 def test_the_version_stands_in_one_place() -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import nullcontext
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
@@ -13,31 +14,19 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.browser import find_chromium, open_browser, show_share, take_animation
+from softrobots.browser import show_share, take_animation
 from softrobots.gallery import EXHIBITS
 from softrobots.meshcat_view.page_commands import RESOLUTION, packed, read_page, tidied, unpacked
 from softrobots.meshcat_view.page_text import page_text, scene_of
 from softrobots.robots import HelixTube
 from softrobots.scene import Scene
 from softrobots.viewer import view
-from tests.conftest import CHECKOUT, missing
+from tests.conftest import CHECKOUT
 from tests.test_scripts import run_script
 
 FOLDER = CHECKOUT / "docs" / "pages"
 LIMITS = {"helix_growth": 3e6, "pcc_arm": 2e6, "inflatable_arm": 0.5e6, "ur5_bench": 2e6}
 """Pages, and how many bytes each may have: they are committed."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[object]:
-    """One browser for all pages."""
-    try:
-        find_chromium()
-        import playwright  # noqa: F401
-    except (ImportError, sr.ViewerError) as error:
-        missing(str(error))
-    with open_browser() as opened:
-        yield opened
 
 
 def opened(browser: object, file: Path, messages: list[str], size: tuple[int, int]) -> object:
@@ -125,6 +114,12 @@ def test_an_old_browser_says_what_is_missing(browser: object) -> None:
     page.close()
 
 
+@lru_cache
+def scene_on(name: str) -> tuple[str, list[bytes]]:
+    """Script and commands of a committed page, unpacked once."""
+    return scene_of((FOLDER / f"{name}.html").read_text(encoding="utf-8"))
+
+
 @pytest.mark.parametrize("name", LIMITS)
 def test_a_page_is_of_today(name: str) -> None:
     """Title, version and size of the committed page, and no name of an object that tells of a time or a machine."""
@@ -133,7 +128,7 @@ def test_a_page_is_of_today(name: str) -> None:
     assert f"<title>{title}</title>" in page
     assert f'<meta name="generator" content="softrobots {sr.__version__}">' in page
     assert len(page) < LIMITS[name]
-    script, commands = scene_of(page)
+    script, commands = scene_on(name)
     assert "MeshCat" in script
     names = {match for command in commands for match in re.findall(rb"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", command)}
     assert names
@@ -145,8 +140,7 @@ def drawn_shapes(name: str) -> set[str]:
     """Names of the shapes of the deformed robot on a committed page."""
     import umsgpack
 
-    commands = scene_of((FOLDER / f"{name}.html").read_text(encoding="utf-8"))[1]
-    paths = [umsgpack.unpackb(command) for command in commands]
+    paths = [umsgpack.unpackb(command) for command in scene_on(name)[1] if b"set_object" in command]
     found = (re.match("/meshcat/softrobots/deformed/([^/]+)/", told["path"]) for told in paths if told["type"] == "set_object")
     return {match[1] for match in found if match}
 

@@ -10,7 +10,7 @@ import pytest
 import softrobots as sr
 from softrobots.body import body
 from softrobots.viewer import Viewer, view
-from tests.test_viewer import browser, pictures_of  # noqa: F401 - a fixture
+from tests.test_viewer import pictures_of
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
 
@@ -29,7 +29,7 @@ def muscles(picture: np.ndarray) -> tuple[int, int]:
     return int(np.count_nonzero(contrast > 80)), int(np.count_nonzero(contrast < -80))
 
 
-def test_page_shows_pulling_and_pushing_muscles(browser: object, pcc: sr.SoftModel, tmp_path: Path) -> None:  # noqa: F811
+def test_page_shows_pulling_and_pushing_muscles(browser: object, pcc: sr.SoftModel, tmp_path: Path) -> None:
     loaded = sr.solve_equilibrium(pcc, HELD, (6, 4, -3), gravity=sr.EARTH_GRAVITY)
     assert loaded.muscle_forces.min() < 0.0 < loaded.muscle_forces.max()
     with view(pcc, loaded) as viewer:
@@ -42,7 +42,7 @@ def test_page_shows_pulling_and_pushing_muscles(browser: object, pcc: sr.SoftMod
     assert min(muscles(shot)) > 300
 
 
-def test_animation_bends_the_tube(browser: object, pcc: sr.SoftModel, tmp_path: Path) -> None:  # noqa: F811
+def test_animation_bends_the_tube(browser: object, pcc: sr.SoftModel, tmp_path: Path) -> None:
     path = sr.straight_line((0.3, 0.2, 0.85), (-0.3, 0.3, 0.8), 0.3, 4)  # ten frames: a light page
     trajectory = sr.follow_trajectory(pcc, path.positions, (0, 0, -3), times=path.times)
     with view(pcc, trajectory) as viewer:

@@ -23,7 +23,7 @@ from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.slider_page import SliderPage
 from softrobots.viser_view.shapes import drawn_of
 from softrobots.viser_view.slider_panel import round_down, slider_grid
-from tests.test_viewer import browser, listening, pixels  # noqa: F401 - browser is a fixture
+from tests.test_viewer import listening, pixels
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
 
@@ -145,11 +145,14 @@ def test_of_many_changes_the_newest_is_solved(page: SliderPage, monkeypatch: pyt
 
     original = slider_page.next_equilibrium
     monkeypatch.setattr(slider_page, "next_equilibrium", slowly)
+    start = time.monotonic()
     for value in np.linspace(0.01, 0.5, 50).tolist():
         page._panel._motors[1].value = value
         time.sleep(0.002)
+    changing = time.monotonic() - start
     wait_for(lambda: page.equilibrium.q_motors[1] == 0.5)
-    assert 2 <= len(solved) <= 20  # 0.1 s of changes, 0.05 s each: four or so; fifty would be a queue
+    # 0.05 s each, while changes come, and perhaps two of what has come by then; fifty would be a queue.
+    assert 2 <= len(solved) <= changing / 0.05 + 3
 
 
 def test_steps_are_round_numbers_within_the_limits() -> None:
@@ -383,7 +386,7 @@ def test_a_missing_viser_says_what_to_install(arm: sr.SoftModel, monkeypatch: py
 # The page
 
 
-def test_sliders_in_the_browser_move_the_arm(browser: object, arm: sr.SoftModel) -> None:  # noqa: F811
+def test_sliders_in_the_browser_move_the_arm(browser: object, arm: sr.SoftModel) -> None:
     messages, requests, sockets = [], [], []
     with SliderPage(arm, q_motors=(0.0, 0.5, -0.5), force=(0, 0, -5)) as page:
         tab = browser.new_page(viewport={"width": 800, "height": 600})

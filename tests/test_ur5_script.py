@@ -65,8 +65,8 @@ def test_the_default_brings_the_loaded_tip_back(tmp_path: Path, ur5: Path, capsy
 
 
 def test_a_line_is_followed_with_the_loaded_tip(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    arguments = ["--to", "1.2", "0.3", "0.6", "--payload", "2", "--steps", "3", "--no-plots", "--output", str(tmp_path / "out")]
-    assert run_script(NAME, arguments) == 0
+    arguments = ["--to", "1.2", "0.3", "0.6", "--payload", "2", "--steps", "3", "--duration", "0.1", "--no-plots"]
+    assert run_script(NAME, [*arguments, "--output", str(tmp_path / "out")]) == 0
     saved = sr.load_result(tmp_path / "out" / "result.npz")
     assert np.allclose(saved.targets[-1], (1.2, 0.3, 0.6), rtol=0.0, atol=1e-15)
     assert saved.tip_error.max() < 1e-9
@@ -84,8 +84,8 @@ def test_it_explains_itself(capsys: pytest.CaptureFixture) -> None:
 
 @pytest.mark.parametrize("robot", ["helix_tube", "pcc_arm"])
 def test_other_arms_are_carried_and_orientation_comes_back(robot: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    arguments = ["--robot", robot, "--keep-orientation", "--payload", "0.001", "--gravity", "0", "0", "-1"]
-    assert run_script(NAME, [*arguments, "--steps", "1", "--no-plots", "--output", str(tmp_path / "out")]) == 0
+    arguments = ["--robot", robot, "--keep-orientation", "--payload", "0.001", "--gravity", "0", "0", "-1", "--no-plots"]
+    assert run_script(NAME, [*arguments, "--steps", "1", "--duration", "0.1", "--output", str(tmp_path / "out")]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["tip_error_after_m"] < 1e-9
     assert summary["tip_turned_after_rad"] < 1e-8 < summary["tip_turned_before_rad"]

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import json
 import os
 import pty
 import queue
 import signal
+import socket
 import subprocess
 import sys
 import termios
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.browser import find_chromium, open_browser, show_share
+from softrobots.browser import show_share
 from softrobots.cli import main
-from tests.conftest import missing
 from tests.test_viewer import coloured, listening, pixels
 
 COMMAND = [sys.executable, "-m", "softrobots", "view"]
@@ -107,18 +105,6 @@ def gone(pid: int) -> bool:
             return True
         time.sleep(0.05)
     return False
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[object]:
-    if importlib.util.find_spec("playwright") is None:
-        missing("playwright is not installed")
-    try:
-        find_chromium()
-    except sr.ViewerError as error:
-        missing(str(error))
-    with open_browser() as opened:
-        yield opened
 
 
 # --- A process that serves
@@ -393,12 +379,12 @@ def test_no_answer_ends_with_status_one(capsys: pytest.CaptureFixture) -> None:
 
 
 def test_a_port_is_taken_or_refused(arm: sr.SoftModel, capsys: pytest.CaptureFixture) -> None:
-    with sr.view(arm) as first:
-        wish = first.port + 1000
-        with sr.Viewer(arm, port=wish) as second:
-            assert second.url == f"http://127.0.0.1:{wish}/static/"
-            assert main(["view", "inflatable_arm", "--port", str(wish)]) == 2
-            assert f"port {wish}: Address already in use" in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        wish = free.getsockname()[1]
+    with sr.Viewer(arm, port=wish) as viewer:
+        assert viewer.url == f"http://127.0.0.1:{wish}/static/"
+        assert main(["view", "inflatable_arm", "--port", str(wish)]) == 2
+        assert f"port {wish}: Address already in use" in capsys.readouterr().err
     for port in (0, 70_000, "7000"):
         with pytest.raises(sr.ParameterError, match="port"):
             sr.Viewer(arm, port=port)

@@ -10,20 +10,18 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.browser import find_chromium, open_browser, show_share, take_picture
+from softrobots.browser import find_chromium, show_share, take_picture
 from softrobots.kinematics import frame_placement
 from softrobots.meshcat_view.page_text import scene_of
 from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.viewer import Viewer, view
-from tests.conftest import missing
 
 FORCE = (0.0, 10.0, -15.0)
 
@@ -32,17 +30,6 @@ FORCE = (0.0, 10.0, -15.0)
 def trajectory(arm: sr.SoftModel) -> sr.Trajectory:
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 1.0, 20)
     return sr.follow_trajectory(arm, path.positions, FORCE, times=path.times, elbow="up")
-
-
-@pytest.fixture
-def browser(tool: Callable[[str], ModuleType]) -> Iterator[object]:
-    tool("playwright")
-    try:
-        find_chromium()
-    except sr.ViewerError as error:
-        missing(str(error))
-    with open_browser() as opened:
-        yield opened
 
 
 def listening(pid: int) -> set[str]:
@@ -187,7 +174,7 @@ def test_take_picture_writes_a_png(browser: object, arm: sr.SoftModel, tmp_path:
     with view(arm, sr.solve_equilibrium(arm, (0.0, 0.6, -0.8), FORCE)) as viewer:
         page = viewer.write_html(tmp_path / "a.html")
     with pytest.MonkeyPatch.context() as patch:  # Playwright's synchronous API runs once at a time
-        patch.setattr("softrobots.browser.open_browser", lambda: _keep(browser))
+        patch.setattr("softrobots.browser.open_browser", lambda: nullcontext(browser))
         shot = take_picture(page, tmp_path / "a.png", width=400, height=300)
     assert pixels(shot.read_bytes()).shape == (300, 400, 3)
 
@@ -197,22 +184,9 @@ def test_a_picture_that_cannot_be_written_is_an_error_of_ours(browser: object, a
     with Viewer(arm) as viewer:
         page = viewer.write_html(tmp_path / "a.html")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("softrobots.browser.open_browser", lambda: _keep(browser))
+        patch.setattr("softrobots.browser.open_browser", lambda: nullcontext(browser))
         with pytest.raises(sr.OutputError, match=r"cannot write /proc/a\.png"):
             take_picture(page, "/proc/a.png")
-
-
-class _keep:
-    """A context manager that leaves the browser open."""
-
-    def __init__(self, browser: object) -> None:
-        self.browser = browser
-
-    def __enter__(self) -> object:
-        return self.browser
-
-    def __exit__(self, *_: object) -> None:
-        pass
 
 
 class forwarded:

@@ -57,7 +57,7 @@ PACKAGES = (
     Package("threadpoolctl", "3.5", "", "one thread for linear algebra"),
     Package("tqdm", "4.66", "", "progress bars"),
     Package("shtab", "1.7", "", "completion of the command in shells"),
-    Package("matplotlib", "3.8", "plot", "plots"),
+    Package("matplotlib", "3.8", "plot", "plots", also="docs"),
     Package("scipy", "1.13", "helix", "actuators that vary along the tube"),
     Package("numba", "0.60", "fast", "compiled solvers"),
     Package("dask", "2024.8", "cluster", "sweeps on many machines"),
@@ -77,6 +77,7 @@ PACKAGES = (
     Package("mkdocstrings", "1.0.8", "docs", "its reference, from docstrings"),
     Package("mkdocs-jupyter", "0.26.3", "docs", "its notebook"),
     Package("latex2mathml", "3.81", "docs", "its equations"),
+    Package("ruff", "0.6", "docs", "its signatures"),
 )
 """Every package that softrobots imports, as `pyproject.toml` asks for it."""
 

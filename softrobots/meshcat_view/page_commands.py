@@ -23,6 +23,7 @@ _COMMAND = re.compile(r'fetch\("data:application/octet-binary;base64,([^"]+)"\)'
 _SCRIPT = re.compile(r"<script>\s*(/\*!.*?)</script>", re.DOTALL)
 _UUID = re.compile(rb"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}")
 _FLOATS = 0x17  # meshcat's number of the extension type of msgpack that holds numbers of 32 bits
+_HEAD = re.compile(rb"(?:\xc8(..)|\xc9(....))[\x12-\x17]", re.DOTALL)  # of an array of meshcat's, with its length in bytes
 _REPEATED = 256  # bytes of an array from which it is looked for among the others
 
 
@@ -113,21 +114,12 @@ def _rounded(value: Any) -> Any:
 
 
 def _parts(command: bytes) -> list[bytes]:
-    """A command split around its large arrays."""
-    import umsgpack
-
-    parts, rest = [], command
-    for array in _arrays(umsgpack.unpackb(command)):
-        before, found, rest = rest.partition(array)
-        parts += [before, found]
-    return [part for part in (*parts, rest) if part]
-
-
-def _arrays(value: Any) -> list[bytes]:
-    """Large arrays in decoded msgpack, in the order in which it holds them."""
-    import umsgpack
-
-    if isinstance(value, dict | list):
-        parts = value.values() if isinstance(value, dict) else value
-        return [array for part in parts for array in _arrays(part)]
-    return [value.data] if isinstance(value, umsgpack.Ext) and len(value.data) >= _REPEATED else []
+    """A command split around its large arrays, which are found by their heads; joined, the parts are the command."""
+    parts, begin, place = [], 0, 0
+    while head := _HEAD.search(command, place):
+        start = place = head.end()
+        stop = start + int.from_bytes(head[1] or head[2], "big")
+        if start + _REPEATED <= stop <= len(command):
+            parts += [command[begin:start], command[start:stop]]
+            begin = place = stop
+    return [part for part in (*parts, command[begin:]) if part]

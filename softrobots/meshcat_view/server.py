@@ -1,15 +1,11 @@
-"""The meshcat server on loopback only; run as `python -m softrobots.meshcat_view.server [PORT]` by the viewer.
-
-Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds 127.0.0.1 and ends
-when its standard input closes, which happens however the parent ends.
-"""
+"""Starts and ends the meshcat server of a viewer, on loopback only, and connects to it."""
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 from softrobots.errors import ViewerError
@@ -18,43 +14,8 @@ LOOPBACK = "127.0.0.1"
 """The only address that is served."""
 
 _REPLY_TIME = 30_000  # [ms], longest wait for an answer of the server
-
-
-def main() -> None:
-    """Serve until standard input closes; print `zmq_url=` and `web_url=` first. A word is the port; by default a free one."""
-    from meshcat.servers.zmqserver import ZMQWebSocketBridge
-    from tornado.web import Application, RequestHandler
-
-    listen = Application.listen
-
-    def listen_on_loopback(self: Any, port: int, address: str | None = None, **options: Any) -> Any:
-        return listen(self, port, address=LOOPBACK, **options)
-
-    class NoIcon(RequestHandler):  # type: ignore[misc]
-        """What browsers ask for of themselves; without an answer they tell an error."""
-
-        def get(self) -> None:
-            """Answer with nothing."""
-            self.set_status(204)
-
-    Application.listen = listen_on_loopback
-    port = int(sys.argv[1]) if len(sys.argv) > 1 else None
-    try:
-        bridge = ZMQWebSocketBridge(port=port)
-    except OSError as error:
-        sys.exit(f"port {port}: {error.strerror}")
-    bridge.app.add_handlers(".*", [(r"/favicon\.ico", NoIcon)])
-    print(f"zmq_url={bridge.zmq_url}\nweb_url={bridge.web_url}", flush=True)  # noqa: T201
-    quiet = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(quiet, sys.stdout.fileno())  # nobody reads on, and a full pipe would block the server
-    os.dup2(quiet, sys.stderr.fileno())
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    bridge.run()
-
-
-def _end_with_parent() -> None:
-    sys.stdin.buffer.read()
-    os._exit(0)
+# As a file: as a module of the package it would import Pinocchio first, which takes as long as the server itself.
+_RUN = f"import runpy; runpy.run_path({str(Path(__file__).with_name('server_process.py'))!r}, run_name='__main__')"
 
 
 def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str, str]:
@@ -71,7 +32,7 @@ def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str,
     """
     wish = [] if port is None else [str(port)]
     server = subprocess.Popen(
-        [sys.executable, "-u", "-m", "softrobots.meshcat_view.server", *wish],
+        [sys.executable, "-u", "-c", _RUN, LOOPBACK, *wish],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -121,7 +82,3 @@ def connect(zmq_url: str, web_url: str) -> Any:
             self.zmq_socket.rcvtimeo = _REPLY_TIME
 
     return meshcat.Visualizer(window=Window())
-
-
-if __name__ == "__main__":
-    main()

@@ -14,7 +14,7 @@ from softrobots.papers import dh_tables
 from softrobots.papers.arm_path import DURATION, END, FORCE, GAIN, START, arm, movement
 from softrobots.papers.dh_tables import MOTORS, SPRINGS, TABLE_1, TABLE_2
 from softrobots.papers.inflatable_arm import HINGE, LENGTH, MEAN_STIFFNESS
-from softrobots.papers.rows import UNPUBLISHED, Row, absent, equation, own, rounded, taken
+from softrobots.papers.rows import UNPUBLISHED, Row, absent, equation, largest, own, rounded, taken
 
 _LENGTHS = {
     "L": 1e-3 * float(LENGTH),
@@ -73,15 +73,15 @@ def recursions() -> list[Row]:
     told = "motor torques made with this force; the paper shows no example"
     rows = [
         equation(
-            "Figure 5", "force that the recursion finds, against the true one", _most(found.force - FORCE), "N", told, 1e-8
+            "Figure 5", "force that the recursion finds, against the true one", largest(found.force - FORCE), "N", told, 1e-8
         ),
         equation(
-            "Figure 5", "its estimate of the tip", _most(found.equilibrium.tip_position - true.tip_position), "m", told, 1e-10
+            "Figure 5", "its estimate of the tip", largest(found.equilibrium.tip_position - true.tip_position), "m", told, 1e-10
         ),
     ]
     settled = solve_equilibrium(model, _POSTURE, FORCE, method="fixed_point")
     told = "100 rounds of q_k <- J_k^T gamma / k on Table 2"
-    apart = _most(settled.q_springs - _fixed_point(np.array(_POSTURE)))
+    apart = largest(settled.q_springs - _fixed_point(np.array(_POSTURE)))
     rows.append(equation("Figure 6", "inner recursion: angles of the springs", apart, "rad", told, 1e-10))
     followed, smallest, step_error = movement().closed_loop, np.inf, 0.0
     for number in range(len(followed.times) - 1):
@@ -93,7 +93,7 @@ def recursions() -> list[Row]:
         velocity = (followed.targets[number + 1] - followed.targets[number]) / interval
         error = followed.targets[number] - followed.tip_positions[number]
         moved = interval * inverse[list(MOTORS)] @ (velocity + GAIN * error)  # (9)
-        step_error = max(step_error, _most(followed.q_motors[number + 1] - followed.q_motors[number] - moved))
+        step_error = max(step_error, largest(followed.q_motors[number + 1] - followed.q_motors[number] - moved))
     told = f"position rows of J; Euler steps of 10 ms, gain {GAIN:g} 1/s (ours); our own path"
     rows.append(equation("(8), (9)", "steps of the motors along a movement", step_error, "rad", told))
     told = "on our path: with all six rows the closed loop leaves the path, as three motors hold no orientation"
@@ -175,14 +175,9 @@ def _apart(postures: FloatArray) -> tuple[float, float]:
     for angles in postures:
         table = dh_tables.frames(TABLE_2, angles, _LENGTHS)[1:]
         for printed, turn, moved, end in zip(table, constant, drawn(angles, _MOVED), drawn(angles, _ENDS), strict=True):
-            places = max(places, _most(end[:3, 3] - printed[:3, 3]))
-            turns = max(turns, _most(moved[:3, :3] - printed[:3, :3] @ turn))
+            places = max(places, largest(end[:3, 3] - printed[:3, 3]))
+            turns = max(turns, largest(moved[:3, :3] - printed[:3, :3] @ turn))
     return places, turns
-
-
-def _most(values: FloatArray) -> float:
-    """Largest size of a number."""
-    return float(np.abs(values).max())
 
 
 JOBS = (kinematics, statics, recursions, figures_10_and_11)

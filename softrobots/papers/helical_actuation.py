@@ -18,7 +18,7 @@ from softrobots.helix import PAPER_CYLINDER
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from softrobots.papers import helix_equations as printed
 from softrobots.papers.helix_equations import Shape
-from softrobots.papers.rows import MEASURED, UNPUBLISHED, Row, absent, equation, erratum, own, rounded, taken
+from softrobots.papers.rows import MEASURED, UNPUBLISHED, Row, absent, equation, erratum, largest, own, rounded, taken
 
 TITLE = "Helical actuation [Blumenschein 2018]"
 """What the paper is called in tables."""
@@ -49,9 +49,11 @@ def paths() -> list[Row]:
     for name in _PATHS:
         radius = shape.radius(name)
         ours = helix.points(shape, quarter, name, "left") + np.stack([0 * lift, 0 * lift, lift], axis=-1)
-        curve = max(curve, _most(ours - printed.path(radius, shape.pitch, s)))
-        tangents = max(tangents, _most(helix.tangents(shape, quarter, name, "left") - printed.tangent(radius, shape.pitch, s)))
-        normals = max(normals, _most(helix.normals(shape, quarter, name, "left") - printed.normal(s)))
+        curve = max(curve, largest(ours - printed.path(radius, shape.pitch, s)))
+        tangents = max(
+            tangents, largest(helix.tangents(shape, quarter, name, "left") - printed.tangent(radius, shape.pitch, s))
+        )
+        normals = max(normals, largest(helix.normals(shape, quarter, name, "left") - printed.normal(s)))
     example = helix.forward(_SHARE, _ANGLE, PAPER_DIAMETER)
     torsion = printed.curvature_torsion(example.outer_radius, example.pitch)[1]
     signed = helix.curvature_torsion(example, "outer", "left")[1]
@@ -65,12 +67,12 @@ def paths() -> list[Row]:
         equation("(9)", "normals of the three paths", normals, "", _RANDOM),
     ]
     straight = helix.forward(1.0, np.array(PAPER_ANGLES), PAPER_DIAMETER)
-    apart = _most(printed.actuator_angle(np.asarray(PAPER_DIAMETER), straight.pitch) - PAPER_ANGLES)
+    apart = largest(printed.actuator_angle(np.asarray(PAPER_DIAMETER), straight.pitch) - PAPER_ANGLES)
     rows.append(
         equation("(2)", "angle of the actuator on the straight tube", apart, "rad", "2.5, 5 and 10 degrees, lambda = 1")
     )
     outer, inner, centre = (helix.tangents(shape, s, name) for name in _PATHS)
-    apart = _most(np.sum(outer * inner, axis=-1) - np.cos(2 * angle))
+    apart = largest(np.sum(outer * inner, axis=-1) - np.cos(2 * angle))
     rows.append(equation("(10)", "outer and inner tangent, cos 2 theta", apart, "", _RANDOM))
     outer, inner, centre = (helix.tangents(example, 0.0, name) for name in _PATHS)
     for name, other in (("outer", outer), ("inner", inner)):
@@ -89,12 +91,12 @@ def closed_form() -> list[Row]:
     plain = Shape(shape.outer_radius, shape.inner_radius, shape.pitch)
     actuator = helix.inverse(shape)
     given = printed.forward(share, angle, tube)
-    apart = max(_most((ours - theirs) / shape.outer_radius) for ours, theirs in zip(plain, given, strict=True))
+    apart = max(largest((ours - theirs) / shape.outer_radius) for ours, theirs in zip(plain, given, strict=True))
     rows = [
-        equation("(6)", "contraction from a shape", _most(actuator.contraction - printed.contraction(plain)), "", _RANDOM),
-        equation("(7)", "diameter from a shape", _most(actuator.diameter - printed.diameter(plain)), "m", _RANDOM),
+        equation("(6)", "contraction from a shape", largest(actuator.contraction - printed.contraction(plain)), "", _RANDOM),
+        equation("(7)", "diameter from a shape", largest(actuator.diameter - printed.diameter(plain)), "m", _RANDOM),
         equation(
-            "(11)", "angle from a shape, cos 2 theta", _most(np.cos(2 * actuator.angle) - printed.cosine(plain)), "", _RANDOM
+            "(11)", "angle from a shape, cos 2 theta", largest(np.cos(2 * actuator.angle) - printed.cosine(plain)), "", _RANDOM
         ),
         equation("(12)", "Ro, Ri and b from an actuator", apart, "", f"relative to Ro; {_RANDOM}", 1e-10),
     ]
@@ -105,12 +107,12 @@ def closed_form() -> list[Row]:
         values.append(ours)
         by_shape = printed.curvature_torsion(shape.radius(name), shape.pitch)
         by_actuator = printed.curvatures_torsions(share, angle, tube)[at : at + 2]
-        apart = max(apart, *(_most((one - other) * tube) for one, other in zip(ours, by_shape, strict=True)))
-        form = max(form, *(_most((one - other) * tube) for one, other in zip(ours, by_actuator, strict=True)))
+        apart = max(apart, *(largest((one - other) * tube) for one, other in zip(ours, by_shape, strict=True)))
+        form = max(form, *(largest((one - other) * tube) for one, other in zip(ours, by_actuator, strict=True)))
     rows.append(equation("(13)", "curvature and torsion from Ro, Ri and b", apart, "", f"times D; {_RANDOM}"))
     pitches = [torsion / (torsion**2 + curvature**2) for curvature, torsion in values]
     rows.append(
-        equation("(14)", "pitch of both paths from curvature and torsion", _most(pitches[0] - pitches[1]), "m", _RANDOM)
+        equation("(14)", "pitch of both paths from curvature and torsion", largest(pitches[0] - pitches[1]), "m", _RANDOM)
     )
     rows.append(equation("(15)", "curvature and torsion from an actuator", form, "", f"times D; {_RANDOM}", 1e-10))
     example = helix.forward(_SHARE, _ANGLE, PAPER_DIAMETER)
@@ -126,7 +128,7 @@ def measuring() -> list[Row]:
     share, angle, tube = _random()
     shape = helix.forward(share, angle, tube)
     length = {name: printed.turn_length(shape.radius(name), shape.pitch) for name in ("outer", "inner")}
-    apart = max(_most(helix.turn_angle(shape, arc, name) - 2 * np.pi) for name, arc in length.items())
+    apart = max(largest(helix.turn_angle(shape, arc, name) - 2 * np.pi) for name, arc in length.items())
     rows = [equation("(17)", "length of a turn, as the angle that it makes", apart, "rad", _RANDOM)]
     example = helix.forward(_SHARE, _ANGLE, PAPER_DIAMETER)
     outer, inner = (float(printed.turn_length(example.radius(name), example.pitch)) for name in ("outer", "inner"))
@@ -141,14 +143,14 @@ def measuring() -> list[Row]:
         unit = "cm" if name != "b" else "cm/rad"
         rows.append(erratum("(16)", f"{name} from the arcs of a turn", 100.0 * float(one), 100.0 * float(other), unit, why))
     back = helix.measure(length["outer"], length["inner"], tube)
-    apart = _most(
+    apart = largest(
         np.stack([back.outer_radius - shape.outer_radius, back.inner_radius - shape.inner_radius]) / shape.outer_radius
     )
     rows.append(
         equation("(16), mended", "Ro and Ri from the arcs, against (12)", apart, "", f"relative to Ro; {_RANDOM}", 1e-10)
     )
     stopper, gap = np.random.default_rng(2).uniform(0.001, 0.02, (2, 100))
-    apart = _most(helix.contraction_from_stoppers(stopper, gap) - stopper / (stopper + gap))
+    apart = largest(helix.contraction_from_stoppers(stopper, gap) - stopper / (stopper + gap))
     told = "stopper / (stopper + gap)"
     rows.append(taken(equation("section III-A.2", "contraction from stoppers and gaps", apart, "", told)))
     return rows
@@ -178,9 +180,9 @@ def figures_5_to_7() -> list[Row]:
         rows.append(absent(MEASURED, "Figure 7", f"mean error of the {name}", text, "mm", told))
     angles = np.array(PAPER_ANGLES)
     start, end = helix.forward(1.0, angles, PAPER_DIAMETER), helix.forward(1e-15, angles, PAPER_DIAMETER)
-    apart = _most(np.stack([start.outer_radius - PAPER_DIAMETER / 2, start.pitch - PAPER_DIAMETER / (2 * np.tan(angles))]))
+    apart = largest(np.stack([start.outer_radius - PAPER_DIAMETER / 2, start.pitch - PAPER_DIAMETER / (2 * np.tan(angles))]))
     rows.append(equation("Figure 7", "start of the curves: Ro = D/2, b that of the actuator", apart, "m", "lambda = 1"))
-    apart = _most(np.stack([end.outer_radius - PAPER_DIAMETER, end.inner_radius, end.pitch]))
+    apart = largest(np.stack([end.outer_radius - PAPER_DIAMETER, end.inner_radius, end.pitch]))
     rows.append(equation("Figure 7", "end of the curves: Ro = D, Ri = 0, b = 0", apart, "m", "lambda = 1e-15"))
     for angle in PAPER_ANGLES:
         name = f"{np.degrees(angle):.4g} degrees"
@@ -212,10 +214,10 @@ def grasping() -> list[Row]:
     apart = float(found.unwrapping[-1, 0]) - 10e3 * _volume_lost()
     told = "our V(L) by differences, 10 kPa; the paper gives no volume"
     rows.append(equation("(18)", "F = P dV/dL for bound (a) of our model", abs(apart), "N", told, 1e-6))
-    apart = _most(found.force * pressures[-1] - found.force[-1] * pressures)
+    apart = largest(found.force * pressures[-1] - found.force[-1] * pressures)
     rows.append(taken(equation("Figure 9", "force linear in the pressure, our model", apart / 10e3, "N", "0 to 10 kPa")))
     told = "bound (b) of our model"
-    apart = _most(found.force[:, 0])
+    apart = largest(found.force[:, 0])
     rows.append(taken(equation("Figure 9", "no force where the radius is not deflected, our model", apart, "N", told)))
     told = "our model, not the paper's; 10 kPa, D = 3.31 cm assumed. The paper's forces are not printed, and rise up to 4 mm"
     for depth, force in zip(test.deflections, found.force[-1], strict=True):
@@ -254,11 +256,6 @@ def _random() -> tuple[FloatArray, FloatArray, FloatArray]:
     random = np.random.default_rng(2018)
     angles = random.uniform(np.radians(1.0), np.radians(45.0), _CASES)
     return random.uniform(0.2, 0.98, _CASES), angles, random.uniform(0.01, 0.1, _CASES)
-
-
-def _most(values: FloatArray) -> float:
-    """Largest size of a number."""
-    return float(np.abs(values).max())
 
 
 JOBS = (paths, closed_form, measuring, figures_5_to_7, grasping)

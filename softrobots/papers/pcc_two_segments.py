@@ -13,7 +13,7 @@ from softrobots.checks import FloatArray
 from softrobots.constant_curvature import Arc, poses
 from softrobots.papers import pcc_equations as printed
 from softrobots.papers.pcc_equations import Segment
-from softrobots.papers.rows import UNPUBLISHED, UNREADABLE, Row, absent, equation, erratum, own, rounded, taken
+from softrobots.papers.rows import UNPUBLISHED, UNREADABLE, Row, absent, equation, erratum, largest, own, rounded, taken
 from softrobots.robots import PccArm
 
 TITLE = "Two-segment arm [PCC paper]"
@@ -62,25 +62,25 @@ def one_segment() -> list[Row]:
         equation(
             "(2)",
             "slope of the chord, 90 degrees less half the bending",
-            _most(slope - np.pi / 2 + arc.bending / 2),
+            largest(slope - np.pi / 2 + arc.bending / 2),
             "rad",
             _RANDOM,
         ),
         equation(
             "(3)-(5)",
             "tip in the bending plane",
-            _most(flat[:, (0, 2), 3] - planar),
+            largest(flat[:, (0, 2), 3] - planar),
             "m",
             "the figures lay azimuth 0 into y-z, (9) into x-z; (9) counts",
         ),
-        equation("(6), (7), (9)", "tip of a segment", _most(ours[:, :3, 3] - printed.tip(segment)), "m", _RANDOM),
+        equation("(6), (7), (9)", "tip of a segment", largest(ours[:, :3, 3] - printed.tip(segment)), "m", _RANDOM),
     ]
     example, shape = _example()
     height, right = float(printed.tip_height(example[0])), float(cc.transform(shape[0], "bending_plane")[2, 3])
     told = "printed r sin alpha, must be r sin theta, as in (9) and (14); our example"
     rows.append(erratum("(8)", "height of the tip", height, right, "m", told))
-    rows.append(equation("(11)-(13)", "rotation as a product", _most(ours[:, :3, :3] - rotation), "", _RANDOM))
-    rows.append(equation("(14), (15)", "transform, all entries", _most(ours - printed.pose(segment)), "m", _RANDOM))
+    rows.append(equation("(11)-(13)", "rotation as a product", largest(ours[:, :3, :3] - rotation), "", _RANDOM))
+    rows.append(equation("(14), (15)", "transform, all entries", largest(ours - printed.pose(segment)), "m", _RANDOM))
     told = "the frame of (14) turns with the azimuth, a body without twist does not; our example"
     angle = float(np.degrees(_angle(cc.transform(shape[0]), cc.transform(shape[0], "bending_plane"))))
     rows.append(own("(14)", "turn between the paper's frame and that of the body", angle, "degrees", told))
@@ -92,7 +92,7 @@ def two_segments() -> list[Row]:
     (one, first), (two, second) = _random(2)
     ours = cc.chain_transform([first, second], frame="bending_plane")
     product = printed.pose(one) @ printed.pose(Segment(two.radius, two.bending, two.azimuth + printed.OFFSET))
-    rows = [equation("(15) x (16)", "transform of two segments, product, all entries", _most(ours - product), "m", _RANDOM)]
+    rows = [equation("(15) x (16)", "transform of two segments, product, all entries", largest(ours - product), "m", _RANDOM)]
     example, shape = _example()
     tip = cc.chain_transform(shape, frame="bending_plane")[:3, 3]
     turned = cc.transform(Arc(shape[1].length, shape[1].bending, shape[1].azimuth + printed.OFFSET), "bending_plane")
@@ -103,7 +103,7 @@ def two_segments() -> list[Row]:
     x, _, z = (float(number) for number in printed.second_tip(*example))
     told = f"no term r1 cos a1 (1 - cos t1), and cos a1 sin t1 sin t2 with a minus; {_SURE}; our example"
     rows.append(erratum("(17)", "x of the tip", x, float(tip[0]), "m", told))
-    apart = _most(printed.second_tip(one, two)[:, 1] - ours[:, 1, 3])
+    apart = largest(printed.second_tip(one, two)[:, 1] - ours[:, 1, 3])
     rows.append(equation("(18)", "y of the tip", apart, "m", _RANDOM))
     told = "printed cos t1 cos t2 in the end, must be cos t1 sin t2; our example"
     rows.append(erratum("(19)", "z of the tip", z, float(tip[2]), "m", told))
@@ -127,39 +127,39 @@ def muscles() -> list[Row]:
     lengths = cc.muscles_from_arc(arc, DISTANCE)
     rows = [
         equation(
-            "(20)-(22)", "lengths of the muscles", _most(lengths - printed.muscle_lengths(segment, DISTANCE)), "m", _RANDOM
+            "(20)-(22)", "lengths of the muscles", largest(lengths - printed.muscle_lengths(segment, DISTANCE)), "m", _RANDOM
         ),
         absent(UNREADABLE, "(23)-(25), (28)", "steps of the derivation", note="the signs; (26) and (27) follow and are right"),
     ]
     cosines = np.cos(printed.muscle_angles(segment.azimuth))
     left = (lengths[:, 0] - lengths[:, 1]) * (cosines[:, 0] - cosines[:, 2])
     right = (lengths[:, 0] - lengths[:, 2]) * (cosines[:, 0] - cosines[:, 1])
-    rows.append(equation("(26), (27)", "proportion of the differences", _most(left - right), "m", _RANDOM))
+    rows.append(equation("(26), (27)", "proportion of the differences", largest(left - right), "m", _RANDOM))
     example, _ = _example()
     sides = printed.tangent_balance(LENGTHS[0], example[0].azimuth)
     told = f"left side of the equation; printed (l1 - l3) - (l1 - l2), must be the other way round; {_SURE}; (31) is right"
     rows.append(erratum("(30)", "balance that gives the tangent", float(sides[0]), float(sides[1]), "m", told))
     found = cc.arc_from_muscles(lengths, DISTANCE)
-    apart = _most(np.sin(found.azimuth) - printed.tangent(lengths) * np.cos(found.azimuth))
+    apart = largest(np.sin(found.azimuth) - printed.tangent(lengths) * np.cos(found.azimuth))
     told = "sin = tan cos, as the tangent itself grows without limit"
     rows.append(equation("(31)", "tangent of the azimuth", apart, "", told, 1e-10))
     # The root of (41) cancels: 1e-16 of 0.8 m^2 over twice the root of 1e-4 m^2 or more.
-    apart = _most(np.stack([np.cos(found.azimuth) - printed.cosine(lengths), np.sin(found.azimuth) - printed.sine(lengths)]))
+    apart = largest(np.stack([np.cos(found.azimuth) - printed.cosine(lengths), np.sin(found.azimuth) - printed.sine(lengths)]))
     rows.append(equation("(32), (33)", "cosine and sine of the azimuth", apart, "", _RANDOM, 1e-10))
     behind = cc.muscles_from_arc(Arc(*np.array((0.5, 1.0, np.radians(150.0)))), DISTANCE)
     told = "a plain arctangent loses the quadrant; atan2 of (33) and (32) keeps it. Bent towards 150 degrees, ours"
     plain, whole = np.degrees(printed.azimuth(behind)), np.degrees(cc.arc_from_muscles(behind, DISTANCE).azimuth)
     rows.append(erratum("(34)", "azimuth", float(plain), float(whole), "degrees", told))
-    apart = _most(arc.length[:, None] / segment.radius[:, None] - lengths / (segment.radius[:, None] - DISTANCE * cosines))
+    apart = largest(arc.length[:, None] / segment.radius[:, None] - lengths / (segment.radius[:, None] - DISTANCE * cosines))
     rows.append(equation("(35), (36)", "bending from any muscle, l/r = l_i/r_i", apart, "rad", _RANDOM))
-    apart = _most(segment.radius[:, None] * (arc.length[:, None] - lengths) - arc.length[:, None] * DISTANCE * cosines)
+    apart = largest(segment.radius[:, None] * (arc.length[:, None] - lengths) - arc.length[:, None] * DISTANCE * cosines)
     rows.append(equation("(37), (38)", "r (l - l_i) = l d cos alpha_i", apart, "m^2", _RANDOM))
-    rows.append(equation("(39)", "length of the backbone", _most(found.length - printed.length(lengths)), "m", _RANDOM))
+    rows.append(equation("(39)", "length of the backbone", largest(found.length - printed.length(lengths)), "m", _RANDOM))
     clear = np.abs(np.cos(arc.azimuth)) > 0.2
-    apart = _most((found.length / found.bending / printed.radius(lengths, DISTANCE) - 1.0)[clear])
+    apart = largest((found.length / found.bending / printed.radius(lengths, DISTANCE) - 1.0)[clear])
     told = "relative; 0/0 where the first muscle keeps the length of the backbone: |cos alpha| > 0.2"
     rows.append(equation("(40)", "radius of curvature", apart, "", told, 1e-10))
-    apart = _most(found.bending - printed.bending(lengths, DISTANCE))
+    apart = largest(found.bending - printed.bending(lengths, DISTANCE))
     rows.append(equation("(41)", "bending angle", apart, "rad", f"{_RANDOM}; the root cancels near straight", 1e-10))
     return rows
 
@@ -186,11 +186,6 @@ def _angle(one: FloatArray, other: FloatArray) -> float:
     """Angle of the turn between two frames [rad]."""
     turn = one[:3, :3].T @ other[:3, :3]
     return float(np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0)))
-
-
-def _most(values: FloatArray) -> float:
-    """Largest size of a number."""
-    return float(np.abs(values).max())
 
 
 JOBS = (sizes, one_segment, two_segments, muscles)

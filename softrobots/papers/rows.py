@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from softrobots.checks import choice, finite_number
+import numpy as np
+
+from softrobots.checks import FloatArray, choice, finite_number
 from softrobots.errors import ParameterError
 
 AGREES, TAKEN, ERRATUM, OURS = "agrees", "by construction", "erratum", "ours alone"
@@ -242,6 +244,11 @@ def absent(kind: str, place: str, quantity: str, printed: str = "", unit: str = 
     """
     choice("kind", kind, (MEASURED, UNPUBLISHED, UNREADABLE))
     return Row(place=place, quantity=quantity, kind=kind, unit=unit, printed=printed, note=note)
+
+
+def largest(values: FloatArray) -> float:
+    """Largest size of a number, e.g. of the differences between two ways to compute the same."""
+    return float(np.abs(values).max())
 
 
 def _number(printed: str) -> tuple[float, int]:
