@@ -12,7 +12,6 @@ import http.server
 import logging
 import os
 import shutil
-import socket
 import sys
 import tempfile
 from pathlib import Path
@@ -21,6 +20,7 @@ from typing import Any
 import softrobots as sr
 from softrobots.command_line import exit_status, serve
 from softrobots.files import free_folder, make_folder
+from softrobots.served_page import LOOPBACK, tunnel_to
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MARK = ".softrobots-site"
@@ -47,19 +47,19 @@ class ServedFolder:
         quiet = type("Quiet", (http.server.SimpleHTTPRequestHandler,), {"log_message": lambda *_: None})
         handler = functools.partial(quiet, directory=str(folder))
         try:
-            self._server = http.server.ThreadingHTTPServer(("127.0.0.1", port), handler)
+            self._server = http.server.ThreadingHTTPServer((LOOPBACK, port), handler)
         except (OSError, OverflowError) as error:
             raise sr.ViewerError(f"cannot serve on port {port}: {error}") from error
 
     @property
     def url(self) -> str:
         """Its address."""
-        return f"http://127.0.0.1:{self._server.server_port}/"
+        return f"http://{LOOPBACK}:{self._server.server_port}/"
 
     @property
     def tunnel(self) -> str:
         """The command that makes it reachable from another machine."""
-        return f"ssh -L {self._server.server_port}:127.0.0.1:{self._server.server_port} {socket.gethostname()}"
+        return tunnel_to(self._server.server_port)
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""

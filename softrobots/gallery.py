@@ -55,7 +55,7 @@ def circling_arm(force: float, duration: float = 6.0) -> Viewer:
     model, targets = load_model(InflatableArm()), circle()
     times = np.linspace(0.0, duration, len(targets))
     viewer = view(model, follow_trajectory(model, targets, (0.0, 0.0, -force), times=times, elbow="up", progress="path"))
-    viewer.look_from((0.42, -0.86, 0.46), (0.22, 0.0, 0.24))
+    viewer.look_from((0.36, -0.98, 0.48), (0.15, 0.0, 0.2))
     return viewer
 
 

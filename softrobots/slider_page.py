@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
-import socket
 import threading
-import time
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -17,11 +13,11 @@ from softrobots.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.errors import NeutralEquilibrium, NotConverged, ParameterError, ViewerError
 from softrobots.loads import EARTH_GRAVITY
 from softrobots.meshcat_view.robot import RobotDrawing
-from softrobots.meshcat_view.server import LOOPBACK
 from softrobots.meshcat_view.stage import Stage
 from softrobots.model import SoftModel, check_model
 from softrobots.scene import Scene
 from softrobots.sensitivity import compliance
+from softrobots.served_page import LOOPBACK, ServedPage
 from softrobots.viser_view.server import end_server, start_server
 from softrobots.viser_view.slider_panel import SliderPanel, Wish, round_down
 from softrobots.viser_view.tree import ViserTree
@@ -32,7 +28,7 @@ _ANY_FORCE = 10.0  # [N], the largest force on a robot that does not bend
 _TRAIL = 2000  # most points of the path of the tip
 
 
-class SliderPage:
+class SliderPage(ServedPage):
     """A page with sliders for one robot, served by viser on loopback only; a context manager that ends its server.
 
     The equilibrium is solved anew at every change, from the one that is shown: a robot that has snapped through stays on its
@@ -103,28 +99,15 @@ class SliderPage:
         self._worker.start()
         atexit.register(self.close)
 
-    def __enter__(self) -> SliderPage:
-        """Return the page."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """End the server."""
-        self.close()
-
     @property
     def url(self) -> str:
         """Address of the page; reachable from this machine only."""
         return f"http://{LOOPBACK}:{self._port}/"
 
     @property
-    def port(self) -> int:
-        """The port that is really used; 8080 if it was free."""
-        return self._port
-
-    @property
-    def tunnel(self) -> str:
-        """Command to type on another machine to see the page there, at the same address."""
-        return f"ssh -L {self.port}:{LOOPBACK}:{self.port} {socket.gethostname()}"
+    def serving(self) -> bool:
+        """Whether the server runs."""
+        return not self._closed.is_set()
 
     @property
     def equilibrium(self) -> Equilibrium:
@@ -165,12 +148,6 @@ class SliderPage:
             if self._problem is not None:
                 raise self._problem
             return self._equilibrium
-
-    def wait(self) -> None:
-        """Serve until Ctrl-C or until the page is closed."""
-        with contextlib.suppress(KeyboardInterrupt):
-            while not self._closed.is_set():
-                time.sleep(0.2)
 
     def close(self) -> None:
         """End the server and its threads; the page stays as it is in browsers that show it."""

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import socket
-import time
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from softrobots.checks import FloatArray, finite_array, positive_integer, positive_number
@@ -15,17 +11,18 @@ from softrobots.errors import ParameterError, ViewerError
 from softrobots.files import new_file, write_text
 from softrobots.inverse_kinematics import IkSolution
 from softrobots.meshcat_view.inline_page import InlinePage
-from softrobots.meshcat_view.page_text import page_text
+from softrobots.meshcat_view.page_text import legend_rows, live_page, page_text
 from softrobots.meshcat_view.robot import RobotDrawing
-from softrobots.meshcat_view.server import connect, end_server, start_server
+from softrobots.meshcat_view.server import connect, end_server, start_server, tell_server
 from softrobots.meshcat_view.stage import Stage
 from softrobots.model import SoftModel, check_model
 from softrobots.robots import HelixTube
 from softrobots.scene import Scene
+from softrobots.served_page import ServedPage
 from softrobots.trajectory import Trajectory
 
 
-class Viewer:
+class Viewer(ServedPage):
     """A meshcat page that shows one robot; a context manager that ends its server.
 
     The deformed robot is opaque; the rigid one, with the same motors and relaxed springs, is translucent. Inflated links are
@@ -54,32 +51,17 @@ class Viewer:
             self._stage = Stage(self._page, root, model)
             self._robot = RobotDrawing(root, model, scene, self._stage.size)
             self._stage.prepare(scene.ground())
+            tell_server(self._page, "page", live_page(model.pinocchio.name))
+            self._legend = ""
+            self._show_legend()
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Viewer:
-        """Return the viewer."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """End the server."""
-        self.close()
 
     @property
     def url(self) -> str:
         """Address of the page; reachable from this machine only."""
         return self._url
-
-    @property
-    def port(self) -> int:
-        """The port that is really used; 7000 if it was free."""
-        return int(self._url.split(":")[2].split("/")[0])
-
-    @property
-    def tunnel(self) -> str:
-        """Command to type on another machine to see the page there, at the same address."""
-        return f"ssh -L {self.port}:127.0.0.1:{self.port} {socket.gethostname()}"
 
     @property
     def serving(self) -> bool:
@@ -98,6 +80,7 @@ class Viewer:
         """
         self._check(equilibrium)
         self._robot.show(equilibrium)
+        self._show_legend()
 
     def show_configuration(self, q: FloatArray) -> None:
         """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling, the chain alone.
@@ -108,6 +91,7 @@ class Viewer:
         q = finite_array("q", q, (self._model.pinocchio.nq,))
         self._check_open()
         self._robot.show_configuration(q)
+        self._show_legend()
 
     def trace(self, points: Any) -> None:
         """Draw a path as dots.
@@ -121,6 +105,7 @@ class Viewer:
         """
         self._check_open()
         self._robot.trace(finite_array("points", points, (None, 3), "m"))
+        self._show_legend()
 
     def mark(self, target: Any) -> None:
         """Draw a cross at a target, in place of the last one.
@@ -134,6 +119,7 @@ class Viewer:
         """
         self._check_open()
         self._robot.mark(None if target is None else finite_array("target", target, (3,), "m"))
+        self._show_legend()
 
     def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1000) -> None:
         """Play a trajectory as a meshcat animation, path and forces included; it starts by itself and can be scrubbed.
@@ -155,6 +141,7 @@ class Viewer:
         positive_integer("repetitions", repetitions)
         self._stage.look_at(trajectory.tip_positions.mean(axis=0))
         self._page.set_animation(self._robot.animation(trajectory, seconds), play=True, repetitions=repetitions)
+        self._show_legend()
 
     def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
         """Play the growth of a helical tube: it everts at its tip, and the helix forms behind the tip.
@@ -177,6 +164,7 @@ class Viewer:
         animation, along = self._robot.growth(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
         self._stage.look_at(along.max(axis=0) + along.min(axis=0))
         self._page.set_animation(animation, play=True, repetitions=1000)
+        self._show_legend()
 
     def look_at(self, tip: FloatArray) -> None:
         """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
@@ -246,18 +234,19 @@ class Viewer:
         """What Jupyter shows of a viewer: `inline`."""
         return self.inline()._repr_html_()
 
-    def wait(self) -> None:
-        """Serve until Ctrl-C or until the server ends."""
-        with contextlib.suppress(KeyboardInterrupt):
-            while self.serving:
-                time.sleep(0.2)
-
     def close(self) -> None:
         """End the server; the page stays as it is in browsers that show it."""
         page = getattr(self, "_page", None)
         if page is not None:
             page.window.zmq_socket.close(linger=0)
         end_server(self._server)
+
+    def _show_legend(self) -> None:
+        """Bring the legend of the served page up to what is drawn."""
+        rows = legend_rows(self._robot.legend())
+        if rows != self._legend:
+            tell_server(self._page, "legend", rows)
+            self._legend = rows
 
     def _check(self, equilibrium: Any) -> None:
         check_same_model(self._model, equilibrium)

@@ -268,6 +268,15 @@ def test_lines_arrive_in_pieces_and_end_with_the_pipe(arm: sr.SoftModel) -> None
     os.close(reader)
 
 
+def test_what_never_ends_a_line_is_refused(arm: sr.SoftModel) -> None:
+    live = live_arm(arm)
+    with Path("/dev/zero").open("rb") as zeros:
+        lines = Lines(zeros.fileno(), print)
+        assert [lines.read(live) for _ in range(15)] == [None] * 15  # 64 KiB each: 983040 bytes
+        with pytest.raises(sr.FileFormatError, match="at most 1000000 bytes"):
+            lines.read(live)
+
+
 # --- A watched file
 
 

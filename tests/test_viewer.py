@@ -101,6 +101,28 @@ def test_two_viewers_take_two_ports(arm: sr.SoftModel) -> None:
         other.show(sr.solve_equilibrium(arm, (0, 0.1, -0.5), FORCE))
 
 
+def test_a_server_keeps_the_last_value_of_a_property_only(arm: sr.SoftModel) -> None:
+    """Or every new browser were told every colour of a long live session."""
+    with Viewer(arm) as viewer:
+        sizes = []
+        for _ in range(3):
+            for motors in ((0.0, 0.0, 0.0), (0.0, 0.6, -0.8)):
+                viewer.show(sr.solve_equilibrium(arm, motors, (0, 0, -15)))
+                viewer.look_at(np.array([1.0, 0.0, 0.0]))
+            sizes.append(len(viewer._page.static_html()))
+    assert sizes[1] == sizes[2]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs SIGSTOP")
+def test_a_server_that_does_not_answer_is_an_error_of_ours(arm: sr.SoftModel) -> None:
+    with Viewer(arm) as viewer:
+        viewer._page.window.zmq_socket.rcvtimeo = 200  # [ms], for 30 s
+        viewer._server.send_signal(signal.SIGSTOP)
+        with pytest.raises(sr.ViewerError, match="does not answer"):
+            viewer.trace([(0, 0, 0)])
+        viewer._server.send_signal(signal.SIGCONT)
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_server_ends_when_its_parent_is_killed(how: int) -> None:
@@ -152,20 +174,31 @@ def test_the_page_draws_the_robot_and_the_animation_moves_it(
 
 
 def test_page_and_websocket_work_through_a_forwarded_port(browser: object, arm: sr.SoftModel) -> None:
-    """As an SSH tunnel does: another loopback port carries bytes to the server and back; live updates arrive."""
+    """As an SSH tunnel does: another loopback port carries bytes to the server and back; live updates and legends arrive."""
     with Viewer(arm) as viewer, forwarded(viewer.port) as port:
         page = browser.new_page(viewport={"width": 800, "height": 600})
         sockets: list[object] = []
         page.on("websocket", lambda opened: sockets.append(opened))
+        requests: list[str] = []
+        page.on("request", lambda request: requests.append(request.url))
         page.goto(f"http://127.0.0.1:{port}/static/")
         viewer.show(sr.solve_equilibrium(arm, (0.0, 0.6, -0.8), FORCE))
         show_share(page, 0.0)
         first = pixels(page.screenshot())
-        viewer.show(sr.solve_equilibrium(arm, (0.0, 1.4, -1.8), FORCE))
+        legend = page.locator("#softrobots-legend").inner_text().splitlines()
+        assert legend[:3] == ["inflatable_arm", "rigid arm, same motor angles", "force"]
+        assert legend[-1] == "wrinkled"
+        viewer.show(sr.solve_equilibrium(arm, (0.0, 1.4, -1.8)))
+        viewer.mark((0.4, 0.2, 0.1))
         page.wait_for_timeout(500)
         show_share(page, 0.0)
         second = pixels(page.screenshot())
-        assert [opened.url for opened in sockets] == [f"ws://127.0.0.1:{port}/"]
+        told = page.locator("#softrobots-legend").inner_text().splitlines()
+        assert told == [*(text for text in legend[:2]), "target (cross)", *legend[3:]]  # no force, a mark
+        assert requests == [f"http://127.0.0.1:{port}/static/", f"http://127.0.0.1:{port}/static/main.min.js"]
+        page.reload()  # a browser that comes later is told what holds now
+        page.get_by_text("target (cross)").wait_for()
+        assert {opened.url for opened in sockets} == {f"ws://127.0.0.1:{port}/"}
         assert coloured(first) > 3000
         assert np.count_nonzero(np.abs(first - second).max(axis=2) > 30) > 5000
 

@@ -19,7 +19,7 @@ PALM = f"""<robot name="palm">
     </visual>
     <visual>
       <origin xyz="0 0 0.09"/><geometry><cylinder radius="{CYLINDER}" length="0.1"/></geometry>
-      <material name="object"><color rgba="0.2 0.6 0.55 1"/></material>
+      <material name="object"><color rgba="0.62 0.64 0.66 1"/></material>
     </visual>
   </link>
 </robot>"""

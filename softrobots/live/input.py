@@ -23,7 +23,7 @@ from softrobots.live.loop import Commands, LiveView
 _WAIT = 0.2  # [s], for input, before a look at whether the page is still there
 _PERIOD = 0.1  # [s], between two looks at a file
 _RECENT = 2.0  # [s]: a file written less than this ago may be written again within one tick of its clock
-_LARGEST = 1_000_000  # bytes of a file of commands
+_LARGEST = 1_000_000  # bytes of a file of commands, or of a line
 _ESCAPE_WAIT = 0.1  # [s], for the rest of what a key sends
 
 _KEY = re.compile(r"\x1b[\[O](\d*)[\d;]*([A-Za-z~])|.", re.DOTALL)
@@ -51,6 +51,9 @@ class Lines:
             self._text, self._open = self._text + part, bool(part)
         line, end, rest = self._text.partition(b"\n")
         if not end and self._open:
+            if len(line) > _LARGEST:
+                self._text = b""
+                raise FileFormatError(f"a line must have at most {_LARGEST} bytes")
             return None
         if not end and not line:
             return live.wanted._replace(done=True)

@@ -26,6 +26,8 @@ _STYLE = """
   @media (max-width: 640px) { #softrobots-legend { top: 30px; font-size: 12px; } }
 """.strip("\n")
 
+_HINT = "Drag: turn. Wheel or two fingers: nearer."
+
 _NOTICE = """
 Packed below with what they draw are MeshCat, Copyright (c) 2018 Robin Deits, and three.js, Copyright (c) 2010-2021 Three.js
 Authors, both under the MIT License: Permission is hereby granted, free of charge, to any person obtaining a copy of this
@@ -40,6 +42,11 @@ SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
 """.strip()
 
 # A window that is narrow for its height shows as much from side to side as one of seven to five, by a smaller scale.
+_FIT = """
+    const fit = () => { viewer.camera.zoom = Math.min(1, innerWidth / innerHeight / 1.4); viewer.set_dirty(); };
+    addEventListener("resize", fit);
+""".strip("\n")
+
 _LOADER = """
   (async () => {
     const text = document.getElementById("softrobots-scene").textContent;
@@ -53,8 +60,7 @@ _LOADER = """
     script.textContent = decoder.decode(pieces[0]);
     document.head.append(script);
     const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-    const fit = () => { viewer.camera.zoom = Math.min(1, innerWidth / innerHeight / 1.4); viewer.set_dirty(); };
-    addEventListener("resize", fit);
+FIT
     for (const numbers of commands) {
       const parts = numbers.map(number => pieces[number]);
       const command = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
@@ -68,7 +74,24 @@ _LOADER = """
     document.getElementById("softrobots-hint").textContent = "This page needs WebGL and a browser of 2023 or newer: " + error;
     throw error;
   });
-""".strip("\n")
+""".strip("\n").replace("FIT", _FIT)
+
+# Meshcat's script takes the commands of the server; the legend, which it does not know, is put where the page has it.
+_FOLLOWER = """
+  {
+    const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+FIT
+    const draw = viewer.handle_command.bind(viewer), legend = document.getElementById("softrobots-rows");
+    viewer.handle_command = command => { command.type === "legend" ? legend.innerHTML = command.text : draw(command); };
+    viewer.connect();
+    viewer.connection.addEventListener("close", () => {
+      document.getElementById("softrobots-hint").textContent = "The program that showed this robot has ended.";
+    });
+    viewer.gui.__folders.Scene.close();
+    fit();
+    window.viewer = viewer;
+  }
+""".strip("\n").replace("FIT", _FIT)
 
 
 def page_text(static: str, title: str, legend: Sequence[tuple[Colour, str]]) -> str:
@@ -93,31 +116,27 @@ def page_text(static: str, title: str, legend: Sequence[tuple[Colour, str]]) -> 
     script, commands = read_page(static)
     ordered = tidied(commands)
     moves = ordered and b"set_animation" in ordered[-1]
-    hint = "Drag: turn. Wheel or two fingers: nearer." + (" Controls: pause, time." if moves else "")
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="softrobots {__version__}">
-<title>{html.escape(title)}</title>
-<style>
-{_STYLE}
-</style>
-</head>
-<body>
-<div id="softrobots-legend"><b>{html.escape(title)}</b>{legend_rows(legend)}
-</div>
-<div id="softrobots-hint">{hint}</div>
-<div id="meshcat-pane"></div>
-<!-- {_NOTICE} -->
+    hint = _HINT + (" Controls: pause, time." if moves else "")
+    scene = f"""<!-- {_NOTICE} -->
 <script id="softrobots-scene" type="text/plain">{packed(script, ordered)}</script>
 <script>
 {_LOADER}
-</script>
-</body>
-</html>
-"""
+</script>"""
+    generator = f'\n<meta name="generator" content="softrobots {__version__}">'
+    return _page(title, f"{legend_rows(legend)}\n", hint, scene, generator)
+
+
+def live_page(title: str) -> str:
+    """Make the page that the meshcat server serves: it draws what the server says, and shows the legend that it is told.
+
+    Args:
+        title: Title of the page.
+
+    Returns:
+        The page.
+    """
+    follower = f'<script src="main.min.js"></script>\n<script>\n{_FOLLOWER}\n</script>'
+    return _page(title, '<div id="softrobots-rows"></div>', _HINT, follower)
 
 
 def legend_rows(legend: Sequence[tuple[Colour, str]]) -> str:
@@ -136,6 +155,28 @@ def scene_of(page: str) -> tuple[str, list[bytes]]:
     if found is None:
         raise ViewerError("this page was not made by softrobots: it holds no packed scene")
     return unpacked(found[1])
+
+
+def _page(title: str, rows: str, hint: str, scene: str, head: str = "") -> str:
+    """What written and served pages share."""
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">{head}
+<title>{html.escape(title)}</title>
+<style>
+{_STYLE}
+</style>
+</head>
+<body>
+<div id="softrobots-legend"><b>{html.escape(title)}</b>{rows}</div>
+<div id="softrobots-hint">{hint}</div>
+<div id="meshcat-pane"></div>
+{scene}
+</body>
+</html>
+"""
 
 
 def _css(colour: Colour) -> str:

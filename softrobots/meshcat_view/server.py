@@ -6,12 +6,11 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from softrobots.errors import ViewerError
-
-LOOPBACK = "127.0.0.1"
-"""The only address that is served."""
+from softrobots.served_page import LOOPBACK
 
 _REPLY_TIME = 30_000  # [ms], longest wait for an answer of the server
 # As a file: as a module of the package it would import Pinocchio first, which takes as long as the server itself.
@@ -70,6 +69,7 @@ def end_server(server: subprocess.Popen[bytes]) -> None:
 def connect(zmq_url: str, web_url: str) -> Any:
     """Connect to a server; returns a `meshcat.Visualizer` whose calls fail rather than wait for ever."""
     import meshcat
+    import zmq
     from meshcat.visualizer import ViewerWindow
 
     class Window(ViewerWindow):  # type: ignore[misc]
@@ -81,4 +81,25 @@ def connect(zmq_url: str, web_url: str) -> Any:
             self.connect_zmq()
             self.zmq_socket.rcvtimeo = _REPLY_TIME
 
+        def send(self, command: Any) -> None:
+            """Send a command, and wait for the answer."""
+            try:
+                super().send(command)
+            except zmq.ZMQError as error:  # ended or stopped while it was asked
+                raise ViewerError(f"the meshcat server does not answer: {error}") from error
+
     return meshcat.Visualizer(window=Window())
+
+
+def tell_server(page: Any, what: str, text: str) -> None:
+    """Tell a server what meshcat itself has no words for.
+
+    Args:
+        page: The `meshcat.Visualizer`.
+        what: "page", the HTML that it serves, or "legend", the rows of the legend on it.
+        text: HTML.
+
+    Raises:
+        ViewerError: If the server does not answer.
+    """
+    page.window.send(SimpleNamespace(lower=lambda: {"type": what, "path": "", "text": text}))

@@ -1,11 +1,13 @@
 """The meshcat server as a process of its own, which `server.start_server` runs; it imports nothing of this package.
 
 Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds the address that it is
-told, and ends when its standard input closes, which happens however the parent ends.
+told, and ends when its standard input closes, which happens however the parent ends. Its page is the one that the parent sends,
+with a legend; and it forgets properties that have been set anew, which meshcat's own keeps and sends to every new browser.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import threading
@@ -14,8 +16,10 @@ from typing import Any
 
 def main() -> None:
     """Serve until standard input closes; print `zmq_url=` and `web_url=` first. Words: the address, and perhaps the port."""
-    from meshcat.servers.zmqserver import ZMQWebSocketBridge
+    import umsgpack
+    from meshcat.servers.zmqserver import ZMQWebSocketBridge, find_node
     from tornado.web import Application, RequestHandler
+    from tornado.websocket import WebSocketClosedError
 
     listen = Application.listen
 
@@ -29,13 +33,58 @@ def main() -> None:
             """Answer with nothing."""
             self.set_status(204)
 
+    class Page(RequestHandler):  # type: ignore[misc]
+        """The page that the parent sent."""
+
+        def get(self) -> None:
+            """Answer with it."""
+            self.set_header("Cache-Control", "no-store")
+            self.finish(bridge.told.get("page", ""))
+
+    class Bridge(ZMQWebSocketBridge):  # type: ignore[misc]
+        """Meshcat's server with a page of our own and its legend."""
+
+        def __init__(self, port: int | None) -> None:
+            self.told: dict[str, str] = {}
+            self.legend = b""
+            super().__init__(port=port)
+
+        def handle_zmq(self, frames: list[bytes]) -> None:
+            """Take a command of the parent."""
+            kind, where, data = frames if len(frames) == 3 else (frames[0], b"", b"")
+            if kind == b"page":
+                self.told["page"] = umsgpack.unpackb(data)["text"]
+                self.zmq_socket.send(b"ok")
+            elif kind == b"legend":
+                self.legend = data
+                self.forward_to_websockets(frames)
+                self.zmq_socket.send(b"ok")
+            else:
+                super().handle_zmq(frames)
+            if kind == b"set_property":
+                node = find_node(self.tree, [part for part in where.decode().split("/") if part])
+                name = umsgpack.unpackb(data)["property"]
+                node.properties = [*(old for old in node.properties[:-1] if umsgpack.unpackb(old)["property"] != name), data]
+
+        def forward_to_websockets(self, frames: list[bytes]) -> None:
+            """Pass a command on to every browser; one that is about to go must not keep the others from it."""
+            for websocket in tuple(self.websocket_pool):
+                with contextlib.suppress(WebSocketClosedError):
+                    websocket.write_message(frames[2], binary=True)
+
+        def send_scene(self, websocket: Any) -> None:
+            """Tell a new browser everything."""
+            super().send_scene(websocket)
+            if self.legend:
+                websocket.write_message(self.legend, binary=True)
+
     Application.listen = listen_on_loopback
     port = int(sys.argv[2]) if len(sys.argv) > 2 else None
     try:
-        bridge = ZMQWebSocketBridge(port=port)
+        bridge = Bridge(port)
     except OSError as error:
         sys.exit(f"port {port}: {error.strerror}")
-    bridge.app.add_handlers(".*", [(r"/favicon\.ico", NoIcon)])
+    bridge.app.add_handlers(".*", [(r"/favicon\.ico", NoIcon), (r"/static/(?:index\.html)?", Page)])
     print(f"zmq_url={bridge.zmq_url}\nweb_url={bridge.web_url}", flush=True)  # noqa: T201
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, sys.stdout.fileno())  # nobody reads on, and a full pipe would block the server

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from softrobots.errors import MissingDependency, ViewerError
-from softrobots.meshcat_view.server import LOOPBACK
+from softrobots.served_page import LOOPBACK
 
 FIRST_PORT = 8080
 """The port that is tried first."""
