@@ -11,13 +11,14 @@ import contextlib
 import os
 import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 
 def main() -> None:
     """Serve until standard input closes; print `zmq_url=` and `web_url=` first. Words: the address, and perhaps the port."""
     import umsgpack
-    from meshcat.servers.zmqserver import ZMQWebSocketBridge, find_node
+    from meshcat.servers.zmqserver import VIEWER_ROOT, ZMQWebSocketBridge, find_node
     from tornado.web import Application, RequestHandler
     from tornado.websocket import WebSocketClosedError
 
@@ -34,12 +35,12 @@ def main() -> None:
             self.set_status(204)
 
     class Page(RequestHandler):  # type: ignore[misc]
-        """The page that the parent sent."""
+        """The page that the parent sent; meshcat's own until it sends one."""
 
         def get(self) -> None:
             """Answer with it."""
             self.set_header("Cache-Control", "no-store")
-            self.finish(bridge.told.get("page", ""))
+            self.finish(bridge.told.get("page") or Path(VIEWER_ROOT, "index.html").read_text(encoding="utf-8"))
 
     class Bridge(ZMQWebSocketBridge):  # type: ignore[misc]
         """Meshcat's server with a page of our own and its legend."""
