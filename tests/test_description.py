@@ -173,7 +173,7 @@ link = st.fixed_dictionaries(
 
 
 @given(st.lists(link, min_size=1, max_size=6))
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_valid_arm_obeys_the_rules_of_portable_urdf(links: list[dict]) -> None:
     """Positive mass above 1e-6 kg, triangle inequality, finite limits, unique names, both copies of every spring."""
     columns = {name: [item[name] for item in links] for name in links[0] if name != "share"}

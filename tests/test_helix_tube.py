@@ -303,7 +303,7 @@ tubes_ = st.fixed_dictionaries(
 
 
 @given(tubes_, st.floats(0.02, 2.8), st.floats(0.004, 0.05), st.integers(0, 3))
-@settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 def test_any_tube_is_on_its_helix_has_its_mass_and_obeys_the_rules_of_portable_urdf(
     tool: Callable[[str], ModuleType], fields: dict, turns: float, thickness: float, more: int
 ) -> None:

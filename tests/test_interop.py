@@ -402,7 +402,7 @@ ROBOTS_ = {
 
 @pytest.mark.parametrize("kind", ROBOTS_)
 @given(data=st.data())
-@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 def test_any_robot_is_refused_with_a_reason_or_the_same_in_every_tool(
     tool: Callable[[str], ModuleType], kind: type, data: st.DataObject
 ) -> None:

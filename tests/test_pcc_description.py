@@ -449,7 +449,7 @@ whole_ = st.fixed_dictionaries(
 
 
 @given(st.lists(segment_, min_size=1, max_size=3), whole_)
-@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 def test_any_valid_arm_obeys_the_rules_of_portable_urdf(
     tool: Callable[[str], ModuleType], segments: list[dict], whole: dict
 ) -> None:

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -201,25 +200,6 @@ def test_page_and_websocket_work_through_a_forwarded_port(browser: object, arm: 
         assert {opened.url for opened in sockets} == {f"ws://127.0.0.1:{port}/"}
         assert coloured(first) > 3000
         assert np.count_nonzero(np.abs(first - second).max(axis=2) > 30) > 5000
-
-
-def test_take_picture_writes_a_png(browser: object, arm: sr.SoftModel, tmp_path: Path) -> None:
-    with view(arm, sr.solve_equilibrium(arm, (0.0, 0.6, -0.8), FORCE)) as viewer:
-        page = viewer.write_html(tmp_path / "a.html")
-    with pytest.MonkeyPatch.context() as patch:  # Playwright's synchronous API runs once at a time
-        patch.setattr("softrobots.browser.open_browser", lambda: nullcontext(browser))
-        shot = take_picture(page, tmp_path / "a.png", width=400, height=300)
-    assert pixels(shot.read_bytes()).shape == (300, 400, 3)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="no file can be made in /proc, not even by root")
-def test_a_picture_that_cannot_be_written_is_an_error_of_ours(browser: object, arm: sr.SoftModel, tmp_path: Path) -> None:
-    with Viewer(arm) as viewer:
-        page = viewer.write_html(tmp_path / "a.html")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("softrobots.browser.open_browser", lambda: nullcontext(browser))
-        with pytest.raises(sr.OutputError, match=r"cannot write /proc/a\.png"):
-            take_picture(page, "/proc/a.png")
 
 
 class forwarded:
