@@ -168,7 +168,7 @@ LINKS = st.tuples(KINDS, AXES, st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples
 
 
 @given(st.lists(LINKS, min_size=1, max_size=6), st.sets(st.integers(0, 5)), st.integers(0, 2**31))
-@settings(max_examples=150)
+@settings(max_examples=80)
 def test_tip_and_energy_of_any_chain(links: list, sprung: set[int], seed: int) -> None:
     """Whatever the axes, placements and kinds of joints."""
 
