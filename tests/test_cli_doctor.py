@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import socket
 from pathlib import Path
 
 import pytest
@@ -71,9 +70,7 @@ def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: 
     assert (status, len(started), len(ended)) == (0, 1, 1)
     process, _, url = started[0]
     assert json.loads(out)["page"] == {"served": True, "url": url, "problem": ""}
-    assert process.poll() is not None
-    with pytest.raises(OSError, match="refused"):
-        socket.create_connection(("127.0.0.1", int(url.split(":")[2].split("/")[0])), timeout=5.0)
+    assert process.poll() is not None  # its port may be somebody else's by now
 
     def no_server() -> None:
         raise sr.ViewerError("the meshcat server ended before it served: no reason")
