@@ -93,7 +93,8 @@ def test_pcc_tells_a_person_the_same(told) -> None:
 @settings(max_examples=12)
 def test_pcc_inverse_and_forward_are_each_others_inverse_and_screw_motions(segments: list, count: int) -> None:
     """The pose of a segment without twist is the exponential of its constant strain: by SciPy."""
-    linalg = pytest.importorskip("scipy.linalg")
+    from scipy import linalg
+
     azimuths = 0.3 + 2.0 * np.pi * np.arange(count) / count
     offsets, distance = ([segment[place] for segment in segments] for place in (3, 4))
     common = ["--azimuths", *words_of(azimuths), "--offsets", *words_of(offsets), "--distance", *words_of(distance)]

@@ -29,24 +29,31 @@ from softrobots.benchmark.arm_contenders import (
     single_name,
     together,
 )
-from softrobots.benchmark.cases import arm, standard_cases
+from softrobots.benchmark.cases import LoadCases, arm, standard_cases
 from softrobots.benchmark.compiled_solvers import BACKENDS
 from softrobots.benchmark.numpy_arrays import ArrayArm
 from softrobots.benchmark.pinocchio_solvers import NEWTON, PinocchioArm, fixed_point, newton_by_torque_derivatives
 from softrobots.benchmark.race import Race, Settings, curve
 from softrobots.benchmark.results import AT_LEAST, AT_MOST, Curve, Row
+from softrobots.checks import FloatArray
 from softrobots.loads import EARTH_GRAVITY
 
 ARRAYS = "NumPy, written plainly"
 
 
-def equilibria(settings: Settings) -> tuple[list[Row], list[str]]:
-    """Equilibria of the arm, weightless: batches and single calls against everything else."""
+def _weightless(settings: Settings) -> tuple[Race, LoadCases, LoadCases, FloatArray]:
+    """The race with our compiled solvers; all cases, the few for single calls, and the springs of those, shape (n, 4) [rad]."""
     race = Race(settings, "equilibria")
     cases = standard_cases(settings.batch)
     few = cases.first(settings.singles)
     expected = expected_springs(few, None)
     add_compiled(race, cases, few, expected, None)
+    return race, cases, few, expected
+
+
+def equilibria(settings: Settings) -> tuple[list[Row], list[str]]:
+    """Equilibria of the arm, weightless: batches and single calls against everything else."""
+    race, cases, few, expected = _weightless(settings)
     add_python(race, few, expected)
     race.add(ARRAYS, lambda: together(ARRAYS, ArrayArm(arm()).equilibria, cases, expected))
     notes: list[str] = []
@@ -81,11 +88,7 @@ def equilibria(settings: Settings) -> tuple[list[Row], list[str]]:
 
 def without_extras(settings: Settings) -> tuple[list[Row], list[str]]:
     """Equilibria of the arm, weightless, against what needs no package beyond the required ones: the short job."""
-    race = Race(settings, "equilibria")
-    cases = standard_cases(settings.batch)
-    few = cases.first(settings.singles)
-    expected = expected_springs(few, None)
-    add_compiled(race, cases, few, expected, None)
+    race, cases, few, expected = _weightless(settings)
     add_pinocchio(race, few, expected)
     race.add(ARRAYS, lambda: together(ARRAYS, ArrayArm(arm()).equilibria, cases, expected))
     race.run()

@@ -12,10 +12,9 @@ from softrobots.checks import finite_array
 from softrobots.commands.answers import add_json, tell, written_lines
 from softrobots.commands.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
 from softrobots.commands.load_argument import add_loads, loads_of
-from softrobots.commands.plot_option import add_plot, check_plot, write_plot
+from softrobots.commands.plot_option import add_plot, check_plot, shape_figure, write_plot
 from softrobots.commands.result_file import add_output, check_output, save
 from softrobots.commands.robot_argument import add_model, motors_of, statics_model_of
-from softrobots.equilibrium import Equilibrium
 from softrobots.errors import ParameterError
 from softrobots.inverse_kinematics import ELBOWS, solve_ik
 from softrobots.model import SoftModel
@@ -114,7 +113,7 @@ def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, A
         wanted = pin.rpy.rpyToMatrix(*finite_array("--rpy", arguments.rpy, (3,), "rad"))
     starts = _STARTS if arguments.starts is None else arguments.starts
     found = solve_ik(model, arguments.target, orientation=wanted, starts=starts, **options)
-    files = save(arguments, found) + write_plot(arguments, lambda: _figure(found.equilibrium))
+    files = save(arguments, found) + write_plot(arguments, lambda: shape_figure(found.equilibrium))
     lines = [*solution_lines(found), *written_lines(files)]
     tell(arguments, {**solution_answer(found), "files": files}, lines)
 
@@ -136,12 +135,6 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
         if wrong:
             value = getattr(arguments, option.removeprefix("--").replace("-", "_"))
             raise ParameterError(option, value, f"given with {requirement}")
-
-
-def _figure(found: Equilibrium) -> Any:
-    from softrobots.arm_plots import loaded_shape
-
-    return loaded_shape(found)
 
 
 def _path_figure(found: Trajectory) -> Any:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from softrobots.equilibrium import Equilibrium
 from softrobots.errors import ParameterError
 from softrobots.files import new_file
 
@@ -58,3 +59,14 @@ def write_plot(arguments: argparse.Namespace, draw: Callable[[], Any]) -> list[P
     from softrobots.plots import write_png
 
     return [write_png(draw(), arguments.plot, overwrite=arguments.overwrite)]
+
+
+def shape_figure(equilibrium: Equilibrium) -> Any:
+    """The loaded robot, as `arm_plots.loaded_shape` draws it; plots are imported when one is asked for.
+
+    Raises:
+        MissingDependency: If matplotlib is not installed.
+    """
+    from softrobots.arm_plots import loaded_shape
+
+    return loaded_shape(equilibrium)

@@ -10,7 +10,7 @@ from softrobots.commands.answers import add_json, aligned, tell, written_lines
 from softrobots.commands.equilibrium_report import coordinate_lines, equilibrium_answer, summary_lines
 from softrobots.commands.facts import spoken
 from softrobots.commands.load_argument import add_loads, loads_of
-from softrobots.commands.plot_option import add_plot, check_plot, write_plot
+from softrobots.commands.plot_option import add_plot, check_plot, shape_figure, write_plot
 from softrobots.commands.result_file import add_output, check_output, save
 from softrobots.commands.robot_argument import add_model, motors_of, statics_model_of
 from softrobots.elastostatics import METHODS, TOLERANCE
@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> None:
         _add_compliance(model, found, answer, lines)
     if arguments.critical_load is not None:
         _add_critical_load(model, found, arguments, answer, told)
-    files = save(arguments, found) + write_plot(arguments, lambda: _figure(found))
+    files = save(arguments, found) + write_plot(arguments, lambda: shape_figure(found))
     answer["files"] = files
     tell(arguments, answer, [*lines, "", *told, *written_lines(files)])
 
@@ -120,9 +120,3 @@ def _add_critical_load(
         return
     answer |= {"critical_load": force, "stable_up_to": force}
     told.append(f"critical load  {spoken(force)} N along {spoken(direction)}")
-
-
-def _figure(found: Equilibrium) -> Any:
-    from softrobots.arm_plots import loaded_shape
-
-    return loaded_shape(found)

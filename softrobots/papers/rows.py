@@ -96,20 +96,9 @@ def rounded(place: str, quantity: str, printed: str, ours: float, unit: str = ""
     Raises:
         ParameterError: If `printed` is no number or ours is not finite.
     """
-    value, decimals = _number(printed)
+    _, decimals = _number(printed)
     tolerance = 0.5 * 10.0**-decimals * (1.0 + 1e-9)  # a value half way between two prints may round to either
-    return Row(
-        place=place,
-        quantity=quantity,
-        kind=AGREES,
-        unit=unit,
-        printed=printed,
-        ours=ours,
-        difference=ours - value,
-        tolerance=tolerance,
-        decimals=decimals + 2,
-        note=note,
-    )
+    return within(place, quantity, printed, ours, tolerance, unit, note)
 
 
 def taken(row: Row) -> Row:
