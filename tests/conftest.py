@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -24,9 +25,11 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """One thread of linear algebra for each of several test processes: more only wait for each other."""
+    """One thread of linear algebra for each of several test processes, as more only wait for each other; Ctrl-C works."""
     if getattr(config.option, "numprocesses", None):
         os.environ.setdefault("OMP_NUM_THREADS", "1")  # before the processes start
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's job in the background; ours would inherit it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def missing(reason: str) -> None:

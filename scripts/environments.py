@@ -1,0 +1,240 @@
+"""Run the tests on every Python that this machine has, and on the lowest versions that pyproject.toml allows.
+
+Environments:
+
+- `3.10`, `3.11`, ...: that Python with the newest of every package, all extras;
+- `lowest`: the lowest supported Python with the lowest version of everything that pyproject.toml names, all extras;
+- `plain`: the lowest supported Python with the lowest versions and no extras: tests of optional tools are skipped.
+
+Each is a new virtual environment beside a copy of the checkout, made by uv. Interpreters are looked for on the PATH and among
+those of pyenv. Prints a table; the exit status is 1 if a test fails anywhere. Takes about eight minutes an environment.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree as ElementTree
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import softrobots as sr
+from softrobots.command_line import exit_status
+from softrobots.files import free_folder, make_folder, write_text
+from softrobots.progress import with_progress
+from softrobots.recorded_run import check_page, write_record
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PYTHONS = ("3.10", "3.11", "3.12", "3.13")
+"""Supported versions of Python."""
+SHOWN = ("pin", "numpy", "numba", "mujoco", "drake")
+"""Packages whose versions are columns of the table."""
+
+
+@dataclass(frozen=True)
+class Environment:
+    """What is installed."""
+
+    name: str
+    """Its name on the command line."""
+    python: str
+    """Version of Python, e.g. "3.10"."""
+    lowest: bool
+    """Whether every package that pyproject.toml names comes in its lowest version."""
+    extra: str
+    """Extra that is installed: `dev` (everything) or `test`."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the tests said."""
+
+    environment: str
+    """Name of the environment."""
+    python: str
+    """Full version of Python."""
+    versions: dict[str, str]
+    """Installed packages."""
+    passed: int
+    """Number of tests that passed."""
+    skipped: int
+    """Number of tests that were skipped."""
+    failed: tuple[str, ...]
+    """Names of the tests that did not pass."""
+    minutes: float
+    """Time of the tests [min]."""
+
+
+ENVIRONMENTS = {python: Environment(python, python, lowest=False, extra="dev") for python in PYTHONS} | {
+    "lowest": Environment("lowest", PYTHONS[0], lowest=True, extra="dev"),
+    "plain": Environment("plain", PYTHONS[0], lowest=True, extra="test"),
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    told = f"environments, of {', '.join(ENVIRONMENTS)} (those whose Python is installed)"
+    made.add_argument("--environment", nargs="+", choices=list(ENVIRONMENTS), metavar="NAME", help=told)
+    made.add_argument("--tests", nargs="+", default=["tests"], metavar="FILE", help="test files (all)")
+    told = "new or empty folder for the reports of the tests (JUnit XML), the output, and results.json"
+    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
+    told = "write the table of docs/validation.md in a checkout (this one); without --environment and --tests"
+    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
+    return made
+
+
+def interpreters() -> dict[str, Path]:
+    """Find a working interpreter of each supported version: on the PATH, then among those of pyenv."""
+    folders = [Path(folder) for folder in os.environ.get("PATH", "").split(os.pathsep) if folder]
+    folders += sorted(Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")).glob("versions/*/bin"))
+    found: dict[str, Path] = {}
+    for python in PYTHONS:
+        for file in (folder / f"python{python}" for folder in folders):
+            if file.is_file() and python not in found and _works(file, python):
+                found[python] = file
+    return found
+
+
+def _works(file: Path, python: str) -> bool:
+    """Whether an interpreter runs, is of that version and can make environments (a shim or a bare one may not)."""
+    told = "import sys, ensurepip; print('%d.%d' % sys.version_info[:2])"
+    done = subprocess.run([file, "-c", told], capture_output=True, text=True, check=False)
+    return done.returncode == 0 and done.stdout.strip() == python
+
+
+def run_tests(environment: Environment, interpreter: Path, tests: list[str], reports: Path) -> Outcome:
+    """Make an environment, run the tests in it, and read their report.
+
+    Raises:
+        OutputError: If the environment cannot be made, or the tests do not write a report.
+    """
+    log = reports / f"{environment.name}.log"
+    with tempfile.TemporaryDirectory(prefix="softrobots_") as temporary, log.open("w", encoding="utf-8") as output:
+        copy = Path(temporary) / "checkout"
+        _copy_checkout(copy)
+        python = copy / ".venv" / "bin" / "python"
+        resolution = ["--resolution", "lowest-direct"] if environment.lowest else []
+        _do([_uv(), "venv", "-q", "--python", interpreter, python.parent.parent], copy, output)
+        _do([_uv(), "pip", "install", "-q", "--python", python, *resolution, "-e", f".[{environment.extra}]"], copy, output)
+        listed = subprocess.run(
+            [_uv(), "pip", "list", "-q", "--format", "json", "--python", python], check=True, capture_output=True
+        )
+        version = subprocess.run(
+            [python, "-c", "import platform; print(platform.python_version())"], check=True, capture_output=True, text=True
+        ).stdout.strip()
+        report = (reports / f"{environment.name}.xml").resolve()
+        asked = [python, "-m", "pytest", "-q", "-n", "auto", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
+        # In CI a missing tool fails its test; without the extras it may be missing.
+        variables = {**os.environ, "CI": "true" if environment.extra == "dev" else "", "VIRTUAL_ENV": str(python.parent.parent)}
+        began = time.perf_counter()
+        subprocess.run(asked, cwd=copy, env=variables, stdout=output, stderr=output, check=False)
+        minutes = (time.perf_counter() - began) / 60.0
+    if not report.is_file():
+        raise sr.OutputError(f"the tests of {environment.name} ended without a report; see {log}")
+    cases = list(ElementTree.parse(report).iter("testcase"))
+    bad = [case for case in cases if case.find("failure") is not None or case.find("error") is not None]
+    skipped = [case for case in cases if case.find("skipped") is not None]
+    return Outcome(
+        environment=environment.name,
+        python=version,
+        versions={package["name"]: package["version"] for package in json.loads(listed.stdout)},
+        passed=len(cases) - len(bad) - len(skipped),
+        skipped=len(skipped),
+        failed=tuple(f"{case.get('classname')}::{case.get('name')}" for case in bad),
+        minutes=round(minutes, 2),
+    )
+
+
+def _uv() -> str:
+    """Where uv is.
+
+    Raises:
+        MissingDependency: If it is not installed.
+    """
+    try:
+        from uv import find_uv_bin
+    except ImportError as error:
+        raise sr.MissingDependency("uv", "dev") from error
+    return str(find_uv_bin())
+
+
+def _copy_checkout(folder: Path) -> None:
+    """Copy the files of the checkout that git knows, or would."""
+    asked = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(asked, cwd=CHECKOUT, check=True, capture_output=True).stdout.decode().split("\0")
+    for name in filter(None, listed):
+        if (CHECKOUT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(CHECKOUT / name, folder / name)
+
+
+def _do(asked: list[str | Path], folder: Path, output: object) -> None:
+    """Run a command of an installation.
+
+    Raises:
+        OutputError: If it fails.
+    """
+    done = subprocess.run(asked, cwd=folder, stdout=output, stderr=output, check=False)
+    if done.returncode:
+        raise sr.OutputError(f"{' '.join(map(str, asked))} failed with status {done.returncode}; see {output.name}")
+
+
+def table(outcomes: list[Outcome]) -> str:
+    """Format the outcomes as Markdown."""
+    head = ["environment", "Python", *SHOWN, "passed", "skipped", "failed", "minutes"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for found in outcomes:
+        versions = [found.versions.get(name, "-") for name in SHOWN]
+        counts = [str(found.passed), str(found.skipped), str(len(found.failed)), f"{found.minutes:.1f}"]
+        lines.append(f"| {' | '.join([found.environment, found.python, *versions, *counts])} |")
+    return "\n".join(lines)
+
+
+def run(arguments: argparse.Namespace) -> bool:
+    """Do the whole job; tell whether every test passed."""
+    _uv()  # tells at once what is missing
+    if arguments.docs is not None:
+        if arguments.environment is not None or arguments.tests != ["tests"]:
+            raise sr.ParameterError("--docs", str(arguments.docs), "given without --environment and --tests")
+        check_page(arguments.docs, "environments")
+    there = interpreters()
+    chosen = [ENVIRONMENTS[name] for name in arguments.environment or ENVIRONMENTS]
+    lacking = [environment for environment in chosen if environment.python not in there]
+    if lacking and arguments.environment is not None:
+        raise sr.NameNotFound("installed Python", lacking[0].python, there)
+    for environment in lacking:
+        print(f"{environment.name}: no Python {environment.python} on this machine", file=sys.stderr)
+    chosen = [environment for environment in chosen if environment not in lacking]
+    folder = free_folder(arguments.output or Path("output") / f"environments_{time.strftime('%Y%m%d_%H%M%S')}")
+    make_folder(folder)
+    outcomes: list[Outcome] = []
+    for environment in with_progress(chosen, True, label="environments", unit="environment"):
+        outcomes.append(run_tests(environment, there[environment.python], arguments.tests, folder))
+        for test in outcomes[-1].failed:
+            print(f"{environment.name}: {test} failed", file=sys.stderr)
+    result = {"environments": [asdict(outcome) for outcome in outcomes]}
+    write_text(folder / "results.json", json.dumps(result, indent=1) + "\n", overwrite=False)
+    print(f"\n{table(outcomes)}\n\nreports: {folder}")
+    good = all(outcome.passed and not outcome.failed for outcome in outcomes)
+    if arguments.docs is not None:
+        if not good:
+            raise sr.ParameterError("--docs", str(arguments.docs), "given while every test passes")
+        write_record(arguments.docs, "environments", table(outcomes), result, command="python scripts/environments.py")
+    return good
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run from the command line: 1 if a test fails, 2 after bad input."""
+    arguments = parser().parse_args(argv)
+    return exit_status(lambda: run(arguments))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
