@@ -199,10 +199,21 @@ def test_the_packages_are_those_of_pyproject() -> None:
     for package in PACKAGES:
         if package.also:
             ours[package.name].add((package.also, package.minimum))
-    of_users = {name: {entry for entry in listed[name] if entry[0] != "dev"} for name in listed}
+    of_users = {name: {entry for entry in listed[name] if entry[0] not in ("dev", "test")} for name in listed}
     assert ours == {name: entries for name, entries in of_users.items() if entries}
     alone = {name for name, entries in of_users.items() if not entries}
-    assert alone == {"build", "hypothesis", "mpmath", "mypy", "pytest", "pytest-xdist", "twine"}
+    assert alone == {
+        "build",
+        "coverage",
+        "hypothesis",
+        "mpmath",
+        "mypy",
+        "pytest",
+        "pytest-timeout",
+        "pytest-xdist",
+        "twine",
+        "uv",
+    }
 
 
 @pytest.mark.parametrize(

@@ -48,16 +48,16 @@ EXTRAS = {
 """What each extra of `pyproject.toml` gives; `dev` is all of them and the tools of development."""
 
 PACKAGES = (
-    Package("pin", "3.8", "", "Pinocchio: kinematics, Jacobians, gravity"),
+    Package("pin", "4.0", "", "Pinocchio: kinematics, Jacobians, gravity"),
     Package("eigenpy", "3.12", "", "Pinocchio's bridge to Eigen, and its factorisation of small matrices"),
-    Package("numpy", "2.0", "", "arrays"),
+    Package("numpy", "2.2", "", "arrays"),
     Package("xacro", "2.1.1", "", "the generator of every URDF"),
     Package("yourdfpy", "0.0.57", "", "a second opinion on URDF files"),
     Package("meshcat", "0.3.2", "", "the browser view"),
     Package("threadpoolctl", "3.5", "", "one thread for linear algebra"),
     Package("tqdm", "4.66", "", "progress bars"),
     Package("shtab", "1.7", "", "completion of the command in shells"),
-    Package("matplotlib", "3.8", "plot", "plots", also="docs"),
+    Package("matplotlib", "3.8.4", "plot", "plots", also="docs"),
     Package("scipy", "1.13", "helix", "actuators that vary along the tube"),
     Package("numba", "0.60", "fast", "compiled solvers"),
     Package("dask", "2024.8", "cluster", "sweeps on many machines"),
@@ -74,7 +74,7 @@ PACKAGES = (
     Package("playwright", "1.45", "pictures", "pictures of the browser view, by an installed chromium"),
     Package("pillow", "10", "pictures", "animated pictures"),
     Package("mkdocs-material", "9.7", "docs", "the documentation site"),
-    Package("mkdocstrings", "1.0.8", "docs", "its reference, from docstrings"),
+    Package("mkdocstrings", "1.0.6", "docs", "its reference, from docstrings"),
     Package("mkdocs-jupyter", "0.26.3", "docs", "its notebook"),
     Package("latex2mathml", "3.81", "docs", "its equations"),
     Package("ruff", "0.6", "docs", "its signatures"),
