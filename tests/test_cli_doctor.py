@@ -103,7 +103,7 @@ def test_doctor_tells_what_is_missing_and_what_to_type(told, monkeypatch: pytest
     status, out, _ = told("doctor")
     assert status == 1
     assert "missing: pip install 'meshcat>=0.3.2'" in out
-    assert "1.26.4 is older than 2.0: pip install -U 'numpy>=2.0'" in out
+    assert "1.26.4 is older than 2.2: pip install -U 'numpy>=2.2'" in out
     assert "missing: pip install 'softrobots[interop]'" in out
     assert "1.2 is older than 1.13: pip install -U 'softrobots[helix]'" in out
     wrong = out[out.index("\nwrong:\n") :]
