@@ -122,7 +122,22 @@ def run_tests(environment: Environment, interpreter: Path, tests: list[str], rep
         python = copy / ".venv" / "bin" / "python"
         resolution = ["--resolution", "lowest-direct"] if environment.lowest else []
         _do([_uv(), "venv", "-q", "--python", interpreter, python.parent.parent], copy, output)
-        _do([_uv(), "pip", "install", "-q", "--python", python, *resolution, "-e", f".[{environment.extra}]"], copy, output)
+        _do(
+            [
+                _uv(),
+                "pip",
+                "install",
+                "-q",
+                "--compile-bytecode",
+                "--python",
+                python,
+                *resolution,
+                "-e",
+                f".[{environment.extra}]",
+            ],
+            copy,
+            output,
+        )
         listed = subprocess.run(
             [_uv(), "pip", "list", "-q", "--format", "json", "--python", python], check=True, capture_output=True
         )

@@ -7,6 +7,7 @@ trimesh, which tells the colour of each part, too.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -72,7 +73,9 @@ def _parts(file: Path, scale: FloatArray) -> tuple[ColouredPart, ...]:
     try:
         import trimesh
 
-        scene = trimesh.Scene(trimesh.load(str(file)))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # pycollada sets shapes as NumPy 2.5 no longer wants
+            scene = trimesh.Scene(trimesh.load(str(file)))
     except Exception:  # whatever the reader of that format comes upon
         return ()
     made = []
