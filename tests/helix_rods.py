@@ -53,6 +53,41 @@ class HelixRod:
         return helix_frames(self.curvature, self.torsion, s)
 
 
+def actuated_rod(
+    contraction: float,
+    angle: float,
+    diameter: float,
+    *,
+    length: float,
+    sign: int,
+    bending_stiffness: float,
+    torsional_stiffness: float,
+    axial_stiffness: float | None = None,
+) -> HelixRod:
+    """The tube that an actuator bends, as a rod, by the complex form zeta = lambda exp(2 i theta).
+
+    Args:
+        contraction: lambda.
+        angle: theta [rad].
+        diameter: D [m].
+        length: of the uninflated tube [m].
+        sign: +1 for a right-handed helix, -1 for a left-handed one.
+        bending_stiffness: EI [N m^2].
+        torsional_stiffness: GJ [N m^2].
+        axial_stiffness: EA [N]; None for an inextensible rod.
+    """
+    zeta = contraction * np.exp(2j * angle)
+    size = diameter * abs(1 + zeta) ** 2
+    return HelixRod(
+        float(length * abs(1 + zeta) / (2 * np.cos(angle))),
+        float(2 * (1 - contraction**2) / size),
+        float(sign * 4 * contraction * np.sin(2 * angle) / size),
+        bending_stiffness,
+        torsional_stiffness,
+        axial_stiffness,
+    )
+
+
 def helix_frames(curvature: float, torsion: float, s: ArrayLike) -> np.ndarray:
     """Frenet frames of a helix at arc lengths s (n,), in the first one: x normal, y binormal, z tangent; shape (n, 4, 4) [m].
 

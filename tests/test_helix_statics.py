@@ -16,7 +16,16 @@ from softrobots.body import body
 from softrobots.kinematics import frame_placement
 from softrobots.loads import distributed_force
 from softrobots.robots import HelixTube
-from tests.helix_rods import HelixRod, axial_wrench, gauss, helix_frames, load_carried, solve_helix_rod, tip_compliance
+from tests.helix_rods import (
+    HelixRod,
+    actuated_rod,
+    axial_wrench,
+    gauss,
+    helix_frames,
+    load_carried,
+    solve_helix_rod,
+    tip_compliance,
+)
 from tests.test_interop import assert_mujoco_balances
 
 FIELDS: dict[str, Any] = {"length": 0.5, "bending_stiffness": 0.02, "torsional_stiffness": 0.012, "axial_stiffness": 100.0}
@@ -38,16 +47,16 @@ def model(count: int, **fields: Any) -> sr.SoftModel:
 
 
 def rod(robot: HelixTube) -> HelixRod:
-    """The same tube as a rod, by the complex form of theory 3: no name of softrobots.helix."""
-    zeta = robot.contraction * np.exp(2j * robot.angle)
-    size, sign = robot.diameter * abs(1 + zeta) ** 2, 1.0 if robot.handedness == "right" else -1.0
-    return HelixRod(
-        robot.length * abs(1 + zeta) / (2 * np.cos(robot.angle)),
-        2 * (1 - robot.contraction**2) / size,
-        sign * 4 * robot.contraction * np.sin(2 * robot.angle) / size,
-        robot.bending_stiffness,
-        robot.torsional_stiffness,
-        robot.axial_stiffness,
+    """The same tube as a rod: no name of softrobots.helix."""
+    return actuated_rod(
+        robot.contraction,
+        robot.angle,
+        robot.diameter,
+        length=robot.length,
+        sign=1 if robot.handedness == "right" else -1,
+        bending_stiffness=robot.bending_stiffness,
+        torsional_stiffness=robot.torsional_stiffness,
+        axial_stiffness=robot.axial_stiffness,
     )
 
 

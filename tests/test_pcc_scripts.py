@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -195,43 +193,6 @@ def test_figures_show_what_they_say(pcc: sr.SoftModel) -> None:
         body_plots.workspace(loaded)
     with pytest.raises(sr.ParameterError, match="with sections"):
         body_plots.shape(sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), (0, 0, 0)))
-
-
-def rod_convergence() -> ModuleType:
-    """The script as a module."""
-    spec = importlib.util.spec_from_file_location("rod_convergence", CHECKOUT / "scripts" / "rod_convergence.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_rod_convergence_prints_tables_of_second_order(
-    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    module = rod_convergence()
-    monkeypatch.setattr(module, "PLANAR", (2, 4, 8))
-    monkeypatch.setattr(module, "SPATIAL", (4, 8))
-    assert module.main(["--cases", "3", "--output", str(tmp_path)]) == 0
-    result = json.loads((tmp_path / "rod_convergence.json").read_text())
-    for form in module.FORMS:
-        assert module.orders((2, 4, 8), result["planar"][form])[-1] > 1.9
-        assert result["spatial"][form][1]["mean_mm"] < 0.5 * result["spatial"][form][0]["mean_mm"]
-    assert (tmp_path / "images" / "rod_convergence.png").stat().st_size > 10_000
-    assert "| sections |" in capsys.readouterr().out
-    with pytest.raises(SystemExit):
-        module.main(["--cases", "0"])
-
-
-def test_the_guide_shows_the_recorded_convergence_and_it_reaches_the_target() -> None:
-    """100 cases; a mean tip error of 0.1 mm with at most 50 sections."""
-    module = rod_convergence()
-    result = json.loads((CHECKOUT / "docs" / "rod_convergence.json").read_text(encoding="utf-8"))
-    assert result["cases"] == 100
-    assert result["spatial"]["sections"][-1]["mean_mm"] <= 0.1
-    guide = (CHECKOUT / "docs" / "pcc_arm.md").read_text(encoding="utf-8")
-    planar, spatial = module.tables(result).split("\n\n")
-    for table in (planar, spatial, module.timing(result)):
-        assert table in guide
 
 
 def test_the_second_robot_in_the_readme_runs() -> None:

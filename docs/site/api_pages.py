@@ -54,6 +54,7 @@ PAGES = {
         (
             *_top("solve_equilibrium", "Equilibrium", "distributed_force", "EARTH_GRAVITY"),
             *_top("compliance", "elastostatic_jacobian", "critical_load", "estimate_load", "LoadEstimate"),
+            *_top("post_buckling_branches", "EquilibriumBranch"),
             *_top("solve_imposed_displacement", "ImposedDisplacement"),
         ),
     ),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from softrobots.checks import FloatArray
-from softrobots.errors import NotConverged
+from softrobots.errors import NotConverged, ParameterError
 from softrobots.interop.newton import balance_point
 from softrobots.interop.outcomes import SECONDS, Outcome, Question
 from softrobots.interop.tools import find_tool
@@ -85,6 +86,32 @@ def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
         message = f"MuJoCo found its simulation unstable {sum(bad)} times in {seconds:g} s and started it anew"
         raise NotConverged(message, best=_joints(model, data.qpos), residual=float("inf"), iterations=done)
     return Outcome(_joints(model, data.qpos), float(np.abs(data.qvel).max(initial=0.0)), contacts, done, elapsed)
+
+
+def tip_pose(question: Question, joints: Mapping[str, float]) -> FloatArray:
+    """Where MuJoCo has the tip, by its own kinematics.
+
+    Args:
+        question: An MJCF file; its load does not matter.
+        joints: Coordinate of every joint by its name [rad or m], as of an `Outcome`.
+
+    Returns:
+        Pose of the tip in the world, shape (4, 4) [m].
+
+    Raises:
+        MissingDependency: If MuJoCo is not installed.
+        ParameterError: If the joints are not those of the file.
+    """
+    mujoco, model, data, body = _loaded(question)
+    names = [model.joint(i).name for i in range(model.njnt)]
+    if sorted(names) != sorted(joints):
+        raise ParameterError("joints", sorted(joints), f"the joints of the file, {', '.join(names)}")
+    for name, value in joints.items():
+        data.qpos[model.jnt_qposadr[model.joint(name).id]] = value
+    mujoco.mj_kinematics(model, data)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
+    return pose
 
 
 def _loaded(question: Question) -> tuple[Any, Any, Any, int]:
