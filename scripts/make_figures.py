@@ -54,6 +54,12 @@ def arm_buckling() -> Any:
     return equilibrium_plots.growing_load(branches, PUSH, critical=critical)
 
 
+def arm_branches() -> Any:
+    """Every branch of the straight arm pushed along its axis."""
+    arm = sr.load_model(sr.InflatableArm())
+    return equilibrium_plots.branches(sr.post_buckling_branches(arm, (0, 0, 0), PUSH, max_force=150.0), (0, 0, 1))
+
+
 def link_reaction() -> Any:
     """A probe pushes links at 0.5 m, through wrinkling, at the pressures of the paper's Table 3 that have a plateau."""
     runs: dict[str, list[sr.ImposedDisplacement]] = {}
@@ -126,7 +132,8 @@ def three_fingers() -> sr.Viewer:
 
 
 FIGURES: dict[str, Callable[[], Any]] = {
-    function.__name__: function for function in (link_deflection, link_pressure, link_reaction, arm_buckling, finger_grip)
+    function.__name__: function
+    for function in (link_deflection, link_pressure, link_reaction, arm_buckling, arm_branches, finger_grip)
 }
 """Plots by the name of their file."""
 SCENES: dict[str, tuple[Callable[[], sr.Viewer], str]] = {

@@ -32,6 +32,7 @@ from softrobots.load_estimation import LoadEstimate, estimate_load
 from softrobots.loader import load_model
 from softrobots.loads import EARTH_GRAVITY, distributed_force
 from softrobots.model import SoftModel, SpringGroup
+from softrobots.post_buckling import EquilibriumBranch, post_buckling_branches
 from softrobots.results_io import load_result, save_csv, save_result
 from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
 from softrobots.sensitivity import compliance, elastostatic_jacobian
@@ -52,6 +53,7 @@ __all__ = [
     "ClusterError",
     "DescriptionError",
     "Equilibrium",
+    "EquilibriumBranch",
     "EquilibriumNotFound",
     "FileFormatError",
     "HelixTube",
@@ -95,6 +97,7 @@ __all__ = [
     "load_model",
     "load_result",
     "mount",
+    "post_buckling_branches",
     "quintic",
     "read_waypoints",
     "sample_workspace",

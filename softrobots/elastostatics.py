@@ -9,13 +9,15 @@ Two methods:
 
 - "newton": Newton on the potential energy with the exact tangent, made positive definite where it is not, and halving of
   steps that do not lower the energy. It ends in a stable equilibrium. With a world-fixed moment in the load there is no
-  energy; then plain Newton from the start, or from the relaxed springs under a load that grows in steps.
+  energy; then plain Newton from the start, or from the relaxed springs under a load that grows in steps, or from that
+  without the moments while these grow.
 - "fixed_point": the recursion of [Troise 2021] Figure 6, `y <- rest + (J_k^T w - g_k) / k`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,7 +125,8 @@ def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
     Returns:
         The state.
     """
-    return _Case(model, q_motors, load).state(q_springs)
+    with one_blas_thread(model.n_springs):
+        return _Case(model, q_motors, load).state(q_springs)
 
 
 def _nowhere(model: SoftModel, q_springs: FloatArray, q: FloatArray, point: Point) -> ElasticState:
@@ -182,8 +185,12 @@ class _Case:
         return trial.energy > highest and trial.energy > highest + self.rounding(state)
 
     def rounding(self, state: ElasticState) -> float:
-        """Rounding of the energy: its terms are as large as this even where they cancel (a tip folded back to the base) [J]."""
-        return ENERGY_ROUNDING * (state.scale + float(self.model.stiffness.dot(state.q_springs * state.q_springs)))
+        """Rounding of the energy [J]: its terms are as large as this even where they cancel (a tip folded back to the base).
+
+        The energy itself counts, too: where weight loads no spring (an upright robot), it is still mass times height.
+        """
+        elastic = float(self.model.stiffness.dot(state.q_springs * state.q_springs))
+        return ENERGY_ROUNDING * (state.scale + elastic + abs(state.energy))
 
 
 def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool, factors: Any = None) -> bool:
@@ -259,7 +266,9 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
         scale = 1.0
         trial = case.state(state.q_springs + step)
         spent += 1
-        while case.too_high(trial, state, ARMIJO * scale * slope) and spent < most and scale > _SHORTEST:
+        while case.too_high(trial, state, ARMIJO * scale * slope) and scale > _SHORTEST:
+            if spent >= most:  # within a step: the last state is the best
+                return state, spent, case.stable(state)
             scale *= 0.5
             trial = case.state(state.q_springs + scale * step)
             spent += 1
@@ -267,10 +276,13 @@ def _descend(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, i
             break
         # Below rounding the energy says nothing; there the residual must shrink.
         if not settled and not stalled and trial.error >= state.error and -slope < case.rounding(state):
-            if case.stable(state, factors):
+            if not case.stable(state, factors):
+                stalled = True  # beside a saddle, where Newton's step leads away from the balance: leave it downhill
+                continue
+            trial = case.state(state.q_springs + _stiff_step(state, stiffness))
+            spent += 1
+            if trial.error >= state.error:
                 break
-            stalled = True  # beside a saddle, where Newton's step leads away from the balance: leave it downhill
-            continue
         state, stalled = trial, False
     return state, spent, case.stable(state)
 
@@ -294,6 +306,14 @@ def _newton_step(state: ElasticState, stiffness: FloatArray, factors: Any) -> Fl
     return np.asarray(step if length <= LARGEST_STEP else step * (LARGEST_STEP / length))
 
 
+def _stiff_step(state: ElasticState, stiffness: FloatArray) -> FloatArray:
+    """The part of a Newton step that moves against stiffness: at the bottom of a curved valley the rest leads out of it."""
+    softness = 1.0 / np.sqrt(stiffness)
+    values, vectors = np.linalg.eigh(scaled(state.tangent, stiffness))
+    pull = vectors.T @ (softness * state.residual)
+    return np.asarray(-softness * (vectors @ np.where(values > 1e-3, pull / np.maximum(values, 1e-3), 0.0)))
+
+
 def _escape(state: ElasticState, stiffness: FloatArray) -> FloatArray | None:
     """Step out of an unstable equilibrium along its softest direction; None at a neutral one.
 
@@ -309,25 +329,45 @@ def _escape(state: ElasticState, stiffness: FloatArray) -> FloatArray | None:
 
 
 def _grow_load(case: _Case, start: FloatArray, most: int) -> tuple[ElasticState, int, bool]:
-    """For loads without a potential: plain Newton from the start, else from the relaxed springs under a growing load."""
-    model, motors = case.model, case.q_motors
-    found, spent = newton(model, motors, case.load, start, tolerance=case.tolerance, max_iterations=min(20, most))
-    if found is not None:
-        return found, spent, case.stable(found)
-    reached, step, y = 0.0, 0.25, np.asarray(model.rest)
+    """For loads without a potential: plain Newton from the start, else from the relaxed springs under a growing load.
+
+    Where the path of that turns back, the moments alone grow, from the equilibrium that descent finds under all the rest.
+    """
+    model, motors, whole = case.model, case.q_motors, case.load
+    found, spent = newton(model, motors, whole, start, tolerance=case.tolerance, max_iterations=min(20, most))
+    if found is None:
+        found, furthest, used = _grown(case, whole.scaled, np.asarray(model.rest), (most - spent) * 2 // 3)
+        spent += used
+    if found is None:
+        calm = _Case(model, motors, whole.with_moments(0.0), case.tolerance)
+        state, used, stable = _descend(calm, start, most - spent)
+        spent += used
+        if stable and calm.settled(state):
+            found, _, used = _grown(case, whole.with_moments, state.q_springs, most - spent)
+            spent += used
+    last = case.state(furthest) if found is None else found
+    return last, spent, case.stable(last)
+
+
+def _grown(case: _Case, part: Callable[[float], Load], y: FloatArray, most: int) -> tuple[ElasticState | None, FloatArray, int]:
+    """Newton under a load that grows from its part 0, where the springs are at `y`, to 1.
+
+    Returns:
+        The equilibrium, or None where the path turns back; the springs as far as it went; and the evaluations spent.
+    """
+    reached, step, spent = 0.0, 0.25, 0
     while spent < most and step > 1e-6:
         aim = min(1.0, reached + step)
-        part = case.load if aim == 1.0 else case.load.scaled(aim)
-        found, used = newton(model, motors, part, y, tolerance=case.tolerance, max_iterations=min(20, most - spent))
+        load, steps = case.load if aim == 1.0 else part(aim), min(20, most - spent)
+        found, used = newton(case.model, case.q_motors, load, y, tolerance=case.tolerance, max_iterations=steps)
         spent += used
-        if found is not None and aim == 1.0:
-            return found, spent, case.stable(found)
-        if found is not None:
-            reached, y, step = aim, found.q_springs, 2.0 * step
-        else:
+        if found is None:
             step *= 0.5
-    last = case.state(y)
-    return last, spent, case.stable(last)
+            continue
+        if aim == 1.0:
+            return found, y, spent
+        reached, y, step = aim, found.q_springs, 2.0 * step
+    return None, y, spent
 
 
 def newton(

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.blas_threads import one_blas_thread
 from softrobots.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
 from softrobots.elastostatics import METHODS, TOLERANCE, ElasticState, is_stable, largest_residual, settle
 from softrobots.errors import EquilibriumNotFound, ParameterError
@@ -142,7 +143,8 @@ class Equilibrium:
     def eigenvalues(self) -> FloatArray:
         """Real parts of the eigenvalues of the tangent stiffness, ascending, shape (n_springs,) [N m/rad]."""
         solver = np.linalg.eigvalsh if self.conservative else np.linalg.eigvals
-        return read_only(np.sort(solver(self.tangent_stiffness).real))
+        with one_blas_thread(len(self.tangent_stiffness)):
+            return read_only(np.sort(solver(self.tangent_stiffness).real))
 
 
 def solve_equilibrium(
@@ -161,7 +163,8 @@ def solve_equilibrium(
     """Find the static equilibrium of the springs at given motor coordinates.
 
     It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
-    has no energy, the one reached by Newton from there, or while the load grows from zero. A descent ends in a stable
+    has no energy, the one reached by Newton from there, or while the load grows from zero, or while the moments grow from the
+    equilibrium without them. A descent ends in a stable
     equilibrium, or in one that is free to move without a force (a symmetric robot that has buckled can turn its bow about its
     axis): that is not certified stable.
 
@@ -228,7 +231,7 @@ def _hint(best: Equilibrium) -> str:
                 f"moment beyond it; solve_imposed_displacement goes on where the displacement is given"
             )
     if not best.conservative:
-        return "; under a world-fixed moment the load is grown from zero, and stops where its path turns back"
+        return "; under a world-fixed moment the load grows from zero, then the moments alone, until the path turns back"
     return ""
 
 

@@ -12,6 +12,7 @@ from softrobots.equilibrium import Equilibrium
 from softrobots.errors import ParameterError
 from softrobots.imposed_displacement import ImposedDisplacement
 from softrobots.plots import line_style, new_figure
+from softrobots.post_buckling import EquilibriumBranch
 
 
 def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, *, critical: float | None = None) -> Any:
@@ -48,6 +49,43 @@ def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, 
         axes.legend(fontsize=9)
     left.set(ylabel="way of the tip [mm]", title="Where the tip goes")
     right.set(ylabel="smallest eigenvalue of the tangent stiffness [N m/rad]", title="What stiffness is left")
+    return figure
+
+
+def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
+    """Way of the tip across a push, and the softest eigenvalue, over the force; one line a branch, dashed where not stable.
+
+    Args:
+        found: Branches as `softrobots.post_buckling_branches` gives them; the way is counted from the first point of the first.
+        across: Direction of the way that is drawn, shape (3,), any length but zero, world axes.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If there is no branch, or something else.
+        MissingDependency: If matplotlib is not installed.
+    """
+    unit = unit_vector("across", across)
+    if not isinstance(found, Sequence) or not found or not all(isinstance(one, EquilibriumBranch) for one in found):
+        raise ParameterError("found", found, "at least one EquilibriumBranch")
+    origin = found[0].equilibria[0].tip_position
+    figure = new_figure((10.0, 4.8))
+    left, right = figure.subplots(1, 2)
+    for number, branch in enumerate(found):
+        ways = [1e3 * float(unit @ (one.tip_position - origin)) for one in branch.equilibria]
+        style = line_style(number) | {"ls": "-", "ms": 4, "markevery": max(len(ways) // 5, 1)}
+        dashed = ~branch.stable
+        dashed[:-1] |= dashed[1:]  # up to where the other line ends
+        for axes, values in ((left, ways), (right, branch.softest)):
+            axes.plot(branch.forces, np.where(branch.stable, values, np.nan), label=branch.label, **style)
+            axes.plot(branch.forces, np.where(dashed, values, np.nan), **(style | {"ls": "--", "marker": ""}))
+    for axes in (left, right):
+        axes.set_xlabel("force [N]")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=7)
+    left.set(ylabel="way of the tip across the push [mm]", title="Where the tip goes (dashed: not stable)")
+    right.set(ylabel="softest eigenvalue over the springs' stiffness [-]", title="How stable it is")
     return figure
 
 

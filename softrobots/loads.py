@@ -139,6 +139,11 @@ class Load:
         gravity = None if self.gravity is None else tuple(factor * g for g in self.gravity)
         return Load({name: factor * value for name, value in self.wrenches.items()}, gravity)  # type: ignore[arg-type]
 
+    def with_moments(self, factor: float) -> Load:
+        """Return the load with every moment multiplied by `factor`, forces and gravity as they are."""
+        share = np.repeat([1.0, factor], 3)
+        return Load({name: share * value for name, value in self.wrenches.items()}, self.gravity)
+
     def plus(self, frame: str, wrench: FloatArray) -> Load:
         """Return the load with one more wrench, shape (6,) [N, N m], at a frame."""
         return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity)

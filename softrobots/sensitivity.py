@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from softrobots.blas_threads import one_blas_thread
 from softrobots.checks import FloatArray
 from softrobots.equilibrium import Equilibrium, check_same_model
 from softrobots.errors import NeutralEquilibrium
@@ -114,6 +115,7 @@ def motor_torque_slope(motors: FloatArray, springs: FloatArray, tangent: FloatAr
 
 def _solve(tangent: FloatArray, right: FloatArray) -> FloatArray:
     try:
-        return np.asarray(np.linalg.solve(tangent, right))
+        with one_blas_thread(len(tangent)):
+            return np.asarray(np.linalg.solve(tangent, right))
     except np.linalg.LinAlgError as error:
         raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has no derivative") from error

@@ -25,6 +25,25 @@ _KNEE = 1e-6  # relative distance of the springs from the beginning of a plateau
 _KNEE_STEP = 1e-4  # of the force, relative to the force reached: shorter steps may cross the beginning of a plateau
 _STIFF = 1e-9  # eigenvalues above this, relative to the springs' own stiffness, count for the prediction
 
+NEUTRAL = 1e-7
+"""Smallest eigenvalue, relative to the springs' own stiffness, that counts as none."""
+
+
+class CriticalPoint(NamedTuple):
+    """Where an equilibrium path stops being stable."""
+
+    force: float
+    """The force [N]."""
+    q_springs: FloatArray
+    """The springs at the last stable point of the path, shape (n_springs,) [rad or m]."""
+    crosses: bool
+    """Whether an eigenvalue of the tangent stiffness goes through zero there and the path goes on, unstable.
+
+    Else it turns back, or jumps below zero where a link comes onto its plateau.
+    """
+    origin: FloatArray
+    """The springs at the beginning of the path, without the force, shape (n_springs,) [rad or m]."""
+
 
 def critical_load(
     model: SoftModel,
@@ -59,6 +78,36 @@ def critical_load(
         NoCriticalLoad: If the path is stable up to `max_force` (the direction pulls or bends rather than pushes), or as far
             as it could be followed.
     """
+    return critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force).force
+
+
+def critical_point(
+    model: SoftModel,
+    q_motors: Any,
+    direction: Any,
+    *,
+    frame: str | None = None,
+    gravity: Any = None,
+    max_force: float | None = None,
+) -> CriticalPoint:
+    """Find where the equilibrium path under a growing force stops being stable: `critical_load` with all that is known of it.
+
+    Args:
+        model: The robot.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        direction: Direction of the force, shape (3,), any length but zero, world axes.
+        frame: Frame that is pushed; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
+        max_force: Largest force to try [N]; by default 100 times the largest stiffness over the reach.
+
+    Returns:
+        The point.
+
+    Raises:
+        ParameterError: If an argument is out of range, the model has no springs, or it is unstable under gravity alone.
+        NameNotFound: If the frame does not exist.
+        NoCriticalLoad: If the path is stable up to `max_force`, or as far as it could be followed.
+    """
     check_model(model)
     motors = model.checked_motors(q_motors)
     unit = unit_vector("direction", direction)
@@ -81,7 +130,7 @@ def critical_load(
     with one_blas_thread(model.n_springs):
         first_state = settled(model, motors, constant, model.rest)
         here = None if first_state is None else _point(model, first_state, 0.0, push, at)
-        if here is None or here.softest <= 0.0:
+        if first_state is None or here is None or here.softest <= 0.0:
             raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
         first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
         nearly_zero = _NEARLY_ZERO * here.softest
@@ -94,10 +143,12 @@ def critical_load(
                 step *= 0.5  # too far to tell this path from a neighbour
                 if step < _SHORTEST_STEP * max(here.force, first_step):
                     if here.softest <= 10.0 * nearly_zero or _at_knee(model, here):
-                        return here.force  # the path turns back here: a limit point
+                        # It turns back: a limit point.
+                        return CriticalPoint(here.force, here.state.q_springs, False, first_state.q_springs)
                     break
             elif there.softest <= 0.0:
-                return _bisect(follow, here, there.force)
+                force, last = _bisect(follow, here, there.force)
+                return CriticalPoint(force, last.state.q_springs, last.softest <= NEUTRAL, first_state.q_springs)
             else:
                 here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
     reached = f"{here.force:.6g} N along {unit.tolist()}"
@@ -139,12 +190,12 @@ def _at_knee(model: SoftModel, here: _Point) -> bool:
     return before != beyond
 
 
-def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high: float) -> float:
-    """Narrow the bracket of the zero of the smallest eigenvalue down to rounding."""
+def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high: float) -> tuple[float, _Point]:
+    """Narrow the bracket of the zero of the smallest eigenvalue down to rounding; the force, and the point below it."""
     while True:
         middle = 0.5 * (here.force + high)
         if not here.force < middle < high:
-            return middle
+            return middle, here
         there = follow(middle, here)
         if there is not None and there.softest > 0.0:
             here = there

@@ -45,6 +45,7 @@ PAGES = {
         (
             *_top("InflatableArm", "PccArm", "HelixTube", "ROBOTS", "robots.Robot"),
             *_top("load_model", "SoftModel", "SpringGroup", "grown_coordinates"),
+            *(f"softrobots.robots.parameter_file.{name}" for name in ("read_robot", "read_parameters", "write_parameters")),
             *_top("mount", "composition.fix_joints", "third_party.robot_file", "__version__"),
         ),
     ),

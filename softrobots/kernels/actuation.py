@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray
+from softrobots.errors import ParameterError
+from softrobots.kernels.settings import LARGEST_POSITION
 from softrobots.kernels.unknowns import Unknowns
 from softrobots.model import SoftModel
 
@@ -45,11 +47,17 @@ class Actuation:
         return joints
 
     def loads(self, run: Any, w: Any) -> FloatArray:
-        """Load on motor joints and muscles of given length there, shape (n_motors,) [N m or N]."""
-        tip = run.program.tip
+        """Load on motor joints and muscles of given length there, shape (n_motors,) [N m or N].
+
+        The multipliers tell what holds the sums beyond what their even spread takes, see `long_chain`.
+        """
+        tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.motor_torques, self._count, 1)[0]
         if self._lengths:
-            return np.concatenate([joints, _rows(w, tip.held_loads, tip.held, 1)[0] @ self._chain.held_slope])
+            first = [self._strains.index(group[0]) for group in chain.held]
+            spread = _rows(w, run.layout.start, len(self._strains), 1)[0] - chain.rest[self._strains]
+            held = _rows(w, tip.held_loads, tip.held, 1)[0] - (chain.stiffness[self._strains] * spread)[first]
+            return np.concatenate([joints, held @ chain.held_slope])
         return np.asarray(joints)
 
     def rows(self, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -60,10 +68,27 @@ class Actuation:
         return np.ascontiguousarray(motors[:, : self._count]), pulls, starts
 
     def unsuited(self, motors: FloatArray) -> Any:
-        """Which rows no shape of the robot has, truth values."""
-        if not self._lengths:
-            return np.zeros(len(motors), dtype=bool)
-        return np.array([not (np.all(np.isfinite(row)) and self._model.actuators.admit(row)) for row in motors])
+        """Which rows no shape of the robot has, or are too large to compute with, truth values."""
+        made = np.zeros(len(motors), dtype=bool)
+        joints = motors[:, : self._count]
+        if joints.size and not (joints.min() >= -LARGEST_POSITION and joints.max() <= LARGEST_POSITION):
+            made |= ~np.all(np.abs(joints) <= LARGEST_POSITION, axis=1)
+        if self._lengths:
+            made |= [not (np.all(np.isfinite(row)) and self._model.actuators.admit(row)) for row in motors]
+        return made
+
+    def checked(self, q_motors: Any, field: str = "q_motors") -> FloatArray:
+        """Return actuators of one case as `SoftModel.checked_motors` does.
+
+        Raises:
+            ParameterError: If that refuses them, or a motor joint is too far to compute with.
+        """
+        motors = self._model.checked_motors(q_motors, field)
+        if np.any(np.abs(motors[: self._count]) > LARGEST_POSITION):
+            raise ParameterError(
+                field, q_motors, f"within +-{LARGEST_POSITION:g} rad or m at motor joints, for compiled solvers"
+            )
+        return motors
 
     def unknowns(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Unknown strains of one case from its elastic coordinates, shape (n,)."""

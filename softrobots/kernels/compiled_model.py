@@ -89,6 +89,10 @@ class CompiledModel:
         self._plain = len(self._chain.muscle_rest) == 0 and backend == "numba"
         self._feels = self._plain and self._unknowns.moved_by_motors
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle as the robot and what was said about it; the other process compiles it again, or finds what is kept."""
+        return CompiledModel, (self._model, self._backend, self._unknowns.locked)
+
     def __repr__(self) -> str:
         """The robot and the back end."""
         return f"CompiledModel({self._chain.name!r}, backend={self._backend!r})"
@@ -172,7 +176,7 @@ class CompiledModel:
 
     def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:
         run = self._run(gravity is not None)
-        motors = self._model.checked_motors(q_motors)
+        motors = self._actuation.checked(q_motors)
         w = run.workspace()
         run.put(w, run.layout.force, finite_array("force", force, (3,), "N"))
         run.put(w, run.layout.gravity, gravity_vector(gravity))
@@ -269,7 +273,7 @@ class CompiledModel:
     def _checked_estimate(self, q_motors: Any, motor_torques: Any, gravity: Any) -> CompiledLoadEstimate:
         check_feels(self._model)
         run = self._run(gravity is not None)
-        motors = self._model.checked_motors(q_motors)
+        motors = self._actuation.checked(q_motors)
         torques = finite_array("motor_torques", motor_torques, self._shape, "N m")
         status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
         found = CompiledLoadEstimate(w, run.layout, self._actuation, motors)
@@ -428,7 +432,7 @@ class CompiledModel:
         if q_motors0 is None:
             motors = solve_ik(self._model, points[0], load, gravity=gravity, tolerance=tolerance).q_motors
         else:
-            motors = self._model.checked_motors(q_motors0, "q_motors0")
+            motors = self._actuation.checked(q_motors0, "q_motors0")
         batch, spent = self._search(run).follow(points, load, gravity_vector(gravity), motors, tolerance)
         if batch.status[0] != Status.CERTIFIED:
             raise TargetUnreachable(

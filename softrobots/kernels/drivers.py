@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from softrobots.kernels.intrinsics import Array, sqrt
+from softrobots.kernels.intrinsics import Array, fabs, sqrt
 from softrobots.kernels.settings import (
     ARMIJO,
     DESCENT_STEPS,
     LARGEST_GUARD,
+    LARGEST_NUMBER,
+    LARGEST_POSITION,
     LARGEST_STEP,
     LEAST_GUARD,
     LEAST_SOFTNESS,
     PASSES,
+    SHORT_STEP,
     TIGHT,
     TOLERANCE,
 )
@@ -37,6 +40,8 @@ SLOPE: int
 ERROR: int
 LENGTH: int
 SIZE: int
+FORCE: int
+GRAVITY: int
 SOFTEST: int
 NEGATIVES: int
 ROOM: int
@@ -45,6 +50,7 @@ ROUNDING: int
 GUARD: int
 SPENT: int
 N: int
+N_MOTORS: int
 HELD: int
 SPRING_ROUNDING: float
 SOFTNESS: tuple[float, ...]
@@ -54,6 +60,19 @@ first_pass: Callable[[Array], None]
 newton_pass: Callable[[Array], None]
 prepare: Callable[[Array], None]
 evaluate: Callable[[Array], None]
+
+
+def is_usable(w: Array) -> bool:
+    """Tell whether motors and load are numbers that can be computed with."""
+    for i in range(N_MOTORS):
+        if not fabs(w[i]) <= LARGEST_POSITION:
+            return False
+    for i in range(3):
+        if not fabs(w[FORCE + i]) <= LARGEST_NUMBER:
+            return False
+        if not fabs(w[GRAVITY + i]) <= LARGEST_NUMBER:
+            return False
+    return True
 
 
 def is_settled(w: Array, tolerance: float) -> bool:
@@ -110,16 +129,20 @@ def outcome(w: Array) -> int:
     return CERTIFIED
 
 
-def search_line(w: Array) -> bool:
-    """Go along the step as far as the energy falls (Armijo); tell whether anything is gained by it."""
+def search_line(w: Array, longest: float) -> bool:
+    """Go along the step as far as the energy falls (Armijo); tell whether anything is gained by it.
+
+    And go on, twice as far each time, while it goes on falling and the way is shorter than `longest`.
+    """
     keep(w)
     energy = w[ENERGY]
     slope = w[SLOPE]
     error = w[ERROR]
     rounding = w[ROUNDING]
+    length = sqrt(w[LENGTH])
     share = 1.0
-    if w[LENGTH] > LARGEST_STEP * LARGEST_STEP:
-        share = LARGEST_STEP / sqrt(w[LENGTH])
+    if length > LARGEST_STEP:
+        share = LARGEST_STEP / length
     slope *= share
     largest = share
     move(w, share)
@@ -133,15 +156,42 @@ def search_line(w: Array) -> bool:
         move(w, 0.0)  # nothing is gained
         evaluate(w)
         return False
+    while 2.0 * share * length < longest:
+        reached = w[ENERGY]
+        move(w, 2.0 * share)
+        evaluate(w)
+        if not w[ENERGY] < reached - rounding:
+            move(w, share)
+            evaluate(w)
+            break
+        share *= 2.0
     return True
+
+
+def cross_valley(w: Array) -> bool:
+    """Take a guarded step for the residual alone: at the bottom of a curved valley a whole one leads out of it again."""
+    error = w[ERROR]
+    w[GUARD] = LEAST_GUARD
+    evaluate(w)
+    w[GUARD] = 0.0
+    keep(w)
+    move(w, 1.0)
+    evaluate(w)
+    if w[ERROR] < error:
+        return True
+    move(w, 0.0)
+    evaluate(w)
+    return False
 
 
 def descend(w: Array) -> int:
     """Newton descent on the energy from the unknowns in the workspace; return the status.
 
     Where pivots are not positive they are made so: by turns hardly, which is quick near a neutral equilibrium, and by the
-    springs' own stiffness, as pivots behind a tiny one are huge. A step that does not lower the energy is halved. It ends in a
-    stable equilibrium unless there is none, a section comes to the end of its range, or the steps are spent.
+    springs' own stiffness, as pivots behind a tiny one are huge. A step that does not lower the energy is halved; a
+    short one with pivots made positive is doubled while that lowers the energy, as beside a saddle it leads hardly away.
+    Where nothing is gained any more although it is not stable, the saddle is left like one that it has settled on. It ends
+    in a stable equilibrium unless there is none, a section comes to the end of its range, or the steps are spent.
     """
     saddles = 0
     strong = 0
@@ -158,6 +208,7 @@ def descend(w: Array) -> int:
             leave_saddle(w)
             evaluate(w)
         else:
+            longest = 0.0
             if not stable:
                 w[GUARD] = LEAST_GUARD
                 if strong > 0:
@@ -165,8 +216,18 @@ def descend(w: Array) -> int:
                 strong = 1 - strong
                 evaluate(w)
                 w[GUARD] = 0.0
-            if not search_line(w):
-                break
+                if w[LENGTH] < SHORT_STEP * SHORT_STEP:
+                    longest = LARGEST_STEP
+            if not search_line(w, longest):
+                if stable:
+                    if not cross_valley(w):
+                        break
+                elif saddles == 3:
+                    break
+                else:
+                    saddles += 1
+                    leave_saddle(w)
+                    evaluate(w)
     return outcome(w)
 
 
@@ -181,12 +242,16 @@ def go_to_start(w: Array) -> None:
 
 def settle_from(w: Array) -> int:
     """Descend from given unknowns."""
+    if not is_usable(w):
+        return NOT_A_NUMBER
     prepare(w)
     return descend(w)
 
 
 def settle(w: Array) -> int:
     """Find the equilibrium from rest: Newton passes while they go well, else descent from rest; return the status."""
+    if not is_usable(w):
+        return NOT_A_NUMBER
     if HELD > 0:
         go_to_start(w)
     first_pass(w)
@@ -201,6 +266,7 @@ def settle(w: Array) -> int:
 
 
 FUNCTIONS: tuple[Callable[..., object], ...] = (
+    is_usable,
     is_settled,
     is_stable,
     move,
@@ -208,6 +274,7 @@ FUNCTIONS: tuple[Callable[..., object], ...] = (
     leave_saddle,
     outcome,
     search_line,
+    cross_valley,
     descend,
     go_to_start,
     settle_from,

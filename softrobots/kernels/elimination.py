@@ -152,21 +152,22 @@ def _symmetric_outer(one: Any, scaled: Any) -> Any:
     return made
 
 
-def release(beyond: Beyond, count: int, scales: Sequence[Scalar]) -> tuple[Eliminated, Beyond]:
-    """Eliminate the multipliers at the base of their segment: the last `count` components.
+def release(beyond: Beyond, gaps: Sequence[Scalar], scales: Sequence[Scalar]) -> tuple[Eliminated, Beyond]:
+    """Eliminate the multipliers at the base of their segment: the last components, one for each gap.
 
     Args:
         beyond: What the elements beyond hand on.
-        count: How many multipliers.
-        scales: Softness of the sums that they hold, to compare pivots with.
+        gaps: How far each held sum is above where it should be; the first step closes them.
+        scales: Softness of the sums, to compare pivots with.
 
     Returns:
         The multipliers, and what is handed on without them.
     """
+    count = len(gaps)
     n = len(beyond.matrix) - count
     unit = constants(np.concatenate([np.zeros((n, count)), np.eye(count)]))
     zeros = constants(np.zeros((n + count, count)))
-    nothing = [[0.0] * count for _ in beyond.columns]
-    made, rest = eliminate(beyond, unit, zeros, constants(np.zeros((count, count))), nothing, scales, multipliers=True)
+    values: list[Sequence[Scalar]] = [gaps, *([0.0] * count for _ in beyond.columns[1:])]
+    made, rest = eliminate(beyond, unit, zeros, constants(np.zeros((count, count))), values, scales, multipliers=True)
     rest = Beyond(rest.matrix[:n, :n], [one[:n] for one in rest.columns], rest.softest, rest.negatives)
     return Eliminated(made.lower, made.inverse_pivots, made.coupling[:, :n], made.columns), rest

@@ -141,6 +141,7 @@ def _trace_kind(
     way_in.store_all(passing.lever, [one for load in left.loads for one in load.lever])
     store_beyond(way_in, passing, left.beyond, tip)
     if tip is None:
+        state = [*state, *_add_held(way_in, element, left, passing, multipliers)]
         way_in.store_all(
             passing.sums, [balance.energy, balance.weight, balance.room, left.beyond.softest, left.beyond.negatives]
         )
@@ -152,6 +153,19 @@ def _trace_kind(
     return Kind(number, rows, [way_out, way_in, take], columns.numbers, columns.width, size)
 
 
+def _add_held(block: Block, element: TracedElement, left: Left, passing: Passing, multipliers: int) -> list[Expression]:
+    """Add an element to the held sums of its segment, and to the torques that hold them; return what they were before."""
+    gaps, torques = block.loads(passing.gaps, multipliers), block.loads(passing.held_torques, multipliers)
+    with_own: list[list[Scalar]] = [list(gaps), list(torques)]
+    for place, held in enumerate(element.held):
+        if held is not None:
+            with_own[0][held] = with_own[0][held] + (element.coordinates[element.moving[place]] - element.rest[place])
+            with_own[1][held] = with_own[1][held] + left.gradient[place]
+    block.store_all(passing.gaps, with_own[0])
+    block.store_all(passing.held_torques, with_own[1])
+    return [*gaps, *torques]
+
+
 def _take_step(
     take: Block, element: TracedElement, left: Left, layout: Layout, passing: Passing, multipliers: int
 ) -> list[Expression]:
@@ -161,13 +175,15 @@ def _take_step(
         turn = vector(turn_loads)
         steps = left.eliminated.steps(0, turn)
         sums: list[Scalar] = list(sum_loads)
+        means = take.loads(passing.held_torques, multipliers)
         for place, step in enumerate(steps):
             held = element.held[place]
-            residual = left.gradient[place] if held is None else left.gradient[place] + turn[3 + held]
+            residual = left.gradient[place] if held is None else left.gradient[place] - means[held]
             sums = [sums[0] + left.gradient[place] * step, sums[1] + residual * residual, sums[2] + step * step]
             take.store(layout.step - layout.unknown + place, step, "q")
         take.store_all(passing.turn, (turn + left.twists @ steps)[:3].tolist())
         take.store_all(passing.steps, sums)
+        return [*turn_loads, *sum_loads, *means]
     return [*turn_loads, *sum_loads]
 
 
@@ -217,10 +233,24 @@ def _common(rows: list[int], unknowns: Unknowns, block: Block, layout: Layout, c
         mass_beyond=columns.entry([one.mass_beyond for one in ones]),
         coordinates=coordinates,
         stiffness=columns.entries([one.stiffness for one in ones]).tolist(),
-        rest=columns.entries([one.rest for one in ones]).tolist(),
+        rest=_relaxed(ones, block, layout, columns),
         pull=pulls,
         length=columns.entry([one.length for one in ones]),
     )
+
+
+def _relaxed(ones: Sequence[TracedElement], block: Block, layout: Layout, columns: TableColumns) -> list[Scalar]:
+    """Where the unknowns of a kind are relaxed.
+
+    For held ones that is their start, which spreads the held sums as the stiffness wants it: from there the springs load all of
+    a sum alike. So only the multipliers feel what it takes to hold the sum, and the residual is not blurred by it.
+    """
+    at_rest: list[Scalar] = columns.entries([one.rest for one in ones]).tolist()
+    start = layout.start - layout.unknown
+    return [
+        rest if held is None else block.load(start + place, "q")
+        for place, (rest, held) in enumerate(zip(at_rest, ones[0].held, strict=True))
+    ]
 
 
 def _arriving(

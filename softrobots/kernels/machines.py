@@ -11,6 +11,7 @@ import re
 import shutil
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray
-from softrobots.errors import MissingDependency
+from softrobots.errors import MissingDependency, OutputError
+from softrobots.files import write_text
 from softrobots.kernels import intrinsics
 from softrobots.kernels.numpy_batches import NumpyBatches
 from softrobots.kernels.program import Program
@@ -172,16 +174,24 @@ def make_run(program: Program, backend: str) -> Run:
     return NumbaRun(program) if backend == "numba" else PythonRun(program)
 
 
-@lru_cache(maxsize=64)
+_importing = threading.Lock()  # or two threads would compile the same text, each for itself
+
+
 def _module(text: str) -> ModuleType:
-    """Import a text from a file of its own, whose name tells its content."""
-    name = "softrobots_" + hashlib.sha256(text.encode()).hexdigest()[:24]
+    """Import a text from a file of its own, once in a process."""
+    with _importing:
+        return _kept_module(text)
+
+
+@lru_cache(maxsize=64)
+def _kept_module(text: str) -> ModuleType:
+    name = "softrobots_" + hashlib.sha256(text.encode()).hexdigest()[:24]  # tells the content
     path = cache_folder() / f"{name}.py"
-    if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        handle, draft = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(draft).replace(path)  # whole or not at all: other processes may want it, too
+    if not path.is_file() or path.read_bytes() != text.encode():
+        try:
+            write_text(path, text, overwrite=True)  # whole or not at all: other processes may want it, too
+        except OutputError:  # e.g. a full disk
+            path = write_text(_temporary_folder() / path.name, text, overwrite=True)
     spec: Any = importlib.util.spec_from_file_location(name, path)
     module = sys.modules[name] = importlib.util.module_from_spec(spec)  # there numba looks for it
     spec.loader.exec_module(module)

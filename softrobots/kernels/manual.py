@@ -102,7 +102,7 @@ def manual(unknowns: Unknowns, layout: Layout, tip: TipPlaces | None, *, weight:
     """
     places = layout.constants() | ({} if tip is None else tip.constants())
     lines = [
-        f"Statics of {unknowns.chain.name}{', with gravity' if weight else ', weightless'}: generated code.",
+        f"Statics of {_on_a_line(unknowns.chain.name)}{', with gravity' if weight else ', weightless'}: generated code.",
         "",
         "Functions work on an array of WORKSPACE_SIZE numbers that is all zeros at first and may be used again.",
         "settle and its like return a status; only with 0 are the numbers an answer:",
@@ -146,4 +146,9 @@ def _strains(unknowns: Unknowns) -> str:
 
 def _listed(names: list[str]) -> str:
     """All of a few; of many the first and the last."""
-    return ", ".join(names if len(names) <= 12 else [*names[:8], "...", names[-1]])
+    return ", ".join(map(_on_a_line, names if len(names) <= 12 else [*names[:8], "...", names[-1]]))
+
+
+def _on_a_line(name: str) -> str:
+    """A name out of somebody's file; what cannot be printed is told by its number."""
+    return name if name.isprintable() else name.encode("unicode_escape").decode()

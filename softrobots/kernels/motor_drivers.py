@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from softrobots.kernels.drivers import descend, go_to_start
+from softrobots.kernels.drivers import descend, go_to_start, is_usable
 from softrobots.kernels.intrinsics import Array
 from softrobots.kernels.settings import (
     FORCE_PASSES,
@@ -24,6 +24,7 @@ from softrobots.kernels.settings import (
 # Made for each robot.
 CERTIFIED: int
 UNSTABLE: int
+NOT_A_NUMBER: int
 UNOBSERVABLE: int
 NOT_REACHED: int
 BEYOND_LIMITS: int
@@ -177,6 +178,10 @@ def within_limits(w: Array, varied: int) -> int:
 
 def estimate(w: Array) -> int:
     """Find the force that explains the motor torques in the workspace; return the status."""
+    for i in range(3):
+        w[FORCE + i] = 0.0
+    if not is_usable(w):
+        return NOT_A_NUMBER
     first_force_pass(w)
     for _ in range(FORCE_PASSES):
         if w[MODE] > 0.5:
@@ -203,6 +208,8 @@ def step_to_target(w: Array) -> bool:
 
 def reach(w: Array) -> int:
     """Find motors that put the tip at the target in the workspace, from those there; return the status."""
+    if not is_usable(w):
+        return NOT_A_NUMBER
     remember(w)
     for i in range(3):
         w[FOLLOWING + i] = w[TARGET + i]

@@ -41,7 +41,7 @@ def point_numbers(
         "error": error,
         "length": length,
         "size": load,
-        "rounding": (square_root(load) + absolute(elastic) * 2.0) * ROUNDING,
+        "rounding": (square_root(load) + absolute(elastic) * 2.0 + absolute(energy)) * ROUNDING,
         "softest": softest,
         "negatives": negatives,
         "room": room,

@@ -58,9 +58,19 @@ class Passing:
         return self.sums + 5
 
     @property
+    def gaps(self) -> int:
+        """How far the held sums of a segment are from where they should be (3)."""
+        return self.steps + 3
+
+    @property
+    def held_torques(self) -> int:
+        """Sums of the torques that hold them; on the way out the mean of each (3)."""
+        return self.gaps + 3
+
+    @property
     def force(self) -> int:
         """Force and gravity in the axes behind the leading motors (6)."""
-        return self.steps + 3
+        return self.held_torques + 3
 
     @property
     def base(self) -> int:

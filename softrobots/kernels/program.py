@@ -76,7 +76,8 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         functions += motor_drivers.FUNCTIONS + path_drivers.FUNCTIONS
         lane_functions += lane_drivers.MOTOR_FUNCTIONS
     names += [*public_names(unknowns, layout, tip, weight=weight), *Status.__members__]
-    title = f'"""{manual(unknowns, layout, tip, weight=weight)}\n"""'
+    told = manual(unknowns, layout, tip, weight=weight).replace("\\", "\\\\").replace('"""', r"\"\"\"")  # names end no text
+    title = f'"""{told}\n"""'
     text = "\n\n\n".join(
         [
             title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
@@ -121,6 +122,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "LEAST_GUARD": settings.LEAST_GUARD,
         "LARGEST_GUARD": settings.LARGEST_GUARD,
         "LARGEST_STEP": settings.LARGEST_STEP,
+        "SHORT_STEP": settings.SHORT_STEP,
         "ARMIJO": settings.ARMIJO,
         "PASSES": settings.PASSES,
         "FORCE_PASSES": settings.FORCE_PASSES,
@@ -130,6 +132,8 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "OBSERVABLE": settings.OBSERVABLE,
         "HIDDEN": settings.HIDDEN,
         "LARGEST_SIZE": settings.LARGEST_SIZE,
+        "LARGEST_NUMBER": settings.LARGEST_NUMBER,
+        "LARGEST_POSITION": settings.LARGEST_POSITION,
         "REACH": float(chain.reach),
         "N_VARIED": max(layout.motors, 3),
         "LOWER": tuple(np.maximum(chain.limits[: layout.motors, 0], -1e300).tolist()),

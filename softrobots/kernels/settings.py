@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softrobots import elastostatics, force_search, springs
+from softrobots import checks, elastostatics, force_search, springs
 
 TOLERANCE = elastostatics.TOLERANCE
 """Largest residual of an answer, relative to the size of the load."""
@@ -12,6 +12,12 @@ TIGHT = 1e-12
 
 LEAST_SIZE = elastostatics.MOMENT_FLOOR
 """Least size of a load [N m]."""
+
+LARGEST_NUMBER = checks.LARGEST
+"""Largest component of a force [N] or of gravity [m/s^2]."""
+
+LARGEST_POSITION = 1e9
+"""Largest position of a motor joint [rad or m]: sines of larger angles lose digits, and beyond 1e15 mean nothing."""
 
 LARGEST_SIZE = 1e31
 """Largest size of motor torques [N m]; above it squares would soon overflow."""
@@ -27,6 +33,9 @@ LARGEST_GUARD = 3.0
 
 LARGEST_STEP = elastostatics.LARGEST_STEP
 """Largest Newton step, as a norm [rad]."""
+
+SHORT_STEP = 0.1 * LARGEST_STEP
+"""A guarded step shorter than this may be doubled [rad]."""
 
 ARMIJO = elastostatics.ARMIJO
 """Share of the predicted fall of the energy that a step must reach."""

@@ -12,7 +12,7 @@ from softrobots.errors import NameNotFound, ParameterError
 from softrobots.kernels.elements import constants
 from softrobots.kernels.expressions import Scalar
 from softrobots.kernels.recursion import TracedElement
-from softrobots.kernels.settings import LONGEST_LINE
+from softrobots.kernels.settings import LARGEST_POSITION, LONGEST_LINE
 from softrobots.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain
 from softrobots.strain_chain import STRAINS
 
@@ -37,6 +37,12 @@ class Unknowns:
         clash = sorted({STRAINS[(strain - self._first_section) % 4] for strain in held & self._locked_strains})
         if clash:
             raise ParameterError("locked_strains", self.locked, f"free of {', '.join(clash)}: given muscle lengths hold it")
+        if self.chain.rest.size and float(np.abs(self.chain.rest).max()) > LARGEST_POSITION:
+            raise ParameterError(
+                "model",
+                self.chain.name,
+                f"a robot whose springs are relaxed within +-{LARGEST_POSITION:g} rad or m, to be compiled",
+            )
         if self.locked and not self._locked_strains:
             raise ParameterError("locked_strains", self.locked, "empty for a robot without sections of constant strain")
 

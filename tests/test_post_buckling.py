@@ -1,0 +1,292 @@
+"""Branches beyond buckling: closed forms of one hinge and of two in a point, rings, paths that turn back, and labels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import softrobots as sr
+from softrobots import equilibrium_plots, force_path, post_buckling
+from softrobots.post_buckling import FUNDAMENTAL, RING
+from softrobots.stability import critical_point
+from tests.laws import law
+from tests.oracles import arm_balance
+
+PUSH = (-1, 0, 0)
+LEVER, OFFSET = 0.57, 0.03  # from the hinge to the tip, and to the motor [m]
+FOLDED = (2.41, -0.95, -1.57), np.array([-0.40, -0.88, 1.47])  # motors, and a push under which it snaps
+ONE_LINK = sr.InflatableArm(link_lengths=(0.6,))
+
+
+@cache
+def link(side: float | None, up: float | None) -> sr.SoftModel:
+    """One link with a spring, or two, at one point [N m/rad]; a joint without one is locked."""
+    given = {"spring_1_side": side, "spring_1_up": up}
+    springs = {name: stiffness for name, stiffness in given.items() if stiffness is not None}
+    return sr.load_model(ONE_LINK.urdf(), springs=springs, motors=("motor_1", "motor_2"))
+
+
+def by_label(branches: tuple[sr.EquilibriumBranch, ...]) -> dict[str, sr.EquilibriumBranch]:
+    made = {branch.label: branch for branch in branches}
+    assert len(made) == len(branches)
+    assert branches[0].label == FUNDAMENTAL
+    return made
+
+
+def springs_of(branch: sr.EquilibriumBranch) -> np.ndarray:
+    return np.array([one.q_springs for one in branch.equilibria])
+
+
+@law("post_buckling_branches", "EquilibriumBranch")
+@given(st.floats(0.0, 3.0), st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(1.05, 4.0))
+@settings(max_examples=10)
+def test_one_hinge_bows_to_either_side_as_its_closed_form_says(power: float, turn: float, lift: float, beyond: float) -> None:
+    """k theta = F L sin theta: a pitchfork at F = k / L, wherever the link points and however stiff it is."""
+    stiffness = 10.0**power
+    model = sr.load_model(link(None, 1.0).urdf, springs={"spring_1_up": stiffness}, motors=("motor_1", "motor_2"))
+    along = np.array([np.cos(turn) * np.cos(lift), np.sin(turn) * np.cos(lift), np.sin(lift)])
+    critical = stiffness / LEVER
+    found = by_label(sr.post_buckling_branches(model, (turn, lift), -along, max_force=beyond * critical, largest_step=0.2))
+    assert sorted(found) == ["+spring_1_up", "-spring_1_up", FUNDAMENTAL]
+    for label, branch in found.items():
+        assert isinstance(branch, sr.EquilibriumBranch)
+        angles, forces = springs_of(branch)[:, 0], branch.forces
+        assert branch.ended == "largest force"
+        assert forces[-1] == pytest.approx(beyond * critical, rel=1e-12)
+        # Energy: 1/2 k theta^2 and the work against the push over l1 + L cos theta.
+        energy = 0.5 * stiffness * angles**2 + forces * (OFFSET + LEVER * np.cos(angles))
+        assert branch.energy == pytest.approx(energy, rel=1e-12)
+        softest = 1.0 - forces * LEVER * np.cos(angles) / stiffness
+        assert branch.softest == pytest.approx(softest, abs=1e-11)
+        if label == FUNDAMENTAL:
+            assert np.abs(angles).max() < 1e-12
+            assert branch.stable.tolist() == (forces < critical * (1.0 - 1e-8)).tolist()
+        else:
+            assert forces[0] == pytest.approx(critical, rel=1e-12)
+            assert branch.neutral.tolist() == [True] + [False] * (len(forces) - 1)
+            assert branch.stable[1:].all()
+            assert np.all(np.sign(angles[1:]) == (1.0 if label[0] == "+" else -1.0))
+            assert angles[1:] / np.sin(angles[1:]) == pytest.approx(forces[1:] * LEVER / stiffness, rel=1e-10)
+            assert np.all(np.diff(branch.amplitude) > 0.0)
+    assert springs_of(found["+spring_1_up"]) == pytest.approx(-springs_of(found["-spring_1_up"]), abs=1e-10)
+
+
+def test_the_softer_of_two_hinges_buckles() -> None:
+    found = by_label(sr.post_buckling_branches(link(150.0, 200.0), (0, 0), PUSH))
+    assert sorted(found) == ["+spring_1_side", "-spring_1_side", FUNDAMENTAL]
+    assert np.abs(springs_of(found["+spring_1_side"])[:, 1]).max() < 1e-12
+
+
+def test_two_equal_hinges_have_eight_branches_four_of_them_stable() -> None:
+    """Not a circle: E = k (a^2 + b^2)/2 + F L cos a cos b tells directions apart in fourth order.
+
+    Along a hinge k a = F L sin a, stable; between them a = b with k a = F L sin a cos a, unstable: the eigenvalue k - F L.
+    """
+    stiffness = 172.71
+    found = by_label(sr.post_buckling_branches(link(stiffness, stiffness), (0, 0), PUSH))
+    axes = {f"{sign}spring_1_{name}" for sign in "+-" for name in ("side", "up")}
+    between = {f"{one}spring_1_side {other}spring_1_up" for one in "+-" for other in "+-"}
+    assert set(found) == {FUNDAMENTAL} | axes | between
+    for label in axes:
+        angles = springs_of(found[label])[1:]
+        a, other = angles[:, int("up" in label)], angles[:, 1 - int("up" in label)]
+        assert np.abs(other).max() < 1e-9
+        assert a / np.sin(a) == pytest.approx(found[label].forces[1:] * LEVER / stiffness, rel=1e-9)
+        assert found[label].stable[1:].all()
+    for label in between:
+        angles = springs_of(found[label])[1:]
+        assert np.abs(angles[:, 0]) == pytest.approx(np.abs(angles[:, 1]), rel=1e-7)
+        a = np.abs(angles[:, 0])
+        assert a / (np.sin(a) * np.cos(a)) == pytest.approx(found[label].forces[1:] * LEVER / stiffness, rel=1e-7)
+        assert not found[label].stable.any()
+        assert found[label].softest[1:] == pytest.approx(1.0 - found[label].forces[1:] * LEVER / stiffness, rel=1e-6)
+    # The stable ones lie lowest, those between them below the straight link.
+    last = {label: branch.energy[-1] for label, branch in found.items()}
+    assert max(last[label] for label in axes) < min(last[label] for label in between)
+    assert max(last[label] for label in between) < last[FUNDAMENTAL]
+
+
+def test_the_arm_of_two_links_on_every_branch_by_the_dh_table(arm: sr.SoftModel) -> None:
+    """Balance and stability of every point by [Troise 2021]'s transforms; descent finds one of the branches."""
+    stiffness = float(arm.stiffness[0])
+    found = by_label(sr.post_buckling_branches(arm, (0, 0, 0), PUSH, max_force=150.0))
+    assert len(found) == 9
+    assert found[FUNDAMENTAL].forces[0] == 0.0
+    for label, branch in found.items():
+        forces = branch.forces[:, None] * np.array(PUSH)
+        residual, tangent, tips = arm_balance(np.zeros((len(forces), 3)), springs_of(branch), forces, stiffness)
+        assert np.linalg.norm(residual, axis=1).max() <= 1e-11 * 150.0 * 1.2
+        least = np.linalg.eigvalsh(tangent)[:, 0] / stiffness
+        assert branch.softest == pytest.approx(least, abs=1e-11)
+        assert [one.tip_position for one in branch.equilibria] == pytest.approx(tips, abs=1e-12)
+        if label != FUNDAMENTAL:
+            assert branch.forces[0] == pytest.approx(sr.critical_load(arm, (0, 0, 0), PUSH), rel=1e-12)
+            assert branch.stable[1:].all() == (" " not in label)
+    descended = sr.solve_equilibrium(arm, (0, 0, 0), (-150, 0, 0)).q_springs
+    stable = [springs_of(branch)[-1] for branch in found.values() if branch.stable[-1]]
+    assert len(stable) == 4
+    assert min(np.abs(one - descended).max() for one in stable) < 1e-9
+
+
+@pytest.fixture(scope="module")
+def rod() -> sr.SoftModel:
+    """A passive rod of three sections along z."""
+    return sr.load_model(sr.PccArm(segment_lengths=(0.5,), elastic_sections=3, muscle_azimuths=()))
+
+
+def test_a_round_rod_buckles_into_a_ring_and_is_said_to_be_neutral(rod: sr.SoftModel) -> None:
+    found = by_label(sr.post_buckling_branches(rod, (), (0, 0, -1)))
+    assert set(found) == {FUNDAMENTAL, RING}
+    ring = found[RING]
+    assert ring.neutral.all()
+    heavy = by_label(sr.post_buckling_branches(rod, (), (0, 0, -1), gravity=sr.EARTH_GRAVITY))  # not round to 1e-9
+    assert all(one.converged for branch in (*found.values(), *heavy.values()) for one in branch.equilibria)
+    assert not ring.stable.any()
+    assert ring.amplitude[-1] > 0.5
+    # Turned about the axis of the rod by any angle it is in balance as it stands: no step is needed.
+    last = ring.equilibria[-1]
+    for angle in (0.3, 2.0, 4.5):
+        z = last.q_springs.reshape(-1, 4).copy()
+        c, s = np.cos(angle), np.sin(angle)
+        z[:, :2] = z[:, :2] @ np.array([[c, s], [-s, c]])
+        turned = sr.solve_equilibrium(rod, (), (0, 0, -ring.forces[-1]), q_springs0=z.ravel())
+        assert turned.q_springs == pytest.approx(z.ravel(), abs=1e-12)
+        assert not turned.stable
+
+
+def test_a_rod_that_is_not_round_has_two_branches() -> None:
+    """The lumped rod under its weight, its hinges about x stiffer: it bows about y."""
+    made = sr.load_model(sr.PccArm(segment_lengths=(0.5,), chain="lumped", hinges=2, muscle_azimuths=()))
+    table = {name: (k * (1.2 if "bend_x" in name else 1.0), rest) for name, (k, rest) in made.spring_table.items()}
+    stiff = sr.load_model(made.urdf, springs=table)
+    found = by_label(sr.post_buckling_branches(stiff, (), (0, 0, -1), gravity=sr.EARTH_GRAVITY))
+    assert len(found) == 3
+    assert all(label == FUNDAMENTAL or "bend_y" in label for label in found)
+    assert all(branch.stable[1:].all() for label, branch in found.items() if label != FUNDAMENTAL)
+
+
+def test_at_a_limit_point_the_path_itself_turns_back(arm: sr.SoftModel) -> None:
+    """A folded arm snaps: nothing branches off, and on the way back it is unstable."""
+    motors, direction = FOLDED
+    (path,) = sr.post_buckling_branches(arm, motors, direction)
+    limit = sr.critical_load(arm, motors, direction)
+    top = int(np.argmax(np.diff(path.forces) < 0.0))  # the last point before the force falls
+    assert path.label == FUNDAMENTAL
+    assert path.forces[: top + 1].max() <= limit * (1.0 + 1e-12)
+    assert path.forces[top] == pytest.approx(limit, rel=1e-2)  # points stand up to 0.05 rad apart
+    assert np.diff(path.forces).min() < 0.0
+    assert path.stable[: top - 1].all()
+    falling = np.flatnonzero(np.diff(path.forces) < 0.0)[1:-1]
+    assert not path.stable[falling].any()
+    unit = direction / np.linalg.norm(direction)
+    for one, force in zip(path.equilibria[::5], path.forces[::5].tolist(), strict=True):
+        residual, _, _ = arm_balance(np.array([motors]), one.q_springs[None], force * unit[None], float(arm.stiffness[0]))
+        assert np.abs(residual).max() < 1e-9
+    assert np.all(path.amplitude == 0.0)
+
+
+@pytest.mark.parametrize("plateau", [3.0, 12.0])
+def test_a_branch_goes_on_where_the_link_comes_onto_its_plateau(plateau: float) -> None:
+    """k a = F L sin a up to the moment M of the plateau, then M = F L sin a: it falls, unstable, to a = pi / 2.
+
+    There the link bends on against -F L cos a; across it has M / a more.
+    """
+    model = sr.load_model(sr.InflatableArm(link_lengths=(0.6,), max_moment=plateau))
+    stiffness = float(model.stiffness[0])
+    found = by_label(sr.post_buckling_branches(model, (0, 0), PUSH))
+    assert len(found) == 9
+    for label in ("+spring_1_up", "-spring_1_side"):
+        branch = found[label]
+        a, forces = np.abs(springs_of(branch)).max(axis=1)[1:], branch.forces[1:]
+        assert branch.ended == "largest force"
+        assert np.abs(springs_of(branch)).min(axis=1).max() < 1e-9
+        assert forces * LEVER * np.sin(a) == pytest.approx(np.minimum(stiffness * a, plateau), rel=1e-9)
+        beyond = stiffness * a > plateau
+        assert branch.stable[1:].tolist() == (~beyond | (a > np.pi / 2)).tolist()
+        assert branch.softest[1:][beyond] == pytest.approx(-(forces * LEVER * np.cos(a))[beyond] / stiffness, abs=1e-9)
+
+
+def test_branches_are_found_before_a_plateau_that_begins_early() -> None:
+    """At 0.017 rad; they end in balance."""
+    model = sr.load_model(sr.InflatableArm(max_moment=3.0))
+    found = by_label(sr.post_buckling_branches(model, (0, 0, 0), PUSH))
+    assert len(found) == 9
+    assert all(branch.equilibria[-1].converged for branch in found.values())
+
+
+def test_a_knee_at_which_stability_is_lost_is_no_crossing() -> None:
+    """The tangent stiffness jumps there; under a larger force there is no equilibrium nearby."""
+    model = sr.load_model(sr.InflatableArm(max_moment=(12.0, 3.0)))
+    motors, direction = (0, 0, 0.20753406386703446), (-1.0, -0.08838592885714874, 0.017351505102718986)
+    critical = critical_point(model, motors, direction)
+    assert not critical.crosses
+    (path,) = sr.post_buckling_branches(model, motors, direction)
+    top = int(np.argmax(np.diff(path.forces) < 0.0))
+    assert path.forces[top] == pytest.approx(critical.force, rel=1e-3)
+    assert path.stable[: top + 1].all()
+    assert not path.stable[top + 1]
+
+
+def test_a_branch_tells_why_it_ends(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    bent = sr.load_model(sr.PccArm(segment_lengths=(0.5,), elastic_sections=1, muscle_azimuths=()))  # to half a turn at most
+    far = by_label(sr.post_buckling_branches(bent, (), (0, 0, -1), max_force=200.0, largest_step=0.2))
+    assert far[RING].ended == "end of range"
+    assert far[RING].forces[-1] < 200.0
+    monkeypatch.setattr(force_path, "_MOST_POINTS", 5)
+    few = by_label(sr.post_buckling_branches(link(None, 172.71), (0, 0), PUSH))
+    assert {branch.ended for branch in few.values()} == {"points"}
+    assert {len(branch.equilibria) for branch in few.values()} == {5}
+    monkeypatch.undo()
+    monkeypatch.setattr(force_path, "_NEWTON_STEPS", 1)
+    (lost,) = sr.post_buckling_branches(arm, *FOLDED)
+    assert lost.ended == "lost"
+    with pytest.raises(sr.NeutralEquilibrium, match=r"not all branches that leave the path at 303 N"):
+        sr.post_buckling_branches(link(None, 172.71), (0, 0), PUSH)
+
+
+def test_more_than_two_modes_at_once_are_refused(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(post_buckling, "NEUTRAL", 2.0)
+    with pytest.raises(sr.NeutralEquilibrium, match=r"4 modes buckle at 114\.066 N"):
+        sr.post_buckling_branches(arm, (0, 0, 0), PUSH)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"direction": (1, 0, 0), "max_force": 300.0}, sr.NoCriticalLoad, "stays stable up to 300 N"),
+        ({"direction": (0, 0, 0)}, sr.ParameterError, "different from zero"),
+        ({"largest_step": 0.0}, sr.ParameterError, "largest_step"),
+        ({"q_motors": (0,)}, sr.ParameterError, "q_motors"),
+        ({"frame": "top"}, sr.NameNotFound, "'top'"),
+        ({"gravity": (1, 2)}, sr.ParameterError, "gravity"),
+        ({"max_force": -1.0}, sr.ParameterError, "max_force"),
+    ],
+)
+def test_bad_input_is_refused(arm: sr.SoftModel, options: dict, error: type[Exception], words: str) -> None:
+    with pytest.raises(error, match=words):
+        sr.post_buckling_branches(arm, **({"q_motors": (0, 0, 0), "direction": PUSH} | options))
+
+
+def test_the_figure_shows_what_is_stable_and_what_is_not(tool: Callable[[str], ModuleType]) -> None:
+    tool("matplotlib")
+    found = sr.post_buckling_branches(link(None, 172.71), (0, 0), PUSH)
+    left, right = equilibrium_plots.branches(found, (0, 0, 2)).axes
+    assert [text.get_text() for text in left.get_legend().get_texts()] == [branch.label for branch in found]
+    for row, branch in enumerate(found):
+        whole, dashed = (np.asarray(line.get_ydata(), dtype=float) for line in left.lines[2 * row : 2 * row + 2])
+        ways = 1e3 * np.array([one.tip_position[2] for one in branch.equilibria])
+        assert whole[branch.stable] == pytest.approx(ways[branch.stable], abs=1e-9)
+        assert np.isnan(whole[~branch.stable]).all()
+        assert dashed[~branch.stable] == pytest.approx(ways[~branch.stable], abs=1e-9)
+        assert np.asarray(right.lines[2 * row].get_ydata())[branch.stable] == pytest.approx(branch.softest[branch.stable])
+    for wrong in ((), [1], 5):
+        with pytest.raises(sr.ParameterError, match="EquilibriumBranch"):
+            equilibrium_plots.branches(wrong, (0, 0, 1))
+    with pytest.raises(sr.ParameterError, match="across"):
+        equilibrium_plots.branches(found, (0, 0, 0))
