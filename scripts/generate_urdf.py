@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-import softrobots as sr
-from softrobots.files import make_folder, write_atomically
+from softrobots.command_line import exit_status
+from softrobots.files import make_folder, write_bytes
 from softrobots.generated import generated_files
 from softrobots.paths import urdf_folder
 
@@ -21,12 +21,7 @@ def main(argv: list[str] | None = None) -> int:
     folder = arguments.output or urdf_folder()
     if folder.exists() and not folder.is_dir():
         parser.error(f"--output {folder} is a file; a folder is required")
-    try:
-        stale = update(folder, check=arguments.check)
-    except sr.SoftRobotsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 1 if arguments.check and stale else 0
+    return exit_status(lambda: not (update(folder, check=arguments.check) and arguments.check))
 
 
 def update(folder: Path, *, check: bool) -> int:
@@ -35,7 +30,7 @@ def update(folder: Path, *, check: bool) -> int:
     for path, text, same in generated_files(folder):
         if not check and not same:
             make_folder(folder)
-            write_atomically(path, lambda file, content=text: file.write(content))
+            write_bytes(path, text, overwrite=True)
         stale += not same
         print(f"{path}: {'up to date' if same else 'differs' if check else 'written'}")
     return stale

@@ -23,7 +23,7 @@ from tqdm import tqdm
 import softrobots as sr
 from softrobots import body_plots, helix, plots
 from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
-from softrobots.files import free_folder, make_folder
+from softrobots.files import free_folder, make_folder, write_text
 from softrobots.loads import Load
 
 PIECES = {"pinch": "pinches", "tape": "tapes", "stoppers": "gaps"}
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> Path:
         with sr.view(model, loaded) as viewer:
             viewer.write_html(folder / "scene.html", title="Helical tube under load")
         if figure is not None:
-            figure.savefig(folder / "shape.png")
+            plots.write_png(figure, folder / "shape.png", overwrite=False)
         step("files")
         sr.save_result(loaded, folder / "equilibrium.npz")
         design.save(folder / "design.json")
@@ -106,8 +106,8 @@ def run(arguments: argparse.Namespace) -> Path:
         helix.write_template_pages(pattern, folder / "template_pages" / "page.svg")
         helix.write_template_table(pattern, folder / "template.csv")
         for name, robot in robots.items():
-            (folder / f"{name}.urdf").write_text(robot.urdf(), encoding="utf-8")
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+            write_text(folder / f"{name}.urdf", robot.urdf(), overwrite=False)
+        write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
         step("growth")
         with sr.view(sr.load_model(tube)) as viewer:
             viewer.animate_growth(tube)

@@ -17,7 +17,7 @@ from pathlib import Path
 import softrobots as sr
 from softrobots import inflated_beam, plots
 from softrobots.command_line import add_load, exit_status, gravity_of, serve, tell_written
-from softrobots.files import free_folder, make_folder
+from softrobots.files import free_folder, make_folder, write_text
 from softrobots.loads import Load
 from softrobots.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 from softrobots.trajectory import METHODS
@@ -90,9 +90,9 @@ def run(arguments: argparse.Namespace) -> Path:
         for name, result in results.items():
             sr.save_result(result, folder / f"{name}.npz")
         sr.save_csv(trajectory, folder / "trajectory.csv")
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
         for name, figure in figures.items():
-            figure.savefig(folder / f"{name}.png")
+            plots.write_png(figure, folder / f"{name}.png", overwrite=False)
         viewer.write_html(folder / "scene.html", title="Inflatable arm, loaded, sag compensated")
         print(table(summary, trajectory.method))
         tell_written(folder)

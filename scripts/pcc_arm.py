@@ -18,7 +18,7 @@ import numpy as np
 import softrobots as sr
 from softrobots import body_plots, plots
 from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
-from softrobots.files import free_folder, make_folder
+from softrobots.files import free_folder, make_folder, write_text
 from softrobots.loads import Load
 from softrobots.robots.pcc_arm import CHAINS
 
@@ -94,9 +94,9 @@ def run(arguments: argparse.Namespace) -> Path:
             sr.save_result(result, folder / f"{name}.npz")
         if waypoints is not None:
             sr.save_csv(shown, folder / "trajectory.csv")
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
         if figure is not None:
-            figure.savefig(folder / "shape.png")
+            plots.write_png(figure, folder / "shape.png", overwrite=False)
         viewer.write_html(folder / "scene.html", title="PCC arm")
         print(table(summary))
         if waypoints is not None:

@@ -1,7 +1,8 @@
 """Sample what the tip of the arm of pneumatic muscles can reach within the limits of its muscles.
 
 Draws random muscle lengths, brings the arm to equilibrium under the load at each, and writes the reached tip positions with
-their manipulability as a picture and an NPZ file (load it again with softrobots.load_result) into a new folder.
+their manipulability as a picture and an NPZ file (load it again with softrobots.load_result) into a new folder. Until then
+finished samples are kept beside it: after an interruption --resume goes on from there, and the file is the same.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import body_plots, plots
-from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, tell_written
+from softrobots.command_line import add_load, add_resume, blocks_beside, exit_status, gravity_of, refuse_too_large, tell_written
 from softrobots.files import free_folder, make_folder
 
 
@@ -35,6 +36,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder for the results (output/pcc_workspace_<time>)"
     )
+    add_resume(made)
     made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
     return made
 
@@ -53,13 +55,15 @@ def run(arguments: argparse.Namespace) -> Path:
     refuse_too_large(robot, "--segments", arguments.segments)
     model = sr.load_model(robot)
     folder = free_folder(arguments.output or Path("output") / f"pcc_workspace_{datetime.now():%Y%m%d_%H%M%S}")
-    reach = sr.sample_workspace(
-        model, arguments.samples, force=arguments.force, gravity=gravity, seed=arguments.seed, progress="muscle lengths"
-    )
-    make_folder(folder)
-    sr.save_result(reach, folder / "workspace.npz")
+    with blocks_beside(folder, arguments) as blocks:
+        reach = sr.sample_workspace(
+            model, arguments.samples, force=arguments.force, gravity=gravity, seed=arguments.seed, checkpoint=blocks,
+            progress="muscle lengths",
+        )  # fmt: skip
+        make_folder(folder)
+        sr.save_result(reach, folder / "workspace.npz")
     if not arguments.no_plots:
-        body_plots.workspace(reach).savefig(folder / "workspace.png")
+        plots.write_png(body_plots.workspace(reach), folder / "workspace.png", overwrite=False)
     tips, radius = reach.tip_positions, np.linalg.norm(reach.tip_positions[:, :2], axis=1)
     rows = [
         ("samples reached", f"{len(tips)}"),

@@ -16,7 +16,8 @@ import numpy as np
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots.files import new_file, write_atomically
+from softrobots.command_line import exit_status
+from softrobots.files import new_file, write_text
 
 
 def random_cases(load: float, count: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -54,7 +55,7 @@ def estimation_rate(model: sr.SoftModel, load: float, method: str, count: int, s
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Measure the rates and print them as two tables."""
+    """Run from the command line; bad input ends with status 2."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=_count, default=10_000, help="random cases a load (%(default)s)")
     parser.add_argument(
@@ -64,11 +65,13 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the random cases (%(default)s)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the rates to a new file")
     arguments = parser.parse_args(argv)
-    try:
-        target = None if arguments.json is None else new_file(arguments.json, overwrite=False)
-    except sr.SoftRobotsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    return exit_status(lambda: run(arguments))
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure the rates, write them if asked, and print them as two tables."""
+    if arguments.json is not None:
+        new_file(arguments.json, overwrite=False)  # tells at once
     model = sr.load_model(sr.InflatableArm())
     count, seed = arguments.cases, arguments.seed
     equilibria = {
@@ -79,17 +82,12 @@ def main(argv: list[str] | None = None) -> int:
         method: {load: estimation_rate(model, load, method, count, seed) for load in arguments.estimation_loads}
         for method in ("newton", "alternation")
     }
+    if arguments.json is not None:
+        told = {"cases": count, "seed": seed, "equilibrium": equilibria, "load_estimation": estimates}
+        write_text(arguments.json, json.dumps(told, indent=2) + "\n", overwrite=False)
     print(f"{count} random cases a load, seed {seed}; loads beyond wrinkling test the solvers, not the robot\n")
     print("Equilibria certified stable [%]\n\n" + _table(equilibria))
     print("\nTrue force recovered to 1e-6 from motor torques [%]\n\n" + _table(estimates))
-    if target is not None:
-        text = _json({"cases": count, "seed": seed, "equilibrium": equilibria, "load_estimation": estimates})
-        write_atomically(target, lambda file: file.write(text.encode("utf-8")))
-    return 0
-
-
-def _json(rates: dict[str, object]) -> str:
-    return json.dumps(rates, indent=2) + "\n"
 
 
 def _count(text: str) -> int:

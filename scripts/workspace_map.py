@@ -2,7 +2,8 @@
 
 Puts the tip at every target of a grid under every load, with the compiled solvers: by default a million cases in the half plane
 through the axis of motor 1 (radius by height). Writes the maps as an NPZ file (load it again with softrobots.load_result) and a
-picture beside it. With --scheduler the same blocks of targets run on a Dask cluster (extra `cluster`).
+picture beside it. With --scheduler the same blocks of targets run on a Dask cluster (extra `cluster`). Finished blocks are kept
+beside the NPZ file until it is written: after an interruption --resume goes on from there, and the file is the same.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 import softrobots as sr
 from softrobots import inflated_beam, map_plots, plots, sweeps
 from softrobots.checks import finite_number, positive_integer, positive_number
-from softrobots.command_line import add_gravity, exit_status, gravity_of
+from softrobots.command_line import add_gravity, add_resume, blocks_beside, exit_status, gravity_of
 from softrobots.files import new_file
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images" / "workspace_map.png"
@@ -55,6 +56,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--threads", type=int, default=1, help="threads of this process (%(default)s)")
     made.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler to do the work, e.g. tcp://127.0.0.1:8786")
     made.add_argument("--output", type=Path, metavar="FILE", help="new NPZ file (output/workspace_map_<time>.npz)")
+    add_resume(made)
     made.add_argument("--overwrite", action="store_true", help="replace files that exist")
     made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
     told = "write only the picture of the guide, here (docs/images/workspace_map.png), replacing it"
@@ -64,8 +66,8 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> None:
     """Do the whole job."""
-    if arguments.docs is not None and (arguments.output is not None or arguments.no_plots):
-        raise sr.ParameterError("--docs", str(arguments.docs), "given without --output and --no-plots")
+    if arguments.docs is not None and (arguments.output is not None or arguments.no_plots or arguments.resume):
+        raise sr.ParameterError("--docs", str(arguments.docs), "given without --output, --resume and --no-plots")
     if not arguments.no_plots:
         plots.require_matplotlib()  # tells at once what is missing
     largest = positive_number("--max-load", arguments.max_load, "N")
@@ -86,13 +88,21 @@ def run(arguments: argparse.Namespace) -> None:
     for file in wanted:
         new_file(file, overwrite=arguments.overwrite or arguments.docs is not None)
     began = time.perf_counter()
-    maps = sweeps.map_workspace(
-        model, grid, np.linspace(0.0, largest, count), direction=arguments.direction, gravity=gravity_of(arguments),
-        backend=arguments.backend, threads=arguments.threads, scheduler=arguments.scheduler, progress="blocks of targets",
-    )  # fmt: skip
-    spent = time.perf_counter() - began
+
+    def maps_with(blocks: Path | None) -> sweeps.WorkspaceMap:
+        return sweeps.map_workspace(
+            model, grid, np.linspace(0.0, largest, count), direction=arguments.direction, gravity=gravity_of(arguments),
+            backend=arguments.backend, threads=arguments.threads, scheduler=arguments.scheduler, checkpoint=blocks,
+            progress="blocks of targets",
+        )  # fmt: skip
+
     if arguments.docs is None:
-        sr.save_result(maps, output, overwrite=arguments.overwrite)
+        with blocks_beside(output, arguments) as blocks:
+            maps = maps_with(blocks)
+            sr.save_result(maps, output, overwrite=arguments.overwrite)
+    else:
+        maps = maps_with(None)
+    spent = time.perf_counter() - began
     if not arguments.no_plots:
         figure = map_plots.workspace_maps(maps, load=shown)
         plots.write_png(figure, picture, overwrite=arguments.overwrite or arguments.docs is not None)

@@ -1,7 +1,8 @@
-"""Linear algebra on one thread while an equilibrium is sought.
+"""Linear algebra on one thread, wherever an equilibrium is sought or asked about.
 
 The matrices are small (4 to 300 rows). From about a hundred rows on, BLAS splits them over all cores, which gains nothing, and
 costs a hundred times the work itself while another program uses one of the cores (measured: 0.2 ms become 25 to 130 ms).
+It also rounds differently then: without this, bytes would depend on the cores, and on what other threads do at the time.
 """
 
 from __future__ import annotations
@@ -36,13 +37,13 @@ def one_blas_thread(rows: int) -> AbstractContextManager[None]:
 @contextmanager
 def _limited() -> Iterator[None]:
     with _LOCK:
-        _Limit.users += 1
-        if _Limit.users == 1:
+        if _Limit.users == 0:
             if _Limit.controller is None:
                 from threadpoolctl import ThreadpoolController
 
                 _Limit.controller = ThreadpoolController()
             _Limit.limiter = _Limit.controller.limit(limits=1, user_api="blas")
+        _Limit.users += 1
     try:
         yield
     finally:

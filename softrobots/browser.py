@@ -13,7 +13,7 @@ import numpy as np
 
 from softrobots.checks import positive_integer, positive_number
 from softrobots.errors import MissingDependency, ParameterError, ViewerError
-from softrobots.files import as_path, new_file, write_atomically
+from softrobots.files import as_path, new_file, write_bytes
 from softrobots.progress import with_progress
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -84,8 +84,7 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
     with _photographed(html, png, width, height) as (page, target):
         show_share(page, share)
         shot = page.screenshot()
-    write_atomically(target, lambda file: file.write(shot))
-    return target
+    return write_bytes(target, shot, overwrite=True)
 
 
 def take_animation(
@@ -134,8 +133,9 @@ def take_animation(
     drawn = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]
     options: dict[str, Any] = {"save_all": True, "append_images": drawn[1:], "loop": 0, "optimize": False}
     interval = 1000.0 * seconds / frames
-    write_atomically(target, lambda file: drawn[0].save(file, format="GIF", duration=interval, **options))
-    return target
+    moving = io.BytesIO()
+    drawn[0].save(moving, format="GIF", duration=interval, **options)
+    return write_bytes(target, moving.getvalue(), overwrite=True)
 
 
 def _palette(shots: list[Any]) -> Any:

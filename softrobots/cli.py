@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import difflib
-import io
-import os
 import re
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 from softrobots import __version__
-from softrobots.command_line import exit_status
+from softrobots.command_line import exit_status, take_negative_numbers
 from softrobots.commands import COMMANDS
 from softrobots.commands.option_names import told_by_option
 from softrobots.errors import ParameterError
@@ -61,7 +57,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         """Make a parser; those of its subcommands are of the same kind."""
         super().__init__(**(options | {"allow_abbrev": False, "formatter_class": Formatter}))
-        self._negative_number_matcher = re.compile(r"-\.?\d")  # that of Python 3.14; before it, -1e-3 was an option
+        take_negative_numbers(self)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Parse words, and refuse those that are left over."""
@@ -102,38 +98,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: Words of the command line; by default those of the process.
 
     Returns:
-        The exit status, as `command_line.exit_status` tells; 2 if the output cannot be written, 141 if nobody
-        reads it any more.
+        The exit status, as `command_line.exit_status` tells.
     """
-    for stream in ("stdout", "stderr"):
-        if getattr(sys, stream) is None:  # closed, as by >&-: nobody wants to read
-            setattr(sys, stream, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
-    arguments = parser().parse_args(argv)
-    try:
-        status = exit_status(lambda: _run(arguments))
-        sys.stdout.flush()
-    except BrokenPipeError:  # whoever read the output has seen enough, e.g. head
-        _give_up_output()
-        return 141
-    except OSError as error:  # e.g. a full disk behind >; files that we write ourselves end in errors of ours
-        sys.stderr.write(f"error: {'' if error.filename else 'cannot write the answer: '}{error}\n")
-        _give_up_output()
-        return 2
-    return status
+    return exit_status(lambda: _run(argv))
 
 
-def _run(arguments: argparse.Namespace) -> object:
+def _run(argv: Sequence[str] | None) -> object:
     """Run a subcommand; what is wrong with an option is told by its name."""
+    arguments = parser().parse_args(argv)
     try:
         return arguments.run(arguments)
     except ParameterError as error:
         raise told_by_option(error, arguments) from error
-
-
-def _give_up_output() -> None:
-    """Let go what is not written yet, or Python would complain of it at its end."""
-    with contextlib.suppress(io.UnsupportedOperation):  # not a file at all
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _nearest(word: str, names: Iterable[str]) -> str:

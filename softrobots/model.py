@@ -25,9 +25,9 @@ from softrobots.structure import Parts, Structure
 from softrobots.urdf_tags import InflatedLinkTag, MuscleTag
 
 MAX_DOF = 300
-"""Largest number of coordinates: Pinocchio's workspace needs 8 s and 1.8 GB there, 57 s and 14 GB at twice as many."""
+"""Largest number of coordinates: Pinocchio's workspace takes seconds and 0.9 GB there, eight times that at twice as many."""
 
-_KEPT_GRAVITIES = 8  # Pinocchio keeps gravity in its model; so many copies are kept per thread
+_KEPT_GRAVITIES = 8  # copies of Pinocchio's model in each thread
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,13 @@ class SoftModel:
     Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then muscle lengths (or tensions).
     Elastic coordinates, `q_springs`, are joint springs and what the actuators leave free of the sections of constant strain.
 
-    Made by `softrobots.load_model`. Arrays are ordered base to tip. Safe to share between threads: each thread gets
-    its own Pinocchio workspace. Nothing of it can be changed; do not change `pinocchio` either.
+    Made by `softrobots.load_model`. Arrays are ordered base to tip. Nothing of it can be changed; do not change `pinocchio`
+    either.
+
+    Safe to share between threads, which get the same bytes as one alone: each thread has its own Pinocchio workspaces, made
+    when it first asks (0.2 ms for an arm, seconds near `MAX_DOF`) and freed when it ends. It pickles as its URDF text and what
+    was said about it; processes that load it anew get the same bytes, too. After `os.fork` in a program with threads nothing is
+    promised: start processes by "spawn".
     """
 
     def __init__(
@@ -320,30 +325,29 @@ class SoftModel:
     def workspace(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         """Pinocchio model and data of the calling thread for a gravity vector (world axes, [m/s^2]; None: weightless).
 
-        Creating Pinocchio data is expensive, so both are kept: the weightless pair always, others up to a small number.
+        Pinocchio data is expensive to make and large (0.2 ms and little for an arm, seconds and 0.9 GB at `MAX_DOF`), so a
+        thread makes it once, for all gravities: no function that is called here finds anything in it from the call before.
+        Pinocchio keeps gravity in its model; of that a few copies are kept.
 
         Raises:
             DescriptionError: If the robot has more than `MAX_DOF` coordinates.
         """
         pairs: dict[Any, tuple[Any, Any]] | None = getattr(self._local, "pairs", None)
         if pairs is None:
-            pairs = self._local.pairs = {}
-        pair = pairs.get(gravity)
-        if pair is None:
             if self._pin.nv > MAX_DOF:
                 raise DescriptionError(
                     f"{self._pin.name} has {self._pin.nv} coordinates; Pinocchio's workspace is made for at most {MAX_DOF} "
                     f"(for longer chains softrobots.compile makes a compiled solver)"
                 )
-            if gravity is None:
-                model = self._pin
-            else:
-                model = self._pin.copy()
-                model.gravity.linear = np.array(gravity)
-                kept = [key for key in pairs if key is not None]
-                if len(kept) >= _KEPT_GRAVITIES:
-                    del pairs[kept[0]]
-            pair = pairs[gravity] = (model, model.createData())
+            pairs = self._local.pairs = {None: (self._pin, self._pin.createData())}
+        pair = pairs.get(gravity)
+        if pair is None:
+            model = self._pin.copy()
+            model.gravity.linear = np.array(gravity)
+            kept = [key for key in pairs if key is not None]
+            if len(kept) >= _KEPT_GRAVITIES:
+                del pairs[kept[0]]
+            pair = pairs[gravity] = (model, pairs[None][1])
         return pair
 
     def chain(self) -> SerialChain:

@@ -6,6 +6,7 @@ well as in colour, so that they can be told apart in grey.
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from softrobots.checks import FloatArray, finite_array, positive_integer
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import MissingDependency, ParameterError
-from softrobots.files import new_file, write_atomically
+from softrobots.files import write_bytes
 from softrobots.kinematics import backbone
 from softrobots.trajectory import Trajectory
 
@@ -24,6 +25,15 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 """Markers that tell lines apart in grey."""
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
 """Styles of lines that tell them apart where they cross."""
+
+
+def plain_words(name: str) -> str:
+    """A name of a robot or a joint as a figure writes it: on one line, and without formulas, which begin with a dollar.
+
+    Args:
+        name: The name, out of somebody's file.
+    """
+    return (name if name.isprintable() else name.encode("unicode_escape").decode()).replace("$", r"\$")
 
 
 def line_style(number: int) -> dict[str, Any]:
@@ -120,8 +130,8 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
     for number, name in enumerate(trajectory.model.motor_joints):
         colour, marker = COLOURS[number % 6], MARKERS[number % 6]
         style = {"color": colour, "marker": marker, "markevery": every, "ms": 5}
-        axes.plot(trajectory.times, trajectory.q_motors[:, number], label=f"{name}, elastic", **style)
-        axes.plot(rigid.times, rigid.q_motors[:, number], ls="--", mfc="white", label=f"{name}, rigid", **style)
+        axes.plot(trajectory.times, trajectory.q_motors[:, number], label=f"{plain_words(name)}, elastic", **style)
+        axes.plot(rigid.times, rigid.q_motors[:, number], ls="--", mfc="white", label=f"{plain_words(name)}, rigid", **style)
     axes.set(xlabel="time [s]", ylabel="motor angle [rad]", title="Motor angles: elastic and rigid inverse kinematics")
     axes.grid(alpha=0.3)
     axes.legend(ncols=min(trajectory.model.n_motors, 3), fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.14))
@@ -242,9 +252,9 @@ def write_png(figure: Any, path: str | Path, *, overwrite: bool) -> Path:
         OutputExists: If the file exists and `overwrite` is false, or is a folder.
         OutputError: If the file cannot be written.
     """
-    target = new_file(path, overwrite=overwrite)
-    write_atomically(target, lambda file: figure.savefig(file, format="png"))
-    return target
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png")
+    return write_bytes(path, picture.getvalue(), overwrite=overwrite)
 
 
 def new_figure(size: tuple[float, float]) -> Any:

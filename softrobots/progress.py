@@ -9,7 +9,7 @@ Step = TypeVar("Step")
 
 
 def with_progress(
-    steps: Iterable[Step], progress: bool | str, *, label: str, unit: str, total: int | None = None
+    steps: Iterable[Step], progress: bool | str, *, label: str, unit: str, total: int | None = None, done: int = 0
 ) -> Iterable[Step]:
     """Go through steps with a progress bar, if one is asked for.
 
@@ -18,7 +18,8 @@ def with_progress(
         progress: Whether to show one; a text is its label.
         label: Its label otherwise.
         unit: What a step is called.
-        total: Number of steps, if they do not know it.
+        total: Number of steps, with those that are done; None: the steps know it.
+        done: Number of steps before these, that are done.
 
     Returns:
         The same steps.
@@ -27,5 +28,7 @@ def with_progress(
         return steps
     from tqdm import tqdm
 
-    bar: Iterable[Step] = tqdm(steps, total=total, desc=progress if isinstance(progress, str) else label, unit=unit)
+    bar: Iterable[Step] = tqdm(
+        steps, total=total, initial=done, desc=progress if isinstance(progress, str) else label, unit=unit
+    )
     return bar

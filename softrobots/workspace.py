@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from softrobots.checkpoint import Checkpoint
 from softrobots.checks import FloatArray, finite_array, positive_integer, read_only
 from softrobots.elastostatics import elastic_state, is_stable, largest_residual, settled
 from softrobots.errors import NeutralEquilibrium, ParameterError
 from softrobots.kinematics import frame_jacobian, frame_placement
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
+from softrobots.npz_file import LARGEST
 from softrobots.progress import with_progress
 from softrobots.sensitivity import tip_motion
+
+_BLOCK = 250  # samples that are kept together
+_FIELDS = ("q_motors", "q_springs", "tip_positions", "manipulability")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +57,7 @@ def sample_workspace(
     frame: str | None = None,
     gravity: Any = None,
     seed: int = 0,
+    checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | str = False,
 ) -> Workspace:
     """Sample what the tip can reach.
@@ -65,29 +73,98 @@ def sample_workspace(
         frame: Frame of `force` and `wrench`; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         seed: Seed of the samples.
+        checkpoint: Folder that keeps the finished samples. After an interruption, even a killed process, the same call goes on
+            from there, to the same bytes. Delete the folder when the workspace is saved. None: nothing is kept.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
         The samples that are stable equilibria.
 
     Raises:
-        ParameterError: If an argument has the wrong shape or is out of range, the robot has no actuators, or no sample is left.
+        ParameterError: If an argument has the wrong shape or is out of range, the robot has no actuators, no sample is left, or
+            the samples that are kept are those of another case.
         NameNotFound: If a frame does not exist.
+        FileFormatError, OutputExists: If the folder of finished samples is no such folder.
+        OutputError: If samples cannot be kept; those before them stay.
     """
     check_model(model)
     if model.n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor or muscle")
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
-    count = positive_integer("samples", samples, 10_000_000)
+    most = LARGEST // (8 * (model.n_motors + model.n_springs + 5))  # as can be saved
+    count = positive_integer("samples", samples, most)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ParameterError("seed", seed, "a whole number, zero or above")
-    random = np.random.default_rng(int(seed))
-    drawn = (model.actuators.draw(random) for _ in with_progress(range(count), progress, label="samples", unit="sample"))
-    rows = [row for motors in drawn if motors is not None and (row := _sample(model, load, motors)) is not None]
-    if not rows:
+    kept = None if checkpoint is None else Checkpoint(checkpoint, _identity(model, load, count, int(seed)))
+    answers = _answers(model, load, count, int(seed), kept, progress)
+    stable = np.concatenate([answer["stable"] for answer in answers])
+    if not stable.any():
         raise ParameterError("samples", samples, "such that one is a stable equilibrium; none is")
-    motors, springs, tips, measures = (read_only(np.array(column)) for column in zip(*rows, strict=True))
-    return Workspace(model, load, motors, springs, tips, measures, count - len(rows))
+    motors, springs, tips, measures = (
+        read_only(np.concatenate([answer[name] for answer in answers])[stable]) for name in _FIELDS
+    )
+    return Workspace(model, load, motors, springs, tips, measures, count - int(stable.sum()))
+
+
+def _identity(model: SoftModel, load: Load, count: int, seed: int) -> dict[str, Any]:
+    """What the samples depend on."""
+    from softrobots import __version__  # here, because the package imports its modules before it knows
+
+    return {
+        "job": "sample_workspace",
+        "version": __version__,
+        "urdf": model.urdf,
+        "springs": model.spring_table,
+        "motors": model.motor_joints,
+        "muscles": model.muscle_input,
+        "tip": model.tip,
+        "wrenches": {frame: wrench.tolist() for frame, wrench in load.wrenches.items()},
+        "gravity": load.gravity,
+        "samples": count,
+        "seed": seed,
+    }
+
+
+def _answers(
+    model: SoftModel, load: Load, count: int, seed: int, kept: Checkpoint | None, progress: bool | str
+) -> list[dict[str, Any]]:
+    """The samples in blocks: those that are kept, and the others; rows that are not stable are zero."""
+    sizes = [min(_BLOCK, count - first) for first in range(0, count, _BLOCK)]
+    found = [None if kept is None else kept.block(number, _arrays(model, size)) for number, size in enumerate(sizes)]
+    answers = [
+        {name: np.zeros(shape, kind) for name, (kind, shape) in _arrays(model, size).items()} if held is None else held
+        for held, size in zip(found, sizes, strict=True)
+    ]
+
+    def drawn() -> Iterator[tuple[int, int, FloatArray | None]]:
+        """Block, row and motors of what is left; the samples that are kept are drawn, too, or the others would differ."""
+        random = np.random.default_rng(seed)
+        for number, size in enumerate(sizes):
+            motors = [model.actuators.draw(random) for _ in range(size)]
+            if found[number] is None:
+                yield from ((number, row, one) for row, one in enumerate(motors))
+
+    done = sum(size for held, size in zip(found, sizes, strict=True) if held is not None)
+    for number, row, motors in with_progress(drawn(), progress, label="samples", unit="sample", total=count, done=done):
+        sample = None if motors is None else _sample(model, load, motors)
+        if sample is not None:
+            answers[number]["stable"][row] = True
+            for name, value in zip(_FIELDS, sample, strict=True):
+                answers[number][name][row] = value
+        if kept is not None and row == sizes[number] - 1:
+            kept.keep(number, answers[number])
+    return answers
+
+
+def _arrays(model: SoftModel, count: int) -> dict[str, tuple[type, tuple[int, ...]]]:
+    """Type of numbers and shape of each array of a block."""
+    return {
+        "stable": (np.bool_, (count,)),
+        "q_motors": (np.float64, (count, model.n_motors)),
+        "q_springs": (np.float64, (count, model.n_springs)),
+        "tip_positions": (np.float64, (count, 3)),
+        "manipulability": (np.float64, (count,)),
+    }
 
 
 def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:

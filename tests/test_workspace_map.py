@@ -206,6 +206,7 @@ def test_a_changed_file_is_refused(
         ({"grid": [(0.5, 0.0, 0.0)]}, "a TargetGrid"),
         ({"model": "arm.urdf"}, "a SoftModel"),
         ({"backend": "fortran"}, "backend"),
+        ({"grid": TargetGrid.plane(1.2, 2000)}, r"number of cases = 48000000.* at most 16\d{6}$"),  # more than a file holds
     ],
 )
 def test_bad_input_is_refused(options: dict[str, Any], message: str, arm: sr.SoftModel) -> None:
@@ -270,7 +271,7 @@ def test_threads_give_the_same_bytes(arm: sr.SoftModel) -> None:
 
 @pytest.mark.usefixtures("small_blocks")
 def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
-    arm: sr.SoftModel, tool: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+    arm: sr.SoftModel, tool: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     distributed = tool("distributed")
     here = map_workspace(arm, GRID, LOADS[::2], backend="python")
@@ -288,10 +289,14 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
                 yield answer
 
         monkeypatch.setattr(mapping, "with_progress", kill_half_way)
-        there = map_workspace(arm, GRID, LOADS[::2], backend="python", scheduler=cluster.scheduler_address)
+        options = {"backend": "python", "scheduler": cluster.scheduler_address, "checkpoint": tmp_path}
+        there = map_workspace(arm, GRID, LOADS[::2], **options)
+        (tmp_path / "block_000005.npz").unlink()
+        again = map_workspace(arm, GRID, LOADS[::2], **options)  # only that one
     assert len(killed) == 1
     assert killed[0][1] > 0
-    assert fingerprint(there) == fingerprint(here)
+    assert fingerprint(there) == fingerprint(again) == fingerprint(here)
+    assert len(list(tmp_path.glob("block_*.npz"))) == 24
 
 
 def test_a_scheduler_that_does_not_answer_is_named(tool: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,6 +34,18 @@ class BlockResult(NamedTuple):
     q_springs: FloatArray
     """Springs there, shape (n, n_loads, n_springs) [rad]; 0 where not reached."""
 
+    @staticmethod
+    def arrays(case: SweepCase, count: int) -> dict[str, tuple[type, tuple[int, ...]]]:
+        """Type of numbers and shape of each array, for a number of targets."""
+        cases = (count, len(case.loads))
+        return {
+            "reached": (np.bool_, cases),
+            "required_pressure": (np.float64, cases),
+            "payload": (np.float64, (count,)),
+            "q_motors": (np.float64, (*cases, len(case.motors))),
+            "q_springs": (np.float64, (*cases, len(case.springs))),
+        }
+
 
 def solve_block(case: SweepCase, targets: FloatArray) -> BlockResult:
     """Solve some targets for all loads.

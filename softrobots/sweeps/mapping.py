@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import os
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from softrobots.checkpoint import Checkpoint
 from softrobots.checks import (
+    FloatArray,
     finite_array,
     increasing,
     non_negative_array,
@@ -20,8 +25,9 @@ from softrobots.errors import ParameterError
 from softrobots.kernels.compiled_model import compile_model
 from softrobots.loads import Load
 from softrobots.model import SoftModel, check_model
+from softrobots.npz_file import LARGEST
 from softrobots.progress import with_progress
-from softrobots.sweeps.block import solve_block
+from softrobots.sweeps.block import BlockResult, solve_block
 from softrobots.sweeps.load_case import SweepCase, package_version
 from softrobots.sweeps.postures import check_arm
 from softrobots.sweeps.scheduling import run_blocks
@@ -30,9 +36,6 @@ from softrobots.workspace_map import WorkspaceMap
 
 BLOCK = 512
 """Targets of a block."""
-
-MOST_CASES = 10**8
-"""Most cases of a map; each takes 65 bytes, of an arm with four springs."""
 
 DOWN = (0.0, 0.0, -1.0)
 """Direction of a weight."""
@@ -49,6 +52,7 @@ def map_workspace(
     backend: str | None = None,
     threads: int = 1,
     scheduler: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | str = False,
 ) -> WorkspaceMap:
     """Find out, for every target and load, whether the loaded arm gets there, and the pressure that it needs.
@@ -67,14 +71,18 @@ def map_workspace(
         threads: Threads of this process, without a scheduler.
         scheduler: Address of a Dask scheduler that has the work done; None: this process. Its workers need the same version of
             softrobots.
+        checkpoint: Folder that keeps the finished blocks. After an interruption, even a killed process, the same call goes on
+            from there, to the same bytes. Delete the folder when the maps are saved. None: nothing is kept.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
         The maps.
 
     Raises:
-        ParameterError: If an argument is out of range, or the robot is no such arm.
+        ParameterError: If an argument is out of range, the robot is no such arm, or the blocks are those of another case.
         DescriptionError: If the robot is no serial chain with linear springs.
+        FileFormatError, OutputExists: If the folder of blocks is no such folder.
+        OutputError: If a block cannot be written; those before it stay.
         MissingDependency: If the back end or distributed is not installed.
         ClusterError: If the cluster does not do the work.
     """
@@ -83,7 +91,8 @@ def map_workspace(
         raise ParameterError("grid", grid, "a TargetGrid")
     sizes = increasing("loads", non_negative_array("loads", finite_array("loads", loads, (None,), "N"), "N"), "N")
     positive_integer("number of loads", len(sizes), 100_000)
-    positive_integer("number of cases", math.prod(grid.shape) * len(sizes), MOST_CASES)
+    most = LARGEST // (10 + 8 * (model.n_motors + model.n_springs))  # as can be saved
+    positive_integer("number of cases", math.prod(grid.shape) * len(sizes), most)
     along = unit_vector("direction", direction)
     weight = Load.of(model, gravity=gravity).gravity
     case = SweepCase.of(
@@ -95,17 +104,16 @@ def map_workspace(
         backend=compile_model(model, backend=backend).backend,
         version=package_version(),
     )
-    targets = grid.targets
-    blocks = [targets[first : first + BLOCK] for first in range(0, len(targets), BLOCK)]
-    answers = run_blocks(partial(solve_block, case), blocks, threads=positive_integer("threads", threads), scheduler=scheduler)
+    positive_integer("threads", threads)
+    kept = None if checkpoint is None else Checkpoint(checkpoint, _identity(case, grid))
+    targets, shape = grid.targets, grid.shape
     cases = (len(targets), len(sizes))
     reached, required, payload = np.zeros(cases, dtype=bool), np.zeros(cases), np.zeros(len(targets))
     motors, springs = np.zeros((*cases, model.n_motors)), np.zeros((*cases, model.n_springs))
-    for number, answer in with_progress(answers, progress, label="targets", unit="block", total=len(blocks)):
+    for number, answer in _answers(case, targets, kept, threads, scheduler, progress):
         rows = slice(number * BLOCK, number * BLOCK + len(answer.payload))
         reached[rows], required[rows], payload[rows] = answer.reached, answer.required_pressure, answer.payload
         motors[rows], springs[rows] = answer.q_motors, answer.q_springs
-    shape = grid.shape
     return WorkspaceMap(
         model=model,
         grid=grid,
@@ -119,3 +127,31 @@ def map_workspace(
         q_motors=motors.reshape(*shape, len(sizes), -1),
         q_springs=springs.reshape(*shape, len(sizes), -1),
     )
+
+
+def _identity(case: SweepCase, grid: TargetGrid) -> dict[str, Any]:
+    """What the answers depend on."""
+    axes = {axis: getattr(grid, axis).tolist() for axis in "xyz"}
+    return {"job": "map_workspace", "targets of a block": BLOCK, **axes, **dataclasses.asdict(case)}
+
+
+def _answers(
+    case: SweepCase, targets: FloatArray, kept: Checkpoint | None, threads: int, scheduler: str | None, progress: bool | str
+) -> Iterator[tuple[int, BlockResult]]:
+    """Number and answer of every block: those that are kept, and then the others as they come."""
+    blocks = [targets[first : first + BLOCK] for first in range(0, len(targets), BLOCK)]
+    left = []
+    for number, block in enumerate(blocks):
+        found = None if kept is None else kept.block(number, BlockResult.arrays(case, len(block)))
+        if found is None:
+            left.append(number)
+        else:
+            yield number, BlockResult(**found)
+    if not left:
+        return
+    answers = run_blocks(partial(solve_block, case), [blocks[number] for number in left], threads=threads, scheduler=scheduler)
+    done = len(blocks) - len(left)
+    for place, answer in with_progress(answers, progress, label="targets", unit="block", total=len(blocks), done=done):
+        if kept is not None:
+            kept.keep(left[place], answer._asdict())
+        yield left[place], answer
