@@ -15,7 +15,9 @@ from softrobots.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
 
-_NOT_NUMBERS = (bool, np.bool_, str, bytes)  # although float() would take them
+_NOT_NUMBERS = (bool, np.bool_, str, bytes, np.datetime64, np.timedelta64)  # although float() may take them
+
+_SHORT = 1000  # numbers of an array that is checked as a list
 
 LARGEST = 1e30
 """Numbers beyond this in size are refused, and positive ones below its inverse: their squares and cubes would overflow."""
@@ -38,18 +40,21 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
     """
     try:
         given = np.asarray(value)
-        kind = given.dtype.kind
-        array = given.astype(np.float64) if kind in "fiu" else None  # always a copy
-    except (TypeError, ValueError, OverflowError) as error:
+        mask = getattr(value, "mask", None)  # of a NumPy array with gaps
+        array = _as_floats(given) if given.dtype.kind in "fiu" and not (isinstance(mask, np.ndarray) and mask.any()) else None
+    except Exception as error:  # an object of the caller may raise anything
         raise ParameterError(name, value, _array_text(shape, unit)) from error
-    if array is None:  # text, truth values, complex numbers, objects
+    if array is None:  # text, truth values, complex numbers, objects, gaps
         raise ParameterError(name, value, _array_text(shape, unit))
     if shape is not None and array.shape != shape and not _fits(array.shape, shape):
         raise ParameterError(name, value, f"{_array_text(shape, unit)} (it has shape {array.shape})")
-    # A comparison refuses NaN too, and on a short list it is several times faster than NumPy's reductions.
-    for number in array.ravel().tolist():
-        if not -LARGEST <= number <= LARGEST:
-            raise ParameterError(name, value, f"{_array_text(shape, unit)}, at most {LARGEST:g} in size")
+    if array.size > _SHORT:
+        refused = not np.abs(array).max() <= LARGEST  # a list of a large one would take five times its memory
+    else:
+        # A comparison refuses NaN too, and on a short list it is several times faster than NumPy's reductions.
+        refused = not all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
+    if refused:
+        raise ParameterError(name, value, f"{_array_text(shape, unit)}, at most {LARGEST:g} in size")
     return array
 
 
@@ -100,7 +105,7 @@ def finite_number(name: str, value: Any, unit: str = "") -> float:
         raise ParameterError(name, value, requirement)
     try:
         number = float(value)
-    except (TypeError, ValueError, OverflowError) as error:
+    except Exception as error:  # an object of the caller may raise anything
         raise ParameterError(name, value, requirement) from error
     if not abs(number) <= LARGEST:  # NaN too
         raise ParameterError(name, value, f"{requirement}, at most {LARGEST:g} in size")
@@ -137,7 +142,7 @@ def positive_integer(name: str, value: Any, most: int | None = None) -> int:
     Raises:
         ParameterError: If it is not one.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value <= 0:
+    if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | np.integer) or value <= 0:
         raise ParameterError(name, value, "a positive integer")
     if most is not None and value > most:
         raise ParameterError(name, value, f"a positive integer, at most {most}")
@@ -168,6 +173,17 @@ def choice(name: str, value: Any, options: Sequence[str]) -> str:
     return str(value)
 
 
+def listed(name: str, value: Any, count: int, requirement: str) -> list[Any]:
+    """Return a tuple, a list or an array of `count` things as a list.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    if not isinstance(value, tuple | list | np.ndarray) or not np.iterable(value) or len(value) != count:
+        raise ParameterError(name, value, requirement)
+    return list(value)
+
+
 def read_only(array: FloatArray) -> FloatArray:
     """Mark an array as read-only and return it."""
     array.setflags(write=False)
@@ -183,6 +199,14 @@ def increasing(name: str, values: FloatArray, unit: str) -> FloatArray:
     if np.any(np.diff(values) <= 0.0):
         raise ParameterError(name, values, f"increasing [{unit}]")
     return values
+
+
+def _as_floats(given: NDArray[Any]) -> FloatArray:
+    """A copy of an array of numbers; infinite where a longer float has a number that this one has not."""
+    if given.dtype.itemsize <= 8:
+        return given.astype(np.float64)
+    with np.errstate(over="ignore"):
+        return given.astype(np.float64)
 
 
 def _fits(shape: tuple[int, ...], required: tuple[int | None, ...]) -> bool:

@@ -173,5 +173,8 @@ def _rebuild(kind: type[SoftRobotsError], arguments: tuple[Any, ...], attributes
 
 
 def _short(value: Any, limit: int = 120) -> str:
-    text = repr(value).replace("\n", " ")
+    try:
+        text = repr(value).replace("\n", " ")
+    except Exception:  # nested too deeply, an integer of more digits than Python writes, an object of the caller
+        text = f"<{type(value).__name__}>"
     return text if len(text) <= limit else text[: limit - 3] + "..."

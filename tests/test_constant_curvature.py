@@ -20,6 +20,7 @@ from scipy.linalg import expm
 from softrobots import constant_curvature as cc
 from softrobots.constant_curvature import Arc
 from softrobots.errors import ParameterError
+from tests.laws import law
 
 FRAMES = ("torsion_free", "bending_plane")
 BENDINGS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, math.pi)
@@ -229,6 +230,7 @@ def test_arc_of_three_muscles_is_the_papers(azimuth: float) -> None:
     assert (abs(plain - azimuth) < 1e-12) == (abs(azimuth) < np.pi / 2)
 
 
+@law("constant_curvature.transform")
 @given(lengths_, st.floats(0.01, 6.0), angles_)
 def test_pose_is_the_papers(length: float, theta: float, alpha: float) -> None:
     """(9) and (14), written out."""
@@ -243,6 +245,7 @@ def test_pose_is_the_papers(length: float, theta: float, alpha: float) -> None:
     assert np.allclose(cc.transform(Arc(length, theta, alpha), "bending_plane"), paper, rtol=0.0, atol=1e-13 * max(length, 1.0))
 
 
+@law("constant_curvature.chain_transform")
 @given(lengths_, st.floats(0.01, 6.0), angles_, lengths_, st.floats(0.01, 6.0), angles_)
 def test_tip_of_two_segments_is_the_papers_corrected(
     l1: float, theta1: float, alpha1: float, l2: float, theta2: float, alpha2: float
@@ -270,6 +273,7 @@ def test_printed_third_component_is_wrong() -> None:
 # --- Independent laws
 
 
+@law("constant_curvature.transform", "constant_curvature.strains_from_arc")
 @given(lengths_, bendings_, angles_)
 def test_pose_is_a_matrix_exponential(length: float, theta: float, alpha: float) -> None:
     strains = cc.strains_from_arc(Arc(length, theta, alpha))
@@ -303,6 +307,7 @@ def test_muscles_are_as_long_as_the_curves_beside_the_backbone(azimuths: tuple[f
         assert length == pytest.approx(arc, rel=1e-13)  # the integrand is constant: quadrature adds rounding only
 
 
+@law("constant_curvature.muscles_from_arc", "constant_curvature.arc_from_muscles")
 @given(lengths_, st.floats(0.0, 1.0), angles_, st.floats(0.005, 0.04), st.sampled_from([cc.AZIMUTHS, UNEVEN, FIVE]))
 def test_muscles_and_arc_are_inverse(
     length: float, theta: float, alpha: float, distance: float, azimuths: tuple[float, ...]
@@ -315,6 +320,7 @@ def test_muscles_and_arc_are_inverse(
     assert abs(found - theta * np.exp(1j * alpha)) <= resolution + 4.0 * np.spacing(theta)
 
 
+@law("constant_curvature.muscle_residual", "constant_curvature.arc_from_muscles", "constant_curvature.muscles_from_arc")
 @given(st.lists(st.floats(0.45, 0.55), min_size=3, max_size=3), st.floats(0.02, 0.2), st.sampled_from([cc.AZIMUTHS, UNEVEN]))
 def test_any_three_lengths_are_an_arc(lengths: list[float], distance: float, azimuths: tuple[float, ...]) -> None:
     assert float(cc.muscle_residual(lengths, distance, azimuths)) <= 1e-15  # rounding of 0.5 m
@@ -323,6 +329,7 @@ def test_any_three_lengths_are_an_arc(lengths: list[float], distance: float, azi
     assert np.allclose(cc.muscles_from_arc(arc, distance, azimuths), lengths, rtol=0.0, atol=2e-15)  # the same, twice
 
 
+@law("constant_curvature.arc_from_strains", "constant_curvature.strains_from_arc")
 @given(bendings_, angles_, lengths_)
 def test_strains_and_arc_are_inverse(theta: float, alpha: float, length: float) -> None:
     arc = cc.arc_from_strains(cc.strains_from_arc(Arc(length, theta, alpha)))
@@ -331,6 +338,7 @@ def test_strains_and_arc_are_inverse(theta: float, alpha: float, length: float) 
     assert float(arc.azimuth) == pytest.approx(alpha if theta > 0.0 else 0.0, abs=2 * ROUNDING)  # a unit of the last place of 3
 
 
+@law("constant_curvature.muscle_residual", "constant_curvature.strains_from_muscles")
 @given(st.lists(st.floats(0.4, 0.6), min_size=5, max_size=5))
 def test_more_muscles_than_three_are_least_squares(lengths: list[float]) -> None:
     """NumPy's solver on the whole lengths; the residual is what it leaves."""
@@ -345,6 +353,7 @@ def test_more_muscles_than_three_are_least_squares(lengths: list[float]) -> None
             cc.arc_from_muscles(lengths, D, FIVE)
 
 
+@law("constant_curvature.transform")
 @given(lengths_, bendings_, angles_, angles_)
 def test_turning_the_azimuth_turns_the_arc(length: float, theta: float, alpha: float, turn: float) -> None:
     straight_on, turned = Arc(length, theta, alpha), Arc(length, theta, alpha + turn)
@@ -355,6 +364,7 @@ def test_turning_the_azimuth_turns_the_arc(length: float, theta: float, alpha: f
     assert np.allclose(cc.transform(turned), rotation @ cc.transform(straight_on) @ rotation.T, **tolerance)
 
 
+@law("constant_curvature.chain_transform", "constant_curvature.transform")
 @given(lengths_, bendings_, angles_, st.floats(0.0, 1.0))
 def test_parts_of_an_arc_make_the_arc(length: float, theta: float, alpha: float, part: float) -> None:
     """Torsion-free, the azimuth stays; in the bending-plane frame the second part bends straight on."""
@@ -365,6 +375,7 @@ def test_parts_of_an_arc_make_the_arc(length: float, theta: float, alpha: float,
         assert np.allclose(cc.chain_transform(parts, (0.0, 0.0), frame), whole, rtol=0.0, atol=8 * ROUNDING * max(length, 1.0))
 
 
+@law("constant_curvature.transform")
 @given(lengths_, bendings_, angles_)
 def test_poses_are_rigid(length: float, theta: float, alpha: float) -> None:
     for frame in FRAMES:
@@ -374,6 +385,7 @@ def test_poses_are_rigid(length: float, theta: float, alpha: float) -> None:
         assert pose[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 
+@law("constant_curvature.backbone")
 @given(lengths_, st.floats(0.05, 6.0), angles_)
 def test_backbone_is_a_circle(length: float, theta: float, alpha: float) -> None:
     points = cc.backbone(Arc(length, theta, alpha), np.linspace(0.0, 1.0, 11))
@@ -495,6 +507,7 @@ def test_arcs_are_frozen() -> None:
     assert pickle.loads(pickle.dumps(arc)).length.tolist() == [0.5, 0.6]
 
 
+@law("constant_curvature.arc_from_muscles", "constant_curvature.arc_jacobian", "constant_curvature.muscle_jacobian")
 @settings(max_examples=200)
 @given(st.lists(st.floats(1e-30, 1e30), min_size=3, max_size=3), st.floats(1e-30, 1e30), st.sampled_from(FRAMES))
 def test_no_number_is_lost_at_the_ends_of_the_range(lengths: list[float], distance: float, frame: str) -> None:
@@ -604,3 +617,38 @@ def test_bad_input_is_refused(call: Callable[[], Any], field: str) -> None:
     with pytest.raises(ParameterError, match=field) as caught:
         call()
     assert caught.value.field == field
+
+
+def test_many_arcs_are_each_of_them() -> None:
+    """Every function of arcs or lengths in an array answers for each element what it answers for that alone."""
+    random = np.random.default_rng(5)
+    length, bending, azimuth = random.uniform(0.2, 0.6, (2, 3)), random.uniform(0.1, 1.0, (2, 3)), random.uniform(-3, 3, (2, 3))
+    arcs, distance = Arc(length, bending, azimuth), random.uniform(0.02, 0.04, 3)
+    lengths = cc.muscles_from_arc(arcs, distance)
+    assert lengths.shape == (2, 3, 3)
+    for place in itertools.product(range(2), range(3)):
+        own, apart = Arc(length[place], bending[place], azimuth[place]), distance[place[1]]
+        assert np.array_equal(cc.strains_from_arc(arcs)[place], cc.strains_from_arc(own))
+        assert np.array_equal(lengths[place], cc.muscles_from_arc(own, apart))
+        assert np.array_equal(cc.strains_from_muscles(lengths, distance)[place], cc.strains_from_muscles(lengths[place], apart))
+        assert np.array_equal(cc.muscle_residual(lengths, distance)[place], cc.muscle_residual(lengths[place], apart))
+    assert cc.muscle_residual(lengths[0, 0], distance).shape == (3,)
+    assert cc.muscle_residual(lengths, 0.03).shape == (2, 3)
+
+
+def test_four_muscles_may_miss_an_arc_by_a_micrometre() -> None:
+    """The default tolerance of everything that takes lengths."""
+    azimuths = np.array([0.0, 0.5, 1.0, 1.5]) * np.pi
+    off = np.array([1.0, -1.0, 1.0, -1.0])  # no arc has any of it: all of it is missed
+    calls = (
+        cc.strains_from_muscles,
+        cc.arc_from_muscles,
+        cc.muscle_jacobian,
+        lambda *given: cc.chain_muscle_jacobian([given[0]] * 2, *given[1:]),
+    )
+    for call in calls:
+        call(0.5 + 0.99e-6 * off, 0.03, azimuths)
+        with pytest.raises(ParameterError, match=r"within 1e-06 m \(they miss it by 1.01e-06 m\)") as caught:
+            call(0.5 + 1.01e-6 * off, 0.03, azimuths)
+        assert caught.value.field == "lengths"
+        assert np.allclose(caught.value.value, 0.5 + 1.01e-6 * off, rtol=0.0, atol=1e-15)

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 import softrobots as sr
 from softrobots.elastostatics import METHODS
+from tests.laws import law
 from tests.oracles import REFERENCE_EQUILIBRIA, arm_energy
 
 FORCE = np.array([0.0, 10.0, -15.0])
@@ -67,6 +68,7 @@ def test_torques_balance(odd_arm: sr.SoftModel, rng: np.random.Generator) -> Non
     assert np.allclose(found.spring_torques, odd_arm.stiffness * (found.q_springs - odd_arm.rest))
 
 
+@law("solve_equilibrium")
 @given(angle, angle, angle, force_component, force_component, force_component, angle)
 @settings(max_examples=40, deadline=None)
 def test_turning_base_and_load_together_turns_the_answer(a, b, c, fx, fy, fz, turn) -> None:
@@ -80,6 +82,7 @@ def test_turning_base_and_load_together_turns_the_answer(a, b, c, fx, fy, fz, tu
     assert np.allclose(turned.motor_torques, still.motor_torques, atol=1e-7)
 
 
+@law("solve_equilibrium")
 @given(angle, angle, force_component, force_component, force_component)
 @settings(max_examples=40, deadline=None)
 def test_mirror_image(b, c, fx, fy, fz) -> None:
@@ -91,6 +94,7 @@ def test_mirror_image(b, c, fx, fy, fz) -> None:
         assert np.allclose(other.q_springs, signs * one.q_springs, atol=1e-8)
 
 
+@law("solve_equilibrium")
 @given(st.floats(0.01, 100.0), angle, angle, angle, force_component, force_component, force_component)
 @settings(max_examples=40, deadline=None)
 def test_stiffness_and_force_scaled_together_change_nothing(factor, a, b, c, fx, fy, fz) -> None:

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from softrobots import helix
 from softrobots.errors import FileFormatError, MissingDependency, OutputExists, ParameterError, StraightTube
 from softrobots.helix import ActuatorTable
+from tests.laws import law
 
 PRESSURES = (0.0, 10e3, 25e3, 40e3, 60e3)
 LENGTHENING = (0.50, 0.58, 0.71, 0.80, 0.86)  # an inverse pneumatic muscle; invented numbers
@@ -64,6 +65,7 @@ def test_the_slope_is_the_derivative(shares: tuple[float, ...], kind: str) -> No
     np.testing.assert_allclose(table.slope_at(places), difference, rtol=1e-7)  # truncation (1 Pa / 1e4 Pa)^2, rounding 1e-11
 
 
+@law("helix.ActuatorTable")
 @settings(max_examples=60, deadline=None)
 @given(
     steps=st.lists(st.tuples(st.floats(1e-3, 1e5), st.floats(1e-3, 1.0)), min_size=1, max_size=8),
@@ -184,16 +186,16 @@ def test_a_file_that_is_no_table_says_where(text: str, message: str, tmp_path: P
 
 
 def test_a_file_that_cannot_be_read_says_so(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match="cannot read an actuator table"):
+    with pytest.raises(FileFormatError, match=r"cannot read .*none\.csv: No such file"):
         ActuatorTable.read_csv(tmp_path / "none.csv")
-    with pytest.raises(FileFormatError, match="cannot read an actuator table"):
+    with pytest.raises(FileFormatError, match=r"cannot read .*: Is a directory"):
         ActuatorTable.read_csv(tmp_path)
     (tmp_path / "image.csv").write_bytes(b"\xff\xd8\xff\xe0")
-    with pytest.raises(FileFormatError, match="cannot read an actuator table"):
+    with pytest.raises(FileFormatError, match=r"cannot read .*image\.csv: 'utf-8' codec"):
         ActuatorTable.read_csv(tmp_path / "image.csv")
     with (tmp_path / "huge.csv").open("wb") as file:
         file.truncate(10_000_001)
-    with pytest.raises(FileFormatError, match="10000001 bytes"):
+    with pytest.raises(FileFormatError, match="a line of more than 1000000 characters"):
         ActuatorTable.read_csv(tmp_path / "huge.csv")
 
 

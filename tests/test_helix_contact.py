@@ -21,6 +21,7 @@ from scipy.spatial.distance import cdist
 
 from softrobots import ParameterError, SoftRobotsError, helix
 from softrobots.errors import OutputExists, SelfIntersection
+from tests.laws import law
 
 DIAMETER = 0.0331
 
@@ -108,6 +109,7 @@ def test_no_pair_of_points_on_different_turns_is_nearer(contraction: float, degr
     assert apart.min() == pytest.approx(found, rel=2e-3)  # points lie up to 0.008 rad beside the minimum
 
 
+@law("helix.self_contact")
 @given(st.floats(0.02, 0.999), st.floats(1e-4, 1.57))
 def test_the_distance_is_stationary_and_convex_where_turns_are_nearest(contraction: float, angle: float) -> None:
     found = helix.self_contact(helix.forward(contraction, angle, 1.0))
@@ -258,6 +260,7 @@ def test_the_simple_rule_allows_a_little_too_much_until_the_fold() -> None:
     )  # it knows nothing of it
 
 
+@law("helix.self_contact", "helix.contraction_limit")
 @given(st.floats(0.02, 0.99), st.floats(0.001, 1.56), st.floats(1e-3, 1e3))
 def test_contact_scales_with_the_diameter(contraction: float, angle: float, factor: float) -> None:
     one = helix.self_contact(helix.forward(contraction, angle, DIAMETER))
@@ -422,8 +425,13 @@ def test_contact_is_a_warning_that_carries_the_finding_where_asked_for() -> None
     with pytest.warns(helix.SelfContactWarning, match="runs into itself") as caught:
         found = helix.check_self_contact(shape, on_contact="warn")
     assert caught[0].message.contact is found  # type: ignore[union-attr]
-    assert caught[0].filename == __file__
     assert found.touches
+
+
+def test_a_warning_points_at_the_caller() -> None:
+    with pytest.warns(helix.SelfContactWarning) as caught:
+        helix.check_self_contact(helix.forward(0.3, math.radians(5.0), DIAMETER), on_contact="warn")
+    assert caught[0].filename == __file__
 
 
 @pytest.mark.parametrize(("contraction", "on_contact"), [(0.3, "ignore"), (0.9, "warn"), (0.9, "error"), (0.9, "ignore")])
@@ -565,3 +573,35 @@ def test_markdown_has_a_line_for_each_helix() -> None:
     assert {line.count("|") for line in lines} == {10}
     assert lines[2] == "| 2.5 | 0.5 | 0.03310 | 0.06546 | 0.03236 | 0.00568 | 0.03547 | yes | yes |"
     assert "| none |" in lines[-4]
+
+
+def test_the_words_on_a_tube_hold_its_numbers() -> None:
+    """Turns that overlap; a centre line that folds; both; neither; and a tube without neighbouring turns."""
+    flat = helix.self_contact(helix.HelixShape(0.1, 0.06, 0.004))  # radius 0.08, diameter 0.04, rise of a turn 0.0251
+    distance = minimize_scalar(lambda s: math.hypot(0.16 * math.sin(s / 2), 0.004 * s), bounds=(6.0, 6.3), method="bounded").fun
+    apart = f"the centre lines of neighbouring turns are {distance:.4g} m apart"
+    assert str(flat) == f"the tube runs into itself: {apart}, {0.04 - distance:.3g} m less than the diameter of 0.04 m"
+    steep = helix.self_contact(helix.HelixShape(0.03, -0.01, 0.002))  # centre line of radius 0.01, bent a little less sharply
+    radius = (0.01**2 + 0.002**2) / 0.01
+    assert f"and its centre line bends with a radius of {radius:.4g} m, less than half the diameter of 0.04 m" in str(steep)
+    assert str(steep).startswith("the tube runs into itself: the centre lines of neighbouring turns are ")
+    alone = helix.self_contact(helix.HelixShape(0.1, 0.06, 0.08))
+    assert str(alone) == "the tube does not touch itself: it has no neighbouring turns"
+    free = helix.self_contact(helix.HelixShape(0.1, 0.06, 0.01))
+    distance = minimize_scalar(lambda s: math.hypot(0.16 * math.sin(s / 2), 0.01 * s), bounds=(5.0, 6.3), method="bounded").fun
+    apart = f"the centre lines of neighbouring turns are {distance:.4g} m apart"
+    assert str(free) == f"the tube does not touch itself: {apart}, {distance - 0.04:.3g} m more than the diameter of 0.04 m"
+
+
+def test_the_tightest_of_several_is_told() -> None:
+    """By the gap over the diameter, or the fold where that is tighter or there are no neighbours, whatever the sizes are."""
+    outer = np.array([0.1, 1.0, 0.1, 0.012])
+    shapes = helix.HelixShape(outer, outer - np.array([0.04, 0.3, 0.04, 0.004]), [0.0053, 0.031, 0.08, 0.0004])
+    contact = helix.self_contact(shapes)
+    margin = np.where(contact.has_neighbours, (contact.turn_distance - shapes.diameter) / shapes.diameter, 1.0)
+    assert contact.has_neighbours.tolist() == [True, True, False, True]
+    worst = int(np.argmin(margin))
+    assert worst != int(np.argmin(contact.turn_clearance))  # the largest tube overlaps by most metres
+    told = helix.self_contact(helix.HelixShape(*(values[worst] for values in (outer, shapes.inner_radius, shapes.pitch))))
+    count = np.count_nonzero(contact.touches)
+    assert str(contact) == f"{count} of 4 tubes run into themselves; the tightest, at index ({worst},): {told}"

@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 from softrobots import helix
 from softrobots.errors import FileFormatError, OutputExists, ParameterError, SelfIntersection
 from softrobots.helix import DesignWarning, HelixDesign, Wish
+from tests.laws import law
 
 D = 0.0331  # the paper's tube
 TURN = 2.0 * math.pi
@@ -83,6 +84,7 @@ def test_a_squeezed_object_has_a_helix_thinner_by_the_squeeze(squeeze: float):
     assert (design.wish.radius, design.wish.squeeze) == (pytest.approx(0.020 - squeeze), squeeze)
 
 
+@law("helix.design_antenna", "helix.turns")
 @settings(max_examples=60)
 @given(
     st.floats(0.3, 0.99), st.floats(0.02, 0.7), st.floats(0.005, 0.5), st.floats(0.3, 8.0), st.sampled_from(["right", "left"])
@@ -337,9 +339,9 @@ def saved(path: Path) -> dict[str, Any]:
         ({"contraction": 1.5}, "contraction"),
         ({"contraction": 0.5}, "tube_length"),  # no longer what was computed from it
         ({"computed": {"tube_length": 0.4}}, "tube_length"),
-        ({"computed": {"tube_length": 10**400}}, "too large"),
+        ({"computed": {"tube_length": 10**400}}, "a number is larger"),
         ({"computed": {}}, "tube_length"),
-        ({"angle": float("nan")}, "angle"),
+        ({"angle": float("nan")}, "NaN is no number"),
         ({"angle": "0.1"}, "angle"),
         ({"turns": None}, "turns"),
         ({"handedness": "up"}, "handedness"),

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from softrobots import helix
 from softrobots.errors import OutputExists, ParameterError
 from softrobots.helix import Pattern, pinch_pattern, write_template, write_template_pages, write_template_table
+from tests.laws import law
 
 D = 0.0331  # the paper's tube
 REFERENCE = (0.66, math.radians(5.0), D, 1.2)
@@ -39,6 +40,7 @@ def test_a_stopper_of_two_and_a_gap_of_one_contract_to_two_thirds():
     assert table == pytest.approx(np.array([[1.0, 1.0], [0.5, 2.0 / 3.0]]), rel=1e-15)
 
 
+@law("helix.gap_for", "helix.contraction_from_stoppers")
 @given(st.floats(1e-3, 1.0), st.floats(1e-3, 1.0))
 def test_gap_and_contraction_are_inverse(contraction: float, stopper: float):
     gap = helix.gap_for(contraction, stopper)
@@ -68,6 +70,7 @@ def test_bad_stoppers_are_refused(call: Callable[..., Any], arguments: tuple[Any
 actuators = st.tuples(st.floats(0.2, 0.97), st.floats(0.0, 1.4), st.floats(0.01, 0.2))
 
 
+@law("helix.pinch_pattern")
 @settings(max_examples=60)
 @given(actuators, st.floats(0.02, 0.99), st.floats(1.0, 60.0), st.sampled_from(["end", "both", "respace"]))
 def test_pinches_and_what_stays_make_up_the_line(actuator: tuple[float, float, float], share: float, periods: float, rest: str):

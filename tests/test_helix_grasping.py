@@ -14,6 +14,7 @@ from scipy.integrate import quad
 from softrobots import helix
 from softrobots.errors import ParameterError
 from softrobots.helix import PAPER_CYLINDER, grasp_force
+from tests.laws import law
 
 PAPER: dict[str, Any] = {
     "object_radius": PAPER_CYLINDER.object_radius,
@@ -149,6 +150,7 @@ def test_contact_is_the_pressure_on_the_flattened_strip(case: dict[str, Any], de
 # --- Laws
 
 
+@law("helix.grasp_force")
 @settings(max_examples=50, deadline=None)
 @given(
     pressure=st.floats(0.0, 1e5),

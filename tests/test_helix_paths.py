@@ -16,6 +16,7 @@ from scipy.linalg import expm
 from softrobots import helix
 from softrobots.errors import ParameterError
 from softrobots.helix import HANDEDNESS, PATHS, HelixShape
+from tests.laws import law
 from tests.test_helix_shapes import (
     ANGLES,
     CONTRACTIONS,
@@ -223,6 +224,7 @@ def test_the_papers_parametrisation_is_left_handed() -> None:
     assert float(helix.curvature_torsion(shape, "outer", "left")[1]) < 0.0
 
 
+@law("helix.tangents", "helix.normals")
 @given(contractions_, angles_, diameters_)
 def test_tangents_of_inner_and_outer_path_are_two_theta_apart(contraction: float, angle: float, diameter: float) -> None:
     """(10) and (11); the angle by its tangent, in the plane across the common normal."""
@@ -269,6 +271,7 @@ def test_curvature_and_torsion_are_the_papers_15(contraction: float, path: str) 
                 assert_close(kappa[place], exact[0], TOLERANCE * exact[0])
 
 
+@law("helix.curvature_torsion", "helix.actuator_curvature_torsion")
 @given(contractions_, angles_, diameters_)
 def test_curvature_of_the_shape_is_that_of_the_actuator(contraction: float, angle: float, diameter: float) -> None:
     if 1.0 - contraction < 1e-13 and angle < 1e-13:
@@ -542,6 +545,7 @@ def test_cases_along_leading_axes() -> None:
     assert [np.shape(number) for number in helix.actuator_curvature_torsion(0.66, 0.1, [D, D], "inner")] == [(2,), (2,)]
 
 
+@law("helix.turns", "helix.length_for_turns")
 @settings(max_examples=60)
 @given(contractions_, angles_, diameters_)
 def test_turns_and_length_for_turns_are_inverse(contraction: float, angle: float, diameter: float) -> None:

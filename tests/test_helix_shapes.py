@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from softrobots import helix
 from softrobots.errors import ParameterError, StraightTube
 from softrobots.helix import HelixShape
+from tests.laws import law
 
 DEG = math.pi / 180.0
 D = 0.0331
@@ -136,6 +137,7 @@ def test_inverse_of_forward_is_the_actuator(contraction: float) -> None:
             assert float(found.contraction) <= 1.0
 
 
+@law("helix.forward", "helix.inverse")
 @settings(max_examples=300)
 @given(contractions_, angles_, diameters_)
 def test_inverse_of_forward_is_the_actuator_anywhere(contraction: float, angle: float, diameter: float) -> None:
@@ -176,6 +178,7 @@ def test_planar_arcs_have_an_actuator_along_the_tube(inner: float) -> None:
     assert float(found.diameter) == 1.0 - inner
 
 
+@law("helix.forward")
 @given(contractions_, angles_, diameters_)
 def test_paths_are_complex_numbers_in_the_ratio_of_the_actuator(contraction: float, angle: float, diameter: float) -> None:
     """`(Ri + i b)/(Ro + i b) = lambda exp(2 i theta)`, the three constraints (6), (7), (11) in one."""
@@ -189,6 +192,7 @@ def test_paths_are_complex_numbers_in_the_ratio_of_the_actuator(contraction: flo
     assert outer - inner == pytest.approx(diameter, abs=TOLERANCE * (abs(outer) + abs(inner)))  # what rounding of radii leaves
 
 
+@law("helix.forward")
 @given(contractions_, angles_, diameters_)
 def test_centre_line_never_passes_the_axis(contraction: float, angle: float, diameter: float) -> None:
     """`Rc = D (1 - lambda^2)/(2 den)` is not negative, although Ri may be; Ri is while lambda > cos 2theta."""
@@ -317,6 +321,7 @@ def test_a_helix_is_measured_by_the_arcs_of_its_points(contraction: float, angle
         assert np.allclose(helix.inverse(found), (contraction, angle, diameter), rtol=1e-9, atol=0.0)
 
 
+@law("helix.measure")
 @settings(max_examples=200)
 @given(contractions_, angles_, diameters_)
 def test_measure_is_the_corrected_16(contraction: float, angle: float, diameter: float) -> None:
@@ -417,6 +422,15 @@ def test_radius_by_name_of_the_path() -> None:
     assert [float(shape.radius(path)) for path in helix.PATHS] == [0.05, float(shape.centre_radius), 0.08]
 
 
+@law(
+    "helix.HelixShape",
+    "helix.curvature_torsion",
+    "helix.frames",
+    "helix.turn_angle",
+    "helix.height",
+    "helix.length_for_turns",
+    "helix.inverse",
+)
 @settings(max_examples=400)
 @given(
     *[st.one_of(st.floats(-1e30, 1e30), st.sampled_from([0.0, 5e-324, 1e-320, 1e-160, -1e-91, 1e-91, 1e-60, 1e30]))] * 3,
@@ -441,6 +455,7 @@ def test_whatever_shape_is_accepted_gives_finite_numbers(outer: float, inner: fl
     assert np.all(np.isfinite(found))
 
 
+@law("helix.actuator_curvature_torsion", "helix.material_twist", "helix.volume", "helix.actuator_tension", "helix.forward")
 @settings(max_examples=400)
 @given(
     st.one_of(st.sampled_from([1e-30, LAST, 1.0]), st.floats(1e-30, 1.0)),
@@ -536,3 +551,21 @@ def test_errors_say_what_came_and_what_is_required() -> None:
         helix.forward(0.5, 5, D)
     with pytest.raises(ParameterError, match=r"path = 'middle': path must be one of 'inner', 'centre', 'outer'"):
         HelixShape(0.08, 0.05, 0.02).radius("middle")
+
+
+def test_arcs_in_a_plane_have_no_pitch_at_all() -> None:
+    """The rounding of their lengths is not taken for a rise, which would be the root of it: a millionth and more."""
+    for contraction in np.linspace(0.05, 0.95, 200):
+        shape = helix.forward(contraction, 0.0, 0.0331)
+        found = helix.measure(2.0 * np.pi * shape.outer_radius, 2.0 * np.pi * shape.inner_radius, 0.0331)
+        assert found.pitch == 0.0
+
+
+def test_arcs_that_no_helix_has_are_told() -> None:
+    with pytest.raises(ParameterError, match=r"at least a circle of the outer radius 0\.6") as caught:
+        helix.measure(0.5, 0.1, 0.005)  # twelve diameters of difference in a circle of sixteen
+    assert (caught.value.field, caught.value.value) == ("outer_arc", 0.5)
+    outer_arc = 0.5
+    with pytest.raises(ParameterError, match="such that a helix explains both arcs at this diameter") as caught:
+        helix.measure(outer_arc, 1e-30, outer_arc / (2.0 * np.pi))  # a circle through the axis: no inner radius, no rise
+    assert (caught.value.field, caught.value.value) == ("inner_arc", 1e-30)

@@ -33,6 +33,7 @@ from softrobots.robots import HelixTube
 from softrobots.tag_reader import read_tags
 from softrobots.urdf_tags import NAMESPACE
 from tests.helix_rods import actuator_frames, gauss
+from tests.laws import law
 from tests.test_pcc_description import changed, check_portable, edited, gazebo_numbers, link_masses, link_poses, within_joint
 
 DEG = math.pi / 180.0
@@ -302,6 +303,7 @@ tubes_ = st.fixed_dictionaries(
 )
 
 
+@law("HelixTube", "load_model")
 @given(tubes_, st.floats(0.02, 2.8), st.floats(0.004, 0.05), st.integers(0, 3))
 @settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 def test_any_tube_is_on_its_helix_has_its_mass_and_obeys_the_rules_of_portable_urdf(

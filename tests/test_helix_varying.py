@@ -20,6 +20,7 @@ from scipy.linalg import expm
 from softrobots import helix
 from softrobots.errors import MissingDependency, ParameterError
 from softrobots.helix import bent_tube
+from tests.laws import law
 
 D = 0.0331
 LENGTH = 1.5
@@ -184,6 +185,7 @@ def test_the_outer_line_of_a_constant_actuator_keeps_its_length(contraction: flo
     assert path_length(tube.outer_line, tube.rest_positions) == pytest.approx(0.5 / np.cos(angle), abs=1e-7)
 
 
+@law("helix.bent_tube")
 @settings(max_examples=15, deadline=None)
 @given(
     shares=st.lists(st.floats(0.3, 1.0), min_size=2, max_size=6),

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from softrobots import ParameterError, inflated_beam
+from tests.laws import law
 from tests.oracles import PRINTED_WRINKLING_MOMENTS
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}
@@ -33,6 +34,7 @@ def test_young_modulus_reproduces_the_papers_range(pressure: float, modulus: flo
     assert found == pytest.approx(modulus, abs=0.005e6)  # theory prints two decimals of MPa
 
 
+@law("inflated_beam.stiffness_from_young_modulus", "inflated_beam.young_modulus_from_stiffness")
 @given(
     st.floats(1e5, 1e10),
     st.floats(0.0, 2e5),
@@ -51,6 +53,19 @@ def test_modulus_and_stiffness_are_inverse(
     condition = 1e-3 / max((stiffness - softened) / stiffness, 1e-12)
     found = inflated_beam.young_modulus_from_stiffness(stiffness, pressure=pressure, **tube)
     assert found == pytest.approx(modulus, rel=1e-13 * max(condition, 1.0) * 100)
+
+
+@pytest.mark.parametrize("pressure", [15e3, 25e3, 30e3, 35e3, 45e3])
+def test_the_least_stiffness_that_has_a_modulus_has_a_positive_one(pressure: float) -> None:
+    """Of two neighbouring numbers the smaller is refused; for these pressures its modulus would come out as exactly zero."""
+    refused, taken = 1e-6, 1e3
+    while (middle := 0.5 * (refused + taken)) not in (refused, taken):
+        try:
+            modulus = inflated_beam.young_modulus_from_stiffness(middle, pressure=pressure, **TUBE)
+            taken = middle
+        except ParameterError:
+            refused = middle
+    assert 0.0 < modulus < 1.0  # [Pa]
 
 
 def test_deflection_integrates_moment_and_shear() -> None:

@@ -29,6 +29,7 @@ from softrobots.paths import xacro_folder
 from softrobots.robots import PccArm
 from softrobots.tag_reader import read_tags
 from softrobots.urdf_tags import NAMESPACE
+from tests.laws import law
 
 XACRO = xacro_folder() / PccArm.XACRO
 SHAPES: tuple[dict[str, Any], ...] = (
@@ -448,6 +449,7 @@ whole_ = st.fixed_dictionaries(
 )
 
 
+@law("PccArm", "load_model")
 @given(st.lists(segment_, min_size=1, max_size=3), whole_)
 @settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 def test_any_valid_arm_obeys_the_rules_of_portable_urdf(

@@ -19,6 +19,7 @@ from softrobots.model import SoftModel
 from softrobots.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain
 from softrobots.structure import Parts
 from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from tests.laws import law
 from tests.test_composition import ur5  # noqa: F401 - a fixture
 from tests.test_strain_chain import rotation, screw_matrix
 
@@ -167,6 +168,7 @@ KINDS = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
 LINKS = st.tuples(KINDS, AXES, st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(ANGLES, ANGLES, ANGLES))
 
 
+@law("SoftModel.chain", "SoftModel.workspace", "load_model")
 @given(st.lists(LINKS, min_size=1, max_size=6), st.sets(st.integers(0, 5)), st.integers(0, 2**31))
 @settings(max_examples=80)
 def test_tip_and_energy_of_any_chain(links: list, sprung: set[int], seed: int) -> None:

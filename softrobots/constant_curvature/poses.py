@@ -76,7 +76,7 @@ def backbone(arc: Arc, s: Any) -> FloatArray:
         ParameterError: If `arc` is not an `Arc`, or `s` has another shape or leaves [0, 1].
     """
     arc = checked_arc(arc)
-    fractions = finite_array("s", s, (None,))
+    fractions = finite_array("s", s, (None,), "-")
     if np.any((fractions < 0.0) | (fractions > 1.0)):
         raise ParameterError("s", s, "within [0, 1], fractions of the length")
     return _tip(arc.length[..., None] * fractions, arc.bending[..., None] * fractions, arc.azimuth[..., None])

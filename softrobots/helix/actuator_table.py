@@ -7,10 +7,8 @@ and publishes none: the table, its CSV file and the interpolation are ours.
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import LARGEST, FloatArray, choice, finite_array, read_only
+from softrobots.csv_table import read_table
 from softrobots.errors import FileFormatError, MissingDependency, ParameterError
 from softrobots.files import as_path, csv_text, write_text
 from softrobots.helix.shapes import HelixShape, checked_contraction, forward
@@ -27,7 +26,6 @@ INTERPOLATIONS = ("linear", "pchip")
 """Straight between the rows, or SciPy's monotone cubic, which has a continuous slope."""
 
 _COLUMNS = ("pressure_Pa", "contraction")
-_LARGEST_FILE = 10_000_000  # bytes
 _HALVINGS = 60  # of an interval of the table: past the last digit
 
 
@@ -87,20 +85,14 @@ class ActuatorTable:
             MissingDependency: For "pchip", if SciPy is not installed.
         """
         file, kind = as_path("path", path), choice("interpolation", interpolation, INTERPOLATIONS)
-        try:
-            if file.stat().st_size > _LARGEST_FILE:
-                raise FileFormatError(f"{file} has {file.stat().st_size} bytes; at most {_LARGEST_FILE} are read")
-            lines, rows = _rows(file, file.read_text(encoding="utf-8-sig"))
-        except (OSError, ValueError) as error:
-            if isinstance(error, FileFormatError):
-                raise
-            raise FileFormatError(f"cannot read an actuator table from {file}: {error}") from error
-        for place, line in enumerate(lines):
+        table = read_table(file, _COLUMNS)
+        rows = table.numbers.tolist()
+        for place, line in enumerate(table.lines):
             _check_row(f"{file}, line {line}", rows, place)
         if len(rows) < 2:
             raise FileFormatError(f"{file} has {len(rows)} rows of numbers; at least two are required")
         try:
-            return cls(np.array(rows)[:, 0], np.array(rows)[:, 1], kind)
+            return cls(table.numbers[:, 0], table.numbers[:, 1], kind)
         except ParameterError as error:  # numbers too large or too small, rows too near
             raise FileFormatError(f"{file}: {error}") from error
 
@@ -229,42 +221,7 @@ def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> Fl
     return values
 
 
-def _rows(file: Path, text: str) -> tuple[list[int], list[tuple[float, float]]]:
-    """Line numbers and numbers of the rows of a CSV text."""
-    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
-    lines: list[int] = []
-    rows: list[tuple[float, float]] = []
-    try:
-        names = [name.strip() for name in next(reader, [])]
-        if any(names.count(name) != 1 for name in _COLUMNS):
-            raise FileFormatError(
-                f"{file}, line 1: it names {', '.join(names) or 'nothing'}; {' and '.join(_COLUMNS)} are required, each once"
-            )
-        places = [names.index(name) for name in _COLUMNS]
-        for cells in reader:
-            if not any(cell.strip() for cell in cells):
-                continue
-            if len(cells) != len(names):
-                raise FileFormatError(f"{file}, line {reader.line_num}: {len(cells)} cells; {len(names)} are required")
-            lines.append(reader.line_num)
-            pressure, share = (_number(f"{file}, line {reader.line_num}: {names[place]}", cells[place]) for place in places)
-            rows.append((pressure, share))
-    except csv.Error as error:
-        raise FileFormatError(f"{file}, line {reader.line_num}: {error}") from error
-    return lines, rows
-
-
-def _number(what: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise FileFormatError(f"{what} = {cell!r}; a finite number is required")
-    return value
-
-
-def _check_row(where: str, rows: list[tuple[float, float]], place: int) -> None:
+def _check_row(where: str, rows: Sequence[Sequence[float]], place: int) -> None:
     """Check a row by itself and against those before it."""
     pressure, share = rows[place]
     if not 0.0 < share <= 1.0:

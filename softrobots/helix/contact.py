@@ -281,5 +281,5 @@ def _checked_turns(turns: Any) -> FloatArray:
         if not np.any(endless):
             return positive_array("turns", turns, "-")
         return positive_array("turns", np.where(endless, 2.0, turns), "-")  # a second turn is all that neighbours need
-    except (TypeError, ValueError) as error:  # ParameterError too: of what came, not of what is made of it
+    except Exception as error:  # ParameterError too: of what came, not of what is made of it; objects may raise anything
         raise ParameterError("turns", turns, "positive numbers, or infinite for an endless tube [-]") from error

@@ -25,6 +25,7 @@ from softrobots.checks import (
     choice,
     common_shape,
     finite_number,
+    listed,
     non_negative_array,
     positive_array,
     positive_number,
@@ -156,12 +157,10 @@ def _checked(actuator: Any, handedness: str | None) -> tuple[float, float, float
         numbers: Any = (actuator.contraction, actuator.angle, actuator.diameter, actuator.tube_length)
         default = actuator.handedness
     else:
-        numbers, default = actuator, "right"
-        if not isinstance(actuator, tuple | list | np.ndarray) or len(actuator) != 4:
-            raise ParameterError("actuator", actuator, "a HelixDesign, or (contraction, angle, diameter, length of the tube)")
-    contraction, angle, diameter, length = (
-        finite_number(name, value) for name, value in zip(("contraction", "angle", "diameter", "length"), numbers, strict=True)
-    )
+        default = "right"
+        numbers = listed("actuator", actuator, 4, "a HelixDesign, or (contraction, angle, diameter, length of the tube)")
+    contraction, angle = finite_number("contraction", numbers[0], "-"), finite_number("angle", numbers[1], "rad")
+    diameter, length = finite_number("diameter", numbers[2], "m"), finite_number("length", numbers[3], "m")
     checked_actuator(contraction, angle, diameter)
     if contraction >= 1.0:
         raise ParameterError("contraction", contraction, "below 1: at 1 there is nothing to pinch")

@@ -11,13 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import choice, finite_number, non_negative_number, positive_number
+from softrobots.checks import choice, finite_number, listed, non_negative_number, positive_number
 from softrobots.errors import FileFormatError, ParameterError
 from softrobots.files import as_path, write_text
 from softrobots.helix.contact import SelfContact, self_contact
 from softrobots.helix.nearest import Limits, distance, within
 from softrobots.helix.shapes import HANDEDNESS, HelixShape, forward
 from softrobots.helix.tube import centre_length, length_for_turns
+from softrobots.json_text import read_json
 
 LIMIT_ROUNDING = 1e-9
 """How far contraction [-] and angle [rad] may pass a limit by rounding."""
@@ -216,10 +217,8 @@ class HelixDesign:
             FileFormatError: If the file cannot be read, is not one of ours, or does not hold what it claims.
         """
         file = as_path("path", path)
+        document = read_json(file, _LARGEST_FILE)
         try:
-            if file.stat().st_size > _LARGEST_FILE:
-                raise ValueError(f"it has {file.stat().st_size} bytes; at most {_LARGEST_FILE} are read")
-            document = json.loads(file.read_text(encoding="utf-8"))
             if document["softrobots_helix_design"] != _FORMAT:
                 raise ValueError(f"it is in format {document['softrobots_helix_design']!r}; known: {_FORMAT}")
             wish = document["wish"] and Wish(**document["wish"])
@@ -228,7 +227,7 @@ class HelixDesign:
                 claimed, rounding = document["computed"][name], _AGREEMENT * design.diameter
                 if not math.isclose(number, claimed, rel_tol=_AGREEMENT, abs_tol=rounding):
                     raise ValueError(f"its {name} is {claimed}, but its other numbers make {number}")
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
             reason = f"it has no {error}" if isinstance(error, KeyError) else error
             raise FileFormatError(f"cannot read a helix design from {file}: {reason}") from error
         return design
@@ -264,9 +263,7 @@ def checked_limits(name: str, limits: Any, unit: str) -> Limits | None:
         return None
     contraction = name == "contraction_limits"
     requirement = "a pair (low, high) " + ("in (0, 1]" if contraction else "in [0, pi/2) rad") + ", low not above high"
-    if not isinstance(limits, tuple | list | np.ndarray) or len(limits) != 2:
-        raise ParameterError(name, limits, requirement)
-    low, high = (finite_number(name, value, unit) for value in limits)
+    low, high = (finite_number(name, value, unit) for value in listed(name, limits, 2, requirement))
     fits = 0.0 < low <= high <= 1.0 if contraction else 0.0 <= low <= high < 0.5 * math.pi
     if not fits:
         raise ParameterError(name, limits, requirement)

@@ -17,6 +17,7 @@ _RANGES = {
     "contraction": (1.0 / LARGEST, 1.0, CONTRACTION_RANGE),
     "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), ANGLE_RANGE),
 }
+_UNITS = {"contraction": "-", "angle": "rad"}
 _MOST_SAMPLES = 1_000_000
 _ROUNDING = 1e-12  # of the length: by how much a table may end too early
 
@@ -98,7 +99,7 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         if len(given) != 2:
             raise ParameterError(name, given, "a number, a function of the position, or a pair (positions, values)")
         positions = finite_array(f"{name} positions", given[0], (None,), "m")
-        values = finite_array(name, given[1], positions.shape)
+        values = finite_array(name, given[1], positions.shape, _UNITS[name])
         if len(positions) < 2 or positions[0] > 0.0 or positions[-1] < length * (1.0 - _ROUNDING):
             raise ParameterError(f"{name} positions", given[0], f"a table of the whole tube, 0 to {length!r} m")
         steps = np.diff(positions)
@@ -108,7 +109,7 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         if np.any((steps < 1.0 / LARGEST) & ~twice):
             raise ParameterError(f"{name} positions", given[0], f"apart by at least {1.0 / LARGEST:g} m, or equal")
     else:
-        number = finite_number(name, given)
+        number = finite_number(name, given, _UNITS[name])
         positions, values = np.array([0.0, length]), np.array([number, number])
     wrong = np.flatnonzero((values < low) | (values > high))
     if wrong.size:

@@ -63,7 +63,9 @@ class HelixShape:
 
     def __post_init__(self) -> None:
         """Check, broadcast and freeze the three arrays."""
-        outer, inner, pitch = (finite_array(name, getattr(self, name), None, "m") for name in self.__dataclass_fields__)
+        outer = finite_array("outer_radius", self.outer_radius, None, "m")
+        inner = finite_array("inner_radius", self.inner_radius, None, "m")
+        pitch = finite_array("pitch", self.pitch, None, "m/rad")
         shape = common_shape("pitch", outer.shape, inner.shape, pitch.shape)
         outer, inner, pitch = (np.array(np.broadcast_to(values, shape)) for values in (outer, inner, pitch))
         if np.any(outer - inner < _SMALLEST):

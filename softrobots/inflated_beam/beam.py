@@ -79,7 +79,7 @@ class _Section:
 
 def _shear_ratio(poisson_ratio: float) -> float:
     """Return `j G / E`."""
-    nu = finite_number("poisson_ratio", poisson_ratio)
+    nu = finite_number("poisson_ratio", poisson_ratio, "-")
     if not -1.0 < nu <= 0.5:
         raise ParameterError("poisson_ratio", poisson_ratio, "in (-1, 0.5]")
     return SHEAR_COEFFICIENT / (2.0 * (1.0 + nu))
@@ -159,6 +159,7 @@ def stiffness_from_young_modulus(
     Raises:
         ParameterError: If an argument is out of range.
     """
+    length = positive_number("length", length, "m")
     tip = deflection(
         length,
         1.0,
@@ -181,9 +182,11 @@ def young_modulus_from_stiffness(
     wall_thickness: float,
     poisson_ratio: float = 0.3,
 ) -> float:
-    """Modulus of the wall that a measured hinge stiffness implies; inverse of `stiffness_from_young_modulus`.
+    r"""Modulus of the wall that a measured hinge stiffness implies; inverse of `stiffness_from_young_modulus`.
 
-    With `a = L^3/(3 I)`, `c = j S/(2 (1 + nu))` the relation `a/(E + P/S) + L/(P + c E) = L^2/k` is quadratic in `E`.
+    With :math:`a = k L / (3 I)`, :math:`b = k / (c L)`, :math:`s = P/S`, :math:`t = P/c` and :math:`c = j S/(2 (1 + nu))`
+    that is :math:`a/(E + s) + b/(E + t) = 1`, or :math:`(E - a + s)(E - b + t) = a b`, which has one root where both
+    denominators are positive.
 
     Args:
         stiffness: Hinge stiffness `k` [N m/rad], positive.
@@ -202,16 +205,16 @@ def young_modulus_from_stiffness(
     stiffness = positive_number("stiffness", stiffness, "N m/rad")
     length = positive_number("length", length, "m")
     section = _Section.of(pressure, radius, wall_thickness)
-    a = length**3 / (3.0 * section.second_moment)
     c = _shear_ratio(poisson_ratio) * section.wall_section
-    cap, stress, compliance = section.cap_force, section.cap_force / section.wall_section, length**2 / stiffness
-    quadratic = compliance * c
-    linear = compliance * (cap + c * stress) - a * c - length
-    constant = compliance * stress * cap - a * cap - length * stress
-    # The larger root, in the form that does not cancel; the other root has a negative denominator in (1).
-    root = math.sqrt(max(linear**2 - 4.0 * quadratic * constant, 0.0))
-    modulus = (root - linear) / (2.0 * quadratic) if linear < 0.0 else -2.0 * constant / (linear + root)
+    bending, shear = stiffness * length / (3.0 * section.second_moment), stiffness / (c * length)
+    stress, shear_stress = section.cap_force / section.wall_section, section.cap_force / c
+    middle = 0.5 * ((bending - stress) + (shear - shear_stress))
+    apart = math.hypot(0.5 * ((bending - stress) - (shear - shear_stress)), math.sqrt(bending) * math.sqrt(shear))
+    if middle >= 0.0:
+        modulus = middle + apart
+    else:  # the product of both roots, over the other root
+        modulus = (bending * shear_stress + shear * stress - stress * shear_stress) / (apart - middle)
     if modulus <= 0.0:
-        floor = length**2 / (a / stress + length / cap) if cap > 0.0 else 0.0
+        floor = stiffness / (bending / stress + shear / shear_stress)
         raise ParameterError("stiffness", stiffness, f"above {floor:.6g} N m/rad, what the pressure alone gives")
     return modulus

@@ -44,10 +44,12 @@ class BendingTest:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        distance = positive_number("probe_distance", self.probe_distance, "m")
-        if not 0.0 <= non_negative_number("hinge_offset", self.hinge_offset, "m") < distance:
-            raise ParameterError("hinge_offset", self.hinge_offset, f"below the distance of the probe, {distance} m")
-        if non_negative_number("offset", self.offset, "m") >= self.arm:
+        object.__setattr__(self, "probe_distance", positive_number("probe_distance", self.probe_distance, "m"))
+        for name in ("hinge_offset", "offset"):
+            object.__setattr__(self, name, non_negative_number(name, getattr(self, name), "m"))
+        if self.hinge_offset >= self.probe_distance:
+            raise ParameterError("hinge_offset", self.hinge_offset, f"below the distance of the probe, {self.probe_distance} m")
+        if self.offset >= self.arm:
             raise ParameterError("offset", self.offset, f"below the distance of the probe from the hinge, {self.arm} m")
 
     @property

@@ -174,7 +174,7 @@ def _knee(theta: FloatArray, tau: FloatArray) -> int:
     gained = left[-1] - left[best]
     past = theta[split[best] :] - theta[split[best] :].mean() if after[best] else np.zeros(0)
     rise, slope = float(past @ tau[split[best] :]), float(products[best] / max(squares[best], np.finfo(np.float64).tiny))
-    if rise > 0.5 * slope * float(past @ past):  # still rising at half the slope: softer, but no plateau
+    if rise >= 0.5 * slope * float(past @ past):  # still rising at half the slope: softer, but no plateau
         return n
     return int(split[best]) if gained > 12.0 * max(left[best], rounding) / max(n - 3, 1) + rounding else n
 
