@@ -38,7 +38,7 @@ from softrobots.interop.mujoco_statics import static_equilibrium, tip_pose
 from softrobots.interop.outcomes import Question
 from softrobots.interop.tools import find_tool
 from softrobots.model import MAX_DOF
-from softrobots.recorded_run import check_page, write_record
+from softrobots.recorded_run import check_page, command_of, write_record
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "agreement.md"
@@ -474,7 +474,8 @@ def run(arguments: argparse.Namespace) -> None:
         plots.write_png(figure(results), folder / "agreement.png", overwrite=False)
     if arguments.docs is not None:
         plots.write_png(figure(results), arguments.docs / "docs" / "images" / "agreement.png", overwrite=True)
-        write_record(arguments.docs, "agreement", shown, told, command="python scripts/agreement.py --docs", page=PAGE)
+        command = command_of("agreement", parser(), arguments, "cases", "seed")
+        write_record(arguments.docs, "agreement", shown, told, command=command, page=PAGE)
     print(text if arguments.json else f"\n{shown}")
 
 

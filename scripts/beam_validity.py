@@ -33,7 +33,7 @@ from softrobots.files import free_folder, make_folder, write_text
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.interop.kinematics import pose_error
 from softrobots.kinematics import backbone
-from softrobots.recorded_run import check_page, write_record
+from softrobots.recorded_run import check_page, command_of, write_record
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "agreement.md"
@@ -548,7 +548,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.docs is not None:
         for name, figure in figures.items():
             plots.write_png(figure, arguments.docs / "docs" / "images" / name, overwrite=True)
-        command = "python scripts/beam_validity.py --docs"
+        command = command_of("beam_validity", parser(), arguments, "cases", "seed")
         write_record(arguments.docs, "beam_validity", table(result), result, command=command, page=PAGE)
 
 

@@ -15,20 +15,22 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
 from dataclasses import asdict, dataclass
+from datetime import datetime, timezone
 from pathlib import Path
 
 import softrobots as sr
+from softrobots.clean_checkout import copy_checkout, find_uv, make_environment
 from softrobots.command_line import exit_status
 from softrobots.files import free_folder, make_folder, write_text
+from softrobots.json_text import read_json
 from softrobots.progress import with_progress
-from softrobots.recorded_run import check_page, write_record
+from softrobots.recorded_run import FOLDER, check_page, write_record
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PYTHONS = ("3.10", "3.11", "3.12", "3.13")
@@ -69,6 +71,8 @@ class Outcome:
     """Names of the tests that did not pass."""
     minutes: float
     """Time of the tests [min]."""
+    date: str
+    """Day of the run."""
 
 
 ENVIRONMENTS = {python: Environment(python, python, lowest=False, extra="dev") for python in PYTHONS} | {
@@ -85,7 +89,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--tests", nargs="+", default=["tests"], metavar="FILE", help="test files (all)")
     told = "new or empty folder for the reports of the tests (JUnit XML), the output, and results.json"
     made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    told = "write the table of docs/validation.md in a checkout (this one); without --environment and --tests"
+    told = (
+        "write the table of docs/validation.md in a checkout (this one); others keep their last row"
+    )
     made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
     return made
 
@@ -113,46 +119,28 @@ def run_tests(environment: Environment, interpreter: Path, tests: list[str], rep
     """Make an environment, run the tests in it, and read their report.
 
     Raises:
-        OutputError: If the environment cannot be made, or the tests do not write a report.
+        OutputError: If the environment cannot be made, or the tests end early or do not write a report.
     """
     log = reports / f"{environment.name}.log"
     with tempfile.TemporaryDirectory(prefix="softrobots_") as temporary, log.open("w", encoding="utf-8") as output:
         copy = Path(temporary) / "checkout"
-        _copy_checkout(copy)
-        python = copy / ".venv" / "bin" / "python"
-        resolution = ["--resolution", "lowest-direct"] if environment.lowest else []
-        _do([_uv(), "venv", "-q", "--python", interpreter, python.parent.parent], copy, output)
-        _do(
-            [
-                _uv(),
-                "pip",
-                "install",
-                "-q",
-                "--compile-bytecode",
-                "--python",
-                python,
-                *resolution,
-                "-e",
-                f".[{environment.extra}]",
-            ],
-            copy,
-            output,
-        )
+        copy_checkout(CHECKOUT, copy)
+        python = make_environment(copy, interpreter, ["-e", f".[{environment.extra}]"], output, lowest=environment.lowest)
         listed = subprocess.run(
-            [_uv(), "pip", "list", "-q", "--format", "json", "--python", python], check=True, capture_output=True
+            [find_uv(), "pip", "list", "-q", "--format", "json", "--python", python], check=True, capture_output=True
         )
         version = subprocess.run(
             [python, "-c", "import platform; print(platform.python_version())"], check=True, capture_output=True, text=True
         ).stdout.strip()
         report = (reports / f"{environment.name}.xml").resolve()
-        asked = [python, "-m", "pytest", "-q", "-n", "auto", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
+        asked = [str(python), "-m", "pytest", "-q", "-n", "auto", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
         # In CI a missing tool fails its test; without the extras it may be missing.
         variables = {**os.environ, "CI": "true" if environment.extra == "dev" else "", "VIRTUAL_ENV": str(python.parent.parent)}
         began = time.perf_counter()
-        subprocess.run(asked, cwd=copy, env=variables, stdout=output, stderr=output, check=False)
+        status = subprocess.run(asked, cwd=copy, env=variables, stdout=output, stderr=output, check=False).returncode
         minutes = (time.perf_counter() - began) / 60.0
-    if not report.is_file():
-        raise sr.OutputError(f"the tests of {environment.name} ended without a report; see {log}")
+    if status not in (0, 1) or not report.is_file():  # 0: all passed, 1: some failed; else not all of them ran
+        raise sr.OutputError(f"the tests of {environment.name} ended early, with status {status}; see {log}")
     cases = list(ElementTree.parse(report).iter("testcase"))
     bad = [case for case in cases if case.find("failure") is not None or case.find("error") is not None]
     skipped = [case for case in cases if case.find("skipped") is not None]
@@ -164,65 +152,32 @@ def run_tests(environment: Environment, interpreter: Path, tests: list[str], rep
         skipped=len(skipped),
         failed=tuple(f"{case.get('classname')}::{case.get('name')}" for case in bad),
         minutes=round(minutes, 2),
+        date=f"{datetime.now(timezone.utc):%Y-%m-%d}",
     )
-
-
-def _uv() -> str:
-    """Where uv is.
-
-    Raises:
-        MissingDependency: If it is not installed.
-    """
-    try:
-        from uv import find_uv_bin
-    except ImportError as error:
-        raise sr.MissingDependency("uv", "dev") from error
-    return str(find_uv_bin())
-
-
-def _copy_checkout(folder: Path) -> None:
-    """Copy the files of the checkout that git knows, or would."""
-    asked = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    listed = subprocess.run(asked, cwd=CHECKOUT, check=True, capture_output=True).stdout.decode().split("\0")
-    for name in filter(None, listed):
-        if (CHECKOUT / name).is_file():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(CHECKOUT / name, folder / name)
-
-
-def _do(asked: list[str | Path], folder: Path, output: object) -> None:
-    """Run a command of an installation.
-
-    Raises:
-        OutputError: If it fails.
-    """
-    done = subprocess.run(asked, cwd=folder, stdout=output, stderr=output, check=False)
-    if done.returncode:
-        raise sr.OutputError(f"{' '.join(map(str, asked))} failed with status {done.returncode}; see {output.name}")
 
 
 def table(outcomes: list[Outcome]) -> str:
     """Format the outcomes as Markdown."""
-    head = ["environment", "Python", *SHOWN, "passed", "skipped", "failed", "minutes"]
+    head = ["environment", "Python", *SHOWN, "passed", "skipped", "failed", "minutes", "date"]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for found in outcomes:
         versions = [found.versions.get(name, "-") for name in SHOWN]
-        counts = [str(found.passed), str(found.skipped), str(len(found.failed)), f"{found.minutes:.1f}"]
+        counts = [str(found.passed), str(found.skipped), str(len(found.failed)), f"{found.minutes:.1f}", found.date]
         lines.append(f"| {' | '.join([found.environment, found.python, *versions, *counts])} |")
     return "\n".join(lines)
 
 
 def run(arguments: argparse.Namespace) -> bool:
     """Do the whole job; tell whether every test passed."""
-    _uv()  # tells at once what is missing
+    find_uv()  # tells at once what is missing
     if arguments.docs is not None:
-        if arguments.environment is not None or arguments.tests != ["tests"]:
-            raise sr.ParameterError("--docs", str(arguments.docs), "given without --environment and --tests")
+        if arguments.tests != ["tests"]:
+            raise sr.ParameterError("--tests", arguments.tests, "left out with --docs")
         check_page(arguments.docs, "environments")
     there = interpreters()
     chosen = [ENVIRONMENTS[name] for name in arguments.environment or ENVIRONMENTS]
     lacking = [environment for environment in chosen if environment.python not in there]
-    if lacking and arguments.environment is not None:
+    if lacking and (arguments.environment is not None or lacking == chosen):
         raise sr.NameNotFound("installed Python", lacking[0].python, there)
     for environment in lacking:
         print(f"{environment.name}: no Python {environment.python} on this machine", file=sys.stderr)
@@ -234,15 +189,27 @@ def run(arguments: argparse.Namespace) -> bool:
         outcomes.append(run_tests(environment, there[environment.python], arguments.tests, folder))
         for test in outcomes[-1].failed:
             print(f"{environment.name}: {test} failed", file=sys.stderr)
-    result = {"environments": [asdict(outcome) for outcome in outcomes]}
-    write_text(folder / "results.json", json.dumps(result, indent=1) + "\n", overwrite=False)
+        result = {"environments": [asdict(outcome) for outcome in outcomes]}  # after each: the next may not be made
+        write_text(folder / "results.json", json.dumps(result, indent=1) + "\n", overwrite=len(outcomes) > 1)
     print(f"\n{table(outcomes)}\n\nreports: {folder}")
     good = all(outcome.passed and not outcome.failed for outcome in outcomes)
-    if arguments.docs is not None:
-        if not good:
-            raise sr.ParameterError("--docs", str(arguments.docs), "given while every test passes")
-        write_record(arguments.docs, "environments", table(outcomes), result, command="python scripts/environments.py")
+    if arguments.docs is not None and not good:
+        print("not recorded: a test failed", file=sys.stderr)
+    elif arguments.docs is not None:
+        record(arguments.docs, outcomes)
     return good
+
+
+def record(checkout: Path, outcomes: list[Outcome]) -> None:
+    """Write the table of the page: these outcomes, and the recorded ones of other environments."""
+    file = checkout / FOLDER / "environments.json"
+    known: dict[str, Outcome] = {}
+    if file.is_file():
+        known = {row["environment"]: Outcome(**row) for row in read_json(file, 10_000_000)["environments"]}
+    known |= {outcome.environment: outcome for outcome in outcomes}
+    rows = [known[name] for name in ENVIRONMENTS if name in known]
+    result = {"environments": [asdict(row) for row in rows]}
+    write_record(checkout, "environments", table(rows), result, command="python scripts/environments.py")
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -6,6 +6,7 @@ Proofs that take minutes (a million random solves, mutants, the suite on every P
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections.abc import Mapping
 from datetime import datetime, timezone
@@ -36,6 +37,20 @@ def check_page(checkout: Path, name: str, *, page: str = VALIDATION) -> None:
         FileFormatError: If the page cannot be read or does not have the marks of this proof.
     """
     _with_record(checkout, name, page, "")
+
+
+def command_of(script: str, parser: argparse.ArgumentParser, arguments: argparse.Namespace, *options: str) -> str:
+    """What a reader types to run a script as it was run.
+
+    Args:
+        script: Its name, e.g. "soak".
+        parser: Its command line.
+        arguments: The options of the run.
+        options: Names of those of one value that the result depends on; told where they are not what they are by default.
+    """
+    given = [(name, getattr(arguments, name)) for name in options]
+    told = [f"--{name} {value}" for name, value in given if value != parser.get_default(name)]
+    return " ".join([f"python scripts/{script}.py", *told])
 
 
 def write_record(

@@ -1,0 +1,150 @@
+"""Scripts of slow proofs: what they refuse, write and record, at little cost; and that the page names tests that exist."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+import softrobots as sr
+from softrobots.clean_checkout import copy_checkout
+from softrobots.mutants import read_explanations
+from softrobots.recorded_run import command_of
+from tests.conftest import CHECKOUT
+from tests.test_scripts import run_script
+
+
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, CHECKOUT / "scripts" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses ask for it
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        del sys.modules[name]
+    return module
+
+
+def test_the_page_names_tests_that_exist() -> None:
+    named = re.findall(r"`(test_\w+)::(\w*)`", (CHECKOUT / "docs" / "validation.md").read_text(encoding="utf-8"))
+    assert len(named) > 50
+    lacking = []
+    for file, test in set(named) - {("test_x", "")}:  # an example
+        path = CHECKOUT / "tests" / f"{file}.py"
+        if not path.is_file() or (test and f"def {test}(" not in path.read_text(encoding="utf-8")):
+            lacking.append(f"{file}::{test}")
+    assert lacking == []
+
+
+# --- What a record says
+
+
+def test_a_record_names_the_options_of_its_run() -> None:
+    parser = argparse.ArgumentParser()
+    for option in ("--cases", "--seed"):
+        parser.add_argument(option, type=int, default=5)
+    told = [command_of("soak", parser, parser.parse_args(words), "cases", "seed") for words in ([], ["--cases", "7"])]
+    assert told == ["python scripts/soak.py", "python scripts/soak.py --cases 7"]
+
+
+def test_the_soak_writes_its_counts(tmp_path: Path) -> None:
+    file = tmp_path / "soak.json"
+    words = ["--cases", "2", "--processes", "1", "--families", "arm", "--json", str(file)]
+    assert run_script("soak", words) == 0
+    assert json.loads(file.read_text(encoding="utf-8"))["broken"] == 0
+
+
+@pytest.mark.parametrize(("name", "words"), [("soak", ["--families", "arm"]), ("fuzz_readers", ["--reader", "URDF"])])
+def test_a_part_of_the_work_is_not_recorded(
+    name: str, words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "docs").mkdir()
+    assert run_script(name, [*words, "--cases", "1", "--docs", str(tmp_path)]) == 2
+    assert f"given without {words[0]}" in capsys.readouterr().err
+
+
+# --- Environments
+
+
+def test_tests_that_end_early_have_not_passed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """pytest writes a report without a failure all the same."""
+    environments = script("environments")
+    monkeypatch.setattr(environments, "copy_checkout", lambda _, copy: copy.mkdir())
+    monkeypatch.setattr(environments, "make_environment", lambda *_, **__: Path(sys.executable))
+    report = '<testsuites><testsuite failures="0"><testcase classname="a" name="b"/></testsuite></testsuites>'
+
+    def run(asked: list[str], **_: object) -> SimpleNamespace:
+        for file in (word.partition("=")[2] for word in map(str, asked) if word.startswith("--junitxml=")):
+            Path(file).write_text(report, encoding="utf-8")
+        return SimpleNamespace(returncode=2, stdout="[]")  # 2 of pytest: interrupted
+
+    monkeypatch.setattr(environments.subprocess, "run", run)
+    with pytest.raises(sr.OutputError, match=r"the tests of plain ended early, with status 2; see .*plain\.log"):
+        environments.run_tests(environments.ENVIRONMENTS["plain"], Path(sys.executable), [], tmp_path)
+    assert (tmp_path / "plain.xml").is_file()
+
+
+def test_a_machine_without_any_python_proves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    environments = script("environments")
+    monkeypatch.setattr(environments, "interpreters", dict)
+    assert environments.main(["--output", str(tmp_path / "out")]) == 2
+    assert not (tmp_path / "out").exists()
+
+
+# --- Coverage
+
+
+@pytest.mark.parametrize("comment", ["# pragma: no cover - why", "#pragma no cover - why", "# PRAGMA: NO BRANCH - why"])
+def test_every_spelling_of_an_exclusion_is_seen(comment: str) -> None:
+    found = script("measure_coverage").EXCLUDED.search(f"x = 1  {comment}\n")
+    assert found is not None
+    assert found["reason"].strip(" :-") == "why"
+
+
+# --- A copy of the checkout
+
+
+def test_a_copy_follows_the_checkout(tmp_path: Path) -> None:
+    checkout, copy = tmp_path / "here", tmp_path / "here" / "runs" / "copy"
+    (checkout / "package").mkdir(parents=True)
+    subprocess.run(["git", "init", "-q", str(checkout)], check=True)
+    for name in ("package/a.py", "package/b.py", "c.txt"):
+        (checkout / name).write_text("old", encoding="utf-8")
+    copy_checkout(checkout, copy)
+    (copy / "setup.cfg").write_text("ours", encoding="utf-8")
+    time_of_a = (copy / "package" / "a.py").stat().st_mtime_ns
+    (checkout / "package" / "b.py").unlink()
+    (checkout / "c.txt").write_text("new", encoding="utf-8")
+    copy_checkout(checkout, copy)
+    held = {file.relative_to(copy).as_posix(): file.read_text(encoding="utf-8") for file in copy.rglob("*") if file.is_file()}
+    assert held == {"package/a.py": "old", "c.txt": "new", "setup.cfg": "ours"}  # b is gone, and the copy is not in itself
+    assert (copy / "package" / "a.py").stat().st_mtime_ns == time_of_a
+    (tmp_path / "plain").mkdir()
+    with pytest.raises(sr.OutputError, match="cannot copy"):
+        copy_checkout(tmp_path / "plain", tmp_path / "other")
+
+
+# --- Explanations
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("{", "it is no JSON"),
+        ("[]", "is no table"),
+        ('{"explanations": [{"reason": " ", "mutants": []}]}', "a group must have a reason"),
+        ('{"explanations": [{"reason": "a", "mutants": [{"module": "m"}]}]}', "a mutant must have texts"),
+    ],
+)
+def test_a_table_without_reasons_is_refused(text: str, told: str, tmp_path: Path) -> None:
+    file = tmp_path / "explained.json"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(sr.FileFormatError, match=told):
+        read_explanations(file)
