@@ -33,6 +33,7 @@ from softrobots.interop.kinematics import KinematicsRow, compare_kinematics
 from softrobots.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
 from softrobots.interop.springs_read import FORMATS, springs_read
 from softrobots.interop.tools import TOOLS
+from softrobots.json_text import read_json
 from softrobots.marked_text import marked
 from softrobots.paths import urdf_folder
 
@@ -44,6 +45,9 @@ BEGIN, END = "<!-- interoperability:begin -->", "<!-- interoperability:end -->"
 POSES = 5
 SMALLEST = 1e-18
 """Where the picture puts a difference of zero."""
+
+LARGEST_FILE = 10_000_000
+"""Bytes of a file of results."""
 
 KEYS = {
     "springs": {"tool", "robot", "format", "read", "of"},
@@ -271,10 +275,7 @@ def read_results(path: Path) -> Results:
     Raises:
         FileFormatError: If the file cannot be read or holds something else.
     """
-    try:
-        results = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise sr.FileFormatError(f"cannot read results from {path}: {error}") from error
+    results = read_json(path, LARGEST_FILE)
     parts = {part: results.get(part) for part in KEYS} if isinstance(results, dict) else {}
     rows = [(part, row) for part, some in parts.items() if isinstance(some, list) for row in some]
     lists = [some for some in parts.values() if isinstance(some, list)]

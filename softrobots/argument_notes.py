@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from softrobots.description import XACRO_NAMESPACE
-from softrobots.errors import DescriptionError
+from softrobots.xml_input import parse_xml, read_xml
 
 
 class ArgumentNote(NamedTuple):
@@ -34,11 +34,9 @@ def argument_notes(xacro_file: str | Path) -> dict[str, ArgumentNote]:
     Raises:
         DescriptionError: If the file does not exist or is not XML.
     """
-    parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
-    try:
-        root = ElementTree.fromstring(Path(xacro_file).read_text(encoding="utf-8"), parser=parser)
-    except (OSError, ElementTree.ParseError, ValueError) as error:
-        raise DescriptionError(f"cannot read the xacro file {xacro_file}: {error}") from error
+    text = read_xml(Path(xacro_file))
+    parse_xml(text, str(xacro_file))  # refuses what is no XML
+    root = ElementTree.fromstring(text, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
     notes, comment = {}, ""
     for element in root:
         if not isinstance(element.tag, str):  # a comment

@@ -10,7 +10,7 @@ from softrobots import body_plots
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import ParameterError
 from softrobots.kinematics import backbone
-from softrobots.plots import equal_box, force_arrow, new_figure
+from softrobots.plots import equal_box, force_arrow, new_figure, plain_words
 
 _LOADED = "#303030"
 _RELAXED = "#7f7f7f"
@@ -40,7 +40,7 @@ def loaded_shape(equilibrium: Equilibrium) -> Any:
     axes.plot(*relaxed.T, color=_RELAXED, lw=1.2, ls=":", label="relaxed springs, same motors")
     axes.plot(*loaded.T, color=_LOADED, lw=2.5, marker="o", ms=4.0, label="loaded")
     arrow = force_arrow(axes, equilibrium)
-    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title=f"{model.pinocchio.name} under load")
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title=f"{plain_words(model.pinocchio.name)} under load")
     equal_box(axes, np.vstack([loaded, relaxed, arrow]))
     axes.legend(loc="upper left", fontsize=9)
     return figure

@@ -185,13 +185,10 @@ def _read(source: Any, field: str) -> _Part:
     tags = read_tags(text, label)  # refuses what is no URDF
     document = minidom.parseString(text.encode("utf-8"))
     (dom,) = children(document)
-    seen: set[str] = set()
-    for element in children(dom):
-        if element.tagName in ("link", "joint"):
-            name = element.getAttribute("name")
-            if name in seen or not name:
-                raise DescriptionError(f"{label} has a link or joint without a name, or two called {name!r}")
-            seen.add(name)
+    both = {e.getAttribute("name") for e in children(dom) if e.tagName == "link"}
+    both &= {e.getAttribute("name") for e in children(dom) if e.tagName == "joint"}
+    if both:
+        raise DescriptionError(f"{label} has links and joints that have the same name: {', '.join(sorted(both))}")
     return _Part(label, document, dom, read_rigid_tree(text, label), tags)
 
 

@@ -178,7 +178,8 @@ def _tip(model: Any, tip: str | None, label: str) -> str:
     parents = {frame.parentFrame for frame in model.frames}
     leaves = [frame.name for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY and i not in parents]
     if len(leaves) != 1:
-        raise DescriptionError(f"{label} has {len(leaves)} ends ({', '.join(leaves)}); say which frame is the tip: tip=...")
+        told = ", ".join(leaves[:20]) + (", ..." if len(leaves) > 20 else "")
+        raise DescriptionError(f"{label} has {len(leaves)} ends ({told}); say which frame is the tip: tip=...")
     return str(leaves[0])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from softrobots.checks import FloatArray, finite_number
 from softrobots.errors import ParameterError
-from softrobots.plots import new_figure
+from softrobots.plots import new_figure, plain_words
 from softrobots.workspace_map import WorkspaceMap
 
 NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
@@ -76,7 +76,7 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
     reach_axes.set_ylabel("height z [m]")
     weight = "weightless arm" if result.gravity is None else f"arm under gravity {_told(result.gravity)} m/s²"
     where = "" if flat else f", slice at y = {result.grid.y[middle]:.4g} m"
-    figure.suptitle(f"{result.model.pinocchio.name}: force along {_told(result.direction)}, {weight}{where}")
+    figure.suptitle(f"{plain_words(result.model.pinocchio.name)}: force along {_told(result.direction)}, {weight}{where}")
     return figure
 
 

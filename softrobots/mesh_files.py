@@ -8,13 +8,22 @@ from __future__ import annotations
 import html
 import os
 import re
+import stat
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from softrobots.description import parse_xml
+from softrobots.collada_check import collada_problem
+from softrobots.xml_input import parse_xml
 
-_MESH = re.compile(r"""(<mesh\b[^>]*?\bfilename\s*=\s*)(?:"([^"]*)"|'([^']*)')""")
+_MESH = re.compile(r"""(<mesh\b[^<>]*?\bfilename\s*=\s*)(?:"([^"]*)"|'([^']*)')""")
+
+
+LARGEST_MESH = 100_000_000
+"""Bytes that a mesh file, or another file that a description names, may have."""
+DRAWN_FILES = (".obj", ".stl", ".dae")
+"""Mesh files that are read. Assimp, by which Pinocchio does that, knows more kinds, and ends the process at one in six
+damaged PLY files."""
 
 
 class MissingMeshWarning(UserWarning):
@@ -28,8 +37,10 @@ class MissingMeshWarning(UserWarning):
         """Say which they are, and what may help."""
         hint = " (package:// is looked up in the folders of ROS_PACKAGE_PATH, of AMENT_PREFIX_PATH and of example-robot-data)"
         told = ", ".join(meshes[:5]) + (", ..." if len(meshes) > 5 else "")
+        other = any(Path(name).suffix.lower() not in DRAWN_FILES for name in meshes)
         super().__init__(
             f"{robot} is drawn without {len(meshes)} mesh files that are not found or cannot be read: {told}"
+            + (f" ({', '.join(DRAWN_FILES)} files are read)" if other else "")
             + (hint if any(name.startswith("package://") for name in meshes) else "")
         )
         self.meshes = tuple(meshes)
@@ -50,7 +61,11 @@ def with_absolute_paths(urdf: str, folder: Path) -> str:
         name = html.unescape(match[2] if match[2] is not None else match[3])
         if not name.strip() or "://" in name or Path(name).is_absolute():
             return match[0]
-        return f'{match[1]}"{html.escape(str((folder / name).resolve()))}"'
+        try:
+            path = (folder / name).resolve()
+        except (OSError, RuntimeError, ValueError):  # links in a circle, a name that is none
+            return match[0]
+        return f'{match[1]}"{html.escape(str(path))}"'
 
     return _MESH.sub(absolute, urdf)
 
@@ -63,7 +78,7 @@ def find_mesh(name: str, folders: Sequence[str]) -> Path | None:
         folders: Folders that hold packages; those of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH come after them.
 
     Returns:
-        The path of the file, or None if there is none.
+        The path of the file, or None if there is none, or none of at most `LARGEST_MESH` bytes.
     """
     scheme, separator, path = name.partition("://")
     if not separator:
@@ -74,7 +89,32 @@ def find_mesh(name: str, folders: Sequence[str]) -> Path | None:
         found = [folder / path for folder in (*map(Path, folders), *ros, *ament)]
     else:
         found = [Path(path)] if scheme == "file" else []
-    return next((file.resolve() for file in found if file.is_file()), None)
+    return next((file.resolve() for file in found if unfit_file(file) == ""), None)
+
+
+def unfit_file(file: Path) -> str | None:
+    """Tell why a file that a description names cannot be read.
+
+    Args:
+        file: Its path.
+
+    Returns:
+        The reason, e.g. that it is a pipe, for which a library would wait; empty if there is none; None if there is no such
+        file.
+    """
+    try:
+        status = file.stat()
+    except (OSError, ValueError):  # not there, links in a circle, a name that is too long or has a NUL
+        return None
+    if not stat.S_ISREG(status.st_mode):
+        return "is a folder, a device or a pipe"
+    return "" if status.st_size <= LARGEST_MESH else f"has {status.st_size} bytes; at most {LARGEST_MESH} are read"
+
+
+def _ends_reader(file: Path) -> bool:
+    """Whether a file is one that Assimp may not survive, or fill the memory with."""
+    kind = file.suffix.lower()
+    return kind not in DRAWN_FILES or (kind == ".dae" and collada_problem(file) != "")
 
 
 def remove_mesh_shapes(robot: ElementTree.Element) -> None:
@@ -111,7 +151,7 @@ def only_found(
             for mesh in visual.findall("geometry/mesh"):
                 name = mesh.get("filename", "")
                 file = find_mesh(name, folders)
-                if file is None or (readable is not None and not readable(file)):
+                if file is None or _ends_reader(file) or (readable is not None and not readable(file)):
                     missing[name] = None
                     link.remove(visual)
                     break

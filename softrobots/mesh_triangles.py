@@ -16,6 +16,8 @@ import numpy as np
 
 from softrobots.checks import FloatArray
 
+_FARTHEST = 1e9  # [m]; sums and squares of corners must be numbers in single precision, too
+
 
 class Triangles(NamedTuple):
     """A surface."""
@@ -61,23 +63,32 @@ def coloured_parts(mesh: Any, file: Path, scale: FloatArray) -> tuple[ColouredPa
 
 
 def readable(file: Path) -> bool:
-    """Whether Coal, and so Pinocchio, can read a mesh file."""
+    """Whether Coal, and so Pinocchio, can read a mesh file, and its corners are numbers."""
     try:
-        coal.MeshLoader().load(str(file), np.ones(3))
+        return has_finite_corners(coal.MeshLoader().load(str(file), np.ones(3)))
     except (ValueError, RuntimeError):
         return False
-    return True
+
+
+def has_finite_corners(geometry: Any) -> bool:
+    """Whether no corner of a geometry that Coal has read is infinite, no number, or absurdly far away."""
+    if not isinstance(geometry, coal.BVHModelBase):
+        return True
+    return bool(np.all(np.abs(np.asarray(geometry.vertices())) <= _FARTHEST))  # NaN is not
 
 
 def _parts(file: Path, scale: FloatArray) -> tuple[ColouredPart, ...]:
     try:
         import trimesh
 
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), np.errstate(all="ignore"):  # what it computes of colours that are no numbers
             warnings.simplefilter("ignore", DeprecationWarning)  # pycollada sets shapes as NumPy 2.5 no longer wants
-            scene = trimesh.Scene(trimesh.load(str(file)))
+            return _parts_of(trimesh, trimesh.Scene(trimesh.load(str(file))), scale)
     except Exception:  # whatever the reader of that format comes upon
         return ()
+
+
+def _parts_of(trimesh: Any, scene: Any, scale: FloatArray) -> tuple[ColouredPart, ...]:
     made = []
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]

@@ -13,24 +13,29 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import finite_array, finite_number, increasing, read_only
-from softrobots.elastostatics import elastic_state, largest_residual
+from softrobots.checks import choice, finite_array, finite_number, increasing, read_only
+from softrobots.elastostatics import METHODS, elastic_state, largest_residual
 from softrobots.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.errors import FileFormatError, ParameterError
 from softrobots.imposed_displacement import ImposedDisplacement, imposed_at
 from softrobots.inverse_kinematics import IkSolution, checked_orientation
+from softrobots.json_text import parse_json
+from softrobots.load_estimation import METHODS as ESTIMATIONS
 from softrobots.load_estimation import LoadEstimate, estimate_at
 from softrobots.loader import load_model
 from softrobots.loads import Load
 from softrobots.model import SoftModel
 from softrobots.probes import Probe
 from softrobots.tip_goal import Goal
+from softrobots.trajectory import METHODS as FOLLOWINGS
 from softrobots.trajectory import Trajectory
 from softrobots.workspace import Workspace, workspace_at
 from softrobots.workspace_map import WorkspaceMap, packed, unpacked
 
 Result = Equilibrium | IkSolution | ImposedDisplacement | LoadEstimate | Trajectory | Workspace | WorkspaceMap
 """What can be saved."""
+
+_SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
 
 
 def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
@@ -49,12 +54,27 @@ def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
 
 
 def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
-    said, loaded = json.loads(str(fields["model"])), json.loads(str(fields["load"]))
+    said, loaded = (parse_json(_text(fields, name)) for name in ("model", "load"))
     springs = {str(name): (float(k), float(rest)) for name, (k, rest) in said["springs"].items()}
-    model = load_model(
-        str(fields["urdf"]), springs=springs, motors=said["motors"], tip=said["tip"], muscles=said.get("muscles", "lengths")
-    )
+    urdf = _text(fields, "urdf")
+    if not urdf.startswith("<"):
+        raise FileFormatError("its urdf is no URDF text")  # but a path, as far as load_model knows
+    model = load_model(urdf, springs=springs, motors=said["motors"], tip=said["tip"], muscles=said.get("muscles", "lengths"))
     return model, Load.of(model, wrench=loaded["wrenches"], gravity=loaded["gravity"])
+
+
+def _text(fields: Mapping[str, Any], name: str) -> str:
+    """A single text."""
+    if fields[name].shape != () or fields[name].dtype.kind != "U":
+        raise FileFormatError(f"its {name} is no text")
+    return str(fields[name])
+
+
+def _counts(field: Any) -> list[int]:
+    """Integers, zero or above."""
+    if field.dtype.kind not in "iu" or field.ndim != 1 or field.min(initial=0) < 0:
+        raise FileFormatError("it counts in something else than integers, zero or above")
+    return [int(number) for number in field]
 
 
 def _pack_rows(equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
@@ -79,13 +99,14 @@ def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
     motors = finite_array("q_motors", fields["q_motors"], (count, model.n_motors))
     springs = finite_array("q_springs", fields["q_springs"], (count, model.n_springs), "rad")
     residual, tolerance = (finite_array(name, fields[name], (count,), "N m") for name in ("residual", "tolerance"))
+    iterations, solvers = _counts(fields["iterations"]), fields["solver"].tolist()
+    for solver in set(solvers):
+        choice("solver", solver, _SOLVERS)
     equilibria = []
     for row in range(count):
         model.checked_motors(motors[row])
         state = elastic_state(model, motors[row], springs[row], load)
-        made = equilibrium_from_state(
-            model, motors[row], load, state, method=str(fields["solver"][row]), iterations=int(fields["iterations"][row])
-        )
+        made = equilibrium_from_state(model, motors[row], load, state, method=solvers[row], iterations=iterations[row])
         # Rounding differs between machines; a coordinate that was shifted by 1e-9 rad shows up above this.
         if made.residual > 1.001 * residual[row] + largest_residual(model, state.scale, 1e-12):
             raise FileFormatError(
@@ -121,7 +142,7 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
         equilibrium=equilibrium,
         error=float(np.linalg.norm(translation)),
         orientation_error=float(np.linalg.norm(turn)),
-        iterations=int(fields["steps"]),
+        iterations=_counts(fields["steps"].reshape(1))[0],
         alternatives=tuple(map(read_only, others)),
     )
 
@@ -151,11 +172,11 @@ def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
         model,
         model.checked_motors(fields["q_motors"][0]),
         load,
-        Probe(str(fields["frame"]), point, direction, origin, normal),
+        Probe(_text(fields, "frame"), point, direction, origin, normal),
         q_springs=finite_array("q_springs", fields["q_springs"][0], (model.n_springs,), "rad"),
         reaction=finite_number("reaction", fields["reaction"], "N"),
         displacement=finite_number("displacement", fields["displacement"], "m"),
-        iterations=int(fields["iterations"][0]),
+        iterations=_counts(fields["iterations"])[0],
     )
     claimed = 1.001 * float(fields["residual"][0]) + 1e-2 * made.equilibrium.tolerance
     if not (made.residual <= claimed and made.gap <= 1e-11 * model.reach):
@@ -180,11 +201,11 @@ def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
     motors = (equilibrium.model.n_motors,)
     return estimate_at(
         equilibrium,
-        frame=str(fields["frame"]),
+        frame=_text(fields, "frame"),
         motor_torques=finite_array("measured_torques", fields["measured_torques"], motors, "N m"),
         force=finite_array("force", fields["force"], (3,), "N"),
         torque_std=finite_array("torque_std", fields["torque_std"], motors, "N m") if "torque_std" in fields else None,
-        method=str(fields["estimation"]),
+        method=choice("estimation", _text(fields, "estimation"), ESTIMATIONS),
     )
 
 
@@ -199,7 +220,7 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
         times=read_only(increasing("times", finite_array("times", fields["times"], (len(equilibria),), "s"), "s")),
         targets=read_only(finite_array("targets", fields["targets"], (len(equilibria), 3), "m")),
         equilibria=equilibria,
-        method=str(fields["following"]),
+        method=choice("following", _text(fields, "following"), FOLLOWINGS),
     )
 
 
@@ -212,7 +233,7 @@ def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
 def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
     model, load = _unpack_model(fields)
     arrays = {name: fields[name] for name in ("q_motors", "q_springs", "tip_positions", "manipulability")}
-    return workspace_at(model, load, **arrays, refused=int(fields["refused"]))
+    return workspace_at(model, load, **arrays, refused=_counts(fields["refused"].reshape(1))[0])
 
 
 def _pack_map(result: WorkspaceMap) -> dict[str, Any]:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from softrobots import npz_file
 from softrobots.errors import FileFormatError, ParameterError
 from softrobots.files import as_path, csv_text, new_file, write_atomically, write_text
+from softrobots.npz_file import check_size, read_arrays
 from softrobots.result_fields import KINDS, Result
 from softrobots.trajectory import Trajectory
 
 _FORMAT = 1
+_MANY = ("trajectory", "workspace", "workspace_map")  # kinds that hold any number of configurations
+_LARGEST_OF_ONE = 2**26  # bytes of arrays of the others, most of it the URDF text
 
 
 def save_result(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -30,7 +33,7 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
         The path of the file.
 
     Raises:
-        ParameterError: If the result is something else, or the path is none.
+        ParameterError: If the result is something else, or has more arrays than `load_result` reads, or the path is none.
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
@@ -45,12 +48,16 @@ def save_result(result: Result, path: str | Path, *, overwrite: bool = False) ->
     named = path if path.suffix or path.is_dir() else path.with_suffix(".npz")
     target = new_file(named, overwrite=overwrite)
     fields = {"format": np.array(_FORMAT), "kind": np.array(kind), **KINDS[kind][1](result)}
-    write_atomically(target, lambda file: np.savez_compressed(file, **fields))
+    check_size("result", fields, _largest(kind))
+    write_atomically(target, lambda file: np.savez_compressed(file, **fields), overwrite=overwrite)
     return target
 
 
 def load_result(path: str | Path) -> Result:
     """Load a result saved by `save_result`.
+
+    The file may come from anybody: nothing in it is run, it names no other file, and it is not unpacked before it is known that
+    its arrays are as large as it says, and have at most a GiB (64 MiB for a result of a single configuration).
 
     Args:
         path: The NPZ file.
@@ -64,20 +71,21 @@ def load_result(path: str | Path) -> Result:
     """
     path = as_path("path", path)
     try:
-        with path.open("rb") as handle:
-            if not zipfile.is_zipfile(handle):  # NumPy would advise to allow pickle
-                raise FileFormatError("it is no NPZ archive")
-            handle.seek(0)
-            with np.load(handle, allow_pickle=False) as file:
-                fields = {name: file[name] for name in file.files}
-        kind = str(fields["kind"])
-        if int(fields["format"]) != _FORMAT or kind not in KINDS:
+        head = read_arrays(path, only=("kind", "format"))
+        kind = str(head["kind"])
+        if int(head["format"]) != _FORMAT or kind not in KINDS:
             raise FileFormatError(
-                f"it holds {kind!r} in format {fields['format']}; known: {', '.join(KINDS)} in format {_FORMAT}"
+                f"it holds {kind[:60]!r} in format {head['format']}; known: {', '.join(KINDS)} in format {_FORMAT}"
             )
-        return KINDS[kind][2](fields)
-    except Exception as error:  # a damaged archive raises whatever zipfile, zlib, NumPy or JSON come upon
-        raise FileFormatError(f"cannot read a result from {path}: {error}") from error
+        return KINDS[kind][2](read_arrays(path, largest=_largest(kind)))
+    except Exception as error:  # arrays of another kind or shape raise whatever NumPy comes upon
+        reason = f"it has no {error}" if isinstance(error, KeyError) else error
+        raise FileFormatError(f"cannot read a result from {path}: {reason}") from error
+
+
+def _largest(kind: str) -> int:
+    """How many bytes of arrays a result of a kind may have."""
+    return npz_file.LARGEST if kind in _MANY else _LARGEST_OF_ONE
 
 
 def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = False) -> Path:

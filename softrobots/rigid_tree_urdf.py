@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.checks import LARGEST, FloatArray, read_only
-from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError
 from softrobots.rigid_tree import SOLIDS, Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.urdf_tags import NAMESPACE, SpringTag
+from softrobots.xml_input import parse_xml
 
 _SHAPES = (*SOLIDS, "mesh")
 

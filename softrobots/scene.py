@@ -15,7 +15,7 @@ from softrobots.checks import FloatArray
 from softrobots.equilibrium import Equilibrium
 from softrobots.errors import ViewerError
 from softrobots.mesh_files import MissingMeshWarning, only_found
-from softrobots.mesh_triangles import ColouredPart, coloured_parts, readable
+from softrobots.mesh_triangles import ColouredPart, coloured_parts, has_finite_corners, readable
 from softrobots.model import SoftModel
 from softrobots.third_party import package_folders
 
@@ -67,7 +67,10 @@ class Scene:
         try:
             try:
                 self._geometry = pin.buildGeomFromUrdfString(pin_model, drawn, pin.GeometryType.VISUAL)
+                whole = all(has_finite_corners(shape.geometry) for shape in self._geometry.geometryObjects)
             except (ValueError, RuntimeError):
+                whole = False
+            if not whole:
                 drawn, missing = only_found(model.urdf, folders, readable)  # takes longer: reads every file
                 self._geometry = pin.buildGeomFromUrdfString(pin_model, drawn, pin.GeometryType.VISUAL)
         except (ValueError, RuntimeError) as error:

@@ -8,6 +8,7 @@ from typing import Any
 from softrobots.errors import DescriptionError, ParameterError
 from softrobots.mesh_files import with_absolute_paths
 from softrobots.readers import to_urdf
+from softrobots.xml_input import as_unicode, read_xml
 
 
 def read_source(source: Any, field: str = "source") -> tuple[str, str]:
@@ -31,13 +32,11 @@ def read_source(source: Any, field: str = "source") -> tuple[str, str]:
     if not isinstance(source, type) and callable(getattr(source, "urdf", None)):
         return str(source.urdf()), type(source).__name__
     if isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
-        return to_urdf(source.lstrip("\ufeff \t\r\n"), "the text"), "the text"
+        return to_urdf(as_unicode(source), "the text"), "the text"
     if not isinstance(source, str | Path):
         raise ParameterError(field, source, "a robot, a path, or URDF text (or that of MJCF or SDF)")
     try:
-        text = Path(source).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise DescriptionError(
-            f"cannot read {str(source)[:200]!r}: {error}; a path of a URDF, MJCF or SDF file or its text is required"
-        ) from error
+        text = read_xml(Path(source))
+    except DescriptionError as error:
+        raise DescriptionError(f"{error}; a path of a URDF, MJCF or SDF file or its text is required") from error
     return to_urdf(with_absolute_paths(text, Path(source).parent), str(source), Path(source)), str(source)

@@ -6,8 +6,10 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 
-from softrobots.description import XACRO_NAMESPACE, parse_xml
+from softrobots.checks import LARGEST
+from softrobots.description import XACRO_NAMESPACE
 from softrobots.errors import DescriptionError
+from softrobots.urdf_structure import check_structure
 from softrobots.urdf_tags import (
     COORDINATES,
     NAMESPACE,
@@ -20,6 +22,7 @@ from softrobots.urdf_tags import (
     SectionTag,
     SpringTag,
 )
+from softrobots.xml_input import number_in, parse_xml
 
 
 def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
@@ -33,7 +36,8 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         The tags; all empty for a file that has none.
 
     Raises:
-        DescriptionError: If the text is no URDF, or a tag of ours is malformed.
+        DescriptionError: If the text is no URDF (see `softrobots.urdf_structure.check_structure`), or a tag of ours is
+            malformed.
     """
     root = parse_xml(urdf_text, source)
     if root.tag != "robot":
@@ -58,6 +62,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         tip=_tip(root, source),
     )
     _check_together(tags, source)
+    check_structure(root, source)
     return tags
 
 
@@ -123,12 +128,9 @@ def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]
 
 def _rest(element: ElementTree.Element, where: str) -> tuple[float, ...]:
     rest = element.get("rest", "").split()
-    try:
-        numbers = tuple(float(text) for text in rest)
-    except ValueError:
-        numbers = ()
-    if len(numbers) != 4 or not all(map(math.isfinite, numbers)) or numbers[3] <= 0.0:
-        raise DescriptionError(f"{where} has rest = {' '.join(rest)!r}; kx, ky, twist and a positive stretch are required")
+    numbers = tuple(number_in(text) for text in rest)
+    if len(numbers) != 4 or any(map(math.isnan, numbers)) or numbers[3] <= 0.0:
+        raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
     return numbers
 
 
@@ -209,17 +211,15 @@ def _segment(element: ElementTree.Element, where: str) -> int:
 
 def _positive(element: ElementTree.Element, attribute: str, where: str) -> float:
     value = _number(element, attribute, where)
-    if value <= 0.0:
-        raise DescriptionError(f"{where} has {attribute} {value}; a positive one is required")
+    if value < 1.0 / LARGEST:
+        raise DescriptionError(f"{where} has {attribute} {value}; a positive one is required, at least {1.0 / LARGEST:g}")
     return value
 
 
 def _number(element: ElementTree.Element, attribute: str, where: str) -> float:
     text = element.get(attribute)
-    try:
-        value = float(text if text is not None else "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise DescriptionError(f"{where} has {attribute} = {text!r}; a finite number is required")
+    value = number_in(text)
+    if math.isnan(value):
+        given = text if text is None else text[:100]
+        raise DescriptionError(f"{where} has {attribute} = {given!r}; a finite number is required, at most {LARGEST:g} in size")
     return value

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import FloatArray, finite_array, increasing, positive_integer, positive_number, read_only
+from softrobots.csv_table import read_table
 from softrobots.errors import FileFormatError, ParameterError
 from softrobots.files import as_path
 
-_LARGEST_FILE = 100_000_000  # bytes
+_INTERVAL = 0.05  # [s], between waypoints without times
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def waypoints(positions: Any, times: Any) -> Path3D:
 def read_waypoints(path: str | Path) -> Path3D:
     """Read waypoints from a CSV file with a header line that names the columns `t, x, y, z` [s, m, m, m].
 
-    Other columns are ignored. Without a column `t` the waypoints are 0.05 s apart.
+    Other columns and empty lines are ignored. Without a column `t` the waypoints are 0.05 s apart.
 
     Args:
         path: The file.
@@ -100,44 +100,13 @@ def read_waypoints(path: str | Path) -> Path3D:
 
     Raises:
         ParameterError: If the path is none.
-        FileFormatError: If the file cannot be read, lacks a column, has a cell that is no finite number (names the line), has
-            fewer than two waypoints, or times that do not increase.
+        FileFormatError: If the file cannot be read or is too large, lacks a column, has fewer than two waypoints, times that do
+            not increase, or (naming the line) a cell that is no finite number, or more or fewer cells than the first line.
     """
     path = as_path("path", path)
+    table = read_table(path, ("x", "y", "z"), ("t",))
+    times = table.numbers[:, 0] if table.columns[0] == "t" else _INTERVAL * np.arange(len(table.numbers))
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise FileFormatError(f"{path} has {path.stat().st_size} bytes; at most {_LARGEST_FILE} are read")
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
-            names = [name.strip() for name in reader.fieldnames or []]
-            reader.fieldnames = names
-            missing = [name for name in "xyz" if names.count(name) != 1]
-            if missing:
-                raise FileFormatError(
-                    f"{path} lacks the column {', '.join(missing)}, or has it twice; its first line must name x, y, z and may "
-                    "name t "
-                    f"(it names {', '.join(names) or 'nothing'})"
-                )
-            columns = [name for name in ("t", "x", "y", "z") if name in names]
-            rows = [[_cell(row, name, path, reader.line_num) for name in columns] for row in reader]
-    except (OSError, ValueError, csv.Error) as error:
-        if isinstance(error, FileFormatError):
-            raise
-        raise FileFormatError(f"cannot read waypoints from {path}: {error}") from error
-    table = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
-    times = table[:, 0] if columns[0] == "t" else 0.05 * np.arange(len(table))
-    try:
-        return waypoints(table[:, -3:], times)
+        return waypoints(table.numbers[:, -3:], times)
     except ParameterError as error:
         raise FileFormatError(f"{path}: {error}") from error
-
-
-def _cell(row: dict[str, str | None], name: str, path: Path, line: int) -> float:
-    text = row.get(name)
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise FileFormatError(f"{path}, line {line}: {name} = {text!r}; a finite number is required")
-    return value

@@ -532,7 +532,7 @@ REFUSED = [
     (("ik", *TARGET, "--allow-jumps"), "--allow-jumps must be given with --waypoints"),
     (("ik", *TARGET, "-o", "x.csv"), "-o must be a file name that ends in .npz"),
     (("ik", "helix_tube", "--target", "0", "0", "1"), "a robot with at least one motor"),
-    (("ik", "inflatable_arm", "--waypoints", "nobody.csv"), "cannot read waypoints from nobody.csv"),
+    (("ik", "inflatable_arm", "--waypoints", "nobody.csv"), "cannot read nobody.csv: No such file"),
     (("ik", "inflatable_arm", "--waypoints", CSV, "--orientation", *"001"), "--orientation must be given with --target"),
     (("ik", "inflatable_arm", "--waypoints", CSV, "--rpy", *"000"), "--rpy must be given with --target"),
     (("ik", "inflatable_arm", "--waypoints", CSV, "--starts", "3"), "--starts must be given with --target"),

@@ -312,7 +312,7 @@ SECTIONS, LUMPED = SMALL["pcc"](), SMALL["pcc_lumped"]()
         (("<mesh/>", "top", ARM), {}, sr.DescriptionError, "mesh"),
         ((stand(), "top", "no/such/file.urdf"), {}, sr.DescriptionError, "cannot read"),
         (("<robot name='a'><link name='top'", "top", ARM), {}, sr.DescriptionError, "not well-formed"),
-        ((stand(more="<link name='top'/>"), "top", ARM), {}, sr.DescriptionError, "two called 'top'"),
+        ((stand(more="<link name='top'/>"), "top", ARM), {}, sr.DescriptionError, "several that are called 'top'"),
         ((stand(more="<link/>"), "top", ARM), {}, sr.DescriptionError, "without a name"),
         ((stand(more="<link name='loose'/>"), "top", ARM), {}, sr.DescriptionError, "floor, loose"),
         ((stand(more="<joint name='soft_motor_1' type='fixed'><parent link='top'/><child link='l'/></joint><link name='l'/>"),

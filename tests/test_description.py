@@ -16,11 +16,12 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.description import declared_arguments, expand, parse_xml
+from softrobots.description import declared_arguments, expand
 from softrobots.paths import urdf_folder, xacro_folder
 from softrobots.robots import HelixTube, PccArm
 from softrobots.tag_reader import read_tags
 from softrobots.urdf_tags import NAMESPACE
+from tests.laws import law
 from tests.oracles import tube_points
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO
@@ -172,6 +173,7 @@ link = st.fixed_dictionaries(
 )
 
 
+@law("InflatableArm")
 @given(st.lists(link, min_size=1, max_size=6))
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_valid_arm_obeys_the_rules_of_portable_urdf(links: list[dict]) -> None:
@@ -265,14 +267,12 @@ def test_bad_arguments_of_the_xacro_file_are_refused(arguments: dict, message: s
 def test_files_that_are_no_robot_are_refused(tmp_path: Path) -> None:
     with pytest.raises(sr.DescriptionError, match="without links; is it a file of macros"):
         expand(xacro_folder() / "macros" / "joints.xacro")
-    with pytest.raises(sr.DescriptionError, match="cannot read the xacro file"):
+    with pytest.raises(sr.DescriptionError, match=r"cannot read .*: No such file"):
         expand(tmp_path / "missing.xacro")
     broken = tmp_path / "broken.xacro"
     broken.write_text("<robot", encoding="utf-8")
     with pytest.raises(sr.DescriptionError, match="not well-formed"):
         expand(broken)
-    with pytest.raises(sr.DescriptionError, match="document type"):
-        parse_xml('<!DOCTYPE r [<!ENTITY a "b">]><robot name="r"/>', "text")
     with pytest.raises(sr.DescriptionError, match="unexpanded xacro"):
         read_tags(XACRO.read_text(encoding="utf-8"))
 

@@ -173,6 +173,7 @@ def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
         "serial_chain",
         "growth",
         "files",
+        "checkpoint",
     ]
     files = [
         PACKAGE / f"{name}.py" for name in (*names, "coordinates", "joint_loads", "muscles", "muscle_lengths", "actuators")

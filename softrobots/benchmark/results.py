@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from softrobots.errors import FileFormatError, ParameterError
+from softrobots.json_text import read_json
 
 AT_LEAST, AT_MOST = "at least", "at most"
+_LARGEST_FILE = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
@@ -98,10 +100,7 @@ def read_results(path: Path) -> Results:
     Raises:
         FileFormatError: If the file cannot be read or holds something else.
     """
-    try:
-        read = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileFormatError(f"cannot read results from {path}: {error}") from error
+    read = read_json(path, _LARGEST_FILE)
     try:
         rows = tuple(Row(**{name: value for name, value in row.items() if name != "met"}) for row in read["rows"])
         curves = tuple(Curve(c["picture"], c["label"], tuple(c["sizes"]), tuple(c["seconds"])) for c in read["curves"])
@@ -117,7 +116,7 @@ def _check(results: Results) -> None:
 
     Raises:
         KeyError: If the machine or the number of rounds is not told.
-        TypeError: If a figure is no number, or a text is none.
+        TypeError: If a figure is no number, or a text is none or has several lines.
         ValueError: If a figure is not finite, or a curve has not a cost for every size.
     """
     texts = [results.machine["processor"], results.machine["system"], *results.machine.values()]
@@ -131,8 +130,8 @@ def _check(results: Results) -> None:
         figures += [*curve.sizes, *curve.seconds]
         if len(curve.sizes) != len(curve.seconds):
             raise ValueError("a curve has a cost for every size")
-    if not all(isinstance(text, str) for text in texts):
-        raise TypeError("names are texts")
+    if not all(isinstance(text, str) and text.isprintable() for text in texts):
+        raise TypeError("names are texts of one line")
     if not all(map(math.isfinite, figures)):
         raise ValueError("figures are finite")
 
@@ -140,7 +139,7 @@ def _check(results: Results) -> None:
 def table(rows: Sequence[Row]) -> str:
     """The rows as Markdown: what is compared, both costs, the figure and its target."""
     lines = [f"| {' | '.join(HEAD)}|", "|---|---|---|---:|---:|---:|---:|---|"]
-    lines += ["| " + " | ".join(cell.replace("|", "/") for cell in cells(row)) + " |" for row in rows]
+    lines += ["| " + " | ".join(map(_plain, cells(row))) + " |" for row in rows]
     return "\n".join(lines)
 
 
@@ -154,6 +153,11 @@ def cells(row: Row) -> tuple[str, ...]:
     costs = (_cost(row.our_seconds), _cost(row.baseline_seconds))
     last = f"skipped: {row.skipped}" if row.skipped else verdict
     return (row.job, row.ours, row.baseline or "-", *costs, _figure(row), _target(row), last)
+
+
+def _plain(cell: str) -> str:
+    """A text that neither ends a cell nor begins an element of HTML."""
+    return cell.replace("|", "/").replace("<", "&lt;")
 
 
 def machine_text(results: Results) -> str:

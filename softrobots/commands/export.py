@@ -8,7 +8,7 @@ from typing import Any
 
 from softrobots.command_line import add_gravity, gravity_of
 from softrobots.commands.answers import add_json, tell
-from softrobots.commands.robot_argument import add_model, model_of, motors_of, robot_source
+from softrobots.commands.robot_argument import add_model, model_of, motors_of, source_of
 from softrobots.export.damping import DAMPING
 from softrobots.export.formats import FORMATS, export_model, guess_format
 from softrobots.export.number_sources import PackagedRobot
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> None:
     }
     options = {option: value for option, value in given.items() if value is not None}
     new_file(arguments.output, overwrite=arguments.overwrite)  # tells at once
-    source = robot_source(arguments.robot, arguments.parameters)
+    source = source_of(arguments)
     if "robot" in FORMATS[name].options and isinstance(source, PackagedRobot):
         options["robot"] = source  # for the sources of its numbers
     model = model_of(arguments, source)

@@ -11,19 +11,21 @@ import numpy as np
 from softrobots.checks import FloatArray
 from softrobots.command_line import refuse_too_large
 from softrobots.commands.coordinate_units import motor_units
-from softrobots.commands.robot_parameters import make_robot, parse_parameters, xacro_parameters
+from softrobots.commands.robot_parameters import NOTHING, check_names, make_robot, parse_parameters, xacro_parameters
 from softrobots.description import expand
 from softrobots.errors import NameNotFound, ParameterError
 from softrobots.interop.kinematics import is_urdf_file
 from softrobots.loader import load_model
 from softrobots.model import SoftModel
 from softrobots.muscles import MUSCLE_INPUTS
-from softrobots.robots import ROBOTS, HelixTube, PccArm, Robot
+from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm, Robot
+from softrobots.robots.parameter_file import read_parameters
+from softrobots.robots.parameters import argument_text
 from softrobots.sources import read_source
 
 
 def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Give a parser `ROBOT` and `--set`; see `robot_source`.
+    """Give a parser `ROBOT`, `--set` and `--parameters`; see `source_of`.
 
     Args:
         parser: The parser.
@@ -42,10 +44,12 @@ def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
         help="parameters of the robot, or arguments of the xacro file; `softrobots urdf ROBOT --list` tells names, units and "
         "defaults",
     )
+    told = "read such parameters from a file, YAML or JSON; --set wins (none)"
+    parser.add_argument("--parameters", dest="parameter_file", type=Path, metavar="FILE", help=told)
 
 
 def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Give a parser `ROBOT`, `--set`, `--spring`, `--tip` and `--muscles`; see `model_of`.
+    """Give a parser `ROBOT`, `--set`, `--parameters`, `--spring`, `--tip` and `--muscles`; see `model_of`.
 
     Args:
         parser: The parser.
@@ -80,24 +84,34 @@ def spring(word: str) -> tuple[str, tuple[float, float]]:
     return joint, typed
 
 
-def robot_source(robot: str, parameters: Sequence[str]) -> Robot | Path | str:
-    """What the words stand for: a robot, the path of a URDF file, or the URDF text that another file expands or translates to.
+def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
+    """What the arguments of `add_robot` name: a robot, the path of a URDF file, or the URDF text that another file becomes.
 
     Args:
-        robot: Name of a robot of `ROBOTS`, or a path.
-        parameters: Parameters of the robot or of the xacro file, each `name=value`.
+        arguments: The arguments.
 
     Raises:
         NameNotFound: If there is no such robot, file or parameter.
-        ParameterError: If a parameter is refused.
+        ParameterError: If a parameter is refused, or the file of parameters is for another robot.
+        FileFormatError: If the file of parameters cannot be read.
         DescriptionError: If xacro refuses the file, or it is of no kind that can be read.
         MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
     """
+    robot, parameters, said = arguments.robot, arguments.parameters, NOTHING
+    if arguments.parameter_file is not None:
+        said = read_parameters(arguments.parameter_file)
+        if said.robot not in (None, robot, Path(robot).name):
+            raise ParameterError("ROBOT", robot, f"{said.robot}, for which {arguments.parameter_file} is")
     if robot in ROBOTS:
-        return make_robot(robot, parameters)
+        return make_robot(robot, parameters, said)
     file = robot_file(robot)
     if file.suffix == ".xacro":
-        return expand(file, parse_parameters(parameters, xacro_parameters(file), file.name))
+        known = xacro_parameters(file)
+        check_names(said, known, file.name)
+        texts = {name: argument_text(value) for name, value in said.values.items()}
+        return expand(file, texts | parse_parameters(parameters, known, file.name))
+    if arguments.parameter_file is not None:
+        raise ParameterError("--parameters", str(arguments.parameter_file), f"left out: {file} is no xacro file")
     if parameters:
         raise ParameterError("--set", " ".join(parameters), f"left out: {file} is no xacro file")
     return file if is_urdf_file(file) else read_source(file)[0]
@@ -108,10 +122,10 @@ def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = 
 
     Args:
         arguments: The arguments.
-        source: What `robot_source` made of them, if that is known.
+        source: What `source_of` made of them, if that is known.
 
     Raises:
-        SoftRobotsError: Whatever `robot_source` and `load_model` raise.
+        SoftRobotsError: Whatever `source_of` and `load_model` raise.
         ParameterError: If a joint is given two springs.
     """
     names = [joint for joint, _ in arguments.spring]
@@ -119,7 +133,7 @@ def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = 
     if twice is not None:
         raise ParameterError("--spring", twice, "given once for each joint")
     if source is None:
-        source = robot_source(arguments.robot, arguments.parameters)
+        source = source_of(arguments)
     return load_model(source, springs=dict(arguments.spring) or None, tip=arguments.tip, muscles=arguments.muscles)
 
 
@@ -127,12 +141,13 @@ def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
     """The same model for a command that solves: a robot that is too large for that is refused before it is made.
 
     Raises:
-        SoftRobotsError: Whatever `robot_source` and `load_model` raise.
+        SoftRobotsError: Whatever `source_of` and `load_model` raise.
         ParameterError: If the robot has too many joints, or a joint is given two springs.
     """
-    source = robot_source(arguments.robot, arguments.parameters)
-    if isinstance(source, PccArm | HelixTube):
-        refuse_too_large(source, "--set", " ".join(arguments.parameters))
+    source = source_of(arguments)
+    if isinstance(source, InflatableArm | PccArm | HelixTube):
+        option = "--set" if arguments.parameters else "--parameters"
+        refuse_too_large(source, option, " ".join(arguments.parameters) or str(arguments.parameter_file))
     return model_of(arguments, source)
 
 

@@ -17,8 +17,13 @@ from softrobots.argument_notes import argument_notes
 from softrobots.description import declared_arguments
 from softrobots.errors import NameNotFound, ParameterError
 from softrobots.robots import ROBOTS, Robot
+from softrobots.robots.parameter_file import ParameterFile
 
 _WORDS = {"true": True, "false": False, "none": None, "": None}  # as xacro arguments spell them
+
+
+NOTHING = ParameterFile(None, {})
+"""What no file says."""
 
 
 class RobotParameter(NamedTuple):
@@ -102,20 +107,40 @@ def parse_parameters(words: Sequence[str], known: Sequence[RobotParameter], owne
     return given
 
 
-def make_robot(name: str, words: Sequence[str]) -> Robot:
+def check_names(said: ParameterFile, known: Sequence[RobotParameter], owner: str) -> None:
+    """Refuse a file with a parameter that there is not.
+
+    Args:
+        said: What the file says.
+        known: What may be given.
+        owner: What it is given to, for errors.
+
+    Raises:
+        NameNotFound: If there is no such parameter; lists those that exist, with default and unit.
+    """
+    names = [parameter.name for parameter in known]
+    for name in said.values:
+        if name not in names:
+            raise NameNotFound(f"parameter of {owner}", name, names, lines=[parameter.line for parameter in known])
+
+
+def make_robot(name: str, words: Sequence[str], said: ParameterFile = NOTHING) -> Robot:
     """Make a robot of `ROBOTS` with parameters of the command line.
 
     Args:
         name: Name of the robot.
         words: Parameters, each `field=value`. A value is a number, a list `[0.5,0.4]`, true, false, none, or a word.
+        said: Parameters of a file; those of the command line win.
 
     Raises:
         NameNotFound: If there is no such robot or parameter.
         ParameterError: If a word is no `field=value`, a parameter comes twice, or a value is not what the robot accepts.
         SelfIntersection: If a helical tube would run into itself.
     """
-    texts = parse_parameters(words, robot_parameters(name), name)
-    return ROBOTS[name](**{field: _value(text) for field, text in texts.items()})
+    known = robot_parameters(name)
+    check_names(said, known, name)
+    texts = parse_parameters(words, known, name)
+    return ROBOTS[name](**{**said.values, **{field: _value(text) for field, text in texts.items()}})
 
 
 def first_sentence(name: str) -> str:

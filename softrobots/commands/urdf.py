@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import dataclasses
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from softrobots.commands.answers import add_json, aligned, tell
-from softrobots.commands.robot_argument import add_robot, robot_file, robot_source
+from softrobots.commands.robot_argument import add_robot, robot_file, source_of
 from softrobots.commands.robot_parameters import first_sentence, robot_parameters, xacro_parameters
 from softrobots.errors import ParameterError
-from softrobots.files import write_text
+from softrobots.files import new_file, write_text
 from softrobots.interop.checks import check_description
 from softrobots.interop.urdf_rules import Finding
-from softrobots.robots import ROBOTS
+from softrobots.robots import ROBOTS, Robot
+from softrobots.robots.parameter_file import write_parameters
 from softrobots.sources import read_source
 
 SHOWN = 8
@@ -25,6 +28,8 @@ _EXAMPLES = """examples:
   softrobots urdf --list                                       the robots
   softrobots urdf pcc_arm --list                               the parameters of one, with unit and default
   softrobots urdf inflatable_arm --set link_lengths=[0.5,0.4] stiffness=200 -o arm.urdf
+  softrobots urdf inflatable_arm --set stiffness=200 --save-parameters arm.yaml
+  softrobots urdf inflatable_arm --parameters arm.yaml --set pressure=40e3 -o arm.urdf
   softrobots urdf helix_tube --set contraction=0.8 --check     check what would be generated; writes nothing
   softrobots urdf my_robot.urdf --check                        check a file
   softrobots urdf my_robot.urdf.xacro --set length=0.3 > my_robot.urdf
@@ -44,7 +49,9 @@ def add_parser(subparsers: Any) -> None:
     )
     add_robot(parser, optional=True)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the URDF there instead of printing it")
-    parser.add_argument("--overwrite", action="store_true", help="allow -o to replace a file")
+    parser.add_argument("--overwrite", action="store_true", help="allow files to be replaced")
+    told = "write all parameters of the robot to a file that --parameters reads, YAML or JSON, instead of printing the URDF"
+    parser.add_argument("--save-parameters", type=Path, metavar="FILE", help=told)
     parser.add_argument("--check", action="store_true", help="check the description; exit with status 1 if anything is wrong")
     parser.add_argument("--list", action="store_true", help="list the robots, or the parameters of ROBOT")
     add_json(parser)
@@ -57,21 +64,50 @@ def run(arguments: argparse.Namespace) -> bool:
     if arguments.list:
         _list(arguments)
         return True
-    source = robot_source(arguments.robot, arguments.parameters)
+    source = source_of(arguments)
     if isinstance(source, Path) and (arguments.output is not None or not arguments.check):
         requirement = "a robot, a xacro, MJCF or SDF file; a URDF file can only be checked, with --check"
         raise ParameterError("ROBOT", str(source), requirement)
+    if arguments.save_parameters is not None and arguments.robot not in ROBOTS:
+        raise ParameterError("--save-parameters", str(arguments.save_parameters), f"given for one of {', '.join(ROBOTS)}")
+    for file in (arguments.output, arguments.save_parameters):
+        if file is not None:
+            new_file(file, overwrite=arguments.overwrite)  # tells at once
     findings = check_description(source) if arguments.check else ()
     well = all(finding.ok for finding in findings)
     lines, answer = _report(findings), _answer(findings) if arguments.check else {}
-    if arguments.output is not None and well:
-        answer["files"] = [write_text(arguments.output, read_source(source)[0], overwrite=arguments.overwrite)]
-        lines.append(f"{answer['files'][0]}: written")
+    if well:
+        answer |= _write(arguments, source)
+    lines += [f"{file}: written" for file in answer.get("files", ())]
     if answer:
         tell(arguments, answer, lines)
     else:
         sys.stdout.write(read_source(source)[0])
     return well
+
+
+def _write(arguments: argparse.Namespace, source: Robot | Path | str) -> dict[str, list[Path]]:
+    """Write the files that are asked for; which ones, if any."""
+    files = []
+    if arguments.output is not None:
+        files.append(write_text(arguments.output, read_source(source)[0], overwrite=arguments.overwrite))
+    if arguments.save_parameters is not None:
+        known = robot_parameters(arguments.robot)
+        values = {parameter.name: _shortest(source, parameter.name) for parameter in known}
+        units = {parameter.name: parameter.unit for parameter in known}
+        file, overwrite = arguments.save_parameters, arguments.overwrite
+        files.append(write_parameters(file, arguments.robot, values, units=units, overwrite=overwrite))
+    return {"files": files} if files else {}
+
+
+def _shortest(robot: Any, name: str) -> Any:
+    """A parameter of a robot: one value where all its parts have the same and the robot takes one."""
+    value = getattr(robot, name)
+    if isinstance(value, tuple) and value and all(item == value[0] for item in value):
+        with contextlib.suppress(ParameterError):
+            if dataclasses.replace(robot, **{name: value[0]}) == robot:
+                return value[0]
+    return value
 
 
 def _answer(findings: Sequence[Finding]) -> dict[str, Any]:
@@ -98,11 +134,12 @@ def _report(findings: Sequence[Finding]) -> list[str]:
 def _refuse_contradictions(arguments: argparse.Namespace) -> None:
     if arguments.robot is None and not arguments.list:
         raise ParameterError("ROBOT", "(nothing)", f"one of {', '.join(ROBOTS)}, or a file")
-    if arguments.list and (arguments.parameters or arguments.output or arguments.check):
-        raise ParameterError("--list", "given", "given without --set, -o and --check")
-    if arguments.overwrite and arguments.output is None:
-        raise ParameterError("--overwrite", "given", "given together with -o FILE")
-    if arguments.json and not (arguments.list or arguments.check or arguments.output):
+    files = arguments.output is not None or arguments.save_parameters is not None
+    if arguments.list and (arguments.parameters or arguments.parameter_file or files or arguments.check):
+        raise ParameterError("--list", "given", "given without --set, --parameters, --save-parameters, -o and --check")
+    if arguments.overwrite and not files:
+        raise ParameterError("--overwrite", "given", "given together with -o FILE or --save-parameters FILE")
+    if arguments.json and not (arguments.list or arguments.check or files):
         raise ParameterError("--json", "given", "given with --list, --check or -o FILE; what is printed otherwise is URDF")
 
 

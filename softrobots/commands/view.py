@@ -15,7 +15,7 @@ from softrobots.checks import finite_number
 from softrobots.command_line import Served, address_lines
 from softrobots.commands.answers import add_json, tell
 from softrobots.commands.load_argument import add_loads, loads_of
-from softrobots.commands.robot_argument import add_model, model_of, motors_of, robot_source
+from softrobots.commands.robot_argument import add_model, model_of, motors_of, source_of
 from softrobots.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.errors import ParameterError
 from softrobots.files import new_file
@@ -40,7 +40,7 @@ _EXAMPLES = """examples:
 """
 
 _NOT_WITH = {
-    "--result": ("ROBOT", "--set", "--spring", "--tip", "--motors", "--target", "--growth", "a load"),
+    "--result": ("ROBOT", "--set", "--parameters", "--spring", "--tip", "--motors", "--target", "--growth", "a load"),
     "--growth": ("--motors", "--target", "a load", "--live", "--sliders"),
     "--html": ("--live", "--sliders", "--open", "--port"),
     "--picture": ("--live", "--sliders", "--open", "--port"),
@@ -138,7 +138,7 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Traject
 
 def _grow(arguments: argparse.Namespace) -> None:
     """Show how a tube grows."""
-    tube = robot_source(arguments.robot, arguments.parameters)
+    tube = source_of(arguments)
     if not isinstance(tube, HelixTube) or tube.chain != "sections":
         raise ParameterError("ROBOT", arguments.robot, "helix_tube, with chain=sections, where it is to grow")
     model = model_of(arguments, tube)
@@ -212,6 +212,7 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
     given = {
         "ROBOT": arguments.robot is not None,
         "--set": bool(arguments.parameters),
+        "--parameters": arguments.parameter_file is not None,
         "--spring": bool(arguments.spring),
         "--tip": arguments.tip is not None,
         "a load": any(arguments.force)

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.description import parse_xml
 from softrobots.errors import ParameterError
 from softrobots.export.damping import lowest_frequency, mass_matrix, rule_told
 from softrobots.export.held import HeldRobot, hold
@@ -24,6 +23,7 @@ from softrobots.model import SoftModel
 from softrobots.rigid_tree import Body, RigidTree, Shape
 from softrobots.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
 from softrobots.urdf_tags import NAMESPACE
+from softrobots.xml_input import parse_xml
 
 MOST_JOINTS = 127
 """Joints that PyBullet takes in one robot, fixed ones counted; beyond that it cannot tell their states."""

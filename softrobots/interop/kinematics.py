@@ -15,13 +15,13 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.checks import FloatArray, positive_integer
-from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError, SoftRobotsError
 from softrobots.interop.placed_links import Poses, open_in
 from softrobots.interop.tools import Tool, find_tool, installed_tools
 from softrobots.model import MAX_DOF
 from softrobots.robots import Robot
 from softrobots.sources import read_source
+from softrobots.xml_input import parse_xml, read_xml
 
 _WIDEST = (2.0 * np.pi, 1.0)
 """Joints with wider limits are drawn within plus and minus these [rad, m]."""
@@ -191,11 +191,7 @@ def is_urdf_file(path: Path) -> bool:
     Raises:
         DescriptionError: If it cannot be read, or is not XML.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DescriptionError(f"cannot read {path}: {error}") from error
-    return parse_xml(text, str(path)).tag == "robot"
+    return parse_xml(read_xml(path), str(path)).tag == "robot"
 
 
 def _pinocchio_poses(file: Path, label: str, count: int, seed: int) -> _Truth:

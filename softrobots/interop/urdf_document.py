@@ -7,10 +7,10 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
 
-from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError
 from softrobots.rigid_tree_urdf import link_at
 from softrobots.urdf_tags import NAMESPACE
+from softrobots.xml_input import parse_xml
 
 Problems = Iterator[tuple[str, str]]
 """What breaks a rule: the link or joint (empty: the whole file), and what is wrong with it."""

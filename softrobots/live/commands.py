@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from softrobots.checks import FloatArray, finite_array, read_only
 from softrobots.errors import FileFormatError, NameNotFound, ParameterError
+from softrobots.json_text import parse_json
 from softrobots.loads import EARTH_GRAVITY
 
 GRAMMAR = """\
@@ -91,8 +91,8 @@ def read_commands(text: str, start: Wanted) -> Wanted:
 
 def _json_object(text: str) -> Mapping[str, Any]:
     try:
-        return dict(json.loads(text))
-    except (ValueError, RecursionError) as error:
+        return dict(parse_json(text))
+    except FileFormatError as error:
         raise FileFormatError(f"this is no JSON object: {error}") from error
 
 

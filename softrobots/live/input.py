@@ -97,20 +97,25 @@ class WatchedFile:
             mark = (about.st_mtime_ns, about.st_size, about.st_ino)
             if mark == self._mark and time.time() - about.st_mtime > _RECENT:
                 return None
-            if mark != self._mark and (about.st_size > _LARGEST or not stat.S_ISREG(about.st_mode)):
+            text = self._content() if stat.S_ISREG(about.st_mode) else None
+            if mark != self._mark and (text is None or len(text) > _LARGEST):
                 self._mark = mark
                 raise FileFormatError(f"{self._path} must be a file of at most {_LARGEST} bytes")
-            text = self._path.read_bytes() if stat.S_ISREG(about.st_mode) else None
         except OSError as error:
             if not self._missed:
                 self._tell(f"waiting for {self._path}: {error.strerror}")
             self._missed, self._mark = True, None
             return None
         self._missed, self._mark = False, mark
-        if text == self._text:
+        if text is None or len(text) > _LARGEST or text == self._text:
             return None
         self._text = text
         return text
+
+    def _content(self) -> bytes:
+        """What the file holds, or so much of it that it is too much; what `stat` tells of its size need not be true."""
+        with self._path.open("rb") as file:
+            return file.read(_LARGEST + 1)
 
 
 class Keys:

@@ -31,6 +31,7 @@ _MOVES = {
     "x": (0, 1.0), "X": (0, -1.0), "y": (1, 1.0), "Y": (1, -1.0), "z": (2, 1.0), "Z": (2, -1.0),
 }  # fmt: skip
 _TARGET_SHARE, _FORCE_SHARE, _MOTOR_SHARE = 0.02, 0.01, 0.05  # steps: of the reach, by what bends it so far, of motor_scale
+_FURTHEST = 2.0**20  # times a step is doubled or halved: whoever leans on the key gets no infinite step
 
 
 class KeyMoves:
@@ -44,6 +45,7 @@ class KeyMoves:
         """
         model = equilibrium.model
         self._motor, self._force = 0, not model.n_motors
+        self._scaled = 1.0
         self._target_step = _round_step(_TARGET_SHARE * model.reach)
         self._motor_steps = [_round_step(_MOTOR_SHARE * scale) for scale in model.motor_scale.tolist()]
         self._force_step, softness = 1.0, 0.0
@@ -116,6 +118,9 @@ class KeyMoves:
         self._motor = motor
 
     def _scale(self, factor: float) -> None:
+        if not 1.0 / _FURTHEST <= self._scaled * factor <= _FURTHEST:
+            return
+        self._scaled *= factor
         self._target_step *= factor
         self._force_step *= factor
         self._motor_steps = [factor * step for step in self._motor_steps]

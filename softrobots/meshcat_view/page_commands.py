@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from softrobots.errors import ViewerError
+from softrobots.json_text import parse_json
 
 RESOLUTION = 2.0**-18
 """Numbers on a page are multiples of this: of lengths it is 4 um, of directions 4 urad."""
@@ -24,6 +25,7 @@ _SCRIPT = re.compile(r"<script>\s*(/\*!.*?)</script>", re.DOTALL)
 _UUID = re.compile(rb"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}")
 _FLOATS = 0x17  # meshcat's number of the extension type of msgpack that holds numbers of 32 bits
 _HEAD = re.compile(rb"(?:\xc8(..)|\xc9(....))[\x12-\x17]", re.DOTALL)  # of an array of meshcat's, with its length in bytes
+_LARGEST = 500_000_000  # bytes of an unpacked page
 _REPEATED = 256  # bytes of an array from which it is looked for among the others
 
 
@@ -86,8 +88,12 @@ def unpacked(text: str) -> tuple[str, list[bytes]]:
         ViewerError: If it is no such text.
     """
     try:
-        head, _, rest = zlib.decompress(base64.b64decode(text, validate=True)).partition(b"\n")
-        told, pieces = json.loads(head), []
+        unpacker = zlib.decompressobj()
+        inflated = unpacker.decompress(base64.b64decode(text, validate=True), _LARGEST)
+        if not unpacker.eof:
+            raise ValueError(f"it is cut off, or has more than {_LARGEST} bytes")
+        head, _, rest = inflated.partition(b"\n")
+        told, pieces = parse_json(head.decode()), []
         for length in told["lengths"]:
             pieces.append(rest[:length])
             rest = rest[length:]

@@ -1,14 +1,16 @@
 """The meshcat server as a process of its own, which `server.start_server` runs; it imports nothing of this package.
 
 Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds the address that it is
-told, and ends when its standard input closes, which happens however the parent ends. Its page is the one that the parent sends,
-with a legend; and it forgets properties that have been set anew, which meshcat's own keeps and sends to every new browser.
+told, answers no page from elsewhere, and ends when its standard input closes, which happens however the parent ends. Its page
+is the one that the parent sends, with a legend; and it forgets properties that have been set anew, which meshcat's own keeps
+and sends to every new browser.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import runpy
 import sys
 import threading
 from pathlib import Path
@@ -22,10 +24,25 @@ def main() -> None:
     from tornado.web import Application, RequestHandler
     from tornado.websocket import WebSocketClosedError
 
-    listen = Application.listen
+    rules = runpy.run_path(str(Path(__file__).resolve().parent.parent / "local_requests.py"))
+    listen, find_handler = Application.listen, Application.find_handler
 
     def listen_on_loopback(self: Any, port: int, address: str | None = None, **options: Any) -> Any:
         return listen(self, port, address=sys.argv[1], **options)
+
+    class Refused(RequestHandler):  # type: ignore[misc]
+        """What pages from elsewhere get, also where they ask for the websocket."""
+
+        def prepare(self) -> None:
+            """Answer before anything else is looked at."""
+            self.set_status(403)
+            self.finish(rules["REFUSAL"])
+
+    def find_for_this_machine(self: Any, request: Any, **options: Any) -> Any:
+        told = request.headers
+        if rules["is_local"](told.get("Host"), told.get("Origin") or told.get("Sec-Websocket-Origin")):
+            return find_handler(self, request, **options)
+        return self.get_handler_delegate(request, Refused)
 
     class NoIcon(RequestHandler):  # type: ignore[misc]
         """What browsers ask for of themselves; without an answer they tell an error."""
@@ -79,7 +96,7 @@ def main() -> None:
             if self.legend:
                 websocket.write_message(self.legend, binary=True)
 
-    Application.listen = listen_on_loopback
+    Application.listen, Application.find_handler = listen_on_loopback, find_for_this_machine
     port = int(sys.argv[2]) if len(sys.argv) > 2 else None
     try:
         bridge = Bridge(port)

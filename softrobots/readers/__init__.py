@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError
 from softrobots.readers.mjcf import read_mjcf
 from softrobots.readers.sdf import read_sdf
 from softrobots.rigid_tree import RigidTree
 from softrobots.rigid_tree_urdf import write_rigid_tree
+from softrobots.urdf_structure import check_link_count
+from softrobots.xml_input import parse_xml
 
 KINDS: Mapping[str, str] = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF"}
 """What can be read, by root tag."""
@@ -35,11 +36,15 @@ def to_urdf(text: str, source: str, path: Path | None = None) -> str:
 
     Raises:
         MissingDependency: If MJCF is given without MuJoCo, or SDF without Drake (extra `interop`).
-        DescriptionError: If it is of another kind, if MuJoCo or Drake refuses it, or if it has something that bears on the
-            statics and that we do not have; all of that is listed.
+        DescriptionError: If it is of another kind or has too many links, if MuJoCo or Drake refuses it, or if it has something
+            that bears on the statics and that we do not have; all of that is listed.
     """
-    tag = parse_xml(text, source).tag
+    root = parse_xml(text, source)
+    tag = str(root.tag)
     if tag not in KINDS:
         known = ", ".join(f"<{name}> ({kind})" for name, kind in KINDS.items())
         raise DescriptionError(f"{source} has the root tag <{tag}>; one of {known} is required")
-    return text if tag == "robot" else write_rigid_tree(_READERS[tag](text, source, path))
+    if tag == "robot":
+        check_link_count(root, source)
+        return text
+    return write_rigid_tree(_READERS[tag](text, source, path))

@@ -14,11 +14,13 @@ import numpy as np
 
 from softrobots.checks import read_only
 from softrobots.errors import DescriptionError, MissingDependency
+from softrobots.readers.mjcf_limits import check_mjcf
 from softrobots.readers.mjcf_refusals import driven_joint, joint_name, not_carried
 from softrobots.readers.mjcf_shapes import visible_shapes
 from softrobots.readers.tree_builder import Motion, TreeBuilder
 from softrobots.rigid_tree import Body, Placement, RigidTree
 from softrobots.urdf_tags import SpringTag
+from softrobots.xml_input import parse_xml
 
 
 def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
@@ -44,16 +46,17 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
 
     Raises:
         MissingDependency: If MuJoCo is not installed (extra `interop`).
-        DescriptionError: If MuJoCo refuses it, it has no bodies, a number is not finite, or it has what is listed in
-            `softrobots.readers.mjcf_refusals`.
+        DescriptionError: If MuJoCo refuses it, it has no bodies, a number is not finite, it has what is listed in
+            `softrobots.readers.mjcf_refusals`, or it asks for more than `softrobots.readers.mjcf_limits` lets through.
     """
     try:
         import mujoco
     except ImportError as error:
         raise MissingDependency("mujoco", "interop") from error
+    check_mjcf(parse_xml(text, source), source, path)
     try:
         model = mujoco.MjModel.from_xml_string(text) if path is None else mujoco.MjModel.from_xml_path(str(path))
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+    except Exception as error:  # ValueError, RuntimeError, mujoco.FatalError, and what its compiler runs into
         reason = " ".join(str(error).split())
         raise DescriptionError(f"MuJoCo {mujoco.__version__} refuses {source}: {reason}") from error
     reasons = not_carried(mujoco, model)

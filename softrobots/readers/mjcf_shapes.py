@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.mesh_files import DRAWN_FILES, unfit_file
 from softrobots.rigid_tree import Placement, Shape
 
 _SHOWN = 3  # MuJoCo's viewers show the geom groups below
-FILES = (".obj", ".stl", ".dae")
-"""Mesh files that are passed on."""
 _UNSAID = np.array(
     [0.5, 0.5, 0.5, 1.0], dtype=np.float32
 )  # MuJoCo's colour of a geom that says none; its material's holds then
@@ -68,7 +67,7 @@ def _mesh_files(mujoco: Any, model: Any, text: str, path: Path | None) -> dict[i
     for mesh in spec.meshes:
         file = folder / mesh.file
         moved = np.any(mesh.refpos) or not np.array_equal(mesh.refquat, [1.0, 0.0, 0.0, 0.0])
-        if not moved and file.suffix.lower() in FILES and file.is_file():
+        if not moved and file.suffix.lower() in DRAWN_FILES and unfit_file(file) == "":
             files[int(model.mesh(mesh.name or file.stem).id)] = str(file.resolve())
     return files
 

@@ -14,15 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.checks import read_only
-from softrobots.description import parse_xml
 from softrobots.errors import DescriptionError, MissingDependency
 from softrobots.readers.drake_log import warnings_of_drake
 from softrobots.readers.sdf_refusals import not_carried
 from softrobots.readers.sdf_shapes import placement_of, visible_shapes
+from softrobots.readers.sdf_text import without_drawings
 from softrobots.readers.tree_builder import Motion, TreeBuilder
 from softrobots.rigid_tree import Body, Placement, RigidTree
+from softrobots.urdf_structure import MOST_LINKS
 from softrobots.urdf_tags import SpringTag
+from softrobots.xml_input import parse_xml
 
+_MOST = {"link": MOST_LINKS, "model": 100, "frame": 1000}  # Drake takes 10 ms for a model, and for frames their number squared
 _KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
 
 
@@ -42,7 +45,7 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
     their names; those of a nested model get its name in front, `arm__link`, those of a static one beside the robot, too. A
     joint off the origin of its child link gets a link without mass. Frames of the file become links without mass. The tip is
     the link or frame called `tip`, or the only moving link at the end of the tree. Visible boxes, cylinders, spheres and mesh
-    files are read, and capsules as cylinders; none if Drake cannot find a mesh.
+    files are read, and capsules as cylinders; meshes whose files are missing are left out.
 
     Contacts, damping, plugins and controllers are left out.
 
@@ -67,13 +70,17 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
     except ImportError as error:
         raise MissingDependency("drake", "interop") from error
     root = parse_xml(text, source)
+    for kind, most in _MOST.items():
+        count = sum(1 for _ in root.iter(kind))
+        if count > most:
+            raise DescriptionError(f"{source} has {count} {kind}s; at most {most} are read")
     reasons = not_carried(root)
     plant = MultibodyPlant(1e-3)  # discrete, because a continuous one takes no constraints
     if not reasons:
         try:
             with warnings_of_drake(shown=True) as warnings:
-                Parser(plant).AddModelsFromString(text, "sdf")
-        except RuntimeError as error:
+                Parser(plant).AddModelsFromString(without_drawings(text), "sdf")
+        except (Exception, SystemExit) as error:  # RuntimeError; SystemExit is what its assertions become in Python
             raise DescriptionError(f"Drake refuses {source}: {' '.join(str(error).split())}") from error
         reasons = [*_not_supported(plant), *(line for line in warnings if "invalid inertia" in line)]
     if reasons:
@@ -120,10 +127,14 @@ def _edges(plant: Any, source: str) -> list[_Edge]:
     loose = [body.scoped_name().get_full() for body in bodies if body.index() not in reached]
     if loose:
         raise DescriptionError(
-            f"{source} has bodies that are not fixed to the world ({', '.join(loose)}): a floating base is not at rest under a "
+            f"{source} has bodies that are not fixed to the world ({_some(loose)}): a floating base is not at rest under a "
             "load; add a fixed joint with the parent world"
         )
     return edges
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
 
 
 def _moving_model(plant: Any, edges: list[_Edge], source: str) -> str:

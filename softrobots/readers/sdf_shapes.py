@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from softrobots.checks import read_only
+from softrobots.mesh_files import DRAWN_FILES
 from softrobots.readers.drake_log import warnings_of_drake
-from softrobots.readers.mjcf_shapes import FILES
+from softrobots.readers.sdf_text import with_found_meshes
 from softrobots.rigid_tree import Placement, Shape
 
 
@@ -21,8 +22,8 @@ def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
         path: Its file, for the meshes that it names.
 
     Returns:
-        Shapes by scoped name of the link, `model::link`; none at all if Drake cannot read one of them, e.g. a mesh that is
-        missing.
+        Shapes by scoped name of the link, `model::link`, without meshes whose files are missing; none at all if Drake cannot
+        read one of them.
     """
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
@@ -34,11 +35,8 @@ def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
     parser = Parser(plant)
     try:
         with warnings_of_drake(shown=False):
-            if path is not None and path.suffix == ".sdf":
-                parser.AddModels(path)
-            else:
-                parser.AddModelsFromString(text, "sdf")
-    except RuntimeError:
+            parser.AddModelsFromString(with_found_meshes(text, None if path is None else path.parent), "sdf")
+    except (Exception, SystemExit):  # SystemExit: what its assertions become in Python
         return {}
     inspector, shapes = scene.model_inspector(), {}
     for number in range(plant.num_bodies()):
@@ -63,7 +61,7 @@ def _shape(inspector: Any, geometry: Any) -> Shape | None:
         return Shape("sphere", (shape.radius(),), place, rgba)
     if kind in ("Cylinder", "Capsule"):
         return Shape("cylinder", (shape.radius(), shape.length()), place, rgba)
-    if kind == "Mesh" and shape.source().is_path() and shape.extension() in FILES:
+    if kind == "Mesh" and shape.source().is_path() and shape.extension() in DRAWN_FILES:
         return Shape("mesh", tuple(np.array(shape.scale3()).tolist()), place, rgba, str(shape.source().path()))
     return None
 

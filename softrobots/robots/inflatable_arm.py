@@ -83,6 +83,11 @@ class InflatableArm:
         return len(self.link_lengths)
 
     @property
+    def n_joints(self) -> int:
+        """Number of movable joints of the chain; above 300 Pinocchio's workspace is refused."""
+        return 3 * self.n_links + 1
+
+    @property
     def volume(self) -> float:
         """Volume of all links together [m^3]."""
         return sum(inflated_beam.volume(*size) for size in zip(self.link_lengths, self._each("radius"), strict=True))

@@ -14,6 +14,9 @@ from softrobots.description import expand
 from softrobots.errors import ParameterError
 from softrobots.paths import xacro_folder
 
+MOST_PARTS = 1000
+"""Links or segments of a robot: xacro spends minutes on so many."""
+
 PerPart = float | Sequence[float]
 """One number for all links or segments, or one for each, base to tip."""
 
@@ -60,12 +63,12 @@ def check_lengths(robot: Any, name: str, part: str) -> int:
     """Check the lengths of the parts of a robot, store them as a tuple, and return how many there are.
 
     Raises:
-        ParameterError: If there are none, or one is not positive.
+        ParameterError: If there are none, or more than `MOST_PARTS`, or one is not positive.
     """
     given = getattr(robot, name)
     lengths = numbers(name, given, None, "m")
-    if not lengths:
-        raise ParameterError(name, given, f"at least one {part} length [m]")
+    if not 0 < len(lengths) <= MOST_PARTS:
+        raise ParameterError(name, given, f"at least one {part} length [m], at most {MOST_PARTS}")
     at_least(name, lengths, 0.0, True, "m")
     object.__setattr__(robot, name, lengths)
     return len(lengths)

@@ -106,7 +106,7 @@ class PccArm:
         choice("chain", self.chain, CHAINS)
         choice("hinge_rule", self.hinge_rule, HINGE_RULES)
         for name in ("elastic_sections", "hinges"):
-            object.__setattr__(self, name, positive_integer(name, getattr(self, name), 1000))
+            object.__setattr__(self, name, positive_integer(name, getattr(self, name), max(1, min(1000, 2000 // count))))
         for name in ("torsion", "extension"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(name, getattr(self, name), "True or False")
