@@ -89,9 +89,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--tests", nargs="+", default=["tests"], metavar="FILE", help="test files (all)")
     told = "new or empty folder for the reports of the tests (JUnit XML), the output, and results.json"
     made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    told = (
-        "write the table of docs/validation.md in a checkout (this one); others keep their last row"
-    )
+    told = "write the table of docs/validation.md in a checkout (this one); others keep their last row"
     made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
     return made
 

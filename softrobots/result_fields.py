@@ -27,7 +27,6 @@ from softrobots.loads import Load
 from softrobots.model import SoftModel
 from softrobots.probes import Probe
 from softrobots.tip_goal import Goal
-from softrobots.trajectory import METHODS as FOLLOWINGS
 from softrobots.trajectory import Trajectory
 from softrobots.workspace import Workspace, workspace_at
 from softrobots.workspace_map import WorkspaceMap, packed, unpacked
@@ -35,6 +34,7 @@ from softrobots.workspace_map import WorkspaceMap, packed, unpacked
 Result = Equilibrium | IkSolution | ImposedDisplacement | LoadEstimate | Trajectory | Workspace | WorkspaceMap
 """What can be saved."""
 
+_LONGEST_WORD = 80  # characters
 _SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
 
 
@@ -68,6 +68,14 @@ def _text(fields: Mapping[str, Any], name: str) -> str:
     if fields[name].shape != () or fields[name].dtype.kind != "U":
         raise FileFormatError(f"its {name} is no text")
     return str(fields[name])
+
+
+def _word(fields: Mapping[str, Any], name: str) -> str:
+    """What somebody calls something, on one line."""
+    word = _text(fields, name)
+    if not 0 < len(word) <= _LONGEST_WORD or not word.isprintable():
+        raise FileFormatError(f"its {name} must be 1 to {_LONGEST_WORD} printable characters")
+    return word
 
 
 def _counts(field: Any) -> list[int]:
@@ -220,7 +228,7 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
         times=read_only(increasing("times", finite_array("times", fields["times"], (len(equilibria),), "s"), "s")),
         targets=read_only(finite_array("targets", fields["targets"], (len(equilibria), 3), "m")),
         equilibria=equilibria,
-        method=choice("following", _text(fields, "following"), FOLLOWINGS),
+        method=_word(fields, "following"),
     )
 
 

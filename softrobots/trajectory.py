@@ -40,7 +40,7 @@ class Trajectory:
     equilibria: tuple[Equilibrium, ...]
     """The loaded robot at each waypoint."""
     method: str
-    """How the path was followed."""
+    """How the path was followed: a method of `follow_trajectory`, or a word of whoever made it otherwise."""
 
     @property
     def model(self) -> SoftModel:

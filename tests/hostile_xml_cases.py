@@ -169,7 +169,7 @@ REFUSED: dict[str, tuple[str, Content | Callable[[], Content], str]] = {
     "xacro that includes itself": (
         "xacro",
         XACRO.replace("<link", '<xacro:include filename="xacro that includes itself.xacro"/><link', 1),
-        ".",
+        "refuses",
     ),
     "xacro that includes a device": (
         "xacro",

@@ -148,6 +148,11 @@ LIMITS: list[tuple[str, str, list[Any], list[Any], str]] = [
     ("muscles_from_arc", "azimuths", [], [[0.0, 2.0, 4.0, 2.0 * math.pi - 0.5e-9]], "distinct modulo a turn"),
     ("muscles_from_arc", "azimuths", [[0.0, 2.0, 4.0]], [[0.0, 2.0], []], "at least three"),
     ("muscles_from_arc", "azimuths", [[0.0, 3e-3, 6e-3]], [[0.0, 2.8e-3, 5.6e-3]], "spread further around the backbone"),
+    (
+        "muscles_from_arc", "arc", [sr.constant_curvature.Arc(0.121, 3.0, 0.0)], [sr.constant_curvature.Arc(0.1, 3.0, 0.0)],
+        "one whose muscles have positive lengths (the shortest has -0.02 m)",
+    ),
+    ("inverse", "shape", [], [sr.helix.HelixShape(0.03, -0.01, 1e-30)], "a helix whose pitch can be told from zero"),
     ("forward", "contraction", [1.0, 1e-30], [up(1.0)], "in (0, 1]: contracted over original length"),
     ("forward", "angle", [0.0, down(QUARTER)], [QUARTER, 2.0], "in [0, pi/2) rad (5 degrees are 0.0873 rad)"),
     ("forward", "angle", [], [-5e-324, [-1.0, 0.1]], "in [0, pi/2) rad; say handedness where it matters"),
@@ -195,6 +200,17 @@ def test_a_wrong_form_is_told_with_the_right_one(call: str, name: str, others: l
         assert told in error.requirement
 
 
+def test_the_derivative_of_muscles_tells_what_it_refuses() -> None:
+    """It checks by itself what its callers have checked."""
+    from softrobots.constant_curvature.muscles import strains_per_muscle
+
+    for name, bad in (("distance", math.nan), ("distance", 0.0), ("azimuths", [0.0, 1.0, math.nan]), ("azimuths", [0.0, 1.0])):
+        with pytest.raises(sr.ParameterError) as caught:
+            strains_per_muscle(**{"distance": 0.03, "azimuths": [0.0, 2.0, 4.0]} | {name: bad})
+        assert caught.value.field == name
+        assert f"[{UNIT_OF[name]}]" in caught.value.requirement or bad == [0.0, 1.0]
+
+
 @pytest.mark.parametrize("method", ["displacement", "angle", "contact", "moment", "small_angles"])
 def test_each_method_of_a_bending_test_tells_what_it_refuses(method: str) -> None:
     test = sr.inflated_beam.BendingTest(probe_distance=0.5, hinge_offset=0.03, offset=0.06)
@@ -217,6 +233,11 @@ NO_COMMON_SHAPE = [
     ("forward", "diameter", "angle"),
     ("points", "s", "shape"),
     ("turn_angle", "arc_length", "shape"),
+    ("check_self_contact", "turns", "shape"),
+    ("contraction_limit", "diameter", "angle"),
+    ("muscles_from_arc", "distance", "arc"),
+    ("arc_from_muscles", "distance", "lengths"),
+    ("muscle_residual", "distance", "lengths"),
 ]
 
 
@@ -224,7 +245,10 @@ NO_COMMON_SHAPE = [
 def test_shapes_that_do_not_broadcast_are_told(call: str, name: str, other: str) -> None:
     function, given = CALLS[call]
     three = given[other]
-    three = sr.helix.forward([0.6] * 3, 0.1, 0.03) if other == "shape" else [three] * 3
+    if other == "shape":
+        three = sr.helix.forward([0.6] * 3, 0.1, 0.03)
+    else:
+        three = sr.constant_curvature.Arc([0.5] * 3, 0.1, 0.2) if other == "arc" else [three] * 3
     with pytest.raises(sr.ParameterError, match=r"\(3,\)") as caught:
         function(**given | {name: [given[name]] * 2, other: three})
     assert caught.value.field == name

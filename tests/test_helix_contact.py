@@ -605,3 +605,7 @@ def test_the_tightest_of_several_is_told() -> None:
     told = helix.self_contact(helix.HelixShape(*(values[worst] for values in (outer, shapes.inner_radius, shapes.pitch))))
     count = np.count_nonzero(contact.touches)
     assert str(contact) == f"{count} of 4 tubes run into themselves; the tightest, at index ({worst},): {told}"
+
+
+def test_no_tube_at_all_is_told() -> None:
+    assert str(helix.self_contact(helix.HelixShape([], [], []))) == "there is no tube"

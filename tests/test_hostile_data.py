@@ -492,7 +492,7 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("equilibrium", {"solver": np.array(["magic"])}, "solver must be one of"),
         ("equilibrium", {"residual": np.array([np.nan])}, "finite"),
         ("load_estimate", {"estimation": np.array("magic")}, "estimation must be one of"),
-        ("trajectory", {"following": np.array("magic")}, "following must be one of"),
+        ("trajectory", {"following": np.array("x" * 81)}, "following must be 1 to 80 printable"),
         ("workspace", {"refused": np.array(-1)}, "counts in something else"),
         ("workspace_map", {"grid_x": np.array([0.8, 0.6])}, "increasing"),
         ("ik_solution", {"steps": np.array(2.5)}, "counts in something else"),

@@ -35,9 +35,10 @@ from softrobots.third_party import UR5, robot_file
 from softrobots.urdf_structure import MOST_LINKS
 from softrobots.xml_input import DEEPEST, LARGEST_FILE, MOST_ATTRIBUTES, MOST_TAGS, number_in, parse_xml
 from tests.conftest import CHECKOUT, missing
-from tests.foreign import BRANCHED, SPRINGS
+from tests.foreign import BRANCHED, INERTIAL, SPRINGS
 from tests.hostile import HOSTILE_NUMBERS, Damage, damaged_bytes, damaged_xml
 from tests.hostile_descriptions import (
+    XACRO,
     dae,
     drawn,
     mjcf_corpus,
@@ -220,6 +221,19 @@ def test_xacro_reads_included_files_in_utf8(tmp_path: Path, monkeypatch: pytest.
     include = '<xacro:include filename="part.xacro"/><xacro:include filename="none.xacro" optional="true"/>'
     file.write_text(f'<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{include}</robot>', encoding="utf-8")
     assert 'name="Glied_ä"' in expand(file)
+
+
+@pytest.mark.parametrize(
+    "body", ['<xacro:part n="1" p="b"><a/></xacro:part>' + "<a/>" * 500, "<xacro:insert_block name='o'/>" * 99]
+)
+def test_a_macro_that_copies_without_end_is_stopped(body: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Elements count that are copied, not only those that are reached: the first body ended at Python's depth of calls only."""
+    monkeypatch.setattr("softrobots.description.MOST_STEPS", 5000)
+    file = tmp_path / "much.xacro"
+    block = f"<a>{'<b/>' * 99}</a>"
+    file.write_text(XACRO.replace(INERTIAL, block).replace('<xacro:insert_block name="o"/>', body))
+    with pytest.raises(sr.DescriptionError, match="goes through more than 5000 elements"):
+        expand(file)
 
 
 # --- Limits where they are
