@@ -189,7 +189,7 @@ def pcc_arm(oracles: ModuleType) -> Study:
 
     solve = partial(solved, q_motors=np.ravel(LENGTHS), force=PCC_FORCE, gravity=gravity)
     forms = {name: Form(partial(robot, form), solve) for name, form in CHAINS.items()}
-    title = "Hanging arm of two segments, lengths of its muscles given, its weight and 3.7 N at the tip; n counts a segment's"
+    title = "Hanging arm of two segments, muscle lengths given, its weight and 3.7 N at the tip; n counts a segment's"
     return Study(title, COUNTS["pcc_arm"], forms, answer, "lumped")
 
 

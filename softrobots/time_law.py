@@ -14,6 +14,7 @@ from softrobots.errors import FileFormatError, ParameterError
 from softrobots.files import as_path
 
 _INTERVAL = 0.05  # [s], between waypoints without times
+_MOST_STEPS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,16 +54,16 @@ def straight_line(start: Any, end: Any, duration: float, steps: int = 200) -> Pa
         start: First position, shape (3,) [m].
         end: Last position, shape (3,) [m].
         duration: Time from start to end [s], positive.
-        steps: Number of intervals; there are `steps + 1` waypoints.
+        steps: Number of intervals, at most a million; there are `steps + 1` waypoints.
 
     Returns:
         The path.
 
     Raises:
-        ParameterError: If an argument has the wrong shape, is not finite or not positive.
+        ParameterError: If an argument has the wrong shape, is not finite or not positive, or there are too many steps.
     """
     a, b = finite_array("start", start, (3,), "m"), finite_array("end", end, (3,), "m")
-    duration, steps = positive_number("duration", duration, "s"), positive_integer("steps", steps)
+    duration, steps = positive_number("duration", duration, "s"), positive_integer("steps", steps, _MOST_STEPS)
     s = np.linspace(0.0, 1.0, steps + 1)
     return Path3D(read_only(s * duration), read_only(a + quintic(s)[:, None] * (b - a)))
 

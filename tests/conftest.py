@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -37,6 +38,45 @@ def missing(reason: str) -> None:
     if os.environ.get("CI") == "true":
         pytest.fail(f"{reason} (CI must have it)")
     pytest.skip(reason)
+
+
+OPTIONAL = re.compile(
+    r"(PIL|build|dask|daqp|distributed|example_robot_data|ikpy|latex2mathml|matplotlib|mkdocs|mujoco|mypy|nbclient|nbformat|numba"
+    r"|pink|playwright|pybullet|pydrake|roboticstoolbox|scipy|twine|urchin|uv|viser)\b"
+)
+"""What the extras bring besides `test`, as imported."""
+_TOLD = re.compile(r"\S+ is not installed; it is part of an extra")
+
+
+def _lacking(error: BaseException | None) -> str | None:
+    """What is missing, if a test or its module ended for want of an optional package."""
+    while error is not None and not isinstance(error, (sr.MissingDependency, ModuleNotFoundError)):
+        error = error.__cause__
+    known = isinstance(error, sr.MissingDependency) or OPTIONAL.match(getattr(error, "name", None) or "")
+    return str(error) if known else None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Iterator[None]:
+    """Skip a module that imports an optional package; not in CI."""
+    report = yield
+    call = getattr(report, "call", None)
+    lacking = _lacking(call.excinfo.value) if call is not None and call.excinfo is not None else None
+    if lacking is not None and os.environ.get("CI") != "true":
+        report.outcome, report.longrepr = "skipped", (str(collector.path), 0, f"Skipped: {lacking}")
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(call: pytest.CallInfo, item: pytest.Item) -> Iterator[None]:
+    """Skip a test that ends for want of an optional package; not in CI."""
+    report = yield
+    if call.excinfo is not None and report.outcome == "failed" and os.environ.get("CI") != "true":
+        told = _TOLD.search(f"{report.longreprtext}\n{report.capstderr}")  # by a command
+        lacking = told[0] if told else _lacking(call.excinfo.value)
+        if lacking is not None:
+            report.outcome, report.longrepr = "skipped", (str(item.path), 0, f"Skipped: {lacking}")
+    return report
 
 
 @pytest.fixture

@@ -336,7 +336,8 @@ def test_a_load_without_a_balance_is_an_error() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("tool_name", ["pybullet", "pinocchio"])
-def test_the_files_are_good_python(tmp_path: Path, name: str, tool_name: str) -> None:
+def test_the_files_are_good_python(tmp_path: Path, tool: Callable[[str], ModuleType], name: str, tool_name: str) -> None:
+    tool("ruff")
     make, motors, _ = CASES[name]
     write = {"pybullet": to_pybullet, "pinocchio": to_pinocchio}[tool_name]
     text = write(make(), motors)

@@ -31,7 +31,9 @@ contractions_ = st.one_of(
     st.floats(1e-3, 1.0), st.floats(-30.0, 0.0).map(lambda x: 10.0**x), st.floats(-15.0, 0.0).map(lambda x: 1.0 - 0.9 * 10.0**x)
 )
 angles_ = st.one_of(
-    st.floats(0.0, 1.5), st.floats(-15.0, 0.0).map(lambda x: 10.0**x), st.floats(-9.0, 0.0).map(lambda x: math.pi / 2 - 10.0**x)
+    st.floats(0.0, 1.5, allow_subnormal=False),
+    st.floats(-15.0, 0.0).map(lambda x: 10.0**x),
+    st.floats(-9.0, 0.0).map(lambda x: math.pi / 2 - 10.0**x),
 )
 diameters_ = st.floats(-3.0, 3.0).map(lambda x: 10.0**x)
 
@@ -326,7 +328,7 @@ def test_a_helix_is_measured_by_the_arcs_of_its_points(contraction: float, angle
 @given(contractions_, angles_, diameters_)
 def test_measure_is_the_corrected_16(contraction: float, angle: float, diameter: float) -> None:
     """The circumferences of 17 at 80 digits, rounded to floats; their rounding times the derivatives of 16 is allowed."""
-    assume((contraction, angle) != (1.0, 0.0))
+    assume(contraction < 1.0 or angle > 1e-25)  # else wider than the 1e30 m that are taken, up to infinite
     outer, inner, pitch = exact_forward(contraction, angle, diameter)
     arcs = [float(2 * mp.pi * mp.sqrt(radius**2 + pitch**2)) for radius in (outer, inner)]
     size = mp.sqrt(outer**2 + pitch**2)

@@ -200,6 +200,7 @@ def test_bad_input_is_refused(arm: sr.SoftModel, method: str) -> None:
         (lambda: sr.straight_line((0, 0, 0), (1, 1, float("inf")), 1.0), "end"),
         (lambda: sr.straight_line((0, 0, 0), (1, 1, 1), 0.0), "duration"),
         (lambda: sr.straight_line((0, 0, 0), (1, 1, 1), 1.0, 0), "steps"),
+        (lambda: sr.straight_line((0, 0, 0), (1, 1, 1), 1.0, 2**63), "steps"),
         (lambda: sr.waypoints([(0, 0, 0)], [0.0]), "at least two"),
         (lambda: sr.waypoints(np.zeros((3, 3)), [0, 2, 1]), "increasing"),
         (lambda: sr.waypoints(np.zeros((3, 3)), [0, 1]), "times"),
