@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import math
 import re
 from collections.abc import Callable
@@ -15,6 +16,7 @@ import pytest
 from softrobots import helix, helix_plots
 from softrobots.errors import ParameterError, StraightTube
 from softrobots.helix_sheet import draw
+from tests.conftest import missing
 from tests.test_scripts import run_script
 
 PICTURES = {"helix_grid.png", "helix_shapes.png", "helix_grasp.png"}
@@ -30,6 +32,8 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if importlib.util.find_spec("matplotlib") is None:
+        missing("matplotlib is not installed")
     made = tmp_path_factory.mktemp("atlas") / "out"
     assert run_script("helix_atlas", ["--output", str(made)]) == 0
     return made
