@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 INERTIAL = '<inertial><mass value="0.5"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
 
 
 LIMIT = '<limit lower="-2" upper="2" effort="10" velocity="1"/>'
+
+
+def mass_error(mujoco: ModuleType) -> float:
+    """Relative error of MuJoCo's mass matrices: version 3 turns moments onto their axes to seven digits, version 4 to all."""
+    return 1e-12 if int(mujoco.__version__.partition(".")[0]) >= 4 else 1e-6
 
 
 def joint(

@@ -253,7 +253,8 @@ def test_pages_from_elsewhere_are_not_answered(server: str, servers: dict[str, t
         status, content = ask(port, path, Host=local)
         assert (status, b"<html" in content) == (200, True)
         assert ask(port, path, Host=local, Origin=f"http://{local}")[0] == 200
-        assert ask(port, "/", upgrade=True, Host=local, Origin=f"http://{local}")[0] == 101
+        written = local.lower()  # by every browser; Tornado before 6.6 compares it as it comes
+        assert ask(port, "/", upgrade=True, Host=written, Origin=f"http://{written}")[0] == 101
     for foreign in ("evil.example", "127.0.0.1.evil.example", "evil.example:80", "", "[", "10.0.0.1"):
         status, content = ask(port, path, Host=foreign)
         assert (status, b"<html" in content) == (403, False)

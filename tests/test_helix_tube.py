@@ -296,7 +296,7 @@ tubes_ = st.fixed_dictionaries(
         "hinge_rule": st.sampled_from(["corrected", "midpoint"]),
         "torsion": st.booleans(),
         "extension": st.booleans(),
-        "rgba": st.tuples(*[st.floats(0.0, 1.0)] * 4),
+        "rgba": st.tuples(*[st.floats(0.0, 1.0).map(lambda share: round(share, 6))] * 4),  # MuJoCo reads single precision
         "damping_time": st.floats(0.0, 10.0),
         "base_mass": st.floats(1e-3, 100.0),
     }

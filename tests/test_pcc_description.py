@@ -431,7 +431,7 @@ segment_ = st.fixed_dictionaries(
         "axial_stiffness": st.floats(1e-2, 1e8),
         "linear_density": st.floats(1e-3, 50.0),
         "radius": st.floats(1e-3, 0.3),
-        "rgba": st.tuples(*[st.floats(0.0, 1.0)] * 4),
+        "rgba": st.tuples(*[st.floats(0.0, 1.0).map(lambda share: round(share, 6))] * 4),  # MuJoCo reads single precision
     }
 )
 whole_ = st.fixed_dictionaries(
