@@ -113,7 +113,7 @@ def test_the_race_is_one() -> None:
     alone = [solver_mix.as_bytes(job) for job in jobs]
     assert in_threads(jobs) == alone
     model._local = SimpleNamespace()  # of all threads
-    assert in_threads(jobs) != alone
+    assert any(in_threads(jobs) != alone for _ in range(50))  # threads meet by chance: nearly every time
 
 
 def _in_process(sent: bytes | None) -> list[bytes]:

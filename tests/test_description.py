@@ -164,11 +164,11 @@ link = st.fixed_dictionaries(
         "radius": st.floats(0.01, 0.1),
         "wall_thickness": st.floats(2e-4, 1e-3),
         "stiffness": st.floats(0.1, 1e5),
-        "rest_side": st.floats(-1.5, 1.5),
-        "rest_up": st.floats(-1.5, 1.5),
-        "pressure": st.floats(0.0, 1e5),
+        "rest_side": st.floats(-1.5, 1.5, allow_subnormal=False),
+        "rest_up": st.floats(-1.5, 1.5, allow_subnormal=False),
+        "pressure": st.floats(0.0, 1e5, allow_subnormal=False),
         "density": st.floats(500.0, 2000.0),
-        "cap_mass": st.floats(0.0, 1.0),
+        "cap_mass": st.floats(0.0, 1.0, allow_subnormal=False),
     }
 )
 

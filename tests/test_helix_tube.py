@@ -279,16 +279,19 @@ tubes_ = st.fixed_dictionaries(
     {
         "contraction": st.one_of(st.floats(0.15, 1.0), st.floats(-12.0, -1.0).map(lambda x: 1.0 - 10.0**x), st.just(1.0)),
         "angle": st.one_of(
-            st.floats(0.0, 0.4), st.floats(0.4, 1.4), st.floats(-9.0, -2.0).map(lambda x: 10.0**x), st.just(0.0)
+            st.floats(0.0, 0.4, allow_subnormal=False),
+            st.floats(0.4, 1.4),
+            st.floats(-9.0, -2.0).map(lambda x: 10.0**x),
+            st.just(0.0),
         ),
         "diameter": st.floats(0.01, 0.3),
         "handedness": st.sampled_from(["right", "left"]),
         "upright": st.sampled_from(["tube", "axis"]),
-        "pressure": st.floats(0.0, 1e5),
+        "pressure": st.floats(0.0, 1e5, allow_subnormal=False),
         "young_modulus": st.floats(1e6, 1e10),
-        "poisson_ratio": st.floats(-0.9, 0.5),
+        "poisson_ratio": st.floats(-0.9, 0.5, allow_subnormal=False),
         "density": st.floats(500.0, 5000.0),
-        "actuator_density": st.one_of(st.just(0.0), st.floats(0.0, 1.0)),
+        "actuator_density": st.one_of(st.just(0.0), st.floats(0.0, 1.0, allow_subnormal=False)),
         "bending_stiffness": st.one_of(st.none(), st.floats(1e-4, 1e4)),
         "torsional_stiffness": st.one_of(st.none(), st.floats(1e-4, 1e4)),
         "axial_stiffness": st.one_of(st.none(), st.floats(1.0, 1e8)),
@@ -297,7 +300,7 @@ tubes_ = st.fixed_dictionaries(
         "torsion": st.booleans(),
         "extension": st.booleans(),
         "rgba": st.tuples(*[st.floats(0.0, 1.0).map(lambda share: round(share, 6))] * 4),  # MuJoCo reads single precision
-        "damping_time": st.floats(0.0, 10.0),
+        "damping_time": st.floats(0.0, 10.0, allow_subnormal=False),
         "base_mass": st.floats(1e-3, 100.0),
     }
 )

@@ -345,9 +345,9 @@ link_ = st.fixed_dictionaries(
         "radius": st.floats(0.01, 0.1),
         "wall_thickness": st.floats(1e-5, 1e-3),
         "stiffness": st.floats(0.1, 1e4),
-        "rest_side": st.floats(-1.5, 1.5),
-        "rest_up": st.floats(-1.5, 1.5),
-        "cap_mass": st.floats(0.0, 1.0),
+        "rest_side": st.floats(-1.5, 1.5, allow_subnormal=False),
+        "rest_up": st.floats(-1.5, 1.5, allow_subnormal=False),
+        "cap_mass": st.floats(0.0, 1.0, allow_subnormal=False),
     }
 )
 segment_ = st.fixed_dictionaries(
@@ -358,7 +358,7 @@ segment_ = st.fixed_dictionaries(
         "bending_stiffness": st.floats(0.01, 100.0),
         "linear_density": st.floats(1e-4, 2.0),
         "radius": st.floats(0.01, 0.1),
-        "offset": st.floats(-3.0, 3.0),
+        "offset": st.floats(-3.0, 3.0, allow_subnormal=False),
     }
 )
 tube_ = st.fixed_dictionaries(
@@ -366,7 +366,7 @@ tube_ = st.fixed_dictionaries(
         "length": sizes,
         "diameter": st.floats(0.02, 0.1),
         "contraction": st.floats(0.3, 1.0),
-        "angle": st.floats(0.0, 1.2),
+        "angle": st.floats(0.0, 1.2, allow_subnormal=False),
         "handedness": st.sampled_from(["right", "left"]),
         "wall_thickness": st.floats(1e-5, 4e-4),
         "upright": st.sampled_from(["tube", "axis"]),
