@@ -282,7 +282,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
 
         def kill_half_way(answers: Iterable[Any], *_: Any, **__: Any) -> Iterator[Any]:
             for number, answer in enumerate(answers):
-                if number == 8:
+                if number == 2:  # nearly all of them are still to come
                     busy = max(cluster.scheduler.workers.values(), key=lambda worker: len(worker.processing))
                     killed.append((cluster.workers[busy.name].process.pid, len(busy.processing)))
                     os.kill(killed[0][0], signal.SIGKILL)
