@@ -152,9 +152,8 @@ def _in_range(z: FloatArray, rest_length: FloatArray, end: Screw, positions: Flo
         return False  # also where a number is none
     if not np.all(np.abs(positions[..., 5] - z[..., 2]) < np.pi):  # r3 has gone past half a turn to the other side
         return False
-    forwards = 1e-3 * np.sqrt((end.position * end.position).sum(axis=-1))
-    at_end = (end.rotation[..., :, 2] * end.position).sum(axis=-1)
-    return bool(np.all(end.position[..., 2] > forwards) and np.all(at_end > forwards))
+    # Strain is constant: the chord has the same angle to the axis of the end as to that of the start.
+    return bool(np.all(end.position[..., 2] > 1e-3 * np.sqrt((end.position * end.position).sum(axis=-1))))
 
 
 def _positions(rotation: FloatArray, position: FloatArray) -> FloatArray:

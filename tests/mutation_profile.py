@@ -1,5 +1,6 @@
 """A plugin of pytest for scripts/mutation.py: the quickest test first, and no search for the simplest failure."""
 
+import gc
 import json
 import os
 from pathlib import Path
@@ -16,6 +17,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     file = Path("mutmut-stats.json")
     times = json.loads(file.read_text(encoding="utf-8"))["duration_by_test"] if file.is_file() else {}
     items.sort(key=lambda item: times.get(item.nodeid, 0.0))
+
+
+def pytest_sessionfinish() -> None:
+    """Keep what is loaded before the processes of the changes begin out of their garbage collection."""
+    if not os.environ.get("MUTANT_UNDER_TEST"):
+        gc.collect()
+        gc.freeze()
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

@@ -154,15 +154,28 @@ def test_a_moment_at_angle_zero_keeps_its_sign() -> None:
     assert fitted(angle, moment).mean_moment_above_wrinkling == 1.5 * WRINKLING
 
 
-def test_points_of_one_angle_may_be_many() -> None:
-    """The order in which equal angles came does not matter, but for rounding, where all of them are on one side of the knee."""
+def test_points_of_one_angle_may_be_many_and_come_in_any_order(rng: np.random.Generator) -> None:
+    """The knee may be among them: here at 0.03, where half of the points have slipped to the plateau."""
     angle = np.repeat([0.01, 0.02, 0.03, 0.2, 0.3], 8)
-    moment = np.repeat([1.0, 2.0, 3.0, 10.0, 10.0], 8) * (1.0 + 1e-3 * np.random.default_rng(1).normal(size=40))
+    moment = np.repeat([1.0, 2.0, 3.0, 10.0, 10.0], 8) * (1.0 + 1e-3 * rng.normal(size=40))
     fit = fitted(angle, moment)
     assert (fit.n_linear, fit.n_saturated) == (24, 16)
-    again = fitted(angle[::-1], moment[::-1])
-    assert (again.n_linear, again.n_saturated) == (24, 16)
-    assert again.stiffness == pytest.approx(fit.stiffness, rel=1e-14)
+    moment[18:24:2] = 9.9
+    fit = fitted(angle, moment)
+    assert (fit.n_linear, fit.n_saturated) == (21, 19)
+    for _ in range(5):
+        order = rng.permutation(40)
+        assert fitted(angle[order], moment[order]) == fit
+
+
+def test_the_slope_is_that_of_its_own_points_where_the_last_of_them_wavers() -> None:
+    """With the last point the slope is so steep that it is beyond wrinkling; without, it would be below."""
+    angle, moment = np.array([0.02, 0.04, 0.06, 0.1]), np.array([3.8, 7.6, 11.4, 22.0])
+    assert 190.0 * 0.1 < WRINKLING < (angle @ moment) / (angle @ angle) * 0.1
+    fit = fitted(angle, moment)
+    assert (fit.n_linear, fit.max_moment) == (3, None)
+    assert fit.stiffness == pytest.approx(190.0, rel=1e-14)
+    assert fit.stiffness_std < 1e-10
 
 
 def test_small_stiffnesses_and_unit_angles_are_taken() -> None:

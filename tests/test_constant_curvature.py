@@ -36,7 +36,8 @@ FIVE = (0.1, 1.2, 2.9, -2.2, -0.7)
 ROUNDING = 4e-16  # a few units in the last place of a number of size 1
 
 lengths_ = st.floats(0.05, 3.0)
-bendings_ = st.one_of(st.floats(0.0, 6.0), st.floats(1e-13, 1e-3))
+# Below 1e-308 rad a float has fewer digits, and so has a direction made of two of them.
+bendings_ = st.one_of(st.floats(0.0, 6.0, allow_subnormal=False), st.floats(1e-13, 1e-3))
 angles_ = st.floats(-3.1, 3.1)
 
 
@@ -652,3 +653,51 @@ def test_four_muscles_may_miss_an_arc_by_a_micrometre() -> None:
             call(0.5 + 1.01e-6 * off, 0.03, azimuths)
         assert caught.value.field == "lengths"
         assert np.allclose(caught.value.value, 0.5 + 1.01e-6 * off, rtol=0.0, atol=1e-15)
+
+
+def test_the_tolerance_itself_is_within() -> None:
+    lengths = (0.50, 0.53, 0.55, 0.51)
+    azimuths = np.array([0.0, 0.5, 1.0, 1.5]) * np.pi
+    missed = float(cc.muscle_residual(lengths, D, azimuths))
+    assert missed > 1e-3
+    cc.strains_from_muscles(lengths, D, azimuths, tolerance=missed)
+    with pytest.raises(ParameterError, match="within"):
+        cc.strains_from_muscles(lengths, D, azimuths, tolerance=math.nextafter(missed, 0.0))
+
+
+def test_azimuths_a_nanoradian_apart_are_two() -> None:
+    cc.strains_from_muscles((0.5, 0.5, 0.5, 0.5), D, (0.0, 1e-9, 2.0, 4.0))
+    with pytest.raises(ParameterError, match="distinct modulo a turn"):
+        cc.strains_from_muscles((0.5, 0.5, 0.5, 0.5), D, (0.0, math.nextafter(1e-9, 0.0), 2.0, 4.0))
+
+
+def test_the_shortest_backbone_is_longer_than_nothing() -> None:
+    """Of two neighbouring lengths of a muscle one is refused; with these, the other would make a backbone of exactly zero."""
+    azimuths, pair = (0.0, 1.0, 2.0), (0.6732655185893088, 0.7497114868223407)
+    refused, taken = 0.1, 0.2
+    while (middle := 0.5 * (refused + taken)) not in (refused, taken):
+        try:
+            backbone = cc.strains_from_muscles((*pair, middle), D, azimuths)[3]
+            taken = middle
+        except ParameterError as error:
+            refused, refusal = middle, error
+    assert 0.0 < backbone < 1e-15
+    assert refusal.field == "lengths"
+    assert np.array_equal(refusal.value, (*pair, refused))
+    assert "a backbone of positive length (it has " in refusal.requirement
+
+
+@given(lengths_, lengths_)
+def test_equal_muscles_on_either_side_bend_in_the_plane_of_the_third(front: float, sides: float) -> None:
+    """Of the paper's three muscles: exactly, so that the azimuth is 0, or pi."""
+    bend = cc.strains_from_muscles((front, sides, sides), D)
+    assert bend[0] == 0.0
+    assert cc.arc_from_muscles((front, sides, sides), D).azimuth in (0.0, math.pi)
+
+
+def test_a_straight_segment_without_a_bending_plane_is_told_with_all_lengths() -> None:
+    lengths = [UPPER, (0.5, 0.5, 0.5)]
+    with pytest.raises(ParameterError) as caught:
+        cc.chain_muscle_jacobian(lengths, D, frame="bending_plane")
+    assert caught.value.value is lengths
+    assert "use 'torsion_free'" in caught.value.requirement

@@ -365,6 +365,14 @@ def test_short_tubes_have_what_their_length_allows(contraction: float, degrees: 
         assert bool(found.touches) == bool(apart.min() < 1.0)
 
 
+def test_a_planar_arc_comes_round_from_half_a_turn_on() -> None:
+    """There its ends are as far from each other as they can be."""
+    arc = helix.forward(0.5, 0.0, DIAMETER)
+    found = helix.self_contact(arc, np.array([0.25, math.nextafter(0.5, 0.0), 0.5, 0.75]))
+    assert found.has_neighbours.tolist() == [False, False, True, True]
+    assert found.turn_distance[2] == pytest.approx(2.0 * arc.centre_radius, rel=1e-15)
+
+
 def test_a_fold_needs_no_length() -> None:
     assert helix.self_contact(helix.forward(0.1, math.radians(60.0), DIAMETER), 0.01).folding
 

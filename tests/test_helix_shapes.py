@@ -16,6 +16,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from softrobots import helix
+from softrobots.checks import LARGEST
 from softrobots.errors import ParameterError, StraightTube
 from softrobots.helix import HelixShape
 from tests.laws import law
@@ -571,3 +572,48 @@ def test_arcs_that_no_helix_has_are_told() -> None:
     with pytest.raises(ParameterError, match="such that a helix explains both arcs at this diameter") as caught:
         helix.measure(outer_arc, 1e-30, outer_arc / (2.0 * np.pi))  # a circle through the axis: no inner radius, no rise
     assert (caught.value.field, caught.value.value) == ("inner_arc", 1e-30)
+
+
+def test_what_must_be_positive_is_at_least_1e_90_m() -> None:
+    """The limit itself is taken; a little less is not, and the error tells what came."""
+    least = LARGEST**-3
+    below = math.nextafter(least, 0.0)
+    HelixShape(least, 0.0, 1.0)
+    HelixShape(1.0, 0.0, least)
+    HelixShape(1.0, least, 0.0)
+    with pytest.raises(ParameterError, match="they differ by D"):
+        HelixShape(below, 0.0, 1.0)
+    for inner, pitch in ((0.0, below), (below, 0.0)):
+        with pytest.raises(ParameterError, match=r"positive where the inner radius .* m is not") as caught:
+            HelixShape(1.0, inner, pitch)
+        assert (caught.value.field, caught.value.value) == ("pitch", pitch)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_the_actuator_is_on_the_shorter_path_but_for_rounding(size: float) -> None:
+    """Rounding is relative to the diameter."""
+    HelixShape(size, -size * (1.0 + 1e-12), 1.0)
+    with pytest.raises(ParameterError, match="at least minus the outer radius"):
+        HelixShape(size, -size * (1.0 + 1e-9), 1.0)
+
+
+def test_a_nearly_straight_tube_has_a_shape_while_numbers_hold_it() -> None:
+    angle = 0.8e-30
+    shape = helix.forward(1.0, angle, 0.1)
+    assert shape.pitch == pytest.approx(0.1 / (2.0 * angle), rel=1e-12)
+    assert shape.outer_radius == pytest.approx(0.05, rel=1e-12)
+    with pytest.raises(
+        StraightTube, match=r"leaves the tube straight: no helix radius; a contraction below 1 or an angle above 0"
+    ):
+        helix.forward(1.0, 0.4e-30, 0.1)
+
+
+def test_radii_that_rounding_makes_one_are_those_of_a_straight_tube(rng: np.random.Generator) -> None:
+    """At the largest contraction below 1 the radii are ten million billion diameters."""
+    for angle, diameter in zip(10.0 ** rng.uniform(-18.0, -15.0, 300), rng.uniform(0.5, 2.0, 300), strict=True):
+        try:
+            shape = helix.forward(math.nextafter(1.0, 0.0), angle, diameter)
+        except StraightTube as error:
+            assert "the tube is straight" in str(error)
+        else:
+            assert 0.0 < shape.diameter < 4.0

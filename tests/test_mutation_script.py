@@ -309,3 +309,16 @@ def test_modules_and_tests_of_the_script_exist(script: ModuleType) -> None:
 def test_the_table_of_explanations_is_sound() -> None:
     table = read_explanations(CHECKOUT / "docs" / "validation" / "mutants_explained.json")
     assert all(len(entry.reason) > 20 for entry in table)
+
+
+def test_the_record_says_what_is_promised(script: ModuleType) -> None:
+    """Every module of the script, none with a survivor that nobody explains; the page shows the same numbers."""
+    record = json.loads((CHECKOUT / "docs" / "validation" / "mutation.json").read_text(encoding="utf-8"))
+    files = {file for part in script.PARTS.values() for file in part.modules}
+    names = {"softrobots." + file.removesuffix(".py").replace("/", ".") for file in files}
+    assert {row["module"] for row in record["modules"]} == names
+    page = (CHECKOUT / "docs" / "validation.md").read_text(encoding="utf-8")
+    for row in record["modules"]:
+        assert row["unexplained"] == 0
+        assert row["mutants"] == sum(row[name] for name in ("killed", "timed_out", "explained", "wording"))
+        assert f"| {row['module']} | {row['mutants']} | {row['killed']} |" in page

@@ -15,7 +15,8 @@ from softrobots import inflated_beam
 from softrobots.description import expand
 from softrobots.paths import xacro_folder
 from softrobots.scene import WRINKLING_COLOURS, wrinkling_level
-from softrobots.springs import LinearSprings, SaturatingLink, SaturatingSprings
+from softrobots.springs import LinearSprings, SaturatingLink, SaturatingSprings, spring_law
+from softrobots.urdf_tags import InflatedLinkTag
 
 K, M = 187.30, 9.45  # [Troise 2021] Table 3 at 20 kPa
 ARM = 0.57  # [m], hinge to tip of one link
@@ -65,6 +66,17 @@ def test_torque_and_tangent_are_derivatives_of_the_energy(values: list[float]) -
     # On the plateau the tangent is M / bend across, at most k; its change over a step is relative to the bend.
     assert np.allclose(LAW.at(y)[TANGENT], tangent, rtol=1e-6, atol=1e-5)
     assert np.array_equal(LAW.at(y)[TANGENT], LAW.at(y)[TANGENT].T)
+
+
+def test_the_knee_itself_is_below_the_plateau() -> None:
+    """Exact numbers: 128 N m/rad times 0.625 rad is 80 N m."""
+    law = SaturatingSprings(LinearSprings(np.full(2, 128.0), np.zeros(2)), (SaturatingLink((0, 1), 128.0, 80.0),))
+    knee = np.array([0.375, -0.5])
+    assert law.saturated(knee) == frozenset()
+    assert np.array_equal(law.at(knee)[TANGENT], 128.0 * np.eye(2))
+    beyond = np.nextafter(1.0, 2.0) * knee
+    assert law.saturated(beyond) == {0, 1}
+    assert np.linalg.norm(law.at(beyond)[TANGENT] @ knee) < 1e-10
 
 
 @given(st.floats(0.0, 0.5), st.floats(-np.pi, np.pi), st.floats(-np.pi, np.pi))
@@ -156,6 +168,19 @@ def test_springs_of_a_link_with_a_plateau_must_be_alike(limp: sr.SoftModel) -> N
     half = sr.load_model(limp.urdf, springs=springs, motors=limp.motor_joints)
     assert [link.max_moment for link in half.springs.links] == [21.76]
     assert isinstance(sr.load_model(limp.urdf, springs={}).springs, LinearSprings)
+
+
+def test_each_link_has_its_own_law() -> None:
+    """Linear links before one with a plateau do not hide it; a link may have one spring; a list of no springs says so."""
+    linear, names = LinearSprings(np.array([50.0, 60.0, 60.0, 70.0]), np.zeros(4)), ["a", "b", "c", "d"]
+    tags = [InflatedLinkTag(springs, 0.05, 1e4, most) for springs, most in ((("a",), None), (("x",), 1.0), (("b", "c"), 2.0))]
+    law = spring_law(linear, names, names, [*tags, InflatedLinkTag(("d",), 0.05, 1e4, 3.0)])
+    assert isinstance(law, SaturatingSprings)
+    assert law.linear is linear
+    assert law.links == (SaturatingLink((1, 2), 60.0, 2.0), SaturatingLink((3,), 70.0, 3.0))
+    assert spring_law(linear, names, names, tags[:2]) is linear
+    with pytest.raises(sr.DescriptionError, match=r"that no muscle length holds; these are: none$"):
+        spring_law(linear, names, ["e", "b_"], [InflatedLinkTag(("e", "b"), 0.05, 1e4, 3.0)])
 
 
 def test_sections_and_hinges_that_muscles_hold_have_no_plateau() -> None:

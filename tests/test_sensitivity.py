@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
+from softrobots.sensitivity import motor_torque_slope, tip_columns
 from tests.oracles import central_difference
 
 # Step 1e-5 on equilibria solved to 1e-13: truncation 1e-10, rounding 1e-13 * 20 / 172 / 1e-5 = 1e-9; bound of the issue 1e-6.
@@ -59,6 +60,21 @@ def test_compliance_is_reciprocal_for_forces_and_positive(odd_arm: sr.SoftModel,
     found = sr.compliance(odd_arm, start)
     assert np.abs(found - found.T).max() < 1e-15
     assert np.linalg.eigvalsh(found).min() > -1e-15
+
+
+def test_motor_torques_by_tip_force_match_solved_equilibria(arm: sr.SoftModel, rng: np.random.Generator) -> None:
+    for motors, force, gravity in cases(rng, 3):
+        found = sr.solve_equilibrium(arm, motors, force, gravity=gravity)
+        columns = (part[:3] for part in tip_columns(arm, found.q_motors, found.q_springs))
+        expected = central_difference(
+            lambda f, motors=motors, gravity=gravity: (
+                sr.solve_equilibrium(arm, motors, f, gravity=gravity, tolerance=1e-13).motor_torques
+            ),
+            force,
+            1e-3,
+        )
+        slope = motor_torque_slope(*columns, found.tangent_stiffness, found.coupling)
+        assert np.abs(slope - expected).max() < RELATIVE * np.abs(expected).max()
 
 
 def test_jacobian_of_the_unloaded_arm_is_the_rigid_one(arm: sr.SoftModel) -> None:

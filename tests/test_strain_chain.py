@@ -118,6 +118,10 @@ def section(size: float, stretch: float = STRETCH) -> np.ndarray:
 ANGLES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.5, 0.999, 1.001, 3.0, math.pi, 6.0, 2 * math.pi, 6.32, 6.33, 7.0, 20.0, 50.0)
 
 
+def test_stumpff_functions_of_no_number_are_none() -> None:
+    assert stumpff(np.zeros((0, 3)), 5).shape == (6, 0, 3)
+
+
 @pytest.mark.parametrize("highest", range(1, 8))
 def test_stumpff_functions_are_those_of_the_series(highest: int) -> None:
     """Relative to `1/k!`, the value at zero: `c_k = 1/k! - x c_{k+2}` magnifies rounding by x / ((k + 1)(k + 2)) up to x = 40.
@@ -317,6 +321,31 @@ def test_bending_in_any_azimuth_is_in_range_below_half_a_turn(azimuth: float) ->
 
     assert all(in_range(bent(degrees), H) for degrees in (0.0, 1.0, 90.0, 120.0, 170.0, 179.0))
     assert not any(in_range(bent(degrees), H) for degrees in (180.0, 181.0, 200.0, 270.0, 355.0))
+
+
+def test_each_of_many_sections_has_the_whole_range() -> None:
+    """Turns and chords are not added up: twenty are bent by 179.7 degrees; the chord of one alone is out of its range."""
+    many = np.tile([math.radians(179.7), 0.0, 0.0, 0.0], (20, 1))
+    assert in_range(many, H)
+    many[:, 0] = 0.1
+    assert in_range(many, H)
+    for place in (0, 7, 19):
+        one = many.copy()
+        one[place, 0] = math.radians(179.95)
+        assert not in_range(one, np.full(20, H))
+
+
+@pytest.mark.parametrize("h", [1e-2, 1.0, 300.0])
+def test_a_section_is_longer_than_a_thousandth_of_its_rest_length(h: float) -> None:
+    for share, expected in ((5.0, True), (1.5, True), (0.0, True), (-0.998, True), (-0.9995, False), (-1.1, False)):
+        assert in_range(np.array([0.1, 0.2, 0.0, share * h]), h) == expected
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
+def test_the_chord_has_the_same_angle_to_both_ends(rotation: list[float]) -> None:
+    """By SciPy: why the range asks at one end only."""
+    motion = expm(np.block([[skew(np.array(rotation)), np.array([[0.0], [0.0], [H]])], [np.zeros((1, 4))]]))
+    assert motion[:3, 2] @ motion[:3, 3] == pytest.approx(motion[2, 3], abs=1e-14)
 
 
 @pytest.mark.parametrize("degrees", [360.0, 365.0, 400.0, 450.0, 535.0, 720.0, 800.0])

@@ -82,7 +82,7 @@ def strains_from_muscles(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, 
     backbone = lengths[..., 0] + fitted[..., 2]
     if np.any(backbone <= 0.0):
         raise ParameterError("lengths", lengths, f"those of a backbone of positive length (it has {backbone.min():.6g} m)")
-    strains = np.zeros((*common_shape("distance", backbone.shape, distance.shape), 4))
+    strains = np.zeros((*np.broadcast_shapes(backbone.shape, distance.shape), 4))
     strains[..., 0] = fitted[..., 0] / distance
     strains[..., 1] = fitted[..., 1] / distance
     strains[..., 3] = backbone
@@ -132,7 +132,7 @@ def muscle_residual(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS) -> Fl
     """
     lengths, distance, azimuths = _checked_muscles(lengths, distance, azimuths)
     residual = _residual(*_fit(lengths, azimuths), azimuths)
-    return np.array(np.broadcast_to(residual, common_shape("distance", residual.shape, distance.shape)))
+    return np.array(np.broadcast_to(residual, np.broadcast_shapes(residual.shape, distance.shape)))
 
 
 def strains_per_muscle(distance: Any, azimuths: Any) -> FloatArray:
@@ -173,6 +173,7 @@ def _checked_azimuths(azimuths: Any) -> FloatArray:
 
 
 def _checked_muscles(lengths: Any, distance: Any, azimuths: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return lengths (..., N), distance and azimuths (N,), if an arc follows from them and the shapes broadcast."""
     azimuths = _checked_azimuths(azimuths)
     distance = positive_array("distance", distance, "m")
     checked = positive_array("lengths", lengths, "m")

@@ -125,16 +125,16 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
     limit = wrinkling_moment(positive_number("pressure", pressure, "Pa"), radius)
     tau = np.where(theta < 0.0, -tau, tau)
     theta = np.abs(theta)
-    order = np.argsort(theta, kind="stable")
+    order = np.lexsort((tau, theta))  # by angle; of one angle by moment, so that the order in which the points came is nothing
     theta, tau = theta[order], tau[order]
     if np.count_nonzero(theta) < 3:
         raise ParameterError("angle", angle, "at least three angles different from zero")
     knee = _knee(theta, tau)
     plateau = float(tau[knee:].mean()) if knee < len(theta) else None
     linear = np.arange(len(theta)) < knee
-    for _ in range(100):  # the slope decides which points are below wrinkling, and they decide the slope
+    while True:  # the slope decides which points are below wrinkling, and they decide the slope; what is left out stays out
         stiffness = _slope(theta, tau, linear, moment, limit)
-        below = (np.arange(len(theta)) < knee) & (stiffness * theta < limit)
+        below = linear & (stiffness * theta < limit)
         if np.array_equal(below, linear):
             break
         linear = below
