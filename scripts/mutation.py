@@ -228,7 +228,8 @@ def run(arguments: argparse.Namespace) -> bool:
     elif arguments.docs is not None:
         shown = f"{table(verdicts)}\n\nReasons in `{EXPLAINED}`, with how many mutants each explains:\n\n"
         shown += reasons(explanations, verdicts)
-        write_record(arguments.docs, "mutation", shown, result, command="python scripts/mutation.py")
+        resumed = "" if arguments.resume is None else " --resume FOLDER"  # most verdicts are older than the tests of today
+        write_record(arguments.docs, "mutation", shown, result, command=f"python scripts/mutation.py{resumed}")
     return good
 
 
