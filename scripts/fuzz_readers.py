@@ -387,7 +387,9 @@ def run(arguments: argparse.Namespace) -> bool:
     if target is not None:
         content = json.dumps({**result, "found": {tally.reader: tally.found for tally in tallies}}, indent=1).encode()
         write_atomically(target, lambda file: file.write(content))
-    if arguments.docs is not None:
+    if arguments.docs is not None and any(tally.found for tally in tallies):
+        print("not recorded: a defect was found", file=sys.stderr)
+    elif arguments.docs is not None:
         command = command_of("fuzz_readers", parser(), arguments, "cases", "first", "seed")
         write_record(arguments.docs, NAME, table(tallies), result, command=command)
     return not any(tally.found for tally in tallies)

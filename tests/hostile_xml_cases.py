@@ -160,6 +160,13 @@ REFUSED: dict[str, tuple[str, Content | Callable[[], Content], str]] = {
     "limit": ("SDF", SDF.replace("<lower>-1<", "<lower>nan<"), "a number of joint j that is none"),
     "many links": ("SDF", lambda: sdf("<link name='b'/>" * (MOST_LINKS + 1)), f"at most {MOST_LINKS} are read"),
     "included model": ("SDF", sdf("<include><uri>model://x</uri></include>"), "included files"),
+    # MuJoCo doubles such a sensor with every copy
+    "doubled sensors": (
+        "MJCF",
+        '<mujoco><worldbody><body name="b"><joint/><geom size=".1"/><replicate count="20" offset=".1 0 0"><geom size=".1"/>'
+        "</replicate></body></worldbody><sensor><clock/></sensor></mujoco>",
+        "sensors without an object",
+    ),
     # xacro
     "macro of itself": (
         "xacro",

@@ -27,6 +27,12 @@ MOST_FOLDERS = 20
 
 _CHAIN = 10  # models within models
 _COST = {"composite": 1.0, "flexcomp": 8.0}  # of one of the `count` parts that an element makes, in elements
+_WITHOUT_OBJECT = (
+    "user",
+    "clock",
+    "e_potential",
+    "e_kinetic",
+)  # sensors; each copy that <replicate> makes doubles their number
 _LARGEST: Mapping[str, Mapping[str, float]] = {
     "composite": {"count": 10_000},
     "flexcomp": {"count": 10_000, "cellcount": 10_000},
@@ -91,6 +97,7 @@ class _Survey:
         included = set(chain)
         models = [self._model(element, chain) for element in root.iter("model") if element.get("file") is not None]
         each, total, stack = max(models, default=0), 0, [(root, 1)]
+        sensors = doublings = 0
         while stack:
             element, times = stack.pop()
             self._look_at(element)
@@ -101,7 +108,9 @@ class _Survey:
                 count = number_in(element.get("count", "1"))
                 if not 0.0 <= count <= MOST_ELEMENTS:
                     self._refuse(f"<replicate count={element.get('count', '')[:100]!r}>")
+                doublings += times * math.ceil(count)
                 times *= math.ceil(count)
+            sensors += element.tag in _WITHOUT_OBJECT and element.get("objname") is None
             if total > MOST_ELEMENTS:
                 self._refuse(f"more than {MOST_ELEMENTS} elements, with all that it includes, attaches and replicates")
             children: Iterator[ElementTree.Element] = iter(element)
@@ -112,6 +121,8 @@ class _Survey:
                 included.add(file)
                 children = iter(self._read(file))
             stack += [(child, times) for child in children]
+        if sensors and sensors * 2.0 ** min(doublings, 100) > MOST_ELEMENTS:
+            self._refuse(f"sensors without an object, doubled {doublings} times by <replicate>")
         return total
 
     def check_files(self) -> None:
