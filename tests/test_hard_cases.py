@@ -25,7 +25,7 @@ from softrobots.soak.plain_sections import section_joints, section_slopes
 from softrobots.soak.plain_statics import Case, PlainStatics
 from softrobots.soak.running import again, family_of, parts_of, soak, table
 from softrobots.soak.verdicts import Tally, judge
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, missing
 from tests.law_robots import ROBOTS, model
 from tests.oracles import central_difference
 
@@ -418,7 +418,7 @@ def test_chains_of_many_sections(chain: str, count: int) -> None:
 def test_what_is_too_large_is_refused_before_it_is_wrong(backend: str) -> None:
     """At 1e16 rad the compiled sine means nothing: certified answers lay 24 km away. And 1e31 N passed unchecked."""
     if backend == "numba" and importlib.util.find_spec("numba") is None:
-        pytest.skip("numba is not installed")
+        missing("numba is not installed")
     fast = compiled("arm") if backend == "python" else sr.compile(model("arm"), backend=backend)
     motors, force = np.array([0.3, 0.6, -0.8]), np.array([0.0, 10.0, -15.0])
     for huge in (2.0 * LARGEST_POSITION, 1e16, 1e29):
