@@ -78,7 +78,7 @@ def test_jacobian_and_loads_are_those_of_the_pinocchio_path(name: str, gravity: 
     """The same equilibrium on both sides: 1e-9 relative leaves room for the condition of the tangent stiffness."""
     model = robot(name)
     search, down = searching(name, gravity=gravity is not None), np.zeros(3) if gravity is None else np.array(gravity)
-    for _ in range(3):
+    for _ in range(2):
         motors, force = drawn(model, rng)
         status, state = search.settle(motors, force, down, model.rest)
         assert status == Status.CERTIFIED

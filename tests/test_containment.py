@@ -223,7 +223,6 @@ def ask(port: int, path: str = "/", *, upgrade: bool = False, **headers: str) ->
 @pytest.fixture(scope="module")
 def servers(hostile: Viewer) -> Iterator[dict[str, tuple[int, str, int]]]:
     """Port, path of the page and process of each server that there is."""
-    pytest.importorskip("viser") if os.environ.get("CI") != "true" else __import__("viser")
     from softrobots.slider_page import SliderPage
 
     with SliderPage(hostile._model) as sliders:
