@@ -26,7 +26,8 @@ CASE = "case.json"
 
 _FORMAT = 1
 _LARGEST_CASE = 100_000  # bytes
-_SHOWN = 60  # characters of it in an error
+_SHOWN = 60  # characters of a text of it in an error
+_NAMED = 5  # things in an error that only another case has
 _LONG = 400  # characters of what a case says; of more its hash stands in the file
 
 
@@ -84,10 +85,15 @@ class Checkpoint:
 
         Raises:
             OutputError: If it cannot be written; the blocks before it stay.
+            ParameterError: If a run of another case has begun in the folder since it was looked at.
+            FileFormatError: If that run says unreadably what its case is.
         """
         if not self._made:
             make_folder(self._folder)
-            write_text(self._folder / CASE, json.dumps(self._case, indent=1) + "\n", overwrite=True)
+            try:
+                write_text(self._folder / CASE, json.dumps(self._case, indent=1) + "\n", overwrite=False)
+            except OutputExists:  # another run was first
+                self._check_same(_read_case(self._folder / CASE))
             self._made = True
         content = {"mark": np.array(f"{self._mark} {number}"), **arrays}
         write_atomically(self._file(number), lambda file: np.savez(file, **content))
@@ -98,10 +104,12 @@ class Checkpoint:
     def _check_same(self, theirs: Mapping[str, str]) -> None:
         if theirs == self._case:
             return
-        differing = [
-            name for name in (*self._case, *theirs.keys() - self._case.keys()) if theirs.get(name) != self._case.get(name)
-        ]
-        told = "; ".join(f"{name} was {_short(theirs.get(name))} and is {_short(self._case.get(name))}" for name in differing)
+        ours = [name for name in self._case if theirs.get(name) != self._case[name]]
+        others = sorted(theirs.keys() - self._case.keys())
+        names = [*ours, *others[:_NAMED]]
+        told = "; ".join(f"{_short(name)} was {_short(theirs.get(name))} and is {_short(self._case.get(name))}" for name in names)
+        if len(others) > _NAMED:
+            told += f"; and {len(others) - _NAMED} more"
         raise ParameterError(
             "checkpoint", str(self._folder), f"a new folder, or one with blocks of the same case; there {told} now"
         )
@@ -162,6 +170,8 @@ def _text(value: Any) -> str:
 
 
 def _short(text: str | None) -> str:
+    """A text of a file as an error shows it: printable, and not long."""
     if text is None:
         return "nothing"
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+    shown = text if text.isprintable() else repr(text)
+    return shown if len(shown) <= _SHOWN else shown[: _SHOWN - 3] + "..."

@@ -17,6 +17,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.benchmark.results import Curve, Results, Row, as_json, read_results
+from softrobots.checkpoint import CASE, Checkpoint
 from softrobots.helix import ActuatorTable, HelixDesign, design_grasp
 from softrobots.live.commands import Wanted, read_commands
 from softrobots.live.input import WatchedFile
@@ -155,6 +156,44 @@ def read_typed(file: Path) -> None:
     finite(wanted.motors, wanted.force, () if wanted.gravity is None else wanted.gravity)
 
 
+JOB = {"robot": "<robot/>", "loads": [0.0, 5.0], "seed": 3, "gravity": None}
+"""What the blocks of a long job depend on."""
+_BLOCK = {"payload": np.array([1.0, np.inf, 2.5]), "reached": np.array([True, False, True])}
+_ARRAYS = {name: (array.dtype.type, array.shape) for name, array in _BLOCK.items()}
+
+
+@cache
+def _kept(name: str) -> bytes:
+    """A file of a folder with one finished block."""
+    with TemporaryDirectory() as folder:
+        Checkpoint(folder, JOB).keep(0, _BLOCK)
+        return (Path(folder) / name).read_bytes()
+
+
+def read_case(file: Path) -> None:
+    """What a folder of finished blocks says of its job."""
+    with TemporaryDirectory() as folder:
+        (Path(folder) / CASE).write_bytes(file.read_bytes())
+        try:
+            Checkpoint(folder, JOB)
+        except sr.SoftRobotsError as error:
+            if not str(error).isprintable() or len(str(error)) > 3000:
+                raise ArithmeticError("an error that is long, or moves the cursor") from error
+            raise
+
+
+def read_block(file: Path) -> None:
+    """A finished block; one that is none is computed again."""
+    with TemporaryDirectory() as folder:
+        (Path(folder) / CASE).write_bytes(_kept(CASE))
+        (Path(folder) / "block_000000.npz").write_bytes(file.read_bytes())
+        held = Checkpoint(folder, JOB).block(0, _ARRAYS)
+    if held is None:
+        raise sr.FileFormatError("a block that is computed again")
+    if any((held[name].dtype.type, held[name].shape) != kind for name, kind in _ARRAYS.items()) or len(held) != len(_ARRAYS):
+        raise ArithmeticError("a block with other arrays than were asked for")
+
+
 @cache
 def results() -> dict[str, Any]:
     """A result of every kind, of a small arm."""
@@ -198,7 +237,8 @@ def damaged_archive(data: bytes, rng: np.random.Generator) -> bytes:
     with np.load(io.BytesIO(data)) as file:
         fields = dict(file)
     name = str(rng.choice(list(fields)))
-    changed = _CHANGES[rng.integers(len(_CHANGES))](fields[name], rng)
+    with np.errstate(invalid="ignore"):  # infinity as an integer is damage, too
+        changed = _CHANGES[rng.integers(len(_CHANGES))](fields[name], rng)
     content = io.BytesIO()
     if changed is None:
         del fields[name]
@@ -260,6 +300,8 @@ READERS: dict[str, tuple[Callable[[], list[bytes]], Damage, Callable[[Path], obj
     "benchmark JSON": (bench_corpus, damaged_bytes, read_bench, ".json"),
     "parameters YAML": (parameter_corpus, damaged_bytes, read_parameter_file, ".yaml"),
     "parameters JSON": (parameter_json_corpus, damaged_bytes, read_parameter_file, ".json"),
+    "checkpoint JSON": (lambda: [_kept(CASE)], damaged_bytes, read_case, ".json"),
+    "checkpoint NPZ": (lambda: [_kept("block_000000.npz")], damaged_archive, read_block, ".npz"),
     "watched file": (command_corpus, damaged_bytes, read_wanted, ".txt"),
     "typed lines": (command_corpus, damaged_bytes, read_typed, ".txt"),
 }

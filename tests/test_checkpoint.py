@@ -304,6 +304,35 @@ def test_a_case_that_cannot_be_read_is_refused(content: bytes, message: str, tmp
         Checkpoint(tmp_path, {"job": "test"})
 
 
+def test_of_two_cases_that_begin_at_once_the_second_is_refused(tmp_path: Path) -> None:
+    """Both find the folder new; the one that keeps a block first has it."""
+    one, same, other = (Checkpoint(tmp_path, {"job": job}) for job in ("one", "one", "other"))
+    one.keep(0, BLOCK)
+    with pytest.raises(sr.ParameterError, match='there job was "one" and is "other" now'):
+        other.keep(0, BLOCK)
+    same.keep(1, BLOCK)
+    assert all(Checkpoint(tmp_path, {"job": "one"}).block(number, ARRAYS) for number in (0, 1))
+
+
+@pytest.mark.parametrize(
+    "theirs",
+    [
+        {"\x1b[2J\nname": "\x1b[31m"},
+        {f"name {number}": "x" * 1000 for number in range(90)},
+        {"x" * 50_000: "1"},
+    ],
+    ids=["escapes", "many", "long"],
+)
+def test_what_differs_is_told_in_a_line(theirs: dict[str, str], tmp_path: Path) -> None:
+    (tmp_path / CASE).write_text(json.dumps(theirs), encoding="utf-8")
+    with pytest.raises(sr.ParameterError, match="blocks of the same case") as caught:
+        Checkpoint(tmp_path, {"job": "test"})
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 1500
+    assert 'job was nothing and is "test"' in str(caught.value)
+    assert ("; and 85 more now" in str(caught.value)) == (len(theirs) == 90)
+
+
 def test_other_folders_are_refused(tmp_path: Path, arm: sr.SoftModel) -> None:
     (tmp_path / "thesis.tex").write_bytes(b"")
     with pytest.raises(sr.OutputExists, match=r"holds thesis\.tex and no case\.json"):

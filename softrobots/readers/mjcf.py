@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import read_only
+from softrobots.checks import LARGEST, read_only
 from softrobots.errors import DescriptionError, MissingDependency
 from softrobots.readers.mjcf_limits import check_mjcf
 from softrobots.readers.mjcf_refusals import driven_joint, joint_name, not_carried
@@ -77,7 +77,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
         if number == 0:
             builder.draw_on_world(body)
             continue
-        motions, end = _motions(mujoco, model, number)
+        motions, end = _motions(mujoco, model, number, source)
         builder.add(body, bodies[model.body_parentid[number]], motions, end)
     for number in range(model.nsite):
         site = model.site(number)
@@ -86,7 +86,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     return builder.tree()
 
 
-def _motions(mujoco: Any, model: Any, body: int) -> tuple[list[Motion], Placement]:
+def _motions(mujoco: Any, model: Any, body: int, source: str) -> tuple[list[Motion], Placement]:
     """Degrees of freedom of a body, and the body in the frame of the last one: all about one anchor after another."""
     place = Placement.turned(model.body_pos[body], model.body_quat[body])
     motions: list[Motion] = []
@@ -96,6 +96,10 @@ def _motions(mujoco: Any, model: Any, body: int) -> tuple[list[Motion], Placemen
         kind = "prismatic" if slides else "revolute"
         axis, anchor = np.array(model.jnt_axis[joint]), np.zeros(3) if slides else np.array(model.jnt_pos[joint])
         reference = float(model.qpos0[model.jnt_qposadr[joint]])
+        if not abs(reference) <= LARGEST:
+            raise DescriptionError(
+                f"{source}: the joint {joint_name(model, joint)} has ref = {reference}; up to {LARGEST:g} is read"
+            )
         dof = int(model.jnt_dofadr[joint])
         motions.append(
             Motion(

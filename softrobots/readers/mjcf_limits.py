@@ -1,8 +1,9 @@
 """What an MJCF file may ask of MuJoCo, looked at before MuJoCo reads it.
 
 A short file can ask for much: `<replicate count="100000000">` and generated meshes ran for minutes until the memory was gone,
-a model that attaches itself ended the process, a named pipe in place of a mesh was waited for (MuJoCo 4.0). Files are included
-from the folder of the description only.
+a model that attaches itself ended the process, a named pipe in place of a mesh was waited for, and the name of a class that is
+not there was taken for a format of C, which can write to memory (MuJoCo 4.0). Files are included from the folder of the
+description only.
 """
 
 from __future__ import annotations
@@ -68,7 +69,8 @@ def check_mjcf(root: ElementTree.Element, source: str, path: Path | None) -> Non
     Raises:
         DescriptionError: If it becomes more than `MOST_ELEMENTS` elements; if a file that it includes is not below its folder,
             is included twice, is no XML or not in UTF-8; if it is text and includes files; if models attach each other in a
-            circle; if a file that it names is no file, or too large; or if a size that it asks for is beyond a limit.
+            circle; if a file that it names is no file, or too large; if a size that it asks for is beyond a limit; or if an
+            attribute has a percent sign.
     """
     survey = _Survey(source, None if path is None else path.parent.resolve())
     if path is not None:
@@ -174,14 +176,17 @@ class _Survey:
     def _read(self, file: Path) -> ElementTree.Element:
         if unfit_file(file) is None:
             return ElementTree.Element("missing")  # MuJoCo tells where it is named
+        text = read_xml(file)  # first, as it refuses what is too large
         _check_utf8(file, self._source)
-        return parse_xml(read_xml(file), str(file))
+        return parse_xml(text, str(file))
 
     def _look_at(self, element: ElementTree.Element) -> None:
         """Check the numbers of an element, and keep the files that it names."""
         tag = str(element.tag)
         limits = {**_ANYWHERE, **_LARGEST.get(tag, {})}
         for name, text in element.items():
+            if "%" in text:
+                self._refuse(f"<{tag} {name}={text[:100]!r}>, which MuJoCo may take for a format of C; use another sign than %")
             if name in limits and not abs(_product(text)) <= limits[name]:
                 self._refuse(f"<{tag} {name}={text[:100]!r}>; at most {limits[name]:g} in all")
             if tag == "lengthrange" and name in _LEAST and not number_in(text) >= _LEAST[name]:

@@ -23,6 +23,7 @@ from softrobots.rigid_tree import Body, Joint, Placement, RigidTree
 from softrobots.urdf_tags import SpringTag
 
 _ROUNDING = 1e-12  # [m]; a joint that is less beside the origin of its body is at it
+_UNIT = 1e-6  # by how much the length of an axis may differ from 1
 _X_AXIS = read_only(np.array([1.0, 0.0, 0.0]))
 
 
@@ -95,7 +96,7 @@ class TreeBuilder:
             end: The body in the frame of the last of them, or in its parent.
 
         Raises:
-            DescriptionError: If a number is not finite.
+            DescriptionError: If a number is not finite, or a joint has no axis, as where its length overflows.
         """
         self._check(f"the body {body.name}", body.mass, body.centre.position, body.centre.rotation, body.inertia)
         self._check(f"the body {body.name}", end.position, end.rotation)
@@ -103,6 +104,10 @@ class TreeBuilder:
             bounds = np.array([bound for bound in motion.limits if not np.isinf(bound)])
             self._check(f"the joint {motion.name}", motion.start.position, motion.start.rotation, motion.axis, bounds)
             self._check(f"the joint {motion.name}", motion.damping)
+            if not abs(np.linalg.norm(motion.axis) - 1.0) <= _UNIT:
+                raise DescriptionError(
+                    f"{self._source}: the joint {motion.name} has the axis {motion.axis.tolist()}; a direction is required"
+                )
         self._carriers.add(parent)
         if motions or parent in self._moving:
             self._moving.add(body.name)
