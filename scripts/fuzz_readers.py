@@ -64,7 +64,7 @@ class Reader(NamedTuple):
     """What the names of such files end with."""
     seconds: float = 1.0
     """CPU time that a file may take [s]."""
-    megabytes: float = 150.0
+    megabytes: float = 200.0
     """Memory that it may take in addition [MB]."""
 
 

@@ -107,7 +107,8 @@ class Checkpoint:
         ours = [name for name in self._case if theirs.get(name) != self._case[name]]
         others = sorted(theirs.keys() - self._case.keys())
         names = [*ours, *others[:_NAMED]]
-        told = "; ".join(f"{_short(name)} was {_short(theirs.get(name))} and is {_short(self._case.get(name))}" for name in names)
+        found = [f"{_short(name)} was {_short(theirs.get(name))} and is {_short(self._case.get(name))}" for name in names]
+        told = "; ".join(found)
         if len(others) > _NAMED:
             told += f"; and {len(others) - _NAMED} more"
         raise ParameterError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import importlib.util
 import io
 import json
 import os
@@ -247,6 +248,15 @@ def test_json_that_is_no_object(reader: str, text: str, tmp_path: Path) -> None:
     read, name = JSON_READERS[reader]
     (tmp_path / name).write_text(text, encoding="utf-8")
     refused(read, tmp_path / name)
+
+
+@pytest.mark.parametrize("figure", ["-1e300", "1e300", "1" + "0" * 300])
+def test_figures_that_no_unit_can_tell_are_refused(figure: str, tmp_path: Path) -> None:
+    """In nanoseconds they would be infinite."""
+    text = data.bench_corpus()[0].decode()
+    assert text.count('"our_seconds": 1e-06') == 2
+    (tmp_path / "a.json").write_text(text.replace('"our_seconds": 1e-06', f'"our_seconds": {figure}', 1), encoding="utf-8")
+    refused(data.read_bench, tmp_path / "a.json", "no results of this benchmark")
 
 
 # --- YAML
@@ -689,6 +699,70 @@ def test_the_scan_sees_what_it_looks_for(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     assert uses_of(file) == {"import pickle", "import marshal", "np.load", "allow_pickle", "shell", "eval", "yaml.load"}
+
+
+# --- No reader is forgotten
+
+DOORS = {"opened", "read_bytes", "read_text", "read_json", "read_xml", "read_arrays", "read_table"}
+"""Names of functions that bring in what a file says."""
+DOORWAYS = {
+    "bounded_reading": "the door itself",
+    "csv_table": "the door itself",
+    "json_text": "the door itself",
+    "npz_file": "the door itself",
+    "xml_input": "the door itself",
+    "sources": ("URDF", "MJCF", "SDF"),
+    "readers.mjcf_limits": ("MJCF",),
+    "description": ("xacro",),
+    "interop.kinematics": ("URDF",),
+    "collada_check": ("DAE",),
+    "time_law": ("waypoints CSV",),
+    "helix.actuator_table": ("actuator CSV",),
+    "helix.helix_design": ("design JSON",),
+    "results_io": ("results NPZ",),
+    "checkpoint": ("checkpoint JSON", "checkpoint NPZ"),
+    "benchmark.results": ("benchmark JSON",),
+    "robots.parameter_file": ("parameters YAML", "parameters JSON"),
+    "live.input": ("watched file",),
+    "export.meshes": ("STL",),
+    "argument_notes": "our own xacro files",
+    "generated": "compares a file with what is generated, byte for byte",
+    "recorded_run": "a page of the checkout",
+    "mutants": "what the tool has just written",
+    "kernels.machines": "compares a file with what is generated, byte for byte",
+    "export.python_text": "a template of ours",
+    "benchmark.machine": "a file of the kernel",
+    "benchmark.processes": "a file of the kernel",
+    "meshcat_view.server_process": "a page of ours",
+}
+"""Modules that read files, and the readers of the campaign that go through them, or why there is none."""
+
+
+def readers_in(text: str) -> bool:
+    """Whether a module reads files: by one of the doors, or a file opened for reading."""
+    calls = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)]
+    names = {ast.unparse(call.func).rpartition(".")[2] for call in calls}
+    modes = [
+        argument.value
+        for call in calls
+        for argument in call.args[:2]
+        if ast.unparse(call.func).rpartition(".")[2] == "open" and isinstance(argument, ast.Constant)
+    ]
+    return bool(names & DOORS) or "rb" in modes or "r" in modes
+
+
+def test_every_module_that_reads_files_is_tried() -> None:
+    spec = importlib.util.spec_from_file_location("fuzz_readers", CHECKOUT / "scripts" / "fuzz_readers.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    package = CHECKOUT / "softrobots"
+    files = {file: ".".join(file.relative_to(package).with_suffix("").parts) for file in package.rglob("*.py")}
+    found = {name for file, name in files.items() if readers_in(file.read_text(encoding="utf-8"))}
+    assert found == set(DOORWAYS)
+    tried = {reader for told in DOORWAYS.values() if isinstance(told, tuple) for reader in told}
+    assert tried <= set(script.READERS)
+    # The rest go through these doors with another caller: text instead of a file, meshes by their library, lines of a pipe.
+    assert set(script.READERS) - tried == {"URDF text", "mount", "OBJ", "typed lines"}
 
 
 def test_json_is_checked_as_python_reads_it(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from softrobots.checks import LARGEST
 from softrobots.errors import FileFormatError, ParameterError
 from softrobots.json_text import read_json
 
@@ -117,7 +118,7 @@ def _check(results: Results) -> None:
     Raises:
         KeyError: If the machine or the number of rounds is not told.
         TypeError: If a figure is no number, or a text is none or has several lines.
-        ValueError: If a figure is not finite, or a curve has not a cost for every size.
+        ValueError: If a figure is not finite or beyond `LARGEST`, or a curve has not a cost for every size.
     """
     texts = [results.machine["processor"], results.machine["system"], *results.machine.values()]
     figures = [results.settings["rounds"]]
@@ -132,7 +133,7 @@ def _check(results: Results) -> None:
             raise ValueError("a curve has a cost for every size")
     if not all(isinstance(text, str) and text.isprintable() for text in texts):
         raise TypeError("names are texts of one line")
-    if not all(map(math.isfinite, figures)):
+    if not all(abs(figure) <= LARGEST for figure in figures):
         raise ValueError("figures are finite")
 
 
