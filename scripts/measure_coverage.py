@@ -27,6 +27,7 @@ from softrobots.recorded_run import check_page, write_record
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 # As coverage.py itself has it: with or without the colon, in small letters or capitals.
+PRAGMA = "# pragma: no cover"
 EXCLUDED = re.compile(r"#\s*pragma[:\s]?\s*no\s*(?:cover|branch)\b(?P<reason>.*)$", re.MULTILINE | re.IGNORECASE)
 
 
@@ -98,18 +99,32 @@ def by_folder(report: dict[str, Any]) -> dict[str, Counts]:
 
 
 def exclusions() -> list[tuple[str, str]]:
-    """Where something of the package is excluded from the count, and why: files in pyproject.toml, comments in the code."""
-    found = []
-    setting = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8").partition("[tool.coverage.run]")[2].partition("\n[")[0]
-    for line in setting.partition("omit = [")[2].partition("]")[0].splitlines():
-        name, _, reason = line.partition("#")
-        if name.strip():
-            found.append((name.strip().strip('",'), reason.strip()))
+    """Where something of the package is excluded from the count, and why: settings of coverage.py, comments in the code."""
+    found = excluded_by_settings(CHECKOUT / "pyproject.toml")
     for file in sorted((CHECKOUT / "softrobots").rglob("*.py")):
         text = file.read_text(encoding="utf-8")
         for match in EXCLUDED.finditer(text):
             number = text.count("\n", 0, match.start()) + 1
             found.append((f"{file.relative_to(CHECKOUT)}:{number}", match["reason"].strip(" :-")))
+    return found
+
+
+def excluded_by_settings(file: Path) -> list[tuple[str, str]]:
+    """What coverage.py leaves out by its settings, its own among them, and the comment behind each, which is the reason.
+
+    Args:
+        file: pyproject.toml.
+    """
+    from coverage import Coverage
+
+    settings, lines = Coverage(config_file=str(file)), file.read_text(encoding="utf-8").splitlines()
+    found = []
+    for option in ("run:omit", "report:omit", "report:include", "report:exclude_lines", "report:exclude_also"):
+        values = settings.get_option(option) or []
+        for value in values if isinstance(values, list) else [values]:
+            if value != PRAGMA:  # what it leaves out is found in the code
+                said = [line.partition(json.dumps(value))[2] for line in lines if json.dumps(value) in line]
+                found.append((f"{option.partition(':')[2]} {value}", said[0].partition("#")[2].strip() if said else ""))
     return found
 
 

@@ -108,6 +108,22 @@ def test_every_spelling_of_an_exclusion_is_seen(comment: str) -> None:
     assert found["reason"].strip(" :-") == "why"
 
 
+def test_settings_that_exclude_are_seen_and_those_of_coverage_itself_are_none_of_ours(tmp_path: Path) -> None:
+    file = tmp_path / "pyproject.toml"
+    file.write_text("[tool.coverage.run]\nbranch = true\n", encoding="utf-8")
+    seen = script("measure_coverage").excluded_by_settings
+    assert all(reason == "" for _, reason in seen(file))  # whatever coverage.py leaves out by itself has no reason of ours
+    file.write_text(
+        '[tool.coverage.run]\nomit = [\n  "a.py", # drawn by hand\n  "b.py",\n]\n[tool.coverage.report]\n'
+        'exclude_lines = ["# pragma: no cover"]\nexclude_also = ["if slow:"] # once a year\n',
+        encoding="utf-8",
+    )
+    assert [(value.split()[-1], reason) for value, reason in seen(file)][:2] == [("a.py", "drawn by hand"), ("b.py", "")]
+    assert ("exclude_also if slow:", "once a year") in seen(file)
+    assert not any("pragma" in value for value, _ in seen(file))
+    assert seen(CHECKOUT / "pyproject.toml") == []
+
+
 # --- A copy of the checkout
 
 
