@@ -20,7 +20,8 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
-from dataclasses import asdict, dataclass
+from collections import Counter
+from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -73,6 +74,13 @@ class Outcome:
     """Time of the tests [min]."""
     date: str
     """Day of the run."""
+    reasons: dict[str, int] = field(default_factory=dict)
+    """Why tests were skipped, and how many for each reason."""
+
+    @property
+    def tests(self) -> int:
+        """Number of tests that there are."""
+        return self.passed + self.skipped + len(self.failed)
 
 
 ENVIRONMENTS = {python: Environment(python, python, lowest=False, extra="dev") for python in PYTHONS} | {
@@ -142,7 +150,7 @@ def run_tests(environment: Environment, interpreter: Path, tests: list[str], rep
         raise sr.OutputError(f"the tests of {environment.name} ended early, with status {status}; see {log}")
     cases = list(ElementTree.parse(report).iter("testcase"))
     bad = [case for case in cases if case.find("failure") is not None or case.find("error") is not None]
-    skipped = [case for case in cases if case.find("skipped") is not None]
+    skipped = [told.get("message", "") for case in cases if (told := case.find("skipped")) is not None]
     return Outcome(
         environment=environment.name,
         python=version,
@@ -152,6 +160,7 @@ def run_tests(environment: Environment, interpreter: Path, tests: list[str], rep
         failed=tuple(f"{case.get('classname')}::{case.get('name')}" for case in bad),
         minutes=round(minutes, 2),
         date=f"{datetime.now(timezone.utc):%Y-%m-%d}",
+        reasons=dict(Counter(skipped).most_common()),
     )
 
 
@@ -163,6 +172,13 @@ def table(outcomes: list[Outcome]) -> str:
         versions = [found.versions.get(name, "-") for name in SHOWN]
         counts = [str(found.passed), str(found.skipped), str(len(found.failed)), f"{found.minutes:.1f}", found.date]
         lines.append(f"| {' | '.join([found.environment, found.python, *versions, *counts])} |")
+    lines += [""] if any(found.reasons for found in outcomes) else []
+    for found in outcomes:
+        if found.reasons and ENVIRONMENTS[found.environment].extra == "dev":
+            told = "; ".join(f"{count}: {reason}" for reason, count in found.reasons.items())
+            lines.append(f"- skipped in {found.environment}: {told}")
+        elif found.reasons:
+            lines.append(f"- skipped in {found.environment}: what needs an optional package, for {len(found.reasons)} reasons")
     return "\n".join(lines)
 
 
