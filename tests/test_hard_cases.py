@@ -178,7 +178,7 @@ def test_a_soak_sees_a_saddle_that_is_called_stable() -> None:
     assert len(tally.broken) == 1
 
 
-def test_a_soak_sees_muscles_that_are_not_as_long_as_they_are_given() -> None:
+def test_a_soak_sees_muscles_that_are_not_as_long_as_they_are_given(monkeypatch: pytest.MonkeyPatch) -> None:
     pcc, family = model("pcc"), family_of("pcc")
     tally, case = Tally(), one(pcc.relaxed_motors)
     verdicts._check(tally, family, 0, PlainStatics(pcc), case, [Answer(0, STABLE, springs=np.zeros(pcc.n_springs))])
@@ -187,6 +187,23 @@ def test_a_soak_sees_muscles_that_are_not_as_long_as_they_are_given() -> None:
     changed = Answer(0, STABLE, springs=np.zeros(pcc.n_springs), changed={"motors": np.array(pcc.relaxed_motors)})
     verdicts._check(tally, family, 0, PlainStatics(pcc), held, [changed])
     assert tally.broken == []  # what was sought counts
+    wrong = PlainStatics(pcc)
+    strains = wrong._strains
+    monkeypatch.setattr(wrong, "_strains", lambda *asked: strains(*asked) + 1e-3)  # [rad and m], of each section
+    verdicts._check(tally, family, 0, wrong, case, [Answer(0, STABLE, springs=np.zeros(pcc.n_springs))])
+    assert any("a muscle is 0.00" in law and "m from its length" in law for _, law in tally.broken)
+
+
+@pytest.mark.parametrize("kind", ["pcc", "mounted"])
+def test_a_soak_sees_a_direction_that_the_solver_does_not_know(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Out of balance along one elastic coordinate, of a robot whose coordinates leave that one out."""
+    robot = model(kind)
+    for number, springs in enumerate(1e-3 * np.eye(robot.n_springs)):
+        plain = PlainStatics(robot)
+        monkeypatch.setattr(plain, "_free", np.delete(plain._free, number, axis=0))
+        found = plain.balance(one(robot.relaxed_motors), springs[None])
+        assert found.imbalance[0] > 1e-6  # what the soak looks at; 1e-10 is let through
+        assert len(found.residual[0]) == robot.n_springs - 1
 
 
 def test_errors_that_are_not_ours_hangs_and_numbers_that_are_none_are_broken_laws() -> None:

@@ -3,7 +3,9 @@
 Of a model it takes the rigid bodies (placements, axes, masses), the names and numbers of springs, sections and muscles as the
 description has them, and nothing of the solvers: forces and moments are summed up from the tip to the base, a section is the
 matrix exponential of its strain, its joints come from that pose by the formulas of `softrobots.strain_chain`, and derivatives
-of those are complex steps. Whole batches of cases are worked on at once; there is no limit to the number of joints.
+of those are complex steps. Where muscle lengths are given, strains come from the model's elastic coordinates as the solvers
+have them; whether these keep the lengths, and whether all that the lengths leave free is in balance, is seen by the rows of the
+muscles here. Whole batches of cases are worked on at once; there is no limit to the number of joints.
 """
 
 from __future__ import annotations
@@ -48,6 +50,8 @@ class Balance(NamedTuple):
 
     residual: FloatArray
     """What is out of balance in the elastic coordinates, shape (n, n_springs) [N m or N]."""
+    imbalance: FloatArray
+    """Size of what is out of balance in all that given muscle lengths leave free, shape (n,) [N m]."""
     size: FloatArray
     """Size of the load, `|f| reach + |moment| + |g|`, with tensions times the reach, shape (n,) [N m]."""
     motor_torques: FloatArray
@@ -105,6 +109,7 @@ class PlainStatics:
         origin = np.array(model.structure.strains(motors, zero))
         units = np.eye(model.n_springs)
         self._free = np.array([model.structure.strains(motors, unit) - origin for unit in units]).reshape(-1, len(names))
+        self._left_free = _null_space(self._muscles) if self._lengths_given else np.eye(len(names))
 
     def _names(self, group: Any) -> list[str]:
         return [self.model.spring_joints[place] for place in group.springs]
@@ -138,10 +143,16 @@ class PlainStatics:
         Returns:
             What is out of balance, n rows.
         """
+        rows, size, motor_torques, tip, held = self._summed(case, springs)
+        rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(np.abs(rows) @ np.abs(self._left_free.T), axis=1)
+        imbalance = np.linalg.norm(rows @ self._left_free.T, axis=1)
+        return Balance(rows @ self._free.T, imbalance, size, motor_torques, tip, rounding, held)
+
+    def _summed(self, case: Case, springs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """What is out of balance of every spring and strain, held or not; size, motor torques, tip, `held` of a `Balance`."""
         strains = self._strains(case.motors, springs)
         torques, size, tip = self._torques(case, strains)
         rows = self._spring_loads(strains)
-        rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(np.abs(rows) @ np.abs(self._free.T), axis=1)
         count = len(self._spring_columns)
         rows[:, :count] -= torques[:, self._spring_columns]
         if len(self._lengths):
@@ -157,7 +168,7 @@ class PlainStatics:
             else:
                 rows += given @ self._muscles
                 size = size + np.abs(given).sum(axis=1) * self.model.reach
-        return Balance(rows @ self._free.T, size, torques[:, self._motor_columns], tip, rounding, held)
+        return rows, size, torques[:, self._motor_columns], tip, held
 
     def tangent(self, case: Case, springs: FloatArray) -> FloatArray:
         """Tangent stiffness of one case by central differences, shape (n_springs, n_springs).
@@ -272,6 +283,13 @@ def _turns(axis: FloatArray, angles: FloatArray) -> FloatArray:
     spin = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     made = np.eye(3) + np.sin(angles)[:, None, None] * spin + (1.0 - np.cos(angles))[:, None, None] * (spin @ spin)
     return np.asarray(made)
+
+
+def _null_space(rows: FloatArray) -> FloatArray:
+    """Directions of length 1 that change none of the rows, shape (k, n), by singular values."""
+    _, values, directions = np.linalg.svd(rows)
+    rank = int(np.count_nonzero(values > values.max(initial=0.0) * 1e-12))
+    return np.asarray(directions[rank:])
 
 
 def _axis(rigid: Any, number: int) -> tuple[bool, FloatArray]:

@@ -112,7 +112,7 @@ def _check(tally: Tally, family: Family, chunk: int, statics: PlainStatics, case
     springs = np.array([answer.springs for answer in answers])
     balance = statics.balance(asked, springs)
     tolerance = np.maximum(TOLERANCE * np.maximum(balance.size, MOMENT_FLOOR), statics.model.rounding)
-    residual = np.maximum(np.linalg.norm(balance.residual, axis=1) - balance.rounding, 0.0) / tolerance
+    residual = np.maximum(balance.imbalance - balance.rounding, 0.0) / tolerance
     residual = np.nan_to_num(residual, nan=WORST, posinf=WORST)
     tally.residual = max(tally.residual, float(residual.max()))
     for place, answer in enumerate(answers):
