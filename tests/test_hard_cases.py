@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
 import runpy
@@ -233,6 +234,31 @@ def test_a_call_that_hangs_is_interrupted() -> None:
     assert time.perf_counter() - begun < 10.0
     with limited(20.0):
         pass
+
+
+def test_compiled_code_that_hangs_ends_the_soak_with_a_broken_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing interrupts it in its own process; a process that only starts takes longer than this patience."""
+    monkeypatch.setattr("softrobots.soak.running.PATIENCE", 1e-3)
+    tallies = soak(6, processes=2, families=[family_of("arm")], compiler=False)
+    assert ["nothing was done for 0.001 s" in law for _, law in tallies["arm"].broken] == [True]
+    assert tallies["arm"].cases == 0
+
+
+def test_every_loop_of_the_compiled_solvers_ends() -> None:
+    """A loop without a count goes on with a share that it halves or doubles, up to a limit that the share itself has."""
+    loops = []
+    for file in (CHECKOUT / "softrobots" / "kernels").glob("*drivers.py"):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        for loop in (node for node in ast.walk(tree) if isinstance(node, ast.While)):
+            told = ast.unparse(loop.test)
+            scaled = [ast.unparse(node) for node in ast.walk(loop) if isinstance(node, ast.AugAssign)]
+            loops.append((told.rpartition(" and ")[2], scaled[0]))
+        calls = [node.iter for node in ast.walk(tree) if isinstance(node, ast.For)]
+        assert all(isinstance(call, ast.Call) and ast.unparse(call.func) == "range" for call in calls)
+    assert set(loops) == {
+        ("share > 1e-12 * largest", "share *= 0.5"),
+        ("2.0 * share * length < longest", "share *= 2.0"),
+    }
 
 
 def test_cases_are_the_same_in_every_run_and_cover_what_is_hard() -> None:

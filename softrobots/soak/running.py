@@ -17,6 +17,8 @@ from softrobots.soak.jobs import STABLE, UNSTABLE
 from softrobots.soak.verdicts import Tally, judge, said
 
 _AHEAD = 4  # parts that wait for each process
+PATIENCE = 1800.0
+"""When no part has been done for so long, compiled code hangs, which nothing in its process interrupts [s]."""
 
 
 class Part(NamedTuple):
@@ -121,8 +123,23 @@ def _judged(parts: Sequence[Part], processes: int, *asked: Any) -> Iterator[tupl
                     break
             if not running:
                 return
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            done = wait(running, PATIENCE, return_when=FIRST_COMPLETED).done
+            for future in done:
                 yield running.pop(future), future.result()
+            if not done:
+                yield from _hanging(running)
+                return
+
+
+def _hanging(running: Mapping[Future[Tally], Part]) -> Iterator[tuple[Part, Tally]]:
+    """End processes that hang; what they had and what was to come is a broken law of each part."""
+    for process in multiprocessing.active_children():
+        process.kill()
+    for part in running.values():
+        law = (
+            f"nothing was done for {PATIENCE:g} s: this case or one of the {part.rows} behind it hangs, and the soak ends here"
+        )
+        yield part, Tally(broken=[(part.chunk * family_of(part.family).chunk, law)])
 
 
 def _judge_part(part: Part, seed: int, compiler: bool) -> Tally:
