@@ -53,7 +53,10 @@ class Part(NamedTuple):
 
 STATICS = ("elastostatics", "equilibrium", "stability", "saturation", "laws_statics")
 CURVATURE = ("constant_curvature", "laws_constant_curvature", "argument_errors", "hostile_numbers")
-HELIX = ("helix_shapes", "helix_paths", "helix_contact", "laws_helix", "argument_errors", "hostile_numbers")
+HELIX = (
+    *(f"helix_{name}" for name in ("shapes", "paths", "contact", "grasping", "fabrication")),
+    *("laws_helix", "argument_errors", "hostile_numbers"),
+)
 PARTS = {
     "elastostatics": Part(("elastostatics.py",), STATICS),
     "sensitivity": Part(("sensitivity.py",), ("sensitivity", "laws_statics_loading")),
@@ -66,7 +69,9 @@ PARTS = {
     "constant_curvature": Part(
         tuple(f"constant_curvature/{name}.py" for name in ("arcs", "jacobians", "muscles", "poses")), CURVATURE
     ),
-    "helix": Part(tuple(f"helix/{name}.py" for name in ("shapes", "paths", "contact")), HELIX),
+    "helix": Part(
+        tuple(f"helix/{name}.py" for name in ("shapes", "paths", "contact", "tube", "grasping", "fabrication")), HELIX
+    ),
 }
 LEFT_OUT = {
     "10000": "ten thousand random cases; what they notice, others do",
