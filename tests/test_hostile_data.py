@@ -35,6 +35,7 @@ from softrobots.robots.parameter_file import LARGEST_FILE, read_parameters
 from tests import hostile_data as data
 from tests.conftest import CHECKOUT
 from tests.hostile import HOSTILE_NUMBERS
+from tests.laws import law
 
 SECONDS = 1.0
 """CPU time of a refusal [s]. Measured: 0.1 s at most, in the largest YAML file."""
@@ -577,6 +578,7 @@ def test_steps_of_keys_stay_numbers(arm: sr.SoftModel) -> None:
         assert not np.array_equal(pushed.force, start.force)
 
 
+@law("live.loop.LiveView")
 @settings(max_examples=25)
 @given(sent=st.binary(max_size=200) | st.text('targetmotorsforcegravityon {}[]:,"0123456789.e-\n', max_size=80).map(str.encode))
 def test_any_lines_of_a_pipe_are_followed_or_told(arm: sr.SoftModel, sent: bytes) -> None:

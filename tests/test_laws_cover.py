@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
-import importlib
+import importlib.util
 import inspect
+from fnmatch import fnmatchcase
 from functools import cache
 from types import ModuleType
 
@@ -16,11 +17,28 @@ from softrobots.kernels.compiled_model import CompiledModel
 from tests.conftest import CHECKOUT
 from tests.laws import REGISTERED
 
-SUBMODULES = ("constant_curvature", "export", "helix", "inflated_beam")
+SUBMODULES = ("constant_curvature", "export", "helix", "inflated_beam", "sweeps")
 CLASSES = (CompiledModel, sr.SoftModel, sr.Viewer)
 
-WITHOUT = {"Viewer.wait": "it returns when the server ends, or on Ctrl-C; test_view_command ends it so"}
-"""Methods without a law, and why."""
+_RESULT = "a result: what is in it is in the laws of what returns it"
+_SCREEN = "it writes to a terminal or reads its words; tests of the commands run it"
+WITHOUT = {
+    "Viewer.wait": "it returns when the server ends, or on Ctrl-C; test_view_command ends it so",
+    "robots.Robot": "a protocol: nothing of it is called",
+    "third_party.robot_file": "a table of a package of data: test_model loads what is in it",
+    "kernels.compiled_model.CompiledModel": "its methods have laws, under the name of the class",
+    "kernels.statuses.Status": "numbers with names",
+    **dict.fromkeys((f"kernels.results.Compiled{name}" for name in ("Equilibrium", "LoadEstimate")), _RESULT),
+    **dict.fromkeys((f"kernels.results.{name}Batch" for name in ("Equilibrium", "Load", "Motor")), _RESULT),
+    "live.commands.Wanted": _RESULT,
+    "meshcat_view.inline_page.InlinePage": "a page of somebody else's notebook: test_view_command shows it in a browser",
+    "slider_page.SliderPage": "a page in a browser: test_slider_page moves its sliders",
+    "*plots.*": "pictures: tests look at what is drawn, and hypothesis has no eyes",
+    "cli.main": "hypothesis tries words for each command in test_cli_bad_words, within a test for each",
+    "cli.parser": _SCREEN,
+    "command_line.*": _SCREEN,
+}
+"""Public names without a law, also by a pattern, and why."""
 
 for _file in sorted((CHECKOUT / "tests").glob("test_*.py")):  # they register their laws
     if "\n@law(" in _file.read_text(encoding="utf-8"):
@@ -36,7 +54,34 @@ def public_names() -> set[str]:
     for kind in CLASSES:
         functions = inspect.getmembers(kind, inspect.isfunction)
         found |= {f"{kind.__name__}.{name}" for name, _ in functions if not name.startswith("_")}
-    return found - set(WITHOUT)
+    return found | documented()
+
+
+@cache
+def documented() -> set[str]:
+    """Every other callable of the API reference: things by their name in `softrobots`, and all that is public in a module."""
+    spec = importlib.util.spec_from_file_location("api_pages", CHECKOUT / "docs" / "site" / "api_pages.py")
+    assert spec is not None
+    pages = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pages)  # type: ignore[union-attr]
+    known = {
+        getattr(sr, name) for name in sr.__all__ if inspect.isroutine(getattr(sr, name)) or inspect.isclass(getattr(sr, name))
+    }
+    found: dict[str, object] = {}
+    for name in (name for page in pages.PAGES.values() for name in page.names if name not in pages.PACKAGES):
+        above, _, last = name.rpartition(".")
+        thing = getattr(importlib.import_module(above), last, None) or importlib.import_module(name)
+        if isinstance(thing, ModuleType):
+            found |= {f"{name}.{key}": one for key, one in vars(thing).items() if getattr(one, "__module__", "") == name}
+        else:
+            found[name] = thing
+    kept = (name for name, thing in found.items() if callable(thing) and thing not in known and thing is not sr.compile)
+    return {name.removeprefix("softrobots.") for name in kept if not name.rpartition(".")[2].startswith("_")}
+
+
+def excused(name: str) -> bool:
+    """Whether a name has no law, for a reason."""
+    return any(fnmatchcase(name, pattern) for pattern in WITHOUT)
 
 
 @cache
@@ -66,14 +111,13 @@ def words_used(module: ModuleType, test: str) -> set[str]:
 
 
 def test_every_public_name_has_a_law() -> None:
-    assert sorted(public_names() - REGISTERED.keys()) == []
+    assert {"sweeps.map_workspace", "robots.parameter_file.read_robot", "plots.poses", "live.loop.LiveView"} <= public_names()
+    assert sorted(name for name in public_names() - REGISTERED.keys() if not excused(name)) == []
 
 
 def test_what_has_no_law_is_there_and_says_why() -> None:
-    methods = {f"{kind.__name__}.{name}": value for kind in CLASSES for name, value in inspect.getmembers(kind)}
-    for name, reason in WITHOUT.items():
-        assert callable(methods[name])
-        assert name not in REGISTERED
+    for pattern, reason in WITHOUT.items():
+        assert any(fnmatchcase(name, pattern) for name in public_names() - REGISTERED.keys()), pattern
         assert reason
 
 

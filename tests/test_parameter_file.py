@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.robots.parameter_file import ParameterFile, read_parameters, read_robot, write_parameters
+from tests.laws import law
 
 NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True).filter(lambda name: name != "robot")
 SCALARS = (
@@ -39,6 +40,7 @@ def lists(value: Any) -> Any:
     return [lists(item) for item in value] if isinstance(value, tuple | list) else (type(value).__name__, value)
 
 
+@law("robots.parameter_file.write_parameters", "robots.parameter_file.read_parameters")
 @settings(max_examples=30)
 @given(values=st.dictionaries(NAMES, VALUES, max_size=5), ending=st.sampled_from([".yaml", ".json"]))
 def test_what_is_written_is_read_back(values: dict[str, Any], ending: str, tmp_path_factory: pytest.TempPathFactory) -> None:
@@ -53,6 +55,24 @@ def test_what_is_written_is_read_back(values: dict[str, Any], ending: str, tmp_p
     said = {"robot": "inflatable_arm", **values}
     assert list(theirs) == list(said)
     assert lists(list(theirs.values())) == lists(list(said.values()))
+
+
+@law("robots.parameter_file.read_robot")
+@settings(max_examples=20)
+@given(
+    lengths=st.lists(st.floats(0.2, 1.0), min_size=1, max_size=4),
+    stiffness=st.floats(1.0, 1e5),
+    moment=st.none() | st.floats(1.0, 1e3),
+    ending=st.sampled_from([".yaml", ".json"]),
+)
+def test_any_robot_comes_back_from_its_file(
+    lengths: list[float], stiffness: float, moment: float | None, ending: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    robot = sr.InflatableArm(link_lengths=tuple(lengths), stiffness=stiffness, max_moment=moment)
+    file = tmp_path_factory.getbasetemp() / f"robot{ending}"
+    write_parameters(file, "inflatable_arm", dataclasses.asdict(robot), overwrite=True)
+    assert read_robot(file) == robot
+    assert read_robot(file, "inflatable_arm") == robot
 
 
 @pytest.mark.parametrize("name", sr.ROBOTS)

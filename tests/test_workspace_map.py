@@ -12,11 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam, map_plots
 from softrobots.sweeps import TargetGrid, map_workspace, mapping, scheduling
 from softrobots.sweeps.scheduling import run_blocks
+from tests.laws import law
 from tests.test_scripts import run_script
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -60,6 +63,26 @@ def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: sr.sweeps.Wo
         assert needed(there) == pytest.approx(weighed.required_pressure[tuple(place)], rel=1e-9, abs=1e-3)
         assert there.wrinkled == weighed.wrinkled[tuple(place)]
     assert tried > 20
+
+
+@law("sweeps.map_workspace", "sweeps.WorkspaceMap")
+@settings(max_examples=10)
+@given(st.floats(0.1, 1.3), st.floats(-1.2, 1.2), st.floats(0.0, 60.0))
+def test_what_a_map_says_of_a_target_holds(arm: sr.SoftModel, x: float, z: float, load: float) -> None:
+    """Reached: an equilibrium on Pinocchio has the tip there. Not reached: Pinocchio's solver does not get there."""
+    found: sr.sweeps.WorkspaceMap = map_workspace(arm, TargetGrid((x,), (0.0,), (z,)), (0.0, load + 1.0), backend="python")
+    for level, weight in enumerate(found.loads):
+        place = (0, 0, 0, level)
+        if found.reached[place]:
+            there = sr.solve_equilibrium(arm, found.q_motors[place], weight * DOWN)
+            assert np.linalg.norm(there.tip_position - (x, 0.0, z)) <= 1.01e-9
+            assert needed(there) == pytest.approx(found.required_pressure[place], rel=1e-9, abs=1e-3)
+        else:
+            assert np.isinf(found.required_pressure[place])
+            with pytest.raises(sr.TargetUnreachable):
+                sr.solve_ik(arm, (x, 0.0, z), weight * DOWN)
+    unloaded = 0.05 < np.hypot(x, z) < 1.15  # well within the ring of the arm, whose links are 0.59 m long
+    assert found.reached[0, 0, 0, 0] or not unloaded
 
 
 def test_the_posture_is_the_better_elbow(arm: sr.SoftModel, weighed: sr.sweeps.WorkspaceMap) -> None:
