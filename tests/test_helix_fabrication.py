@@ -593,42 +593,92 @@ def test_the_helix_of_the_periods_is_that_on_which_their_ends_lie():
 # --- Bad input
 
 
+POSITIVE = "positive [m], at least 1e-30"
+PARTS = ("contraction", "angle", "diameter", "length")
+
+
+def refused(call: Callable[[], Any]) -> ParameterError:
+    with pytest.raises(ParameterError) as caught:
+        call()
+    return caught.value
+
+
 @pytest.mark.parametrize(
-    ("change", "field"),
+    ("change", "field", "requirement"),
     [
-        ({"actuator": (1.0, 0.1, D, 1.0)}, "contraction"),  # nothing to pinch
-        ({"actuator": (0.0, 0.1, D, 1.0)}, "contraction"),
-        ({"actuator": (0.5, -0.1, D, 1.0)}, "angle"),
-        ({"actuator": (0.5, 1.56, D, 1.0)}, "angle"),
-        ({"actuator": (0.5, math.nan, D, 1.0)}, "angle"),
-        ({"actuator": (0.5, 0.1, 0.0, 1.0)}, "diameter"),
-        ({"actuator": (0.5, 0.1, D, -1.0)}, "length"),
-        ({"actuator": (0.5, 0.1, D)}, "actuator"),
-        ({"actuator": "tube"}, "actuator"),
-        ({"actuator": None}, "actuator"),
-        ({"spacing": 0.0}, "spacing"),
-        ({"spacing": math.inf}, "spacing"),
-        ({"spacing": 0.2}, "spacing"),  # more than a quarter turn
-        ({"actuator": (0.5, 0.1, D, 0.01)}, "spacing"),  # not one period
-        ({"spacing": 1e-5}, "spacing"),  # too many
-        ({"method": "glue"}, "method"),
-        ({"remainder": "start"}, "remainder"),
-        ({"handedness": "up"}, "handedness"),
-        ({"handedness": ""}, "handedness"),
-        ({"start_azimuth": math.nan}, "start_azimuth"),
-        ({"tape_length": 0.01}, "tape_length"),
-        ({"tape_width": 0.01}, "tape_width"),
-        ({"method": "tape", "tape_length": 0.011}, "tape_length"),  # more than stays
-        ({"method": "tape", "tape_length": 0.0}, "tape_length"),
-        ({"method": "tape", "tape_width": 0.06}, "tape_width"),
-        ({"method": "tape", "tape_width": -0.01}, "tape_width"),
+        ({"actuator": (1.0, 0.1, D, 1.0)}, "contraction", "below 1: at 1 there is nothing to pinch"),
+        ({"actuator": (0.0, 0.1, D, 1.0)}, "contraction", "positive [-], at least 1e-30"),
+        ({"actuator": (0.5, -0.1, D, 1.0)}, "angle", "in [0, pi/2) rad; say handedness where it matters"),
+        ({"actuator": (0.5, 1.56, D, 1.0)}, "angle", "at most 1.5533 rad (89 degrees) for a sheet that can be drawn"),
+        ({"actuator": (0.5, math.nan, D, 1.0)}, "angle", "a finite number [rad], at most 1e+30 in size"),
+        ({"actuator": (0.5, 0.1, 0.0, 1.0)}, "diameter", POSITIVE),
+        ({"actuator": (0.5, 0.1, D, -1.0)}, "length", POSITIVE),
+        ({"actuator": (0.5, 0.1, D)}, "actuator", "a HelixDesign, or (contraction, angle, diameter, length of the tube)"),
+        ({"actuator": "tube"}, "actuator", "a HelixDesign, or (contraction, angle, diameter, length of the tube)"),
+        ({"actuator": None}, "actuator", "a HelixDesign, or (contraction, angle, diameter, length of the tube)"),
+        ({"spacing": 0.0}, "spacing", POSITIVE),
+        ({"spacing": math.inf}, "spacing", "a finite number [m], at most 1e+30 in size"),
+        ({"spacing": 0.2}, "spacing", "at most 0.08668 m, with which a period turns the tube by a quarter turn"),
+        ({"actuator": (0.5, 0.1, D, 0.01)}, "spacing", "at most the length 0.01005 m of the actuator line"),
+        ({"spacing": 1e-5}, "spacing", "at least 5.03e-05 m: at most 20000 pinches are planned"),
+        ({"method": "glue"}, "method", "one of 'pinch', 'tape', 'stoppers'"),
+        ({"remainder": "start"}, "remainder", "one of 'end', 'both', 'respace'"),
+        ({"handedness": "up"}, "handedness", "one of 'right', 'left'"),
+        ({"handedness": ""}, "handedness", "one of 'right', 'left'"),
+        ({"start_azimuth": math.nan}, "start_azimuth", "a finite number [rad], at most 1e+30 in size"),
+        ({"tape_length": 0.01}, "tape_length", "None where the method is 'pinch'; only 'tape' uses it"),
+        ({"tape_width": 0.01}, "tape_width", "None where the method is 'pinch'; only 'tape' uses it"),
+        ({"method": "tape", "tape_length": 0.011}, "tape_length", "at most 0.01 m, what stays of a period"),
+        ({"method": "tape", "tape_length": 0.0}, "tape_length", POSITIVE),
+        ({"method": "tape", "tape_width": 0.06}, "tape_width", "at most half the circumference, 0.05199 m"),
+        ({"method": "tape", "tape_width": -0.01}, "tape_width", POSITIVE),
     ],
 )
-def test_a_bad_pattern_is_refused(change: dict[str, Any], field: str):
+def test_a_bad_pattern_is_refused(change: dict[str, Any], field: str, requirement: str):
     good: dict[str, Any] = {"actuator": (0.5, 0.1, D, 1.0), "spacing": 0.02}
-    with pytest.raises(ParameterError) as caught:
-        pinch_pattern(**(good | change))
-    assert caught.value.field == field
+    error = refused(lambda: pinch_pattern(**(good | change)))
+    assert (error.field, error.requirement) == (field, requirement)
+    asked = good | change
+    came = asked["actuator"][PARTS.index(field)] if field in PARTS else asked[field]
+    assert error.value is came or error.value == came or math.isnan(error.value)
+
+
+def test_what_is_just_allowed_is_planned():
+    steep = pinch_pattern((0.5, math.radians(89.0), D, 1.0), 0.02)
+    assert steep.count == int(1.0 / math.cos(math.radians(89.0)) / 0.02)
+    assert pinch_pattern((0.5, 0.0, D, 20.0), 0.001).count == 20_000  # so many are planned
+    quarter = 0.5 * math.pi * D / 0.5  # of a straight line, which turns by the pinches alone
+    assert pinch_pattern((0.5, 0.0, D, 1.0), quarter).spacing == quarter
+    tape = pinch_pattern((0.5, 0.1, D, 1.0), 0.02, "tape", tape_length=0.01, tape_width=0.5 * math.pi * D)
+    assert (tape.tape_length, tape.tape_width) == (0.01, 0.5 * math.pi * D)  # all that stays, and half the circumference
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.0, 1.4])
+def test_a_period_turns_the_tube_by_a_quarter_turn_at_most(angle: float):
+    """The bend of a pinch about one side of the tube, and twice the angle of what stays."""
+    contraction = 0.6
+    widest = 0.5 * math.pi * D / (0.4 + 1.2 * math.sin(angle))
+    assert pinch_pattern((contraction, angle, D, 1.0), 0.999 * widest).count > 0
+    assert refused(lambda: pinch_pattern((contraction, angle, D, 1.0), 1.001 * widest)).field == "spacing"
+
+
+def test_what_is_not_said_of_a_pattern():
+    """The line starts at the fold; tape is half as long as what stays, and a quarter as wide as the tube."""
+    plan = pinch_pattern((0.5, 0.1, D, 1.0), 0.02, "tape")
+    assert (plan.start_azimuth, plan.tape_length, plan.tape_width) == (0.0, 0.005, 0.25 * D)
+    assert float(plan.locate(0.0).y) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments", "field"),
+    [
+        (helix.contraction_from_stoppers, ([0.01, 0.02], [0.1, 0.2, 0.3]), "gap"),
+        (helix.gap_for, ([0.5, 0.6], [0.1, 0.2, 0.3]), "stopper"),
+    ],
+)
+def test_the_shapes_that_do_not_fit_are_told(call: Callable[..., Any], arguments: tuple[Any, ...], field: str):
+    error = refused(lambda: call(*arguments))
+    assert (error.field, error.value) == (field, ((2,), (3,)))
 
 
 @pytest.mark.parametrize("arc", [-0.01, 10.0, math.nan, "far"])

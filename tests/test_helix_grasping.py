@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 from softrobots import helix
 from softrobots.errors import ParameterError
-from softrobots.helix import PAPER_CYLINDER, grasp_force
+from softrobots.helix import PAPER_CYLINDER, GraspForce, grasp_force
 from tests.laws import law
 
 PAPER: dict[str, Any] = {
@@ -197,6 +197,30 @@ def test_arguments_broadcast() -> None:
     assert grasp_force(1e4, deflection=0.002, **PAPER).force.shape == ()
     one = grasp_force(1.5e4, deflection=0.002, **PAPER)
     assert table.force[3, 1] == one.force
+
+
+def test_the_result_keeps_what_was_asked() -> None:
+    asked = {"object_radius": [0.02, 0.03], "deflection": 0.002, "turn_height": 0.08, "turns": 2, "diameter": 0.03}
+    grasp = grasp_force(10_000, **asked)
+    for name, value in (asked | {"pressure": 10_000}).items():
+        kept = getattr(grasp, name)
+        assert kept.tolist() == np.broadcast_to(value, 2).tolist()
+        assert kept.dtype == np.float64
+    assert {array.dtype for array in vars(GraspForce(*range(12))).values()} == {np.dtype(np.float64)}
+
+
+def test_one_turn_may_be_flat() -> None:
+    """Only the next turn collides with it."""
+    assert grasp_force(1e4, **(PAPER | {"deflection": 0.002, "turn_height": 0.01, "turns": 1.0})).force > 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [({"deflection": 0.0166}, "from 0 to 0.01655 m"), ({"deflection": 0.011, "object_radius": 0.01}, "from 0 to 0.01 m")],
+)
+def test_the_largest_deflection_is_told(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(ParameterError, match=f"{told}, the radius of the tube or that of the object"):
+        grasp_force(**({"pressure": 1e4, **PAPER} | change))
 
 
 def test_the_result_is_frozen() -> None:

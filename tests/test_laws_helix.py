@@ -8,6 +8,7 @@ import math
 import re
 import tempfile
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -530,3 +531,21 @@ def test_a_table_is_the_same_in_other_units_and_from_its_file(
     assert float(helix.inverse(shape).contraction) == pytest.approx(found, rel=1e-12)
     with pytest.raises(ParameterError, match="within the measured table"):
         table.contraction_at(pressures[-1] * (1.0 + 1e-9))
+
+
+@pytest.mark.parametrize(
+    ("call", "field", "shapes"),
+    [
+        (lambda: helix.turns(helix.forward([0.6, 0.7], 0.2, 0.03), [0.1, 0.2, 0.3], 1.0), "angle", ((2,), (3,))),
+        (lambda: helix.actuator_tension(0.6, [0.1, 0.2], 0.03, [1.0, 2.0, 3.0]), "pressure", None),
+        (lambda: helix.actuator_tension(0.6, 0.1, [0.03, 0.04], [1.0, 2.0, 3.0]), "pressure", None),
+        (lambda: helix.actuator_tension([0.6, 0.7], 0.1, 0.03, [1.0, 2.0, 3.0]), "pressure", None),
+    ],
+)
+def test_shapes_that_do_not_fit_are_told(
+    call: Callable[[], object], field: str, shapes: tuple[tuple[int, ...], ...] | None
+) -> None:
+    with pytest.raises(ParameterError, match="of a shape that broadcasts with the others") as caught:
+        call()
+    assert caught.value.field == field
+    assert shapes in (None, caught.value.value)
