@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import json
+import os
 import re
 import subprocess
 import sys
@@ -108,20 +109,28 @@ def test_every_spelling_of_an_exclusion_is_seen(comment: str) -> None:
     assert found["reason"].strip(" :-") == "why"
 
 
-def test_settings_that_exclude_are_seen_and_those_of_coverage_itself_are_none_of_ours(tmp_path: Path) -> None:
-    file = tmp_path / "pyproject.toml"
-    file.write_text("[tool.coverage.run]\nbranch = true\n", encoding="utf-8")
-    seen = script("measure_coverage").excluded_by_settings
-    assert all(reason == "" for _, reason in seen(file))  # whatever coverage.py leaves out by itself has no reason of ours
-    file.write_text(
+def test_settings_that_exclude_are_seen(tmp_path: Path) -> None:
+    """In a process of its own: another instance of coverage.py would end the count of this one."""
+    bare, full = tmp_path / "bare.toml", tmp_path / "full.toml"
+    bare.write_text("[tool.coverage.run]\nbranch = true\n", encoding="utf-8")
+    full.write_text(
         '[tool.coverage.run]\nomit = [\n  "a.py", # drawn by hand\n  "b.py",\n]\n[tool.coverage.report]\n'
         'exclude_lines = ["# pragma: no cover"]\nexclude_also = ["if slow:"] # once a year\n',
         encoding="utf-8",
     )
-    assert [(value.split()[-1], reason) for value, reason in seen(file)][:2] == [("a.py", "drawn by hand"), ("b.py", "")]
-    assert ("exclude_also if slow:", "once a year") in seen(file)
-    assert not any("pragma" in value for value, _ in seen(file))
-    assert seen(CHECKOUT / "pyproject.toml") == []
+    told = (
+        "import json, pathlib, sys; sys.path.insert(0, 'scripts'); from measure_coverage import excluded_by_settings as seen;"
+        "print(json.dumps([seen(pathlib.Path(file)) for file in sys.argv[1:]]))"
+    )
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE")}
+    asked = [sys.executable, "-c", told, str(bare), str(full), str(CHECKOUT / "pyproject.toml")]
+    done = subprocess.run(asked, capture_output=True, text=True, check=True, cwd=CHECKOUT, env=variables)
+    without, found, ours = json.loads(done.stdout)
+    assert all(reason == "" for _, reason in without)  # whatever coverage.py leaves out by itself has no reason of ours
+    assert [(value.split()[-1], reason) for value, reason in found][:2] == [("a.py", "drawn by hand"), ("b.py", "")]
+    assert ["exclude_also if slow:", "once a year"] in found
+    assert not any("pragma" in value for value, _ in found)
+    assert ours == []
 
 
 # --- A copy of the checkout

@@ -49,7 +49,7 @@ EXTRAS = {
 
 PACKAGES = (
     Package("pin", "4.0", "", "Pinocchio: kinematics, Jacobians, gravity"),
-    Package("eigenpy", "3.12", "", "Pinocchio's bridge to Eigen, and its factorisation of small matrices"),
+    Package("eigenpy", "3.13", "", "Pinocchio's bridge to Eigen, and its factorisation of small matrices"),
     Package("numpy", "2.2", "", "arrays"),
     Package("xacro", "2.1.1", "", "the generator of every URDF"),
     Package("yourdfpy", "0.0.60", "", "a second opinion on URDF files"),
@@ -60,7 +60,7 @@ PACKAGES = (
     Package("shtab", "1.13", "", "completion of the command in shells"),
     Package("matplotlib", "3.10.8", "plot", "plots", also="docs"),
     Package("scipy", "1.13", "helix", "actuators that vary along the tube"),
-    Package("numba", "0.60", "fast", "compiled solvers"),
+    Package("numba", "0.61.2", "fast", "compiled solvers"),
     Package("dask", "2024.8", "cluster", "sweeps on many machines"),
     Package("example-robot-data", "6", "robots", "third-party robots"),
     Package("pin-pink", "4.4", "bench", "rigid inverse kinematics, to compare with"),
