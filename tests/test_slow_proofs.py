@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -109,8 +110,9 @@ def test_every_spelling_of_an_exclusion_is_seen(comment: str) -> None:
     assert found["reason"].strip(" :-") == "why"
 
 
-def test_settings_that_exclude_are_seen(tmp_path: Path) -> None:
+def test_settings_that_exclude_are_seen(tool: Callable[[str], ModuleType], tmp_path: Path) -> None:
     """In a process of its own: another instance of coverage.py would end the count of this one."""
+    tool("coverage")
     bare, full = tmp_path / "bare.toml", tmp_path / "full.toml"
     bare.write_text("[tool.coverage.run]\nbranch = true\n", encoding="utf-8")
     full.write_text(

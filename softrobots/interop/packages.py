@@ -56,7 +56,7 @@ PACKAGES = (
     Package("meshcat", "0.3.2", "", "the browser view"),
     Package("threadpoolctl", "3.5", "", "one thread for linear algebra"),
     Package("tqdm", "4.66", "", "progress bars"),
-    Package("pyyaml", "6.0.1", "", "files of parameters: --parameters"),
+    Package("pyyaml", "6.0.3", "", "files of parameters: --parameters"),
     Package("shtab", "1.13", "", "completion of the command in shells"),
     Package("matplotlib", "3.10.8", "plot", "plots", also="docs"),
     Package("scipy", "1.13", "helix", "actuators that vary along the tube"),
