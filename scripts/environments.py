@@ -77,11 +77,6 @@ class Outcome:
     reasons: dict[str, int] = field(default_factory=dict)
     """Why tests were skipped, and how many for each reason."""
 
-    @property
-    def tests(self) -> int:
-        """Number of tests that there are."""
-        return self.passed + self.skipped + len(self.failed)
-
 
 ENVIRONMENTS = {python: Environment(python, python, lowest=False, extra="dev") for python in PYTHONS} | {
     "lowest": Environment("lowest", PYTHONS[0], lowest=True, extra="dev"),

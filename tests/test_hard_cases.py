@@ -112,6 +112,16 @@ def test_the_solvers_see_the_same_residual_and_tangent(kind: str, rng: np.random
     assert np.abs(tangent - state.tangent).max() <= 1e-7 * np.abs(state.tangent).max()
 
 
+def test_rounding_is_of_the_spring_loads_also_where_they_are_in_balance() -> None:
+    """A spring's load `k q` is exact to an ulp of itself, however little of it is left when the load is taken off."""
+    arm, motors, force = model("arm"), (0.3, 0.6, -0.8), (0.0, 10.0, -15.0)
+    found = sr.solve_equilibrium(arm, motors, force)
+    balance = PlainStatics(arm).balance(one(motors, force), found.q_springs[None])
+    loads = 172.71 * np.linalg.norm(found.q_springs)
+    assert balance.imbalance[0] < 1e-9 * loads
+    assert balance.rounding[0] == pytest.approx(16.0 * np.finfo(float).eps * loads, rel=1e-12, abs=0.0)
+
+
 def test_slopes_of_a_section_by_complex_steps_are_its_differences(rng: np.random.Generator) -> None:
     for size in (1e-9, 1e-2, 0.1, 1.0):
         z, length = size * rng.normal(size=4) * np.array([1.0, 1.0, 1.0, 0.1]), np.array(0.3)

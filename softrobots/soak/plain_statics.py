@@ -143,16 +143,10 @@ class PlainStatics:
         Returns:
             What is out of balance, n rows.
         """
-        rows, size, motor_torques, tip, held = self._summed(case, springs)
-        rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(np.abs(rows) @ np.abs(self._left_free.T), axis=1)
-        imbalance = np.linalg.norm(rows @ self._left_free.T, axis=1)
-        return Balance(rows @ self._free.T, imbalance, size, motor_torques, tip, rounding, held)
-
-    def _summed(self, case: Case, springs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What is out of balance of every spring and strain, held or not; size, motor torques, tip, `held` of a `Balance`."""
         strains = self._strains(case.motors, springs)
         torques, size, tip = self._torques(case, strains)
         rows = self._spring_loads(strains)
+        rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(np.abs(rows) @ np.abs(self._left_free.T), axis=1)
         count = len(self._spring_columns)
         rows[:, :count] -= torques[:, self._spring_columns]
         if len(self._lengths):
@@ -168,7 +162,8 @@ class PlainStatics:
             else:
                 rows += given @ self._muscles
                 size = size + np.abs(given).sum(axis=1) * self.model.reach
-        return rows, size, torques[:, self._motor_columns], tip, held
+        imbalance = np.linalg.norm(rows @ self._left_free.T, axis=1)
+        return Balance(rows @ self._free.T, imbalance, size, torques[:, self._motor_columns], tip, rounding, held)
 
     def tangent(self, case: Case, springs: FloatArray) -> FloatArray:
         """Tangent stiffness of one case by central differences, shape (n_springs, n_springs).

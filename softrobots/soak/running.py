@@ -115,6 +115,7 @@ def _judged(parts: Sequence[Part], processes: int, *asked: Any) -> Iterator[tupl
             yield part, _judge_part(part, *asked)
         return
     waiting, running = iter(parts), dict[Future[Tally], Part]()
+    others = set(multiprocessing.active_children())
     with ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         while True:
             for part in waiting:
@@ -127,14 +128,14 @@ def _judged(parts: Sequence[Part], processes: int, *asked: Any) -> Iterator[tupl
             for future in done:
                 yield running.pop(future), future.result()
             if not done:
+                for process in set(multiprocessing.active_children()) - others:
+                    process.kill()
                 yield from _hanging(running)
                 return
 
 
 def _hanging(running: Mapping[Future[Tally], Part]) -> Iterator[tuple[Part, Tally]]:
-    """End processes that hang; what they had and what was to come is a broken law of each part."""
-    for process in multiprocessing.active_children():
-        process.kill()
+    """A broken law for each part that processes had, or were to get, when they hung."""
     for part in running.values():
         law = (
             f"nothing was done for {PATIENCE:g} s: this case or one of the {part.rows} behind it hangs, and the soak ends here"
