@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-import importlib
+import importlib.util
 import os
 import re
 import signal
@@ -39,6 +39,20 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 50)
+
+
+def load_script(name: str, folder: str = "scripts") -> ModuleType:
+    """A file of the checkout that belongs to no package, as a module."""
+    spec = importlib.util.spec_from_file_location(name, CHECKOUT / folder / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses ask for it
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        del sys.modules[name]
+    return module
 
 
 def missing(reason: str) -> None:

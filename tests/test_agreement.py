@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from collections.abc import Callable
@@ -20,7 +19,7 @@ from softrobots.export.mjcf import to_mjcf
 from softrobots.interop.kinematics import pose_error
 from softrobots.interop.mujoco_statics import tip_pose
 from softrobots.interop.outcomes import Question
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 from tests.helix_rods import HelixRod, solve_helix_rod
 from tests.muscle_rods import MuscleSegment, solve_muscle_arm
 
@@ -37,10 +36,7 @@ SAME = 1e-12
 
 @cache
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("agreement", CHECKOUT / "scripts" / "agreement.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("agreement")
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
 from dataclasses import replace
@@ -16,7 +15,7 @@ import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.composition import fix_joints
 from tests import rods
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 from tests.inflated_rods import InflatedRod, product, solve_inflated_chain, turned
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005, "pressure": 50e3}
@@ -177,10 +176,7 @@ def test_the_error_of_two_hinges_is_of_second_order_in_the_load() -> None:
 
 @pytest.fixture
 def script() -> Any:
-    spec = importlib.util.spec_from_file_location("beam_validity", CHECKOUT / "scripts" / "beam_validity.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("beam_validity")
 
 
 def test_the_record_is_what_a_fresh_run_says(script: Any) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import json
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -30,18 +29,11 @@ from softrobots.benchmark.pinocchio_solvers import NEWTON, PinocchioArm
 from softrobots.benchmark.race import Race, Settings, figure, quick_settings
 from softrobots.benchmark.results import AT_LEAST, AT_MOST, Curve, Results, Row, as_json, read_results, require_whole, table
 from softrobots.benchmark.scipy_solvers import solvers
-from tests.conftest import CHECKOUT, missing
+from tests.conftest import CHECKOUT, load_script, missing
 
 SAME = 1e-8
 """[rad]: residuals are below 1e-10 f L, 2e-9 N m, over at least 80 N m/rad, which a load can soften by a few times."""
 RECORDED = CHECKOUT / "docs" / "benchmark.json"
-
-
-def load_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("benchmark", CHECKOUT / "scripts" / "benchmark.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def cases_of(model: sr.SoftModel, count: int, size: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -352,7 +344,7 @@ def test_curves_go_over_all_sizes(stand_in: list, tmp_path: Path) -> None:
     assert [curve.sizes for curve in results.curves if curve.picture == "sizes"] == [(2, 3)] * 5
     assert [curve.sizes for curve in results.curves if curve.picture == "batches"] == [(1, 4)] * 4
     assert (results.rows, results.notes) == ((), ())  # growth is told from 10 to 50
-    files = load_script().write_pictures(results, tmp_path, overwrite=False)
+    files = load_script("benchmark").write_pictures(results, tmp_path, overwrite=False)
     assert [file.name for file in files] == ["benchmark_sizes.png", "benchmark_batches.png"]
 
 
@@ -430,7 +422,7 @@ def test_docs_are_made_of_whole_results_only(settings: dict, row: dict, told: st
 
 def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
     with pytest.raises(SystemExit) as ended:
-        load_script().main(["--help"])
+        load_script("benchmark").main(["--help"])
     assert ended.value.code == 0
     told = capsys.readouterr().out
     assert all(f"--{name}" in told for name in ("only", "rounds", "cpp", "quick", "from", "json", "plots", "docs"))
@@ -441,7 +433,7 @@ def test_the_script_runs_end_to_end(tool: Callable, stand_in: list, tmp_path: Pa
     tool("mujoco")
     target = tmp_path / "results.json"
     arguments = ["--quick", "--rounds", "1", "--only", "equilibrium", "trajectory", "--json", str(target)]
-    assert load_script().main(arguments) == 0
+    assert load_script("benchmark").main(arguments) == 0
     printed = capsys.readouterr()
     assert "round" in printed.err  # the progress bar
     results = read_results(target)
@@ -452,20 +444,20 @@ def test_the_script_runs_end_to_end(tool: Callable, stand_in: list, tmp_path: Pa
     timed = [name for name, row in by_baseline.items() if row.baseline_seconds is not None]
     assert len(timed) >= 9
     assert any("MuJoCo settling, tuned, any step: time step" in note for note in results.notes)
-    assert load_script().main(["--from", str(target)]) == 0
+    assert load_script("benchmark").main(["--from", str(target)]) == 0
     assert capsys.readouterr().out == printed.out.partition("\nwritten: ")[0]
-    assert load_script().main(arguments) == 2  # the file is there
+    assert load_script("benchmark").main(arguments) == 2  # the file is there
     assert "exists" in capsys.readouterr().err
-    assert load_script().main(["--from", str(target), "--docs", str(tmp_path)]) == 2
+    assert load_script("benchmark").main(["--from", str(target), "--docs", str(tmp_path)]) == 2
     assert "whole benchmark" in capsys.readouterr().err
-    assert load_script().main(["--quick", "--docs", str(tmp_path)]) == 2  # before anything is measured
+    assert load_script("benchmark").main(["--quick", "--docs", str(tmp_path)]) == 2  # before anything is measured
     assert "--cpp" in capsys.readouterr().err
     told = json.loads(target.read_text(encoding="utf-8"))
     del told["machine"]["processor"]
     (tmp_path / "foreign.json").write_text(json.dumps(told), encoding="utf-8")
-    assert load_script().main(["--from", str(tmp_path / "foreign.json")]) == 2
+    assert load_script("benchmark").main(["--from", str(tmp_path / "foreign.json")]) == 2
     assert "holds no results" in capsys.readouterr().err
-    assert load_script().main(["--rounds", "0"]) == 2
+    assert load_script("benchmark").main(["--rounds", "0"]) == 2
     assert "--rounds = 0" in capsys.readouterr().err
 
 
@@ -488,7 +480,7 @@ def test_a_baseline_that_is_not_installed_is_named(
 
 
 def test_docs_are_made_of_a_recorded_run(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    script, saved = load_script(), tmp_path / "saved.json"
+    script, saved = load_script("benchmark"), tmp_path / "saved.json"
     saved.write_text(as_json(made_up()), encoding="utf-8")
     (tmp_path / "docs").mkdir()
     for name in script.PAGES:
@@ -510,7 +502,7 @@ def test_docs_are_made_of_a_recorded_run(tmp_path: Path, capsys: pytest.CaptureF
 def test_the_tables_of_the_pages_are_those_of_the_recorded_run() -> None:
     if not RECORDED.is_file():
         missing("docs/benchmark.json has not been recorded: scripts/benchmark.py --cpp --docs")
-    script, results = load_script(), read_results(RECORDED)
+    script, results = load_script("benchmark"), read_results(RECORDED)
     require_whole(results, list(JOBS))
     for name, targets_only in script.PAGES.items():
         text = (CHECKOUT / name).read_text(encoding="utf-8")

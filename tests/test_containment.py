@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import csv
 import http.client
-import importlib.util
 import os
 import re
 import socket
@@ -27,7 +26,7 @@ from softrobots.export import FORMATS, export_model
 from softrobots.local_requests import is_local
 from softrobots.meshcat_view.page_text import legend_rows
 from softrobots.viewer import Viewer, view
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 from tests.test_viewer import listening
 
 SCRIPT = "</script><script>window.pwned = 1</script><img src=x onerror='window.pwned = 1'>"
@@ -267,11 +266,7 @@ def test_pages_from_elsewhere_are_not_answered(server: str, servers: dict[str, t
 @pytest.mark.parametrize("server", ["meshcat", "sliders", "documentation"])
 def test_servers_listen_on_loopback_only(server: str, servers: dict[str, tuple[int, str, int]]) -> None:
     if server == "documentation":
-        spec = importlib.util.spec_from_file_location("build_docs", CHECKOUT / "scripts" / "build_docs.py")
-        assert spec is not None
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)  # type: ignore[union-attr]
-        served = module.ServedFolder(CHECKOUT / "docs", 0)
+        served = load_script("build_docs").ServedFolder(CHECKOUT / "docs", 0)
         assert listening(os.getpid()) == {"127.0.0.1"}
         served._server.server_close()
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
 import json
 import re
 from pathlib import Path
@@ -13,16 +12,13 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from tests.conftest import CHECKOUT
+from tests.conftest import load_script
 from tests.helix_rods import actuator_frames
 from tests.test_scripts import run_script
 
 
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("helix_validation", CHECKOUT / "scripts" / "helix_validation.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("helix_validation")
 
 
 def test_it_validates_the_shipped_files_and_random_tubes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

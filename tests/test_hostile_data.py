@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import contextlib
-import importlib.util
 import io
 import json
 import os
@@ -33,7 +32,7 @@ from softrobots.live.loop import LiveView, follow
 from softrobots.result_fields import KINDS
 from softrobots.robots.parameter_file import LARGEST_FILE, read_parameters
 from tests import hostile_data as data
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 from tests.hostile import HOSTILE_NUMBERS
 from tests.laws import law
 
@@ -754,9 +753,7 @@ def readers_in(text: str) -> bool:
 
 
 def test_every_module_that_reads_files_is_tried() -> None:
-    spec = importlib.util.spec_from_file_location("fuzz_readers", CHECKOUT / "scripts" / "fuzz_readers.py")
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
+    script = load_script("fuzz_readers")
     package = CHECKOUT / "softrobots"
     files = {file: ".".join(file.relative_to(package).with_suffix("").parts) for file in package.rglob("*.py")}
     found = {name for file, name in files.items() if readers_in(file.read_text(encoding="utf-8"))}

@@ -14,7 +14,7 @@ from hypothesis import is_hypothesis_test
 
 import softrobots as sr
 from softrobots.kernels.compiled_model import CompiledModel
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 from tests.laws import REGISTERED
 
 SUBMODULES = ("constant_curvature", "export", "helix", "inflated_beam", "sweeps")
@@ -60,10 +60,7 @@ def public_names() -> set[str]:
 @cache
 def documented() -> set[str]:
     """Every other callable of the API reference: things by their name in `softrobots`, and all that is public in a module."""
-    spec = importlib.util.spec_from_file_location("api_pages", CHECKOUT / "docs" / "site" / "api_pages.py")
-    assert spec is not None
-    pages = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(pages)  # type: ignore[union-attr]
+    pages = load_script("api_pages", "docs/site")
     known = {
         getattr(sr, name) for name in sr.__all__ if inspect.isroutine(getattr(sr, name)) or inspect.isclass(getattr(sr, name))
     }

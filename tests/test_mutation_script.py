@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -23,7 +21,7 @@ from softrobots.mutants import (
     read_explanations,
     read_mutants,
 )
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 
 GENERATED = '''
 from mutmut.mutation.trampoline import wrap_in_trampoline as _mutmut_mutated
@@ -224,13 +222,7 @@ def test_an_explanation_of_one_function_is_none_of_another() -> None:
 
 @pytest.fixture
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("mutation", CHECKOUT / "scripts" / "mutation.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["mutation"] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_script("mutation")
 
 
 @pytest.fixture

@@ -41,7 +41,7 @@ from softrobots.papers.rows import (
     taken,
     within,
 )
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 from tests.oracles import PRINTED_WRINKLING_MOMENTS, central_difference, flexible_jacobian, flexible_table, rigid_table
 from tests.test_scripts import run_script
 
@@ -364,12 +364,7 @@ def test_the_comparison_of_pages_can_fail() -> None:
 
 
 def _script():
-    import importlib.util
-
-    spec = importlib.util.spec_from_file_location("reproduce_papers", CHECKOUT / "scripts" / "reproduce_papers.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("reproduce_papers")
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import json
 import re
 from collections.abc import Callable
@@ -24,22 +23,15 @@ from softrobots.interop.newton import balance_point
 from softrobots.interop.outcomes import Question
 from softrobots.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
 from softrobots.interop.springs_read import springs_read
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 
 ROBOTS = tuple(FORCES)
 STATIC, SIMULATED, SINGLE = 1e-9, 1e-6, 1e-3  # what the issue asks for [rad or m]
 Tool = Callable[[str], ModuleType]
 
 
-def load_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("interoperability", CHECKOUT / "scripts" / "interoperability.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def run_script(arguments: list[str]) -> int:
-    return load_script().main(arguments)
+    return load_script("interoperability").main(arguments)
 
 
 @lru_cache
@@ -297,7 +289,7 @@ RECORDED = CHECKOUT / "docs" / "interoperability.json"
 
 
 def test_the_table_of_the_readme_is_that_of_the_recorded_run() -> None:
-    script = load_script()
+    script = load_script("interoperability")
     results = script.read_results(RECORDED)
     readme = (CHECKOUT / "README.md").read_text(encoding="utf-8")
     assert script.readme_with(readme, results) == readme
@@ -333,7 +325,7 @@ def test_the_script_compares_what_it_is_told_to(tool: Tool, tmp_path: Path, caps
 
 
 def test_docs_are_made_of_the_recorded_run(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    script = load_script()
+    script = load_script("interoperability")
     (tmp_path / "docs" / "images").mkdir(parents=True)
     before, after = "# softrobots\n\n", "\n\nThe end.\n"
     (tmp_path / "README.md").write_text(f"{before}{script.BEGIN}\nold\n{script.END}\n{after}", encoding="utf-8")

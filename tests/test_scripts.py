@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
 from pathlib import Path
@@ -12,15 +11,12 @@ import pytest
 
 import softrobots as sr
 from softrobots.trajectory import METHODS
-from tests.conftest import CHECKOUT
+from tests.conftest import load_script
 
 
 def run_script(name: str, arguments: list[str]) -> int:
     """Import a script as a module and call its main."""
-    spec = importlib.util.spec_from_file_location(name, CHECKOUT / "scripts" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.main(arguments)
+    return load_script(name).main(arguments)
 
 
 @pytest.mark.parametrize("method", METHODS)

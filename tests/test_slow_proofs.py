@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import json
 import os
 import re
@@ -19,19 +18,8 @@ import softrobots as sr
 from softrobots.clean_checkout import copy_checkout
 from softrobots.mutants import read_explanations
 from softrobots.recorded_run import command_of
-from tests.conftest import CHECKOUT
+from tests.conftest import CHECKOUT, load_script
 from tests.test_scripts import run_script
-
-
-def script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, CHECKOUT / "scripts" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses ask for it
-    try:
-        spec.loader.exec_module(module)
-    finally:
-        del sys.modules[name]
-    return module
 
 
 def test_the_page_names_tests_that_exist() -> None:
@@ -77,7 +65,7 @@ def test_a_part_of_the_work_is_not_recorded(
 
 def test_tests_that_end_early_have_not_passed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """pytest writes a report without a failure all the same."""
-    environments = script("environments")
+    environments = load_script("environments")
     monkeypatch.setattr(environments, "copy_checkout", lambda _, copy: copy.mkdir())
     monkeypatch.setattr(environments, "make_environment", lambda *_, **__: Path(sys.executable))
     report = '<testsuites><testsuite failures="0"><testcase classname="a" name="b"/></testsuite></testsuites>'
@@ -94,7 +82,7 @@ def test_tests_that_end_early_have_not_passed(tmp_path: Path, monkeypatch: pytes
 
 
 def test_a_machine_without_any_python_proves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    environments = script("environments")
+    environments = load_script("environments")
     monkeypatch.setattr(environments, "interpreters", dict)
     assert environments.main(["--output", str(tmp_path / "out")]) == 2
     assert not (tmp_path / "out").exists()
@@ -105,7 +93,7 @@ def test_a_machine_without_any_python_proves_nothing(tmp_path: Path, monkeypatch
 
 @pytest.mark.parametrize("comment", ["# pragma: no cover - why", "#pragma no cover - why", "# PRAGMA: NO BRANCH - why"])
 def test_every_spelling_of_an_exclusion_is_seen(comment: str) -> None:
-    found = script("measure_coverage").EXCLUDED.search(f"x = 1  {comment}\n")
+    found = load_script("measure_coverage").EXCLUDED.search(f"x = 1  {comment}\n")
     assert found is not None
     assert found["reason"].strip(" :-") == "why"
 
