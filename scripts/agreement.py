@@ -28,17 +28,18 @@ import numpy as np
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots import inflated_beam, plots
-from softrobots.command_line import exit_status
+from softrobots import inflated_beam
+from softrobots.cli.options.command_line import exit_status
+from softrobots.cli.tools.kinematics import pose_error
+from softrobots.cli.tools.known_tools import find_tool
+from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.export.mjcf import to_mjcf
-from softrobots.files import free_folder, make_folder, write_text
-from softrobots.interop.cases import TOLERANCE, WELDED
-from softrobots.interop.kinematics import pose_error
-from softrobots.interop.mujoco_statics import static_equilibrium, tip_pose
-from softrobots.interop.outcomes import Question
-from softrobots.interop.tools import find_tool
-from softrobots.model import MAX_DOF
-from softrobots.recorded_run import check_page, command_of, write_record
+from softrobots.model.soft_model import MAX_DOF
+from softrobots.view.figures import plots
+from studies.interop.cases import TOLERANCE, WELDED
+from studies.interop.mujoco_statics import static_equilibrium, tip_pose
+from studies.interop.outcomes import Question
+from studies.recorded_run import check_page, command_of, write_record
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "agreement.md"

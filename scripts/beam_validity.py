@@ -26,14 +26,15 @@ import numpy as np
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots import inflated_beam, plots
-from softrobots.command_line import exit_status
-from softrobots.composition import fix_joints
-from softrobots.files import free_folder, make_folder, write_text
+from softrobots import inflated_beam
+from softrobots.cli.options.command_line import exit_status
+from softrobots.cli.tools.kinematics import pose_error
+from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.description.composition import fix_joints
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
-from softrobots.interop.kinematics import pose_error
-from softrobots.kinematics import backbone
-from softrobots.recorded_run import check_page, command_of, write_record
+from softrobots.statics.kinematics import backbone
+from softrobots.view.figures import plots
+from studies.recorded_run import check_page, command_of, write_record
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "agreement.md"
@@ -505,7 +506,7 @@ def tests_rods() -> ModuleType:
     """The inflated rods of the tests."""
     sys.path.insert(0, str(ROOT))
     try:
-        from tests import inflated_rods
+        from tests.support import inflated_rods
     except ImportError as error:
         raise sr.MissingDependency("scipy", "dev") from error
     return inflated_rods

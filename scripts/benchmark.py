@@ -15,14 +15,14 @@ import sys
 from pathlib import Path
 
 import softrobots as sr
-from softrobots import plots
-from softrobots.benchmark.jobs import JOBS, measure
-from softrobots.benchmark.pictures import PICTURES, picture
-from softrobots.benchmark.race import Settings, quick_settings
-from softrobots.benchmark.results import Results, as_json, machine_text, read_results, require_whole, table
-from softrobots.command_line import exit_status
-from softrobots.files import make_folder, new_file, write_text
-from softrobots.marked_text import marked
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.files import make_folder, new_file, write_text
+from softrobots.view.figures import plots
+from studies.benchmark.jobs import JOBS, measure
+from studies.benchmark.pictures import PICTURES, picture
+from studies.benchmark.race import Settings, quick_settings
+from studies.benchmark.results import Results, as_json, machine_text, read_results, require_whole, table
+from studies.marked_text import marked
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"

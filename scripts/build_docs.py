@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import softrobots as sr
-from softrobots.command_line import exit_status, serve
-from softrobots.files import free_folder, make_folder
-from softrobots.served_page import LOOPBACK, tunnel_to
+from softrobots.cli.options.command_line import exit_status, serve
+from softrobots.core.files import free_folder, make_folder
+from softrobots.view.served_page import LOOPBACK, tunnel_to
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MARK = ".softrobots-site"

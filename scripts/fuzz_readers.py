@@ -39,12 +39,12 @@ if str(CHECKOUT) not in sys.path:
     sys.path.insert(0, str(CHECKOUT))  # the damages and the valid files are those of the tests
 
 import softrobots as sr  # noqa: E402
-from softrobots.command_line import exit_status  # noqa: E402
-from softrobots.files import new_file, write_atomically  # noqa: E402
-from softrobots.recorded_run import check_page, command_of, write_record  # noqa: E402
-from tests import hostile_data as data  # noqa: E402
-from tests import hostile_descriptions as descriptions  # noqa: E402
-from tests.hostile import Damage, damaged_bytes, damaged_xml  # noqa: E402
+from softrobots.cli.options.command_line import exit_status  # noqa: E402
+from softrobots.core.files import new_file, write_atomically  # noqa: E402
+from studies.recorded_run import check_page, command_of, write_record  # noqa: E402
+from tests.support import hostile_data as data  # noqa: E402
+from tests.support import hostile_descriptions as descriptions  # noqa: E402
+from tests.support.hostile import Damage, damaged_bytes, damaged_xml  # noqa: E402
 
 NAME = "fuzzing"
 DEFECTS = ("other", "ended", "beyond")

@@ -6,10 +6,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from softrobots.command_line import exit_status
-from softrobots.files import make_folder, write_bytes
-from softrobots.generated import generated_files
-from softrobots.paths import urdf_folder
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.files import make_folder, write_bytes
+from softrobots.description.paths import urdf_folder
+from softrobots.robots.generated import generated_files
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 
 import softrobots as sr
-from softrobots import helix, helix_plots, plots
-from softrobots.checks import positive_number
-from softrobots.command_line import exit_status
-from softrobots.files import csv_text, free_folder, make_folder, write_text
+from softrobots import helix
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.checks import positive_number
+from softrobots.core.files import csv_text, free_folder, make_folder, write_text
 from softrobots.helix import atlas
+from softrobots.view.figures import helix_plots, plots
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
 PICTURES = ("helix_grid", "helix_shapes", "helix_grasp")

@@ -21,10 +21,11 @@ import numpy as np
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots import body_plots, helix, plots
-from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
-from softrobots.files import free_folder, make_folder, write_text
-from softrobots.loads import Load
+from softrobots import helix
+from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
+from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.statics.loads import Load
+from softrobots.view.figures import body_plots, plots
 
 PIECES = {"pinch": "pinches", "tape": "tapes", "stoppers": "gaps"}
 """What the template counts, by method."""

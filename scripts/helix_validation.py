@@ -25,13 +25,14 @@ import numpy as np
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots import helix, plots
-from softrobots.body import body_at
-from softrobots.command_line import exit_status
-from softrobots.files import csv_text, free_folder, make_folder, write_text
-from softrobots.kinematics import frame_placement
-from softrobots.paths import urdf_folder
+from softrobots import helix
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.files import csv_text, free_folder, make_folder, write_text
+from softrobots.description.paths import urdf_folder
 from softrobots.robots import HelixTube
+from softrobots.statics.kinematics import frame_placement
+from softrobots.view.body import body_at
+from softrobots.view.figures import plots
 
 ANGLES = (2.5, 5.0, 10.0)
 CONTRACTIONS = (0.5, 0.6, 0.7, 0.8, 0.9)

@@ -15,12 +15,13 @@ from datetime import datetime
 from pathlib import Path
 
 import softrobots as sr
-from softrobots import inflated_beam, plots
-from softrobots.command_line import add_load, exit_status, gravity_of, serve, tell_written
-from softrobots.files import free_folder, make_folder, write_text
-from softrobots.loads import Load
-from softrobots.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
-from softrobots.trajectory import METHODS
+from softrobots import inflated_beam
+from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, serve, tell_written
+from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.statics.loads import Load
+from softrobots.statics.trajectory import METHODS
+from softrobots.view.figures import plots
+from studies.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 
 LINE = {"start": START, "end": END, "duration": DURATION, "steps": STEPS}
 """The default path."""

@@ -24,18 +24,18 @@ from typing import Any
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots import plots
-from softrobots.command_line import exit_status
+from softrobots.cli.options.command_line import exit_status
+from softrobots.cli.tools.kinematics import KinematicsRow, compare_kinematics
+from softrobots.cli.tools.known_tools import TOOLS
+from softrobots.core.files import make_folder, new_file, write_text
+from softrobots.core.json_text import read_json
+from softrobots.description.paths import urdf_folder
 from softrobots.export import to_mjcf, to_sdf
-from softrobots.files import make_folder, new_file, write_text
-from softrobots.interop.cases import WELDED, equilibrium_cases
-from softrobots.interop.kinematics import KinematicsRow, compare_kinematics
-from softrobots.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
-from softrobots.interop.springs_read import FORMATS, springs_read
-from softrobots.interop.tools import TOOLS
-from softrobots.json_text import read_json
-from softrobots.marked_text import marked
-from softrobots.paths import urdf_folder
+from softrobots.view.figures import plots
+from studies.interop.cases import WELDED, equilibrium_cases
+from studies.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
+from studies.interop.springs_read import FORMATS, springs_read
+from studies.marked_text import marked
 
 ROBOTS = {"inflatable_arm": "inflatable arm", "pcc_arm_lumped": "arm of muscles", "helix_tube_lumped": "helical tube"}
 """Robots of the equilibria, and what the tables call them."""

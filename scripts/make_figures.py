@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 
 import softrobots as sr
-from softrobots import equilibrium_plots, inflated_beam, link_plots, plots
-from softrobots.browser import take_picture
-from softrobots.command_line import exit_status
-from softrobots.description import expand
+from softrobots import inflated_beam
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.progress import with_progress
+from softrobots.description.expansion import expand
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
-from softrobots.progress import with_progress
+from softrobots.view.browser import take_picture
+from softrobots.view.figures import equilibrium_plots, link_plots, plots
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 EXAMPLES = DOCS / "examples"

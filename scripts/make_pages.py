@@ -9,9 +9,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from softrobots.command_line import exit_status
-from softrobots.files import new_file
-from softrobots.gallery import EXHIBITS
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.files import new_file
+from studies.gallery import EXHIBITS
 
 PAGES = {
     "helix_growth": "helix_growth",

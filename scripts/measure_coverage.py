@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import softrobots as sr
-from softrobots.checks import non_negative_number
-from softrobots.command_line import exit_status
-from softrobots.files import new_file, write_text
-from softrobots.recorded_run import check_page, write_record
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.checks import non_negative_number
+from softrobots.core.files import new_file, write_text
+from studies.recorded_run import check_page, write_record
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 # As coverage.py itself has it: with or without the colon, in small letters or capitals.

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 
 import softrobots as sr
-from softrobots import body_plots, plots
-from softrobots.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
-from softrobots.files import free_folder, make_folder, write_text
-from softrobots.loads import Load
+from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
+from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.robots.pcc_arm import CHAINS
+from softrobots.statics.loads import Load
+from softrobots.view.figures import body_plots, plots
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 """The default muscle lengths [m]."""

@@ -15,9 +15,17 @@ from pathlib import Path
 import numpy as np
 
 import softrobots as sr
-from softrobots import body_plots, plots
-from softrobots.command_line import add_load, add_resume, blocks_beside, exit_status, gravity_of, refuse_too_large, tell_written
-from softrobots.files import free_folder, make_folder
+from softrobots.cli.options.command_line import (
+    add_load,
+    add_resume,
+    blocks_beside,
+    exit_status,
+    gravity_of,
+    refuse_too_large,
+    tell_written,
+)
+from softrobots.core.files import free_folder, make_folder
+from softrobots.view.figures import body_plots, plots
 
 
 def parser() -> argparse.ArgumentParser:

@@ -12,15 +12,15 @@ import sys
 from pathlib import Path
 
 import softrobots as sr
-from softrobots import plots
-from softrobots.command_line import exit_status, tell_written
-from softrobots.files import free_folder, make_folder, write_text
-from softrobots.marked_text import marked
-from softrobots.papers import rendering
-from softrobots.papers.curves import write_curves
-from softrobots.papers.pictures import PICTURES
-from softrobots.papers.reproduction import PAPERS, reproduce
-from softrobots.progress import with_progress
+from softrobots.cli.options.command_line import exit_status, tell_written
+from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.progress import with_progress
+from softrobots.view.figures import plots
+from studies.marked_text import marked
+from studies.papers import rendering
+from studies.papers.curves import write_curves
+from studies.papers.pictures import PICTURES
+from studies.papers.reproduction import PAPERS, reproduce
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PAGE = Path("docs") / "reproduction.md"

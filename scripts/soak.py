@@ -14,12 +14,12 @@ import os
 import sys
 from pathlib import Path
 
-from softrobots.command_line import exit_status
-from softrobots.errors import ParameterError
-from softrobots.files import new_file, write_text
-from softrobots.recorded_run import check_page, command_of, write_record
-from softrobots.soak.families import FAMILIES
-from softrobots.soak.running import again, as_json, family_of, soak, table
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.errors import ParameterError
+from softrobots.core.files import new_file, write_text
+from studies.recorded_run import check_page, command_of, write_record
+from studies.soak.families import FAMILIES
+from studies.soak.running import again, as_json, family_of, soak, table
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 CASES = 1_000_000

@@ -16,8 +16,8 @@ import numpy as np
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots.command_line import exit_status
-from softrobots.files import new_file, write_text
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.files import new_file, write_text
 
 
 def random_cases(load: float, count: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

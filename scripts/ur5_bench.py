@@ -22,13 +22,15 @@ from typing import Any
 import numpy as np
 
 import softrobots as sr
-from softrobots import bench_plots, inflated_beam, plots
-from softrobots.bench_run import BenchRun, Measurement, push_link
-from softrobots.checks import non_negative_number, positive_integer
-from softrobots.command_line import exit_status, serve, tell_written
-from softrobots.files import csv_text, free_folder, make_folder, write_text
+from softrobots import inflated_beam
+from softrobots.cli.options.command_line import exit_status, serve, tell_written
+from softrobots.core.checks import non_negative_number, positive_integer
+from softrobots.core.files import csv_text, free_folder, make_folder, write_text
 from softrobots.inflated_beam import CharacterisationRow, fit_characterisation
-from softrobots.ur5_bench import UR5_JOINTS, UR5Bench
+from softrobots.view.figures import plots
+from studies.ur5 import bench_plots
+from studies.ur5.bench import UR5_JOINTS, UR5Bench
+from studies.ur5.bench_run import BenchRun, Measurement, push_link
 
 TABULATED = tuple(row.pressure / 1e3 for row in inflated_beam.TABLE_3)
 """Pressures of Table 3 [kPa]."""

@@ -21,13 +21,13 @@ import numpy as np
 import pinocchio as pin
 
 import softrobots as sr
-from softrobots import plots
-from softrobots.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
-from softrobots.command_line import exit_status, serve, tell_written
-from softrobots.composition import fix_joints
-from softrobots.files import free_folder, make_folder, write_text
-from softrobots.rigid_tree_urdf import read_rigid_tree
-from softrobots.third_party import UR5, robot_file
+from softrobots.cli.options.command_line import exit_status, serve, tell_written
+from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
+from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.description.composition import fix_joints
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.third_party import UR5, robot_file
+from softrobots.view.figures import plots
 
 UR5_PAYLOAD = 5.0
 """What a UR5 may carry, by its maker [kg]."""

@@ -17,10 +17,12 @@ from pathlib import Path
 import numpy as np
 
 import softrobots as sr
-from softrobots import inflated_beam, map_plots, plots, sweeps
-from softrobots.checks import finite_number, positive_integer, positive_number
-from softrobots.command_line import add_gravity, add_resume, blocks_beside, exit_status, gravity_of
-from softrobots.files import new_file
+from softrobots import inflated_beam
+from softrobots.cli.options.command_line import add_gravity, add_resume, blocks_beside, exit_status, gravity_of
+from softrobots.compiled import sweeps
+from softrobots.core.checks import finite_number, positive_integer, positive_number
+from softrobots.core.files import new_file
+from softrobots.view.figures import map_plots, plots
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images" / "workspace_map.png"
 CELLS = {"plane": 160, "box": 19}

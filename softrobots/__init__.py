@@ -3,9 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from softrobots import constant_curvature, export, helix, inflated_beam
-from softrobots.composition import mount
-from softrobots.equilibrium import Equilibrium, solve_equilibrium
-from softrobots.errors import (
+from softrobots.core.errors import (
     ClusterError,
     DescriptionError,
     EquilibriumNotFound,
@@ -25,27 +23,28 @@ from softrobots.errors import (
     TargetUnreachable,
     ViewerError,
 )
-from softrobots.growth import grown_coordinates
-from softrobots.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
-from softrobots.inverse_kinematics import IkSolution, solve_ik
-from softrobots.load_estimation import LoadEstimate, estimate_load
-from softrobots.loader import load_model
-from softrobots.loads import EARTH_GRAVITY, distributed_force
-from softrobots.model import SoftModel, SpringGroup
-from softrobots.post_buckling import EquilibriumBranch, post_buckling_branches
-from softrobots.results_io import load_result, save_csv, save_result
+from softrobots.description.composition import mount
+from softrobots.model.loader import load_model
+from softrobots.model.soft_model import SoftModel, SpringGroup
 from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
-from softrobots.sensitivity import compliance, elastostatic_jacobian
-from softrobots.stability import critical_load
-from softrobots.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
-from softrobots.trajectory import Trajectory, follow_trajectory
-from softrobots.viewer import Viewer, view
-from softrobots.workspace import Workspace, sample_workspace
+from softrobots.robots.growth import grown_coordinates
+from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
+from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
+from softrobots.statics.load_estimation import LoadEstimate, estimate_load
+from softrobots.statics.loads import EARTH_GRAVITY, distributed_force
+from softrobots.statics.post_buckling import EquilibriumBranch, post_buckling_branches
+from softrobots.statics.results_io import load_result, save_csv, save_result
+from softrobots.statics.sensitivity import compliance, elastostatic_jacobian
+from softrobots.statics.stability import critical_load
+from softrobots.statics.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
+from softrobots.statics.trajectory import Trajectory, follow_trajectory
+from softrobots.statics.workspace import Workspace, sample_workspace
+from softrobots.version import __version__
+from softrobots.view.viewer import Viewer, view
 
 if TYPE_CHECKING:
-    from softrobots.kernels.compiled_model import compile_model as compile  # noqa: F401  (in __all__ it would hide the builtin)
-
-__version__ = "0.1.0"
+    from softrobots.compiled.run.compiled_model import compile_model as compile  # noqa: F401  (in __all__ it would hide the builtin)
 
 __all__ = [
     "EARTH_GRAVITY",
@@ -116,7 +115,7 @@ def __getattr__(name: str) -> Any:
     """Import the compiled solvers when they are asked for: a fifth of all other imports."""
     if name != "compile":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from softrobots.kernels.compiled_model import compile_model
+    from softrobots.compiled.run.compiled_model import compile_model
 
     globals()["compile"] = compile_model
     return compile_model

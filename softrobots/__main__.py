@@ -2,7 +2,7 @@
 
 import sys
 
-from softrobots.cli import main
+from softrobots.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

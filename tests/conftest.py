@@ -131,7 +131,7 @@ def bullet(tool: Callable[[str], ModuleType]) -> ModuleType:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[object]:
     """A headless Chromium, one for all tests of a module; Playwright's synchronous API runs once at a time."""
-    from softrobots.browser import open_browser
+    from softrobots.view.browser import open_browser
 
     with ExitStack() as stack:
         try:
@@ -145,7 +145,7 @@ def browser() -> Iterator[object]:
 @pytest.fixture
 def told(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
     """Run the command `softrobots` in this process: its status, what it printed, what it said on stderr."""
-    from softrobots.cli import main
+    from softrobots.cli.main import main
 
     def run(*words: str) -> tuple[int, str, str]:
         try:

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 
 import softrobots as sr
+from softrobots.cli.tools.kinematics import pose_error
 from softrobots.constant_curvature import chain_transform
 from softrobots.export.mjcf import to_mjcf
-from softrobots.interop.kinematics import pose_error
-from softrobots.interop.mujoco_statics import tip_pose
-from softrobots.interop.outcomes import Question
+from studies.interop.mujoco_statics import tip_pose
+from studies.interop.outcomes import Question
 from tests.conftest import CHECKOUT, load_script
-from tests.helix_rods import HelixRod, solve_helix_rod
-from tests.muscle_rods import MuscleSegment, solve_muscle_arm
+from tests.support.helix_rods import HelixRod, solve_helix_rod
+from tests.support.muscle_rods import MuscleSegment, solve_muscle_arm
 
 FORMS = {"link": ("pseudo-rigid, hinge in the middle", "pseudo-rigid, hinge at l1 = 5 %", "lumped", "sections")}
 FRESH = {

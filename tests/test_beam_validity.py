@@ -13,10 +13,10 @@ import pytest
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.composition import fix_joints
-from tests import rods
+from softrobots.description.composition import fix_joints
 from tests.conftest import CHECKOUT, load_script
-from tests.inflated_rods import InflatedRod, product, solve_inflated_chain, turned
+from tests.support import rods
+from tests.support.inflated_rods import InflatedRod, product, solve_inflated_chain, turned
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005, "pressure": 50e3}
 MODULUS = 138e6
@@ -181,7 +181,7 @@ def script() -> Any:
 
 def test_the_record_is_what_a_fresh_run_says(script: Any) -> None:
     """One pressure and two loads of the link, two cases of the arm; recorded with six digits, solved to 1e-6."""
-    from tests import inflated_rods
+    from tests.support import inflated_rods
 
     record = json.loads(RECORD.read_text())
     link, arm = record["link"], record["arm"]

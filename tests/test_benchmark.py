@@ -16,19 +16,19 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.benchmark import compiled_solvers, cpp_kinematics, mujoco_settling, pinocchio_solvers, processes
-from softrobots.benchmark.aligned_joints import aligned_joints
-from softrobots.benchmark.cases import FORCE, ROD_LENGTH, ROD_STIFFNESS, path_targets, rod, rod_forces, standard_cases
-from softrobots.benchmark.jobs import JOBS, measure
-from softrobots.benchmark.measurement import Contender, interleaved, ratio, require_agreement
-from softrobots.benchmark.mujoco_settling import SettlingArm
-from softrobots.benchmark.numpy_arrays import ArrayArm
-from softrobots.benchmark.pictures import PICTURES
-from softrobots.benchmark.pink_kinematics import PinkArm
-from softrobots.benchmark.pinocchio_solvers import NEWTON, PinocchioArm
-from softrobots.benchmark.race import Race, Settings, figure, quick_settings
-from softrobots.benchmark.results import AT_LEAST, AT_MOST, Curve, Results, Row, as_json, read_results, require_whole, table
-from softrobots.benchmark.scipy_solvers import solvers
+from studies.benchmark import compiled_solvers, cpp_kinematics, mujoco_settling, pinocchio_solvers, processes
+from studies.benchmark.aligned_joints import aligned_joints
+from studies.benchmark.cases import FORCE, ROD_LENGTH, ROD_STIFFNESS, path_targets, rod, rod_forces, standard_cases
+from studies.benchmark.jobs import JOBS, measure
+from studies.benchmark.measurement import Contender, interleaved, ratio, require_agreement
+from studies.benchmark.mujoco_settling import SettlingArm
+from studies.benchmark.numpy_arrays import ArrayArm
+from studies.benchmark.pictures import PICTURES
+from studies.benchmark.pink_kinematics import PinkArm
+from studies.benchmark.pinocchio_solvers import NEWTON, PinocchioArm
+from studies.benchmark.race import Race, Settings, figure, quick_settings
+from studies.benchmark.results import AT_LEAST, AT_MOST, Curve, Results, Row, as_json, read_results, require_whole, table
+from studies.benchmark.scipy_solvers import solvers
 from tests.conftest import CHECKOUT, load_script, missing
 
 SAME = 1e-8

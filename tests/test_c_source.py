@@ -20,8 +20,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.kernels import intrinsics, trigonometry
-from softrobots.kernels.c_source import to_c
+from softrobots.compiled.c.c_source import to_c
+from softrobots.compiled.drivers import intrinsics, trigonometry
 from tests.conftest import missing
 
 FLAGS = [

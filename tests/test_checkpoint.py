@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import workspace
-from softrobots.checkpoint import CASE, Checkpoint, discard
-from softrobots.command_line import blocks_beside
-from softrobots.sweeps import TargetGrid, map_workspace, mapping
+from softrobots.cli.options.command_line import blocks_beside
+from softrobots.compiled.sweeps import TargetGrid, map_workspace, mapping
+from softrobots.core.checkpoint import CASE, Checkpoint, discard
+from softrobots.statics import workspace
 from tests.conftest import CHECKOUT
 from tests.test_scripts import run_script
 from tests.test_workspace_map import fingerprint
@@ -80,7 +80,8 @@ def killed_after_first_block(words: list[str], folder: Path, block: str) -> None
     It waits at the fourth block, or it might be done before we look.
     """
     code = (
-        "import runpy, sys, time; from softrobots import checkpoint; from softrobots.sweeps import mapping; mapping.BLOCK = 3\n"
+        "import runpy, sys, time; from softrobots.core import checkpoint\n"
+        "from softrobots.compiled.sweeps import mapping; mapping.BLOCK = 3\n"
         "keep = checkpoint.Checkpoint.keep\n"
         "checkpoint.Checkpoint.keep = lambda self, n, block: time.sleep(300) if n == 3 else keep(self, n, block)\n"
         f"sys.exit(runpy.run_path({str(CHECKOUT / 'scripts' / 'workspace_map.py')!r})['main'](sys.argv[1:]))"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from softrobots.clean_checkout import copy_checkout, find_uv, make_environment
+from studies.clean_checkout import copy_checkout, find_uv, make_environment
 
 
 @pytest.fixture

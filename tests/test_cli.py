@@ -16,15 +16,14 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from softrobots.cli import main, parser
-from softrobots.commands import COMMANDS
-from softrobots.commands.robot_parameters import make_robot, robot_parameters, xacro_parameters
-from softrobots.description import expand
-from softrobots.interop.tools import TOOLS
-from softrobots.interop.urdf_rules import RULES
-from softrobots.paths import urdf_folder, xacro_folder
+from softrobots.cli.main import COMMANDS, main, parser
+from softrobots.cli.options.robot_parameters import make_robot, robot_parameters, xacro_parameters
+from softrobots.cli.tools.known_tools import TOOLS
+from softrobots.description.expansion import expand
+from softrobots.description.paths import urdf_folder, xacro_folder
+from softrobots.description.urdf_rules import RULES
 from tests.conftest import missing
-from tests.foreign import BRANCHED, SPRINGS
+from tests.support.foreign import BRANCHED, SPRINGS
 
 ARM = urdf_folder() / "inflatable_arm.urdf"
 
@@ -193,7 +192,7 @@ def test_errors_name_the_option_that_was_typed(words: list[str], message: str, t
 
 
 def test_the_command_imports_no_tool_before_it_needs_it() -> None:
-    code = "import softrobots.cli, sys; softrobots.cli.parser(); print(*sys.modules)"
+    code = "import softrobots.cli.main, sys; softrobots.cli.main.parser(); print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
     heavy = {"matplotlib", "trimesh", "xacro", "tqdm", "meshcat", "scipy", "shtab"} | {tool.module for tool in TOOLS.values()}
     assert not loaded & heavy

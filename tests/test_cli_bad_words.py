@@ -13,8 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from softrobots.cli import main, parser
-from softrobots.commands import COMMANDS
+from softrobots.cli.main import COMMANDS, main, parser
 
 NAMES = [command.__name__.rpartition(".")[2] for command in COMMANDS]
 LONG = {"bench", "doctor", "view"}
@@ -54,7 +53,7 @@ def words_of(action: argparse.Action) -> st.SearchStrategy[list[str]]:
 def test_any_words_end_with_a_status_and_a_message(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     if command in LONG:
-        monkeypatch.setattr(importlib.import_module(f"softrobots.commands.{command}"), "run", lambda arguments: None)
+        monkeypatch.setattr(importlib.import_module(f"softrobots.cli.{command}"), "run", lambda arguments: None)
     (subparsers,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
     options = actions(subparsers.choices[command])
     first = st.sampled_from([["inflatable_arm"]] * 4 + [[], ["nobody"], [""], ["forward", "0.5"], ["inverse", "1"]])

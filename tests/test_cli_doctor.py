@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from softrobots.interop import packages
-from softrobots.interop.packages import EXTRAS, PACKAGES, Package, PackageState, extra_states
-from softrobots.interop.tools import TOOLS
-from softrobots.kernels.machines import available_backend, cache_folder, cache_is_kept
-from softrobots.meshcat_view.server import end_server, start_server
-from softrobots.paths import urdf_folder, xacro_folder
+from softrobots.cli.tools import packages
+from softrobots.cli.tools.known_tools import TOOLS
+from softrobots.cli.tools.packages import EXTRAS, PACKAGES, Package, PackageState, extra_states
+from softrobots.compiled.run.machines import available_backend, cache_folder, cache_is_kept
+from softrobots.description.paths import urdf_folder, xacro_folder
+from softrobots.view.meshcat_page.server import end_server, start_server
 from tests.conftest import CHECKOUT
 
 ARM = urdf_folder() / "inflatable_arm.urdf"
@@ -23,9 +23,9 @@ ARM = urdf_folder() / "inflatable_arm.urdf"
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Look at one file, and at no page: all of them are looked at once, which is enough."""
-    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", {"inflatable_arm": sr.InflatableArm})
-    monkeypatch.setattr("softrobots.generated.ROBOTS", {"inflatable_arm": sr.InflatableArm})
-    monkeypatch.setattr("softrobots.commands.doctor._page", lambda report: None)
+    monkeypatch.setattr("softrobots.cli.doctor.ROBOTS", {"inflatable_arm": sr.InflatableArm})
+    monkeypatch.setattr("softrobots.robots.generated.ROBOTS", {"inflatable_arm": sr.InflatableArm})
+    monkeypatch.setattr("softrobots.cli.doctor._page", lambda report: None)
 
 
 def test_doctor_finds_this_installation_well(told) -> None:
@@ -61,11 +61,11 @@ def test_doctor_asks_every_tool_if_told_and_answers_machines(told) -> None:
 def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A server that starts and ends, one that does not start, and one that serves something else."""
     started, ended = [], []
-    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", {})
-    monkeypatch.setattr("softrobots.generated.ROBOTS", {})
+    monkeypatch.setattr("softrobots.cli.doctor.ROBOTS", {})
+    monkeypatch.setattr("softrobots.robots.generated.ROBOTS", {})
     monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # nobody is there; loopback needs no proxy
-    monkeypatch.setattr("softrobots.commands.doctor.start_server", lambda: started.append(start_server()) or started[-1])
-    monkeypatch.setattr("softrobots.commands.doctor.end_server", lambda server: ended.append(end_server(server)))
+    monkeypatch.setattr("softrobots.cli.doctor.start_server", lambda: started.append(start_server()) or started[-1])
+    monkeypatch.setattr("softrobots.cli.doctor.end_server", lambda server: ended.append(end_server(server)))
     status, out, _ = told("doctor", "--json")
     assert (status, len(started), len(ended)) == (0, 1, 1)
     process, _, url = started[0]
@@ -75,7 +75,7 @@ def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: 
     def no_server() -> None:
         raise sr.ViewerError("the meshcat server ended before it served: no reason")
 
-    monkeypatch.setattr("softrobots.commands.doctor.start_server", no_server)
+    monkeypatch.setattr("softrobots.cli.doctor.start_server", no_server)
     status, out, _ = told("doctor")
     assert status == 1
     assert "  not served  the meshcat server ended before it served: no reason" in out
@@ -83,12 +83,12 @@ def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: 
 
     page = tmp_path / "page.html"
     page.write_text("<p>nothing of ours</p>", encoding="utf-8")
-    monkeypatch.setattr("softrobots.commands.doctor.end_server", ended.append)
+    monkeypatch.setattr("softrobots.cli.doctor.end_server", ended.append)
     for url, told_of_it in (
         (page.as_uri(), "answers with something else than"),
         ("http://127.0.0.1:9/", "http://127.0.0.1:9/: "),
     ):
-        monkeypatch.setattr("softrobots.commands.doctor.start_server", lambda url=url: ("a server", "", url))
+        monkeypatch.setattr("softrobots.cli.doctor.start_server", lambda url=url: ("a server", "", url))
         status, out, _ = told("doctor")
         assert status == 1
         assert told_of_it in out
@@ -154,10 +154,10 @@ def test_doctor_sees_files_that_differ_and_kinematics_that_do_not_agree(
     text = ARM.read_text(encoding="utf-8")
     (tmp_path / ARM.name).write_text(text.replace('xyz="0.0 -1.0 0.0"', 'xyz="0.0 -2.0 0.0"'), encoding="utf-8")
     (tmp_path / "pcc_arm.urdf").write_text("<robot", encoding="utf-8")
-    monkeypatch.setattr("softrobots.commands.doctor.urdf_folder", lambda: tmp_path)
-    monkeypatch.setattr("softrobots.commands.doctor.installed_tools", lambda: ("ikpy",))
+    monkeypatch.setattr("softrobots.cli.doctor.urdf_folder", lambda: tmp_path)
+    monkeypatch.setattr("softrobots.cli.doctor.installed_tools", lambda: ("ikpy",))
     some = {name: sr.ROBOTS[name] for name in ("inflatable_arm", "pcc_arm")}  # the others agree, as the tests above see
-    monkeypatch.setattr("softrobots.commands.doctor.ROBOTS", some)  # the page is left out
+    monkeypatch.setattr("softrobots.cli.doctor.ROBOTS", some)  # the page is left out
     status, out, _ = told("doctor", "--all")
     assert status == 1
     assert re.search(r"inflatable_arm\.urdf +differs", out)
@@ -176,7 +176,7 @@ def test_doctor_goes_on_without_browser_and_stops_without_folders(told, monkeypa
     status, out, _ = told("doctor")
     assert status == 0
     assert "browser  none, so no pictures of the viewer: no browser found" in out
-    monkeypatch.setattr("softrobots.commands.doctor.urdf_folder", nowhere)
+    monkeypatch.setattr("softrobots.cli.doctor.urdf_folder", nowhere)
     status, out, _ = told("doctor")
     assert status == 1
     assert "Packages" in out

@@ -16,13 +16,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import constant_curvature, helix, pcc_plots
-from softrobots.benchmark import compiled_solvers
-from softrobots.benchmark.jobs import JOBS, PLAIN
-from softrobots.benchmark.race import Settings, quick_settings, short_settings
-from softrobots.benchmark.results import Results, as_json, read_results
-from softrobots.cli import main
-from softrobots.commands import bench
+from softrobots import constant_curvature, helix
+from softrobots.cli import bench
+from softrobots.cli.main import main
+from softrobots.view.figures import pcc_plots
+from studies.benchmark import compiled_solvers
+from studies.benchmark.jobs import JOBS, PLAIN
+from studies.benchmark.race import Settings, quick_settings, short_settings
+from studies.benchmark.results import Results, as_json, read_results
 from tests.conftest import CHECKOUT
 
 LENGTHS = ("0.50", "0.53", "0.55", "0.54", "0.51", "0.52")

@@ -14,9 +14,9 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.arm_plots import loaded_shape
-from softrobots.errors import NeutralEquilibrium
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from softrobots.core.errors import NeutralEquilibrium
+from softrobots.view.figures.arm_plots import loaded_shape
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 
 Told = Callable[..., tuple[int, str, str]]
 
@@ -186,7 +186,7 @@ def test_solve_says_that_a_neutral_equilibrium_has_no_compliance(told: Told, mon
     def none(*_: object) -> None:
         raise NeutralEquilibrium("the tangent stiffness is singular")
 
-    monkeypatch.setattr("softrobots.commands.solve.compliance", none)
+    monkeypatch.setattr("softrobots.cli.solve.compliance", none)
     status, out, _ = told("solve", "inflatable_arm", "--compliance", "--json")
     assert (status, json.loads(out)["compliance"]) == (0, None)
     assert "compliance  none: the tangent stiffness is singular" in told("solve", "inflatable_arm", "--compliance")[1]

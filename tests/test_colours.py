@@ -10,10 +10,10 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from softrobots import helix_sheet, map_plots, plots
-from softrobots.meshcat_view.body import PULL_COLOUR, PUSH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
-from softrobots.meshcat_view.shapes import FORCE_COLOUR, PATH_COLOUR
-from softrobots.scene import WRINKLING_COLOURS
+from softrobots.view.figures import helix_sheet, map_plots, plots
+from softrobots.view.meshcat_page.body import PULL_COLOUR, PUSH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
+from softrobots.view.meshcat_page.shapes import FORCE_COLOUR, PATH_COLOUR
+from softrobots.view.scene import WRINKLING_COLOURS
 
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A physiologically-based model for simulation of color vision deficiency,
 # IEEE Trans. Vis. Comput. Graph. 15(6), 2009: severity 1.0, on linear RGB.

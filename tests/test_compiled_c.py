@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.kernels import Status
-from softrobots.kernels.compiled_model import CompiledModel
+from softrobots.compiled import Status
+from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
 from tests.test_c_source import compiled as library_of
 from tests.test_compiled_model import cases, directions

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from softrobots.kernels import Status
+from softrobots.compiled import Status
 from tests.conftest import CHECKOUT, missing
-from tests.documentation import PageRunner, blocks
+from tests.support.documentation import PageRunner, blocks
 
 GUIDE = (CHECKOUT / "docs" / "compiled.md").read_text(encoding="utf-8")
 

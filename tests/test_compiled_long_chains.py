@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.kernels import Status
-from softrobots.kernels.compiled_model import CompiledModel
-from tests.rods import Rod, elastica_tip, rod_tip
+from softrobots.compiled import Status
+from softrobots.compiled.run.compiled_model import CompiledModel
+from tests.support.rods import Rod, elastica_tip, rod_tip
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 EI, LENGTH = 1.5, 1.0

@@ -14,11 +14,12 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import softrobots as sr
-from softrobots.kernels import Status, compiled_model
-from softrobots.kernels.compiled_model import CompiledModel
+from softrobots.compiled import Status
+from softrobots.compiled.run import compiled_model
+from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
-from tests.foreign import BRANCHED
-from tests.oracles import REFERENCE_EQUILIBRIA, arm_balance, arm_energy
+from tests.support.foreign import BRANCHED
+from tests.support.oracles import REFERENCE_EQUILIBRIA, arm_balance, arm_energy
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 STIFFNESS = sr.inflated_beam.MEAN_STIFFNESS

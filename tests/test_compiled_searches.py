@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.kernels import Status
-from softrobots.kernels.chain_search import ChainSearch
-from softrobots.kernels.compiled_model import CompiledModel
-from tests.oracles import central_difference
+from softrobots.compiled import Status
+from softrobots.compiled.run.chain_search import ChainSearch
+from softrobots.compiled.run.compiled_model import CompiledModel
+from tests.support.oracles import central_difference
 
 GRAVITY = (0.4, -1.0, -9.7)  # [m/s^2]
 EIGHT_LINKS: dict[str, Any] = {"link_lengths": (0.15,) * 8, "hinge_offset": 0.01, "rest_side": 0.02, "rest_up": -0.01}

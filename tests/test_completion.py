@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from softrobots.commands import COMMANDS
+from softrobots.cli.main import COMMANDS
 from softrobots.export.formats import FORMATS
 from tests.conftest import missing
 
@@ -60,7 +60,7 @@ def offered(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
     with pytest.MonkeyPatch.context() as patch:
         printed: list[str] = []
         patch.setattr("sys.stdout.write", printed.append)
-        from softrobots.cli import main
+        from softrobots.cli.main import main
 
         assert main(["completion", "bash"]) == 0
     quoted = ("ask " + " ".join(f"'{word}'" for word in ("softrobots", *words)) for words in CASES.values())

@@ -14,12 +14,12 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.composition import fix_joints
-from softrobots.kinematics import frame_placement
-from softrobots.tag_reader import read_tags
-from softrobots.third_party import UR5, robot_file
+from softrobots.description.composition import fix_joints
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.third_party import UR5, robot_file
+from softrobots.statics.kinematics import frame_placement
 from tests.conftest import missing
-from tests.foreign import INERTIAL, joint
+from tests.support.foreign import INERTIAL, joint
 
 XYZ, RPY = (0.02, -0.03, 0.05), (0.3, -1.1, 0.7)
 SMALL: dict[str, Callable[[], object]] = {

@@ -20,12 +20,12 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import blas_threads
-from softrobots.blas_threads import one_blas_thread
+from softrobots.core import blas_threads
+from softrobots.core.blas_threads import one_blas_thread
 from softrobots.robots import parameters
-from tests import solver_mix
 from tests.conftest import missing
-from tests.foreign import INERTIAL, joint
+from tests.support import solver_mix
+from tests.support.foreign import INERTIAL, joint
 
 THREADS = 8
 CHAIN = f'<robot name="chain"><link name="{{}}">{INERTIAL}</link>{{}}</robot>'

@@ -19,8 +19,8 @@ from scipy.linalg import expm
 
 from softrobots import constant_curvature as cc
 from softrobots.constant_curvature import Arc
-from softrobots.errors import ParameterError
-from tests.laws import law
+from softrobots.core.errors import ParameterError
+from tests.support.laws import law
 
 FRAMES = ("torsion_free", "bending_plane")
 BENDINGS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, math.pi)

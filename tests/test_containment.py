@@ -20,12 +20,12 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import plots
-from softrobots.arm_plots import loaded_shape
 from softrobots.export import FORMATS, export_model
-from softrobots.local_requests import is_local
-from softrobots.meshcat_view.page_text import legend_rows
-from softrobots.viewer import Viewer, view
+from softrobots.view.figures import plots
+from softrobots.view.figures.arm_plots import loaded_shape
+from softrobots.view.local_requests import is_local
+from softrobots.view.meshcat_page.page_text import legend_rows
+from softrobots.view.viewer import Viewer, view
 from tests.conftest import CHECKOUT, load_script
 from tests.test_viewer import listening
 
@@ -222,7 +222,7 @@ def ask(port: int, path: str = "/", *, upgrade: bool = False, **headers: str) ->
 @pytest.fixture(scope="module")
 def servers(hostile: Viewer) -> Iterator[dict[str, tuple[int, str, int]]]:
     """Port, path of the page and process of each server that there is."""
-    from softrobots.slider_page import SliderPage
+    from softrobots.view.slider_page import SliderPage
 
     with SliderPage(hostile._model) as sliders:
         yield {
@@ -278,7 +278,7 @@ def test_servers_listen_on_loopback_only(server: str, servers: dict[str, tuple[i
 
 @pytest.mark.parametrize("server", ["meshcat", "sliders"])
 def test_a_second_page_on_the_same_port_does_not_break_the_first(server: str, servers: dict[str, tuple[int, str, int]]) -> None:
-    from softrobots.slider_page import SliderPage
+    from softrobots.view.slider_page import SliderPage
 
     port, path, _ = servers[server]
     model = robot("second")

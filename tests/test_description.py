@@ -16,13 +16,13 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.description import declared_arguments, expand
-from softrobots.paths import urdf_folder, xacro_folder
+from softrobots.description.expansion import declared_arguments, expand
+from softrobots.description.paths import urdf_folder, xacro_folder
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube, PccArm
-from softrobots.tag_reader import read_tags
-from softrobots.urdf_tags import NAMESPACE
-from tests.laws import law
-from tests.oracles import tube_points
+from tests.support.laws import law
+from tests.support.oracles import tube_points
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO
 KINDS = (sr.InflatableArm, PccArm, HelixTube)

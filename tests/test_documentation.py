@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.cli import parser
-from softrobots.kernels import Status
+from softrobots.cli.main import parser
+from softrobots.compiled import Status
 from tests.conftest import CHECKOUT, missing
-from tests.documentation import PageError, PageRunner, blocks, differences, missing_package
+from tests.support.documentation import PageError, PageRunner, blocks, differences, missing_package
 
 DOCS = CHECKOUT / "docs"
 PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in DOCS.glob("*.md"))]

@@ -12,8 +12,8 @@ import pytest
 from scipy.linalg import eigh
 
 import softrobots as sr
-from softrobots import elastostatics
-from softrobots.elastostatics import (
+from softrobots.statics import elastostatics
+from softrobots.statics.elastostatics import (
     LARGEST_STEP,
     ElasticState,
     _Case,
@@ -30,8 +30,8 @@ from softrobots.elastostatics import (
     settle,
     settled,
 )
-from softrobots.loads import Load
-from tests.oracles import arm_energy, central_difference, flexible_jacobian
+from softrobots.statics.loads import Load
+from tests.support.oracles import arm_energy, central_difference, flexible_jacobian
 
 MOTORS = np.array([0.3, 0.6, -0.8])
 SPRINGS = [2, 3, 5, 6]

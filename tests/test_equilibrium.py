@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 import softrobots as sr
-from softrobots.elastostatics import METHODS
-from tests.laws import law
-from tests.oracles import REFERENCE_EQUILIBRIA, arm_energy
+from softrobots.statics.elastostatics import METHODS
+from tests.support.laws import law
+from tests.support.oracles import REFERENCE_EQUILIBRIA, arm_energy
 
 FORCE = np.array([0.0, 10.0, -15.0])
 angle = st.floats(-3.1, 3.1)

@@ -19,12 +19,12 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots import cli
+from softrobots.cli import main as cli
+from softrobots.description.third_party import UR5, robot_file
 from softrobots.export import FORMATS, export_model, to_mjcf, to_sdf
 from softrobots.export.meshes import mujoco_reads
-from softrobots.third_party import UR5, robot_file
 from tests.conftest import missing
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint, mass_error
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint, mass_error
 
 Tool = Callable[[str], ModuleType]
 

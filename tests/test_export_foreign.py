@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.urdf_rules import check_rules
 from softrobots.export import to_json, to_mjcf, to_pinocchio, to_sdf
-from softrobots.interop.urdf_rules import check_rules
-from softrobots.rigid_tree_urdf import read_rigid_tree
-from tests.foreign import mass_error
+from tests.support.foreign import mass_error
 
 Tool = Callable[[str], Any]
 BALL = "0.01 0.01 0.01"

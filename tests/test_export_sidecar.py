@@ -15,13 +15,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.argument_notes import argument_notes
-from softrobots.description import declared_arguments
+from softrobots.description.argument_notes import argument_notes
+from softrobots.description.expansion import declared_arguments
+from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.export import export_model, to_json
 from softrobots.export.number_sources import PackagedRobot
 from softrobots.inflated_beam import wrinkling_moment
-from softrobots.paths import urdf_folder, xacro_folder
-from tests.foreign import BRANCHED, SPRINGS
+from tests.support.foreign import BRANCHED, SPRINGS
 
 NAMES = {name: getattr(math, name) for name in ("pi", "sqrt", "sin", "cos")} | {"__builtins__": {}}
 PARTS = ("joints", "inflated_links", "sections", "lumped_sections", "muscles", "lines")

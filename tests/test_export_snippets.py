@@ -23,8 +23,8 @@ import pytest
 import softrobots as sr
 from softrobots.export import to_pinocchio, to_pybullet
 from softrobots.export.snippets import MOST_JOINTS
-from softrobots.kinematics import frame_placement
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from softrobots.statics.kinematics import frame_placement
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 
 Tool = Callable[[str], ModuleType]
 

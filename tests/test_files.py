@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import plots
-from softrobots.checkpoint import Checkpoint
-from softrobots.cli import main
-from softrobots.files import free_folder, make_folder, new_file, write_atomically, write_bytes, write_text
+from softrobots.cli.main import main
+from softrobots.core.checkpoint import Checkpoint
+from softrobots.core.files import free_folder, make_folder, new_file, write_atomically, write_bytes, write_text
+from softrobots.view.figures import plots
 from tests.conftest import CHECKOUT, missing
 from tests.test_scripts import run_script
 
@@ -175,7 +175,7 @@ def test_a_killed_process_leaves_the_old_file(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
     file.write_bytes(b"old")
     code = (
-        "import os, pathlib, signal, softrobots.files as files\n"
+        "import os, pathlib, signal, softrobots.core.files as files\n"
         "def half(file): file.write(b'half'); file.flush(); os.kill(os.getpid(), signal.SIGKILL)\n"
         f"files.write_atomically(pathlib.Path({str(file)!r}), half)\n"
     )
@@ -343,17 +343,17 @@ def test_text_without_utf_8_is_refused(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
-# --- Nothing is written past softrobots.files
+# --- Nothing is written past softrobots.core.files
 
 # Calls that write, and what they may be there for.
 PLAIN_WRITES = {
-    "softrobots/files.py": "where it is done",
-    "softrobots/benchmark/processes.py": "a switch of the kernel",
-    "softrobots/command_line.py": "the null device",
-    "softrobots/composition.py": "a temporary folder",
-    "softrobots/interop/kinematics.py": "a temporary folder",
-    "softrobots/interop/springs_read.py": "a temporary folder, and the null device",
-    "softrobots/clean_checkout.py": "a copy of the checkout, made for one run",
+    "softrobots/core/files.py": "where it is done",
+    "scripts/studies/benchmark/processes.py": "a switch of the kernel",
+    "softrobots/cli/options/command_line.py": "the null device",
+    "softrobots/description/composition.py": "a temporary folder",
+    "softrobots/cli/tools/kinematics.py": "a temporary folder",
+    "scripts/studies/interop/springs_read.py": "a temporary folder, and the null device",
+    "scripts/studies/clean_checkout.py": "a copy of the checkout, made for one run",
     "scripts/environments.py": "the log of a program while it runs",
     "scripts/mutation.py": "the log of a program while it runs",
     "scripts/fuzz_readers.py": "a temporary folder, a switch of the kernel, and a pipe",
@@ -375,7 +375,7 @@ def plain_writes(file: Path) -> set[str]:
     ours = {
         alias.asname or alias.name
         for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.module == "softrobots.files"
+        if isinstance(node, ast.ImportFrom) and node.module == "softrobots.core.files"
         for alias in node.names
     }
     found = set()

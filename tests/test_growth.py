@@ -11,11 +11,11 @@ import pytest
 from scipy.linalg import expm
 
 import softrobots as sr
-from softrobots.body import body_at
-from softrobots.growth import SHORTEST, grown_coordinates
-from softrobots.meshcat_view.animation_frames import growth_frames
-from softrobots.scene import Scene
-from softrobots.viewer import view
+from softrobots.robots.growth import SHORTEST, grown_coordinates
+from softrobots.view.body import body_at
+from softrobots.view.meshcat_page.animation_frames import growth_frames
+from softrobots.view.scene import Scene
+from softrobots.view.viewer import view
 
 
 @pytest.fixture(scope="module")

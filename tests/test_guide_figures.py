@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import equilibrium_plots, inflated_beam, link_plots
+from softrobots import inflated_beam
 from softrobots.inflated_beam import TABLE_3, CharacterisationRow
+from softrobots.view.figures import equilibrium_plots, link_plots
 from tests.conftest import CHECKOUT
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}

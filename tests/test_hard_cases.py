@@ -16,19 +16,19 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.kernels import Status
-from softrobots.kernels.compiled_model import CompiledModel
-from softrobots.kernels.settings import LARGEST_POSITION
-from softrobots.soak import jobs, verdicts
-from softrobots.soak.families import FAMILIES, Family, draw_cases
-from softrobots.soak.jobs import STABLE, Answer, Hang, limited
-from softrobots.soak.plain_sections import section_joints, section_slopes
-from softrobots.soak.plain_statics import Case, PlainStatics
-from softrobots.soak.running import again, family_of, parts_of, soak, table
-from softrobots.soak.verdicts import Tally, judge
+from softrobots.compiled import Status
+from softrobots.compiled.run.compiled_model import CompiledModel
+from softrobots.compiled.settings import LARGEST_POSITION
+from studies.soak import jobs, verdicts
+from studies.soak.families import FAMILIES, Family, draw_cases
+from studies.soak.jobs import STABLE, Answer, Hang, limited
+from studies.soak.plain_sections import section_joints, section_slopes
+from studies.soak.plain_statics import Case, PlainStatics
+from studies.soak.running import again, family_of, parts_of, soak, table
+from studies.soak.verdicts import Tally, judge
 from tests.conftest import CHECKOUT, missing
-from tests.law_robots import ROBOTS, model
-from tests.oracles import central_difference
+from tests.support.law_robots import ROBOTS, model
+from tests.support.oracles import central_difference
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 LARGEST_FORCE = 1000.0  # [N]
@@ -94,8 +94,8 @@ def test_plain_torques_and_tips_are_those_of_pinocchio(kind: str, rng: np.random
 
 @pytest.mark.parametrize("kind", ROBOTS)
 def test_the_solvers_see_the_same_residual_and_tangent(kind: str, rng: np.random.Generator) -> None:
-    from softrobots.elastostatics import elastic_state
-    from softrobots.loads import Load
+    from softrobots.statics.elastostatics import elastic_state
+    from softrobots.statics.loads import Load
 
     robot, case, springs = drawn(kind, rng)
     plain = PlainStatics(robot)
@@ -248,7 +248,7 @@ def test_a_call_that_hangs_is_interrupted() -> None:
 
 def test_compiled_code_that_hangs_ends_the_soak_with_a_broken_law(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing interrupts it in its own process; a process that only starts takes longer than this patience."""
-    monkeypatch.setattr("softrobots.soak.running.PATIENCE", 1e-3)
+    monkeypatch.setattr("studies.soak.running.PATIENCE", 1e-3)
     tallies = soak(6, processes=2, families=[family_of("arm")], compiler=False)
     assert ["nothing was done for 0.001 s" in law for _, law in tallies["arm"].broken] == [True]
     assert tallies["arm"].cases == 0

@@ -15,9 +15,9 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from softrobots import helix
-from softrobots.errors import FileFormatError, MissingDependency, OutputExists, ParameterError, StraightTube
+from softrobots.core.errors import FileFormatError, MissingDependency, OutputExists, ParameterError, StraightTube
 from softrobots.helix import ActuatorTable
-from tests.laws import law
+from tests.support.laws import law
 
 PRESSURES = (0.0, 10e3, 25e3, 40e3, 60e3)
 LENGTHENING = (0.50, 0.58, 0.71, 0.80, 0.86)  # an inverse pneumatic muscle; invented numbers

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softrobots import helix, helix_plots
-from softrobots.errors import ParameterError, StraightTube
-from softrobots.helix_sheet import draw
+from softrobots import helix
+from softrobots.core.errors import ParameterError, StraightTube
+from softrobots.view.figures import helix_plots
+from softrobots.view.figures.helix_sheet import draw
 from tests.conftest import missing
 from tests.test_scripts import run_script
 

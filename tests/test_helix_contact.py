@@ -20,8 +20,8 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.spatial.distance import cdist
 
 from softrobots import ParameterError, SoftRobotsError, helix
-from softrobots.errors import OutputExists, SelfIntersection
-from tests.laws import law
+from softrobots.core.errors import OutputExists, SelfIntersection
+from tests.support.laws import law
 
 DIAMETER = 0.0331
 

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 from softrobots import helix
-from softrobots.errors import FileFormatError, OutputExists, ParameterError, SelfIntersection
+from softrobots.core.errors import FileFormatError, OutputExists, ParameterError, SelfIntersection
 from softrobots.helix import DesignWarning, HelixDesign, Wish
-from tests.laws import law
+from tests.support.laws import law
 
 D = 0.0331  # the paper's tube
 TURN = 2.0 * math.pi

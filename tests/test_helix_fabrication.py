@@ -19,9 +19,9 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from softrobots import helix
-from softrobots.errors import OutputExists, ParameterError
+from softrobots.core.errors import OutputExists, ParameterError
 from softrobots.helix import Pattern, pinch_pattern, write_template, write_template_pages, write_template_table
-from tests.laws import law
+from tests.support.laws import law
 
 D = 0.0331  # the paper's tube
 REFERENCE = (0.66, math.radians(5.0), D, 1.2)

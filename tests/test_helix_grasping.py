@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from softrobots import helix
-from softrobots.errors import ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.helix import PAPER_CYLINDER, GraspForce, grasp_force
-from tests.laws import law
+from tests.support.laws import law
 
 PAPER: dict[str, Any] = {
     "object_radius": PAPER_CYLINDER.object_radius,

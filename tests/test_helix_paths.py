@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from scipy.linalg import expm
 
 from softrobots import helix
-from softrobots.errors import ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.helix import HANDEDNESS, PATHS, HelixShape
-from tests.laws import law
+from tests.support.laws import law
 from tests.test_helix_shapes import (
     ANGLES,
     CONTRACTIONS,

@@ -16,7 +16,7 @@ from tests.test_scripts import run_script
 @pytest.fixture(autouse=True)
 def light_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """A growth of few pictures."""
-    monkeypatch.setattr("softrobots.meshcat_view.animation_frames._MOST_BODIES", 6)
+    monkeypatch.setattr("softrobots.view.meshcat_page.animation_frames._MOST_BODIES", 6)
 
 
 def test_an_actuator_becomes_design_template_robots_and_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,10 +16,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from softrobots import helix
-from softrobots.checks import LARGEST
-from softrobots.errors import ParameterError, StraightTube
+from softrobots.core.checks import LARGEST
+from softrobots.core.errors import ParameterError, StraightTube
 from softrobots.helix import HelixShape
-from tests.laws import law
+from tests.support.laws import law
 
 DEG = math.pi / 180.0
 D = 0.0331

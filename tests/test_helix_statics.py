@@ -12,11 +12,11 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.body import body
-from softrobots.kinematics import frame_placement
-from softrobots.loads import distributed_force
 from softrobots.robots import HelixTube
-from tests.helix_rods import (
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import distributed_force
+from softrobots.view.body import body
+from tests.support.helix_rods import (
     HelixRod,
     actuated_rod,
     axial_wrench,

@@ -25,15 +25,15 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.body import body_at
-from softrobots.description import expand
-from softrobots.kinematics import frame_placement
-from softrobots.paths import urdf_folder, xacro_folder
+from softrobots.description.expansion import expand
+from softrobots.description.paths import urdf_folder, xacro_folder
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube
-from softrobots.tag_reader import read_tags
-from softrobots.urdf_tags import NAMESPACE
-from tests.helix_rods import actuator_frames, gauss
-from tests.laws import law
+from softrobots.statics.kinematics import frame_placement
+from softrobots.view.body import body_at
+from tests.support.helix_rods import actuator_frames, gauss
+from tests.support.laws import law
 from tests.test_pcc_description import changed, check_portable, edited, gazebo_numbers, link_masses, link_poses, within_joint
 
 DEG = math.pi / 180.0

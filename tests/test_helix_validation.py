@@ -13,7 +13,7 @@ import pytest
 
 import softrobots as sr
 from tests.conftest import load_script
-from tests.helix_rods import actuator_frames
+from tests.support.helix_rods import actuator_frames
 from tests.test_scripts import run_script
 
 

@@ -18,9 +18,9 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from softrobots import helix
-from softrobots.errors import MissingDependency, ParameterError
+from softrobots.core.errors import MissingDependency, ParameterError
 from softrobots.helix import bent_tube
-from tests.laws import law
+from tests.support.laws import law
 
 D = 0.0331
 LENGTH = 1.5

@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 
 import softrobots as sr
-from softrobots.json_text import parse_json
-from softrobots.npz_file import read_arrays
-from softrobots.readers.mjcf_limits import check_mjcf
-from softrobots.readers.sdf_text import with_found_meshes, without_drawings
-from softrobots.xml_input import parse_xml, read_xml
+from softrobots.core.json_text import parse_json
+from softrobots.core.npz_file import read_arrays
+from softrobots.core.xml_input import parse_xml, read_xml
+from softrobots.description.readers.mjcf_limits import check_mjcf
+from softrobots.description.readers.sdf_text import with_found_meshes, without_drawings
 from tests.conftest import missing
 
 SECONDS = 3.0

@@ -24,17 +24,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import csv_table, npz_file, results_io
+from softrobots.core import csv_table, npz_file
 from softrobots.helix import ActuatorTable, HelixDesign
-from softrobots.live.input import Keys, Lines, WatchedFile
-from softrobots.live.keys import KeyMoves
-from softrobots.live.loop import LiveView, follow
-from softrobots.result_fields import KINDS
 from softrobots.robots.parameter_file import LARGEST_FILE, read_parameters
-from tests import hostile_data as data
+from softrobots.statics import results_io
+from softrobots.statics.result_fields import KINDS
+from softrobots.view.live.input import Keys, Lines, WatchedFile
+from softrobots.view.live.keys import KeyMoves
+from softrobots.view.live.loop import LiveView, follow
 from tests.conftest import CHECKOUT, load_script
-from tests.hostile import HOSTILE_NUMBERS
-from tests.laws import law
+from tests.support import hostile_data as data
+from tests.support.hostile import HOSTILE_NUMBERS
+from tests.support.laws import law
 
 SECONDS = 1.0
 """CPU time of a refusal [s]. Measured: 0.1 s at most, in the largest YAML file."""
@@ -595,7 +596,7 @@ def test_any_lines_of_a_pipe_are_followed_or_told(arm: sr.SoftModel, sent: bytes
 
 def test_a_watched_file_may_lie_about_its_size(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Files of the kernel have no size until they are read, and some have no end."""
-    monkeypatch.setattr("softrobots.live.input._LARGEST", 1000)
+    monkeypatch.setattr("softrobots.view.live.input._LARGEST", 1000)
     live = LiveView(Shown(), sr.solve_equilibrium(arm, (0.3, 0.6, -0.8)))
     endless = Path("/proc/kallsyms")
     if not endless.is_file():
@@ -654,16 +655,16 @@ RUNS |= {f"{module}.{call}" for module in ("np", "numpy", "json", "yaml", "torch
 RUNS |= {f"yaml.{call}" for call in ("load_all", "unsafe_load", "full_load", "unsafe_load_all", "full_load_all")}
 FORBIDDEN = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 ALLOWED = {
-    ("softrobots/benchmark/processes.py", "json.loads"): "what a process of ours prints",
-    ("softrobots/commands/bench.py", "json.loads"): "the text that was made just before",
-    ("softrobots/commands/robot_parameters.py", "ast.literal_eval"): "values behind --set: literals only",
-    ("softrobots/interop/bullet_statics.py", "compile"): "the exported file is run as PyBullet's users run it",
-    ("softrobots/interop/bullet_statics.py", "exec"): "the same",
-    ("softrobots/json_text.py", "json.loads"): "the reader of all JSON",
-    ("softrobots/kernels/machines.py", "compile"): "code that kernels/ has generated",
-    ("softrobots/kernels/machines.py", "exec"): "the same",
-    ("softrobots/kernels/numpy_batches.py", "compile"): "the same",
-    ("softrobots/kernels/numpy_batches.py", "exec"): "the same",
+    ("scripts/studies/benchmark/processes.py", "json.loads"): "what a process of ours prints",
+    ("softrobots/cli/bench.py", "json.loads"): "the text that was made just before",
+    ("softrobots/cli/options/robot_parameters.py", "ast.literal_eval"): "values behind --set: literals only",
+    ("scripts/studies/interop/bullet_statics.py", "compile"): "the exported file is run as PyBullet's users run it",
+    ("scripts/studies/interop/bullet_statics.py", "exec"): "the same",
+    ("softrobots/core/json_text.py", "json.loads"): "the reader of all JSON",
+    ("softrobots/compiled/run/machines.py", "compile"): "code that kernels/ has generated",
+    ("softrobots/compiled/run/machines.py", "exec"): "the same",
+    ("softrobots/compiled/run/numpy_batches.py", "compile"): "the same",
+    ("softrobots/compiled/run/numpy_batches.py", "exec"): "the same",
     ("scripts/environments.py", "json.loads"): "what pip prints",
     ("scripts/fuzz_readers.py", "json.loads"): "what a process of its own prints",
     ("scripts/measure_coverage.py", "json.loads"): "what coverage writes",

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots import constant_curvature as cc
 from softrobots import helix, inflated_beam
-from softrobots.sweeps import TargetGrid
+from softrobots.compiled.sweeps import TargetGrid
 
 ARC = cc.Arc(0.5, 0.8, 0.7)
 SHAPE = helix.forward(0.66, 0.0873, 0.0331)

@@ -25,20 +25,20 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.collada_check import collada_problem
-from softrobots.description import expand
-from softrobots.mesh_files import LARGEST_MESH, MissingMeshWarning, find_mesh
-from softrobots.readers.mjcf_limits import MOST_ELEMENTS
-from softrobots.scene import Scene
-from softrobots.sources import read_source
-from softrobots.tag_reader import read_tags
-from softrobots.third_party import UR5, robot_file
-from softrobots.urdf_structure import MOST_LINKS
-from softrobots.xml_input import DEEPEST, LARGEST_FILE, MOST_ATTRIBUTES, MOST_TAGS, number_in, parse_xml
+from softrobots.core.xml_input import DEEPEST, LARGEST_FILE, MOST_ATTRIBUTES, MOST_TAGS, number_in, parse_xml
+from softrobots.description.collada_check import collada_problem
+from softrobots.description.expansion import expand
+from softrobots.description.mesh_files import LARGEST_MESH, MissingMeshWarning, find_mesh
+from softrobots.description.readers.mjcf_limits import MOST_ELEMENTS
+from softrobots.description.sources import read_source
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.third_party import UR5, robot_file
+from softrobots.description.urdf_structure import MOST_LINKS
+from softrobots.view.scene import Scene
 from tests.conftest import CHECKOUT, missing
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS
-from tests.hostile import HOSTILE_NUMBERS, Damage, damaged_bytes, damaged_xml
-from tests.hostile_descriptions import (
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS
+from tests.support.hostile import HOSTILE_NUMBERS, Damage, damaged_bytes, damaged_xml
+from tests.support.hostile_descriptions import (
     XACRO,
     dae,
     drawn,
@@ -53,7 +53,7 @@ from tests.hostile_descriptions import (
     stl,
     urdf_corpus,
 )
-from tests.hostile_xml_cases import BOMB, REFUSED, ROBOT, VALID, fixed, mjcf
+from tests.support.hostile_xml_cases import BOMB, REFUSED, ROBOT, VALID, fixed, mjcf
 
 Corpus = Callable[[], list[bytes]]
 Read = Callable[[Path], None]
@@ -234,7 +234,7 @@ def test_xacro_reads_included_files_in_utf8(tmp_path: Path, monkeypatch: pytest.
 )
 def test_a_macro_that_copies_without_end_is_stopped(body: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Elements count that are copied, not only those that are reached: the first body ended at Python's depth of calls only."""
-    monkeypatch.setattr("softrobots.description.MOST_STEPS", 5000)
+    monkeypatch.setattr("softrobots.description.expansion.MOST_STEPS", 5000)
     file = tmp_path / "much.xacro"
     block = f"<a>{'<b/>' * 99}</a>"
     file.write_text(XACRO.replace(INERTIAL, block).replace('<xacro:insert_block name="o"/>', body))

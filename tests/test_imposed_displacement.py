@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.imposed_displacement import imposed_at
-from softrobots.loads import Load
-from softrobots.probes import Probe
+from softrobots.statics.imposed_displacement import imposed_at
+from softrobots.statics.loads import Load
+from softrobots.statics.probes import Probe
 
 K, M = 169.44, 21.76  # [Troise 2021] Table 3 at 50 kPa
 REACH = 0.47  # [m], from the hinge to the probe at h = 500 mm

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from softrobots import ParameterError, inflated_beam
-from tests.laws import law
-from tests.oracles import PRINTED_WRINKLING_MOMENTS
+from tests.support.laws import law
+from tests.support.oracles import PRINTED_WRINKLING_MOMENTS
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}
 

@@ -19,15 +19,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.interop import tools
-from softrobots.interop.kinematics import compare_kinematics, pose_error
-from softrobots.interop.tools import TOOLS, find_tool, installed_tools
-from softrobots.paths import urdf_folder
+from softrobots.cli.tools import known_tools as tools
+from softrobots.cli.tools.kinematics import compare_kinematics, pose_error
+from softrobots.cli.tools.known_tools import TOOLS, find_tool, installed_tools
+from softrobots.description.paths import urdf_folder
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.third_party import UR5, robot_file
 from softrobots.robots import HelixTube, InflatableArm, PccArm, Robot
-from softrobots.tag_reader import read_tags
-from softrobots.third_party import UR5, robot_file
 from tests.conftest import missing, skip_without_bullet_wheels
-from tests.foreign import BRANCHED, INERTIAL, joint
+from tests.support.foreign import BRANCHED, INERTIAL, joint
 
 FILE = urdf_folder() / "inflatable_arm.urdf"
 FILES = [urdf_folder() / f"{name}.urdf" for name in sr.ROBOTS]
@@ -178,7 +178,7 @@ def test_the_angle_between_poses_is_that_of_the_logarithm(rng: np.random.Generat
 
 
 def test_the_draw_keeps_the_limits_and_can_be_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
-    from softrobots.interop import kinematics
+    from softrobots.cli.tools import kinematics
 
     drawn: list[dict[str, float]] = []
     original = kinematics._pinocchio_poses
@@ -267,7 +267,7 @@ def test_gazebos_parser_keeps_every_link_joint_spring_and_mass(tmp_path: Path) -
     The converter is compiled once (3 s), for all files. libsdformat prints 16 digits: rounding is at most 5e-16 of a number.
     """
     flags = subprocess.run(["pkg-config", "--cflags", "--libs", sdformat()], capture_output=True, text=True, check=True)
-    source, program = Path(__file__).with_name("urdf_to_sdf.cc"), tmp_path / "urdf_to_sdf"
+    source, program = Path(__file__).parent / "support" / "urdf_to_sdf.cc", tmp_path / "urdf_to_sdf"
     subprocess.run(["g++", "-std=c++17", str(source), "-o", str(program), *flags.stdout.split()], check=True)
     copies = [Path(shutil.copy(file, tmp_path)) for file in FILES]
     done = subprocess.run([str(program), *map(str, copies)], capture_output=True, text=True, check=True)

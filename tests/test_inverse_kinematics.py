@@ -7,10 +7,10 @@ import pytest
 from scipy.optimize import minimize
 
 import softrobots as sr
-from softrobots.elastostatics import METHODS
-from softrobots.inverse_kinematics import elbow_side
-from softrobots.kinematics import frame_placement
-from tests.oracles import flexible_table, rigid_table
+from softrobots.statics.elastostatics import METHODS
+from softrobots.statics.inverse_kinematics import elbow_side
+from softrobots.statics.kinematics import frame_placement
+from tests.support.oracles import flexible_table, rigid_table
 
 FORCE = (0.0, 10.0, -15.0)
 TOLERANCE = 1e-9  # the bound [m]

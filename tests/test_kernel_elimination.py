@@ -14,24 +14,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.elastostatics import elastic_state
-from softrobots.kernels.actuation import Actuation
-from softrobots.kernels.blocks import Block
-from softrobots.kernels.elements import constants
-from softrobots.kernels.elimination import Beyond, Eliminated, eliminate, release
-from softrobots.kernels.layout import Layout
-from softrobots.kernels.machines import Run
-from softrobots.kernels.program import make_program
-from softrobots.kernels.settings import LEAST_GUARD as FLOOR
-from softrobots.kernels.short_chain import Evaluation, evaluate, solve_again
-from softrobots.kernels.small_systems import inverse_small, smallest_square, solve_small
-from softrobots.kernels.tip_motion import step_with_motors, tip_motion
-from softrobots.kernels.unknowns import Unknowns
-from softrobots.kinematics import frame_jacobian, frame_placement
-from softrobots.loads import Load
-from softrobots.model import SoftModel
+from softrobots.compiled.chain.elements import constants
+from softrobots.compiled.chain.elimination import Beyond, Eliminated, eliminate, release
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.short_chain import Evaluation, evaluate, solve_again
+from softrobots.compiled.chain.small_systems import inverse_small, smallest_square, solve_small
+from softrobots.compiled.chain.tip_motion import step_with_motors, tip_motion
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.program.generated_module import make_program
+from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.machines import Run
+from softrobots.compiled.settings import LEAST_GUARD as FLOOR
+from softrobots.compiled.trace.blocks import Block
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import elastic_state
+from softrobots.statics.kinematics import frame_jacobian, frame_placement
+from softrobots.statics.loads import Load
+from tests.support.traced import functions, values
 from tests.test_serial_chain import ROBOTS, drawn
-from tests.traced import functions, values
 
 
 def floats(array: Any) -> np.ndarray:
@@ -345,7 +345,7 @@ def test_loops_compute_what_the_straight_line_does(
     for gravity in (None, GRAVITY):
         runs = [program_at(model, motors, force, gravity)]
         with monkeypatch.context() as patch:
-            patch.setattr("softrobots.kernels.unknowns.LONGEST_LINE", 0)
+            patch.setattr("softrobots.compiled.chain.unknowns.LONGEST_LINE", 0)
             runs.append(program_at(model, motors, force, gravity))
         assert ["enter_all" in code for _, code, _, _ in runs] == [False, True]
         for guard in (0.0, 1.0):

@@ -15,8 +15,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from softrobots.kernels.blocks import Block, hoist
-from softrobots.kernels.expressions import (
+from softrobots.compiled.c.kernel_language import read_module
+from softrobots.compiled.trace.blocks import Block, hoist
+from softrobots.compiled.trace.expressions import (
     Expression,
     Trace,
     absolute,
@@ -30,8 +31,7 @@ from softrobots.kernels.expressions import (
     smaller,
     square_root,
 )
-from softrobots.kernels.kernel_language import read_module
-from tests.traced import MANY_DIGITS, functions, values
+from tests.support.traced import MANY_DIGITS, functions, values
 
 INPUTS = 4
 CONSTANTS = (0.0, 1.0, -1.0, 2.0, -0.75)

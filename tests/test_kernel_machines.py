@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.kernels import machines
-from softrobots.kernels.c_source import to_c
-from softrobots.kernels.kernel_language import read_module
-from softrobots.kernels.machines import NumbaRun, PythonRun, available_backend, cache_folder, make_run
-from softrobots.kernels.program import Program, make_program
-from softrobots.kernels.unknowns import Unknowns
-from softrobots.model import SoftModel
+from softrobots.compiled.c.c_source import to_c
+from softrobots.compiled.c.kernel_language import read_module
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.program.generated_module import Program, make_program
+from softrobots.compiled.run import machines
+from softrobots.compiled.run.machines import NumbaRun, PythonRun, available_backend, cache_folder, make_run
+from softrobots.model.soft_model import SoftModel
 from tests.test_serial_chain import ROBOTS
 
 GRAVITY = np.array([0.5, -1.0, -9.6])
@@ -73,7 +73,7 @@ def test_the_places_of_the_workspace_do_not_overlap(kind: str) -> None:
 SCRIPT = """
 import hashlib, sys
 import softrobots as sr
-from softrobots.kernels.machines import cache_folder
+from softrobots.compiled.run.machines import cache_folder
 for robot in (sr.InflatableArm(), sr.PccArm(segment_lengths=(0.5, 0.4), bending_stiffness=(1.9, 1.2), elastic_sections=2)):
     text = sr.compile(sr.load_model(robot), backend="python").source(lanes=True)
     print(hashlib.sha256(text.encode()).hexdigest())
@@ -191,7 +191,7 @@ def test_a_damaged_file_is_written_anew(no_folder: Path, monkeypatch: pytest.Mon
 RACE = """
 import sys, time
 from pathlib import Path
-from softrobots.kernels.machines import _module
+from softrobots.compiled.run.machines import _module
 here = Path(sys.argv[1])
 (here / sys.argv[2]).touch()
 while len(list(here.glob("ready*"))) < 2:

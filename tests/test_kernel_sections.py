@@ -14,17 +14,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.kernels.blocks import Block
-from softrobots.kernels.elements import Load, Screw, constants, vector
-from softrobots.kernels.expressions import Expression, gradient
-from softrobots.kernels.section_weight import OwnWeight, weight_moment
-from softrobots.kernels.stumpff_series import LARGEST, stumpff
-from softrobots.model import SoftModel
-from softrobots.serial_chain import ChainSection
-from tests.oracles import central_difference
+from softrobots.compiled.chain.elements import Load, Screw, constants, vector
+from softrobots.compiled.chain.section_weight import OwnWeight, weight_moment
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Expression, gradient
+from softrobots.compiled.trace.stumpff_series import LARGEST, stumpff
+from softrobots.model.serial_chain import ChainSection
+from softrobots.model.soft_model import SoftModel
+from tests.support.oracles import central_difference
+from tests.support.traced import functions, values
 from tests.test_serial_chain import section_frames
 from tests.test_strain_chain import H, exact_screw, exact_stumpff, screw_matrix
-from tests.traced import functions, values
 
 angles_ = st.floats(-1.5, 1.5)
 sections_ = st.tuples(angles_, angles_, angles_, st.floats(-0.04, 0.1))

@@ -13,8 +13,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from softrobots.kernels import intrinsics, trigonometry
-from softrobots.kernels.trigonometry import cosine, sine
+from softrobots.compiled.drivers import intrinsics, trigonometry
+from softrobots.compiled.drivers.trigonometry import cosine, sine
 
 TEXT = "from __future__ import annotations\n" + "\n".join(map(inspect.getsource, trigonometry.FUNCTIONS))
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.kinematics import frame_jacobian, frame_placement
-from softrobots.paths import urdf_folder
-from tests.oracles import flexible_jacobian, flexible_table, rigid_table
+from softrobots.description.paths import urdf_folder
+from softrobots.statics.kinematics import frame_jacobian, frame_placement
+from tests.support.oracles import flexible_jacobian, flexible_table, rigid_table
 
 # The last DH frame has its z axis along -y of the arm; the tip frame of the URDF has z up.
 TIP_TO_DH = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

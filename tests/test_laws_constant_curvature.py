@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from softrobots import ParameterError
 from softrobots import constant_curvature as cc
 from softrobots.constant_curvature import Arc
-from tests.laws import law
+from tests.support.laws import law
 
 FRAMES = ("torsion_free", "bending_plane")
 STEP = 1e-5

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import is_hypothesis_test
 
 import softrobots as sr
-from softrobots.kernels.compiled_model import CompiledModel
+from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import CHECKOUT, load_script
-from tests.laws import REGISTERED
+from tests.support.laws import REGISTERED
 
 SUBMODULES = ("constant_curvature", "export", "helix", "inflated_beam", "sweeps")
 CLASSES = (CompiledModel, sr.SoftModel, sr.Viewer)

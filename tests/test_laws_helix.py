@@ -18,9 +18,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from softrobots import SelfIntersection, helix
-from softrobots.errors import ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.helix import HANDEDNESS, PATHS, HelixShape
-from tests.laws import law
+from tests.support.laws import law
 
 TURN = 2.0 * math.pi
 HANDS = {"right": 1.0, "left": -1.0}

@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from softrobots import ParameterError, inflated_beam
-from tests.laws import law
+from tests.support.laws import law
 
 ROUNDING = 1e-14  # a few dozen operations on positive numbers
 

@@ -22,21 +22,22 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import checks, errors, inflated_beam
-from softrobots.actuators import Actuators
-from softrobots.files import csv_text, write_text
-from softrobots.loads import cross_matrix
-from softrobots.marked_text import marked
-from softrobots.muscle_lengths import MuscleLengths
-from softrobots.probes import Probe, face_normal, touch
-from softrobots.renaming import prefix_names, shift_segments, used_names
-from softrobots.screws import Screw, skew
-from softrobots.springs import LinearSprings, SaturatingLink, SaturatingSprings
-from softrobots.strain_chain import in_range, joint_positions
-from softrobots.stumpff import stumpff
-from softrobots.sweeps import TargetGrid
-from softrobots.workspace_map import required_pressures
-from tests.laws import law
+from softrobots import inflated_beam
+from softrobots.compiled.sweeps import TargetGrid
+from softrobots.constant_curvature.screws import Screw, skew
+from softrobots.constant_curvature.strain_chain import in_range, joint_positions
+from softrobots.constant_curvature.stumpff import stumpff
+from softrobots.core import checks, errors
+from softrobots.core.files import csv_text, write_text
+from softrobots.description.renaming import prefix_names, shift_segments, used_names
+from softrobots.model.actuators import Actuators
+from softrobots.model.muscle_lengths import MuscleLengths
+from softrobots.model.springs import LinearSprings, SaturatingLink, SaturatingSprings
+from softrobots.statics.loads import cross_matrix
+from softrobots.statics.probes import Probe, face_normal, touch
+from softrobots.statics.workspace_map import required_pressures
+from studies.marked_text import marked
+from tests.support.laws import law
 
 numbers_ = st.floats(-1e3, 1e3)
 

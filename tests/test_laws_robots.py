@@ -16,9 +16,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import command_line, composition, export, inflated_beam
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
-from tests.laws import law
+from softrobots import export, inflated_beam
+from softrobots.cli.options import command_line
+from softrobots.description import composition
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from tests.support.laws import law
 
 triples_ = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3)
 lengths_ = st.lists(st.floats(0.2, 1.0), min_size=1, max_size=4)

@@ -12,9 +12,9 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from tests.law_robots import ROBOTS, Case, cases, load_energy, model, scaled, shares, stored_energy, turned, turns
-from tests.laws import law
-from tests.oracles import flexible_jacobian
+from tests.support.law_robots import ROBOTS, Case, cases, load_energy, model, scaled, shares, stored_energy, turned, turns
+from tests.support.laws import law
+from tests.support.oracles import flexible_jacobian
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Mirror image in the x-z plane."""

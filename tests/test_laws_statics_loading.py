@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 import softrobots as sr
-from tests.law_robots import (
+from tests.support.law_robots import (
     PUSHES,
     ROBOTS,
     Case,
@@ -24,8 +24,8 @@ from tests.law_robots import (
     turned,
     turns,
 )
-from tests.laws import law
-from tests.oracles import central_difference
+from tests.support.laws import law
+from tests.support.oracles import central_difference
 
 LOADED = tuple(kind for kind in ROBOTS if kind != "limp")
 """Robots whose equilibria are smooth in the load."""

@@ -12,8 +12,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from tests.law_robots import PUSHES, Case, cases, model, triples
-from tests.laws import law
+from tests.support.law_robots import PUSHES, Case, cases, model, triples
+from tests.support.laws import law
 
 # --- Loads
 

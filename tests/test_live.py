@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.live import input as live_input
-from softrobots.live.commands import Wanted, changed, read_commands
-from softrobots.live.input import Lines, Terminal, WatchedFile, commands_from
-from softrobots.live.keys import KeyMoves
-from softrobots.live.loop import LiveView, follow, state_line, tip_force
-from softrobots.warm_start import next_equilibrium, next_solution
+from softrobots.view.live import input as live_input
+from softrobots.view.live.commands import Wanted, changed, read_commands
+from softrobots.view.live.input import Lines, Terminal, WatchedFile, commands_from
+from softrobots.view.live.keys import KeyMoves
+from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
+from softrobots.view.warm_start import next_equilibrium, next_solution
 
 START = Wanted(np.array([0.0, 0.5, -0.5]), None, np.array([0.0, 0.0, -1.0]), None)
 NOW = Wanted(np.array([0.1, 0.2, 0.3]), np.array([0.8, 0.1, 0.2]), np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, -9.81]))
@@ -153,7 +153,7 @@ def test_without_a_way_from_the_last_springs_the_relaxed_ones_are_tried(
             raise sr.EquilibriumNotFound("none", best=None, residual=1.0, iterations=1)
         return sr.solve_equilibrium(*arguments, **options)
 
-    monkeypatch.setattr("softrobots.warm_start.solve_equilibrium", fails_warm)
+    monkeypatch.setattr("softrobots.view.warm_start.solve_equilibrium", fails_warm)
     assert np.array_equal(next_equilibrium(last, (0.2, 0.5, -0.5), (0, 3, 0)).q_springs, cold.q_springs)
 
 

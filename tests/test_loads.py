@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.joint_loads import Entries, JointLoad
-from softrobots.loads import AppliedLoad, Load
-from tests.foreign import BRANCHED, LIMIT, SPRINGS
-from tests.oracles import central_difference, flexible_jacobian
+from softrobots.model.joint_loads import Entries, JointLoad
+from softrobots.statics.loads import AppliedLoad, Load
+from tests.support.foreign import BRANCHED, LIMIT, SPRINGS
+from tests.support.oracles import central_difference, flexible_jacobian
 
 MODELS = {
     "one link": sr.load_model(sr.InflatableArm(link_lengths=(0.6,))),

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.composition import fix_joints
-from softrobots.mesh_files import MissingMeshWarning, find_mesh, with_absolute_paths
-from softrobots.mesh_triangles import Triangles
-from softrobots.scene import Scene, Shape
-from softrobots.third_party import UR5, package_folders, robot_file
-from softrobots.viewer import Viewer
+from softrobots.description.composition import fix_joints
+from softrobots.description.mesh_files import MissingMeshWarning, find_mesh, with_absolute_paths
+from softrobots.description.third_party import UR5, package_folders, robot_file
+from softrobots.view.mesh_triangles import Triangles
+from softrobots.view.scene import Scene, Shape
+from softrobots.view.viewer import Viewer
 from tests.conftest import missing
-from tests.foreign import INERTIAL, joint
+from tests.support.foreign import INERTIAL, joint
 
 CORNERS = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 FACES = [(1, 4, 3, 2), (5, 6, 7, 8), (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8)]

@@ -11,9 +11,9 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.kinematics import frame_placement
-from softrobots.model import MAX_DOF
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from softrobots.model.soft_model import MAX_DOF
+from softrobots.statics.kinematics import frame_placement
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 
 
 def test_springs_of_the_caller_on_a_foreign_file() -> None:

@@ -10,17 +10,7 @@ from typing import Any
 import pytest
 
 import softrobots as sr
-from softrobots.mutants import (
-    KILLED,
-    NOT_TESTED,
-    SURVIVED,
-    TIMED_OUT,
-    Explanation,
-    Mutant,
-    judge,
-    read_explanations,
-    read_mutants,
-)
+from studies.mutants import KILLED, NOT_TESTED, SURVIVED, TIMED_OUT, Explanation, Mutant, judge, read_explanations, read_mutants
 from tests.conftest import CHECKOUT, load_script
 
 GENERATED = '''

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.browser import find_chromium, open_browser, show_share
+from softrobots.view.browser import find_chromium, open_browser, show_share
 from tests.conftest import CHECKOUT, missing
 from tests.test_viewer import coloured, pixels
 

@@ -16,10 +16,11 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import description, inflated_beam
-from softrobots.description import expand
-from softrobots.interop.checks import check_description
-from softrobots.paths import xacro_folder
+from softrobots import inflated_beam
+from softrobots.cli.tools.checks import check_description
+from softrobots.description import expansion as description
+from softrobots.description.expansion import expand
+from softrobots.description.paths import xacro_folder
 from tests.conftest import CHECKOUT
 
 EXAMPLES = CHECKOUT / "docs" / "examples"

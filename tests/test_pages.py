@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.browser import show_share, take_animation
-from softrobots.gallery import EXHIBITS
-from softrobots.meshcat_view.page_commands import RESOLUTION, packed, read_page, tidied, unpacked
-from softrobots.meshcat_view.page_text import page_text, scene_of
 from softrobots.robots import HelixTube
-from softrobots.scene import Scene
-from softrobots.viewer import view
+from softrobots.view.browser import show_share, take_animation
+from softrobots.view.meshcat_page.page_commands import RESOLUTION, packed, read_page, tidied, unpacked
+from softrobots.view.meshcat_page.page_text import page_text, scene_of
+from softrobots.view.scene import Scene
+from softrobots.view.viewer import view
+from studies.gallery import EXHIBITS
 from tests.conftest import CHECKOUT
 from tests.test_scripts import run_script
 
@@ -264,7 +264,7 @@ def test_what_is_no_page_is_refused(call: Callable[[], object], message: str) ->
 def test_a_moving_picture_moves_and_repeats(browser: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from PIL import Image
 
-    monkeypatch.setattr("softrobots.browser.open_browser", lambda: nullcontext(browser))
+    monkeypatch.setattr("softrobots.view.browser.open_browser", lambda: nullcontext(browser))
     page = FOLDER / "inflatable_arm.html"
     file = take_animation(page, tmp_path / "a.gif", width=320, height=240, seconds=0.9, frames=3)
     with Image.open(file) as made:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.robots.parameter_file import ParameterFile, read_parameters, read_robot, write_parameters
-from tests.laws import law
+from tests.support.laws import law
 
 NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True).filter(lambda name: name != "robot")
 SCALARS = (

@@ -22,14 +22,14 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 import softrobots as sr
-from softrobots.body import body, body_at
-from softrobots.description import expand
-from softrobots.kinematics import frame_placement
-from softrobots.paths import xacro_folder
+from softrobots.description.expansion import expand
+from softrobots.description.paths import xacro_folder
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import PccArm
-from softrobots.tag_reader import read_tags
-from softrobots.urdf_tags import NAMESPACE
-from tests.laws import law
+from softrobots.statics.kinematics import frame_placement
+from softrobots.view.body import body, body_at
+from tests.support.laws import law
 
 XACRO = xacro_folder() / PccArm.XACRO
 SHAPES: tuple[dict[str, Any], ...] = (

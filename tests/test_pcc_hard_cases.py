@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.elastostatics import elastic_state
-from softrobots.loads import Load
-from tests.oracles import central_difference
+from softrobots.statics.elastostatics import elastic_state
+from softrobots.statics.loads import Load
+from tests.support.oracles import central_difference
 
 LENGTHS = np.array((0.50, 0.53, 0.55, 0.54, 0.51, 0.52))
 
@@ -163,7 +163,7 @@ def test_azimuths_too_close_to_fix_an_arc_are_refused() -> None:
 def test_one_blas_thread_is_given_back() -> None:
     import threadpoolctl
 
-    from softrobots.blas_threads import one_blas_thread
+    from softrobots.core.blas_threads import one_blas_thread
 
     def counts() -> list[int]:
         """Threads of NumPy's BLAS; another one, of SciPy, may have been loaded later."""

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import body_plots, constant_curvature
-from softrobots.body import body
-from softrobots.workspace import workspace_at
+from softrobots import constant_curvature
+from softrobots.statics.workspace import workspace_at
+from softrobots.view.body import body
+from softrobots.view.figures import body_plots
 from tests.conftest import CHECKOUT
-from tests.oracles import central_difference
+from tests.support.oracles import central_difference
 from tests.test_scripts import run_script
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)

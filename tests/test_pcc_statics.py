@@ -15,11 +15,11 @@ from scipy.optimize import minimize
 
 import softrobots as sr
 from softrobots.constant_curvature import arc_from_muscles, chain_transform
-from softrobots.elastostatics import elastic_state
-from softrobots.kinematics import frame_placement
-from softrobots.loads import Load
-from tests.oracles import central_difference
-from tests.rods import Rod, elastica_moment_tip, elastica_tip, random_wrenches, rod_tip, steel_rod
+from softrobots.statics.elastostatics import elastic_state
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import Load
+from tests.support.oracles import central_difference
+from tests.support.rods import Rod, elastica_moment_tip, elastica_tip, random_wrenches, rod_tip, steel_rod
 
 LENGTHS = np.array([0.50, 0.53, 0.55, 0.54, 0.51, 0.52])  # theory: the reference case, d = 0.04 m
 REFERENCE_TIP = (0.44957382, -0.31544214, 0.84384418)

@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import equilibrium_plots, force_path, post_buckling
-from softrobots.post_buckling import FUNDAMENTAL, RING
-from softrobots.stability import critical_point
-from tests.laws import law
-from tests.oracles import arm_balance
+from softrobots.statics import force_path, post_buckling
+from softrobots.statics.post_buckling import FUNDAMENTAL, RING
+from softrobots.statics.stability import critical_point
+from softrobots.view.figures import equilibrium_plots
+from tests.support.laws import law
+from tests.support.oracles import arm_balance
 
 PUSH = (-1, 0, 0)
 LEVER, OFFSET = 0.57, 0.03  # from the hinge to the tip, and to the motor [m]

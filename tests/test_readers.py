@@ -16,14 +16,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.description.readers.shared_mass import give_mass
+from softrobots.description.rigid_tree import Body, Placement
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.export import to_mjcf, to_sdf
-from softrobots.interop.newton import balance_point
-from softrobots.kinematics import frame_placement
-from softrobots.meshcat_view.stage import Stage
-from softrobots.readers.shared_mass import give_mass
-from softrobots.rigid_tree import Body, Placement
-from softrobots.rigid_tree_urdf import read_rigid_tree
-from softrobots.scene import Scene
+from softrobots.statics.kinematics import frame_placement
+from softrobots.view.meshcat_page.stage import Stage
+from softrobots.view.scene import Scene
+from studies.interop.newton import balance_point
 from tests.conftest import missing
 
 Tool = Callable[[str], ModuleType]

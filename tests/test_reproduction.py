@@ -1,6 +1,6 @@
 """The three papers, computed again: every claim holds, the page shows what the script prints, and a wrong row is told.
 
-The printed equations of `softrobots.papers` are one side of the comparison; here they have oracles of their own, so that a
+The printed equations of `studies.papers` are one side of the comparison; here they have oracles of their own, so that a
 mistake in copying them is not taken for an erratum, or for agreement.
 """
 
@@ -22,10 +22,10 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.papers import dh_tables, helix_equations, inflatable_arm, pcc_equations, rendering
-from softrobots.papers.pictures import PICTURES
-from softrobots.papers.reproduction import PAPERS, reproduce
-from softrobots.papers.rows import (
+from studies.papers import dh_tables, helix_equations, inflatable_arm, pcc_equations, rendering
+from studies.papers.pictures import PICTURES
+from studies.papers.reproduction import PAPERS, reproduce
+from studies.papers.rows import (
     AGREES,
     ERRATUM,
     MEASURED,
@@ -42,7 +42,7 @@ from softrobots.papers.rows import (
     within,
 )
 from tests.conftest import CHECKOUT, load_script
-from tests.oracles import PRINTED_WRINKLING_MOMENTS, central_difference, flexible_jacobian, flexible_table, rigid_table
+from tests.support.oracles import PRINTED_WRINKLING_MOMENTS, central_difference, flexible_jacobian, flexible_table, rigid_table
 from tests.test_scripts import run_script
 
 Found = dict[str, tuple[Row, ...]]

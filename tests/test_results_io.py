@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.files import write_atomically
+from softrobots.core.files import write_atomically
 
 FORCE = (0.0, 10.0, -15.0)
 
@@ -61,7 +61,7 @@ def test_what_is_saved_comes_back_equal(results: dict, kind: str, tmp_path: Path
 
 
 def test_springs_said_by_the_caller_come_back(tmp_path: Path) -> None:
-    from tests.foreign import BRANCHED, SPRINGS
+    from tests.support.foreign import BRANCHED, SPRINGS
 
     model = sr.load_model(BRANCHED, springs=SPRINGS, motors=["elbow"], tip="finger")
     state = sr.solve_equilibrium(model, (0.3,), (0, 0, -2))
@@ -109,7 +109,7 @@ def test_csv_holds_the_trajectory_in_full_precision(results: dict, tmp_path: Pat
 
 
 def test_joints_called_like_columns_do_not_hide_the_targets(tmp_path: Path) -> None:
-    from tests.foreign import BRANCHED
+    from tests.support.foreign import BRANCHED
 
     model = sr.load_model(BRANCHED.replace('"elbow"', '"x"'), springs={"wrist": 20.0}, motors=["shoulder", "x"], tip="finger")
     target = sr.solve_equilibrium(model, (0.3, 0.4)).tip_position

@@ -15,13 +15,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.paths import urdf_folder
-from softrobots.rigid_tree import Placement, RigidTree
-from softrobots.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
-from softrobots.third_party import UR5, package_folders, robot_file
-from softrobots.urdf_tags import SpringTag
+from softrobots.description.paths import urdf_folder
+from softrobots.description.rigid_tree import Placement, RigidTree
+from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
+from softrobots.description.third_party import UR5, package_folders, robot_file
+from softrobots.description.urdf_tags import SpringTag
 from tests.conftest import missing
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS
 
 SHIPPED = [urdf_folder() / f"{name}.urdf" for name in sr.ROBOTS]
 

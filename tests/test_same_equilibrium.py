@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.errors import NotConverged
+from softrobots.core.errors import NotConverged
 from softrobots.export import to_mjcf, to_sdf
-from softrobots.interop import drake_statics, mujoco_statics
-from softrobots.interop.cases import FORCES, MUSCLE_POSES, WELDED, EquilibriumCase, equilibrium_cases
-from softrobots.interop.newton import balance_point
-from softrobots.interop.outcomes import Question
-from softrobots.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
-from softrobots.interop.springs_read import springs_read
+from studies.interop import drake_statics, mujoco_statics
+from studies.interop.cases import FORCES, MUSCLE_POSES, WELDED, EquilibriumCase, equilibrium_cases
+from studies.interop.newton import balance_point
+from studies.interop.outcomes import Question
+from studies.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
+from studies.interop.springs_read import springs_read
 from tests.conftest import CHECKOUT, load_script
 
 ROBOTS = tuple(FORCES)
@@ -214,7 +214,7 @@ def test_no_answer_is_a_row_that_does_not_agree(tool: Tool, monkeypatch: pytest.
         raise NotConverged("it swings", best=None, residual=1.0, iterations=1)
 
     broken = dict(SIMULATORS) | {"MuJoCo": dataclasses.replace(SIMULATORS["MuJoCo"], simulate=stuck)}
-    monkeypatch.setattr("softrobots.interop.simulators.SIMULATORS", broken)
+    monkeypatch.setattr("studies.interop.simulators.SIMULATORS", broken)
     row = compare_equilibrium(cases("inflatable_arm")[0], "MuJoCo")
     assert row.problem == "it swings"
     assert row.static_difference is not None
@@ -376,7 +376,7 @@ def test_the_script_refuses_to_compare_nothing(capsys: pytest.CaptureFixture) ->
 
 
 def test_the_script_tells_of_a_tool_that_is_missing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    monkeypatch.setattr("softrobots.interop.tools.installed_version", lambda package: None)
+    monkeypatch.setattr("softrobots.cli.tools.known_tools.installed_version", lambda package: None)
     assert run_script(["--tools", "Drake"]) == 2
     assert "pip install 'softrobots[interop]'" in capsys.readouterr().err
 

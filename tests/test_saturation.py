@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.description import expand
-from softrobots.paths import xacro_folder
-from softrobots.scene import WRINKLING_COLOURS, wrinkling_level
-from softrobots.springs import LinearSprings, SaturatingLink, SaturatingSprings, spring_law
-from softrobots.urdf_tags import InflatedLinkTag
+from softrobots.description.expansion import expand
+from softrobots.description.paths import xacro_folder
+from softrobots.description.urdf_tags import InflatedLinkTag
+from softrobots.model.springs import LinearSprings, SaturatingLink, SaturatingSprings, spring_law
+from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 
 K, M = 187.30, 9.45  # [Troise 2021] Table 3 at 20 kPa
 ARM = 0.57  # [m], hinge to tip of one link

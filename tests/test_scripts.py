@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.trajectory import METHODS
+from softrobots.statics.trajectory import METHODS
 from tests.conftest import load_script
 
 
@@ -56,7 +56,7 @@ def test_ik_trajectory_reads_waypoints_gravity_and_parameters(tmp_path: Path, ca
 
 
 def test_ik_trajectory_serves_until_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    from softrobots.viewer import Viewer
+    from softrobots.view.viewer import Viewer
 
     served: list[bool] = []
     monkeypatch.setattr(Viewer, "wait", lambda self: served.append(self._server.poll() is None))
@@ -163,7 +163,7 @@ def test_scripts_refuse_bad_arguments(name: str, arguments: list[str], message: 
 def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     from PIL import Image
 
-    from softrobots.browser import find_chromium
+    from softrobots.view.browser import find_chromium
     from tests.conftest import missing
 
     try:
@@ -179,7 +179,7 @@ def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.Captur
 
 def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     """Lines, axis labels with units, legends: read back from the figures."""
-    from softrobots import plots
+    from softrobots.view.figures import plots
 
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 12)
     loaded = sr.follow_trajectory(arm, path.positions, (0, 10, -15), times=path.times, elbow="up")

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.sensitivity import motor_torque_slope, tip_columns
-from tests.oracles import central_difference
+from softrobots.statics.sensitivity import motor_torque_slope, tip_columns
+from tests.support.oracles import central_difference
 
 # Step 1e-5 on equilibria solved to 1e-13: truncation 1e-10, rounding 1e-13 * 20 / 172 / 1e-5 = 1e-9; bound of the issue 1e-6.
 RELATIVE = 1e-6
@@ -78,7 +78,7 @@ def test_motor_torques_by_tip_force_match_solved_equilibria(arm: sr.SoftModel, r
 
 
 def test_jacobian_of_the_unloaded_arm_is_the_rigid_one(arm: sr.SoftModel) -> None:
-    from tests.oracles import rigid_table
+    from tests.support.oracles import rigid_table
 
     motors = np.array([0.3, 0.6, -0.8])
     found = sr.elastostatic_jacobian(arm, sr.solve_equilibrium(arm, motors))

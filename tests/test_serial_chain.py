@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import softrobots as sr
-from softrobots.kinematics import frame_placement
-from softrobots.model import SoftModel
-from softrobots.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain
-from softrobots.structure import Parts
-from tests.foreign import BRANCHED, INERTIAL, SPRINGS, joint
-from tests.laws import law
+from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain
+from softrobots.model.soft_model import SoftModel
+from softrobots.model.structure import Parts
+from softrobots.statics.kinematics import frame_placement
+from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from tests.support.laws import law
 from tests.test_composition import ur5  # noqa: F401 - a fixture
 from tests.test_strain_chain import rotation, screw_matrix
 

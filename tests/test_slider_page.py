@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots import slider_page
-from softrobots.body import body
-from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
-from softrobots.slider_page import SliderPage
-from softrobots.viser_view.shapes import drawn_of
-from softrobots.viser_view.slider_panel import round_down, slider_grid
+from softrobots.view import slider_page
+from softrobots.view.body import body
+from softrobots.view.scene import WRINKLING_COLOURS, Scene, wrinkling_level
+from softrobots.view.slider_page import SliderPage
+from softrobots.view.viser_page.shapes import drawn_of
+from softrobots.view.viser_page.slider_panel import round_down, slider_grid
 from tests.test_viewer import listening, pixels
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
@@ -304,7 +304,7 @@ def test_other_objects_are_refused() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_server_listens_on_loopback_only_says_nothing_and_ends_with_ctrl_c() -> None:
     code = (
-        "import softrobots as sr\nfrom softrobots.slider_page import SliderPage\n"
+        "import softrobots as sr\nfrom softrobots.view.slider_page import SliderPage\n"
         "with SliderPage(sr.load_model(sr.InflatableArm())) as p:\n    print(p.port, flush=True)\n    p.wait()\nprint('end')"
     )
     command = [sys.executable, "-c", code]

@@ -15,9 +15,9 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 import softrobots as sr
-from softrobots.clean_checkout import copy_checkout
-from softrobots.mutants import read_explanations
-from softrobots.recorded_run import command_of
+from studies.clean_checkout import copy_checkout
+from studies.mutants import read_explanations
+from studies.recorded_run import command_of
 from tests.conftest import CHECKOUT, load_script
 from tests.test_scripts import run_script
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.elastostatics import is_stable
+from softrobots.statics.elastostatics import is_stable
 
 
 def test_one_link_buckles_at_k_over_l2() -> None:

@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from softrobots.screws import Screw, skew
-from softrobots.strain_chain import JOINTS, SectionChain, in_range, joint_map, joint_positions
-from softrobots.stumpff import stumpff
-from tests.oracles import central_difference
+from softrobots.constant_curvature.screws import Screw, skew
+from softrobots.constant_curvature.strain_chain import JOINTS, SectionChain, in_range, joint_map, joint_positions
+from softrobots.constant_curvature.stumpff import stumpff
+from tests.support.oracles import central_difference
 
 H = 0.131  # rest length of a section of the default arm [m]
 SIZES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, math.pi - 0.1)  # of the rotation over a section [rad]

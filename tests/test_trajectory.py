@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.trajectory import METHODS
-from tests.oracles import paper_closed_loop
+from softrobots.statics.trajectory import METHODS
+from tests.support.oracles import paper_closed_loop
 
 FORCE = (0.0, 10.0, -15.0)
 PATH = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
@@ -100,7 +100,7 @@ def test_a_robot_without_inflated_links_has_no_moments(arm: sr.SoftModel) -> Non
 
 
 def test_the_unloaded_trajectory_is_rigid_inverse_kinematics(arm: sr.SoftModel) -> None:
-    from tests.oracles import rigid_table
+    from tests.support.oracles import rigid_table
 
     found = sr.follow_trajectory(arm, PATH.positions, elbow="up")
     assert np.abs(found.q_springs).max() == 0.0

@@ -13,11 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import inflated_beam, third_party
-from softrobots.bench_run import BenchRun, push_link
+from softrobots import inflated_beam
+from softrobots.description import third_party
 from softrobots.inflated_beam import TABLE_3, BendingTest
-from softrobots.kinematics import frame_placement
-from softrobots.ur5_bench import PROBE, TOUCH, UR5_JOINTS, UR5Bench
+from softrobots.statics.kinematics import frame_placement
+from studies.ur5.bench import PROBE, TOUCH, UR5_JOINTS, UR5Bench
+from studies.ur5.bench_run import BenchRun, push_link
 from tests.conftest import missing
 from tests.test_scripts import run_script
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.third_party import UR5, robot_file
+from softrobots.description.third_party import UR5, robot_file
 from tests.conftest import missing
 from tests.test_scripts import run_script
 

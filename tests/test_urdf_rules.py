@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from softrobots.interop.checks import check_description
-from softrobots.interop.urdf_rules import RULES, check_rules
-from softrobots.paths import urdf_folder
+from softrobots.cli.tools.checks import check_description
+from softrobots.description.paths import urdf_folder
+from softrobots.description.urdf_rules import RULES, check_rules
 from softrobots.robots import Robot
-from tests.foreign import BRANCHED, INERTIAL
+from tests.support.foreign import BRANCHED, INERTIAL
 
 FILES = sorted(urdf_folder().glob("*.urdf"))
 ARM = (urdf_folder() / "inflatable_arm.urdf").read_text(encoding="utf-8")
@@ -212,7 +212,7 @@ def test_what_cannot_be_loaded_is_said(before: str, after: str, what: str, messa
 
 def test_a_robot_that_is_too_large_to_be_compared_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit of Pinocchio's workspace, as everywhere, is told at once. Here it is small, for a long arm takes seconds."""
-    monkeypatch.setattr("softrobots.interop.kinematics.MAX_DOF", 6)
+    monkeypatch.setattr("softrobots.cli.tools.kinematics.MAX_DOF", 6)
     findings = {finding.what: finding for finding in check_description(sr.InflatableArm())}
     assert findings["yourdfpy's kinematics"].problems == ("inflatable_arm has 7 movable joints; from 1 to 6 can be compared",)
     assert [what for what, finding in findings.items() if not finding.ok] == ["yourdfpy's kinematics"]

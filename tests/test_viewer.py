@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.browser import find_chromium, show_share, take_picture
-from softrobots.kinematics import frame_placement
-from softrobots.meshcat_view.page_text import scene_of
-from softrobots.scene import WRINKLING_COLOURS, Scene, wrinkling_level
-from softrobots.viewer import Viewer, view
+from softrobots.statics.kinematics import frame_placement
+from softrobots.view.browser import find_chromium, show_share, take_picture
+from softrobots.view.meshcat_page.page_text import scene_of
+from softrobots.view.scene import WRINKLING_COLOURS, Scene, wrinkling_level
+from softrobots.view.viewer import Viewer, view
 
 FORCE = (0.0, 10.0, -15.0)
 
@@ -126,7 +126,7 @@ def test_a_server_that_does_not_answer_is_an_error_of_ours(arm: sr.SoftModel) ->
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_server_ends_when_its_parent_is_killed(how: int) -> None:
     code = (
-        "import softrobots as sr, time; from softrobots.viewer import Viewer\n"
+        "import softrobots as sr, time; from softrobots.view.viewer import Viewer\n"
         "v = Viewer(sr.load_model(sr.InflatableArm())); print(v._server.pid, flush=True); time.sleep(60)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:

@@ -16,10 +16,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import inflated_beam, map_plots
-from softrobots.sweeps import TargetGrid, map_workspace, mapping, scheduling
-from softrobots.sweeps.scheduling import run_blocks
-from tests.laws import law
+from softrobots import inflated_beam
+from softrobots.compiled.sweeps import TargetGrid, map_workspace, mapping, scheduling
+from softrobots.compiled.sweeps.scheduling import run_blocks
+from softrobots.view.figures import map_plots
+from tests.support.laws import law
 from tests.test_scripts import run_script
 
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -3,8 +3,8 @@
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from softrobots.checks import positive_integer, positive_number
-from softrobots.description import expand
+from softrobots.core.checks import positive_integer, positive_number
+from softrobots.description.expansion import expand
 
 XACRO = Path(__file__).with_name("soft_finger.urdf.xacro")
 

@@ -79,8 +79,8 @@ PAGES = {
         "leaves it out, since it would hide the builtin.",
         (
             *_top("kernels.compiled_model.compile_model", "kernels.compiled_model.CompiledModel", "kernels.statuses.Status"),
-            *(f"softrobots.kernels.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
-            *(f"softrobots.kernels.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),
+            *(f"softrobots.compiled.run.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
+            *(f"softrobots.compiled.run.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),
             *_top("sweeps"),
         ),
     ),
@@ -106,7 +106,7 @@ PAGES = {
     "command_line": ApiPage(
         "Command line",
         "The command `softrobots` from Python, and what the scripts share.",
-        (*_top("cli.main", "cli.parser"), "softrobots.command_line"),
+        (*_top("cli.main", "cli.parser"), "softrobots.cli.options.command_line"),
     ),
 }
 """The pages, by the name of their file."""

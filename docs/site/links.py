@@ -67,9 +67,9 @@ def _identifiers() -> dict[str, str]:
         for full in page.names:
             found.setdefault(full.rpartition(".")[2], full)
             found[full.removeprefix("softrobots.")] = full
-    found |= {"compile": "softrobots.kernels.compiled_model.compile_model"}
+    found |= {"compile": "softrobots.compiled.run.compiled_model.compile_model"}
     classes = {name: getattr(softrobots, name) for name in softrobots.__all__ if isinstance(getattr(softrobots, name), type)}
-    classes["CompiledModel"] = importlib.import_module("softrobots.kernels.compiled_model").CompiledModel
+    classes["CompiledModel"] = importlib.import_module("softrobots.compiled.run.compiled_model").CompiledModel
     for name, kind in classes.items():
         known = [inner for inner in (*vars(kind), *getattr(kind, "__annotations__", ())) if not inner.startswith("_")]
         found |= {f"{name}.{inner}": f"{found[name]}.{inner}" for inner in known}

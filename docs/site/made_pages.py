@@ -14,7 +14,7 @@ from api_pages import PAGES, overview, page_text
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
-from softrobots.cli import parser
+from softrobots.cli.main import parser
 
 CHECKOUT = Path(__file__).resolve().parent.parent.parent
 HELP = re.compile(r"^<!-- help: softrobots (\w+) -->$", re.MULTILINE)

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, common_shape, finite_array, read_only
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, common_shape, finite_array, read_only
+from softrobots.core.errors import ParameterError
 
 
 @dataclass(frozen=True, eq=False)

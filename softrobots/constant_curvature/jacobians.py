@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, choice, finite_array
 from softrobots.constant_curvature.arcs import Arc, arc_from_strains, checked_arc, checked_strains, stack_arcs
 from softrobots.constant_curvature.muscles import AZIMUTHS, strains_from_muscles, strains_per_muscle
 from softrobots.constant_curvature.poses import FRAMES, cardinal_sine, chain_frames
-from softrobots.errors import ParameterError
-from softrobots.stumpff import stumpff
+from softrobots.constant_curvature.stumpff import stumpff
+from softrobots.core.checks import FloatArray, choice, finite_array
+from softrobots.core.errors import ParameterError
 
 
 def arc_jacobian(arc: Arc, frame: str = "torsion_free") -> FloatArray:

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, common_shape, finite_array, non_negative_number, positive_array
 from softrobots.constant_curvature.arcs import Arc, arc_from_strains, checked_arc
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, common_shape, finite_array, non_negative_number, positive_array
+from softrobots.core.errors import ParameterError
 
 AZIMUTHS = (0.0, -2.0 * math.pi / 3.0, 2.0 * math.pi / 3.0)
 """Azimuths of the three muscles of [PCC paper], figure 9 [rad]."""

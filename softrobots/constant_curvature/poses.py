@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, choice, finite_array
 from softrobots.constant_curvature.arcs import Arc, checked_arc, stack_arcs
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, choice, finite_array
+from softrobots.core.errors import ParameterError
 
 FRAMES = ("torsion_free", "bending_plane")
 OFFSET = np.pi / 3.0

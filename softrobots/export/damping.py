@@ -18,11 +18,11 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from softrobots.checks import FloatArray
-from softrobots.errors import DescriptionError
-from softrobots.model import SoftModel
-from softrobots.rigid_tree import RigidTree
-from softrobots.urdf_tags import SpringTag
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import DescriptionError
+from softrobots.description.rigid_tree import RigidTree
+from softrobots.description.urdf_tags import SpringTag
+from softrobots.model.soft_model import SoftModel
 
 DAMPING = ("critical", "file")
 """Where the damping of the spring joints comes from: the rule of this module, or the description."""

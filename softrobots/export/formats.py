@@ -8,15 +8,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from softrobots.errors import ParameterError
+from softrobots.core.errors import ParameterError
+from softrobots.core.files import as_path, new_file, write_text
 from softrobots.export.mjcf import to_mjcf
 from softrobots.export.number_sources import PackagedRobot
 from softrobots.export.sdf import to_sdf
 from softrobots.export.sidecar import to_json
 from softrobots.export.snippets import to_pinocchio, to_pybullet
-from softrobots.files import as_path, new_file, write_text
-from softrobots.loader import load_model
-from softrobots.model import SoftModel
+from softrobots.model.loader import load_model
+from softrobots.model.soft_model import SoftModel
 
 
 class Format(NamedTuple):

@@ -1,7 +1,7 @@
 r"""What an exporter needs of a robot whose actuators are held: motor positions, and joint springs that carry the muscles.
 
-A tension `t` of the muscles adds the energy :math:`t^T A z` (see `softrobots.muscles`). On joint springs, where `z` are the
-coordinates of joints, that only moves the reference of each spring:
+A tension `t` of the muscles adds the energy :math:`t^T A z` (see `softrobots.model.muscles`). On joint springs, where `z` are
+the coordinates of joints, that only moves the reference of each spring:
 
 .. math:: \tfrac12 k (z - r)^2 + t^T A z = \tfrac12 k (z - r + A^T t / k)^2 + \text{constant}
 
@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from softrobots.errors import ParameterError
-from softrobots.model import SoftModel, check_model
-from softrobots.rigid_tree import RigidTree
-from softrobots.rigid_tree_urdf import read_rigid_tree
-from softrobots.springs import LinearSprings
-from softrobots.urdf_tags import SpringTag
+from softrobots.core.errors import ParameterError
+from softrobots.description.rigid_tree import RigidTree
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.urdf_tags import SpringTag
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.springs import LinearSprings
 
 ACTUATORS = ("driven", "welded")
 """What becomes of motor joints: they stay joints that are driven to their positions, or become fixed there."""

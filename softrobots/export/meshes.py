@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from softrobots.mesh_files import find_mesh
-from softrobots.rigid_tree import Shape
-from softrobots.third_party import package_folders
+from softrobots.description.mesh_files import find_mesh
+from softrobots.description.rigid_tree import Shape
+from softrobots.description.third_party import package_folders
 
 _STL_HEAD, _STL_FACE, _STL_MOST = 84, 50, 200_000  # bytes, bytes, faces that MuJoCo takes
 

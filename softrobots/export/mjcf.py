@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.errors import DescriptionError
+from softrobots.core.errors import DescriptionError
+from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.export.meshes import MeshFiles, mujoco_reads
 from softrobots.export.prepared import PreparedRobot, checked_gravity, neighbours, prepare, weld_groups
 from softrobots.export.servos import ANGLE_ERROR, Motor, Muscle, Servo
 from softrobots.export.xml_text import document
-from softrobots.model import SoftModel
-from softrobots.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
+from softrobots.model.soft_model import SoftModel
 
 _GREY = (0.6, 0.6, 0.6, 1.0)
 _DRAWN, _HIDDEN = "2", "3"  # MuJoCo's groups of shapes

@@ -11,9 +11,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from softrobots.errors import ParameterError
+from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
+from softrobots.core.errors import ParameterError
 from softrobots.robots import HelixTube, InflatableArm, PccArm
-from softrobots.strain_chain import JOINTS, STRAINS
 
 PackagedRobot = InflatableArm | PccArm | HelixTube
 """The robots that have parameters."""

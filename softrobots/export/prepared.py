@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from softrobots.checks import FloatArray, choice, finite_array
-from softrobots.errors import DescriptionError, ParameterError
+from softrobots.core.checks import FloatArray, choice, finite_array
+from softrobots.core.errors import DescriptionError, ParameterError
+from softrobots.description.rigid_tree import RigidTree
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.urdf_tags import SpringTag
 from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix, rule_told
 from softrobots.export.held import ACTUATORS, check_linear, hold, locked_joints, weld
 from softrobots.export.servos import Motor, Muscle, motors_of, muscles_of
-from softrobots.model import SoftModel
-from softrobots.rigid_tree import RigidTree
-from softrobots.rigid_tree_urdf import read_rigid_tree
-from softrobots.urdf_tags import SpringTag
+from softrobots.model.soft_model import SoftModel
 
 _LIGHTEST = 1e-15  # [kg]; MuJoCo refuses moving bodies below
 

@@ -8,6 +8,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from softrobots.version import __version__
+
 _WIDTH = 88
 
 
@@ -51,8 +53,6 @@ def filled(template: str, *, name: str, description: Iterable[str], **fields: st
     Returns:
         Text of the file.
     """
-    from softrobots import __version__  # here, because the package imports its modules before it knows
-
     text = Template(Path(__file__).with_name(template).read_text(encoding="utf-8"))
     paragraphs = "\n\n".join(textwrap.fill(part, _WIDTH, break_long_words=False) for part in description)
     return text.substitute(name=_in_docstring(name), description=_in_docstring(paragraphs), version=__version__, **fields)

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import LARGEST
-from softrobots.errors import DescriptionError, ParameterError
+from softrobots.core.checks import LARGEST
+from softrobots.core.errors import DescriptionError, ParameterError
+from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.export.meshes import MeshFiles, drake_collides, drawn_anywhere
 from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
 from softrobots.export.xml_text import document
-from softrobots.model import SoftModel
-from softrobots.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
+from softrobots.model.soft_model import SoftModel
 
 DRAKE = "http://drake.mit.edu"
 """XML namespace of Drake's tags."""

@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softrobots.checks import LARGEST, FloatArray
-from softrobots.model import SoftModel
-from softrobots.rigid_tree import Joint
-from softrobots.urdf_tags import MuscleTag
+from softrobots.core.checks import LARGEST, FloatArray
+from softrobots.description.rigid_tree import Joint
+from softrobots.description.urdf_tags import MuscleTag
+from softrobots.model.soft_model import SoftModel
 
 ANGLE_ERROR = 1e-2
 """Error at which the servo of a turning motor gives all its torque [rad]."""

@@ -10,17 +10,18 @@ import json
 import math
 from typing import Any
 
-from softrobots.argument_notes import argument_notes
-from softrobots.description import declared_arguments
-from softrobots.errors import ParameterError, SoftRobotsError
+from softrobots.core.errors import ParameterError, SoftRobotsError
+from softrobots.description.argument_notes import argument_notes
+from softrobots.description.expansion import declared_arguments
+from softrobots.description.paths import xacro_folder
+from softrobots.description.rigid_tree import Joint
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag
 from softrobots.export.number_sources import PackagedRobot, Rules, check_robot, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
-from softrobots.model import SoftModel, check_model
-from softrobots.paths import xacro_folder
-from softrobots.rigid_tree import Joint
-from softrobots.rigid_tree_urdf import read_rigid_tree
-from softrobots.tag_reader import read_tags
-from softrobots.urdf_tags import LumpedSectionTag, SectionTag
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.version import __version__
 
 FORMAT = "softrobots sidecar"
 """What the files call themselves."""
@@ -71,8 +72,6 @@ def to_json(model: SoftModel, robot: PackagedRobot | None = None) -> str:
     Raises:
         ParameterError: If `model` is none, or `robot` is not what it was made from.
     """
-    from softrobots import __version__  # here, because the package imports its modules before it knows
-
     checked = check_model(model)
     rules: Rules = {}
     content: dict[str, Any] = {

@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.errors import ParameterError
+from softrobots.core.errors import ParameterError
+from softrobots.core.xml_input import parse_xml
+from softrobots.description.mesh_files import remove_mesh_shapes
+from softrobots.description.rigid_tree import Body, RigidTree, Shape
+from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
+from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.export.damping import lowest_frequency, mass_matrix, rule_told
 from softrobots.export.held import HeldRobot, hold
 from softrobots.export.prepared import checked_gravity, prepare
 from softrobots.export.python_text import assignment, block, filled, table
-from softrobots.mesh_files import remove_mesh_shapes
-from softrobots.model import SoftModel
-from softrobots.rigid_tree import Body, RigidTree, Shape
-from softrobots.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
-from softrobots.urdf_tags import NAMESPACE
-from softrobots.xml_input import parse_xml
+from softrobots.model.soft_model import SoftModel
 
 MOST_JOINTS = 127
 """Joints that PyBullet takes in one robot, fixed ones counted; beyond that it cannot tell their states."""

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import LARGEST, FloatArray, choice, finite_array, read_only
-from softrobots.csv_table import read_table
-from softrobots.errors import FileFormatError, MissingDependency, ParameterError
-from softrobots.files import as_path, csv_text, write_text
+from softrobots.core.checks import LARGEST, FloatArray, choice, finite_array, read_only
+from softrobots.core.csv_table import read_table
+from softrobots.core.errors import FileFormatError, MissingDependency, ParameterError
+from softrobots.core.files import as_path, csv_text, write_text
 from softrobots.helix.shapes import HelixShape, checked_contraction, forward
 
 INTERPOLATIONS = ("linear", "pchip")

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import read_only
-from softrobots.files import csv_text, write_text
+from softrobots.core.checks import read_only
+from softrobots.core.files import csv_text, write_text
 from softrobots.helix.contact import self_contact
 from softrobots.helix.shapes import Actuator, checked_actuator, forward
 

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softrobots.checks import FloatArray, choice, common_shape, positive_array, read_only
-from softrobots.errors import ParameterError, SelfIntersection
+from softrobots.core.checks import FloatArray, choice, common_shape, positive_array, read_only
+from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.helix.paths import curvature_torsion
 from softrobots.helix.shapes import HelixShape, checked_angle, checked_shape
 

@@ -12,8 +12,8 @@ import warnings
 
 import numpy as np
 
-from softrobots.checks import choice, non_negative_number, positive_number
-from softrobots.errors import ParameterError, SelfIntersection
+from softrobots.core.checks import choice, non_negative_number, positive_number
+from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.helix.helix_design import LIMIT_ROUNDING, DesignWarning, HelixDesign, Wish, checked_limits
 from softrobots.helix.nearest import Limits, WantedHelix, nearest_realisable, within
 from softrobots.helix.shapes import HelixShape, inverse

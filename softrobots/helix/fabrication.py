@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import (
+from softrobots.core.checks import (
     FloatArray,
     choice,
     common_shape,
@@ -30,7 +30,7 @@ from softrobots.checks import (
     positive_array,
     positive_number,
 )
-from softrobots.errors import ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.helix.helix_design import HelixDesign
 from softrobots.helix.pattern import Pattern, located
 from softrobots.helix.shapes import HANDEDNESS, checked_actuator, checked_contraction

@@ -30,8 +30,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray, common_shape, finite_array, non_negative_array, positive_array, read_only
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, common_shape, finite_array, non_negative_array, positive_array, read_only
+from softrobots.core.errors import ParameterError
 
 
 class GraspTest(NamedTuple):

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import choice, finite_number, listed, non_negative_number, positive_number
-from softrobots.errors import FileFormatError, ParameterError
-from softrobots.files import as_path, write_text
+from softrobots.core.checks import choice, finite_number, listed, non_negative_number, positive_number
+from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.files import as_path, write_text
+from softrobots.core.json_text import read_json
 from softrobots.helix.contact import SelfContact, self_contact
 from softrobots.helix.nearest import Limits, distance, within
 from softrobots.helix.shapes import HANDEDNESS, HelixShape, forward
 from softrobots.helix.tube import centre_length, length_for_turns
-from softrobots.json_text import read_json
 
 LIMIT_ROUNDING = 1e-9
 """How far contraction [-] and angle [rad] may pass a limit by rounding."""

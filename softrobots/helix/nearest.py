@@ -25,8 +25,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
 from softrobots.helix.contact import BoolArray, self_contact
 from softrobots.helix.shapes import HelixShape, inverse
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, choice, common_shape, finite_array
+from softrobots.core.checks import FloatArray, choice, common_shape, finite_array
 from softrobots.helix.shapes import PATHS, HelixShape, checked_actuator, checked_shape, length_ratio, turning_sign
 
 

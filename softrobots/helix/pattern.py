@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softrobots.checks import FloatArray, finite_array, read_only
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.errors import ParameterError
 from softrobots.helix.shapes import HelixShape, forward, turning_sign
 from softrobots.helix.tube import turns
 

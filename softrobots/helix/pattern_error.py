@@ -27,11 +27,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray, positive_integer, read_only
+from softrobots.constant_curvature.screws import Screw
+from softrobots.core.checks import FloatArray, positive_integer, read_only
 from softrobots.helix.paths import actuator_curvature_torsion
 from softrobots.helix.pattern import Pattern, checked_pattern
 from softrobots.helix.shapes import length_ratio, turning_sign
-from softrobots.screws import Screw
 
 _MOST_POINTS = 500_000
 

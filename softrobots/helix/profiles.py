@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import LARGEST, FloatArray, finite_array, finite_number, positive_integer
-from softrobots.errors import ParameterError
+from softrobots.core.checks import LARGEST, FloatArray, finite_array, finite_number, positive_integer
+from softrobots.core.errors import ParameterError
 from softrobots.helix.shapes import ANGLE_RANGE, CONTRACTION_RANGE
 
 _RANGES = {

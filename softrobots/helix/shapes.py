@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import LARGEST, FloatArray, choice, common_shape, finite_array, positive_array, read_only
-from softrobots.errors import ParameterError, StraightTube
+from softrobots.core.checks import LARGEST, FloatArray, choice, common_shape, finite_array, positive_array, read_only
+from softrobots.core.errors import ParameterError, StraightTube
 
 PATHS = ("inner", "centre", "outer")
 """The actuator, the centre line of the tube, and the line opposite the actuator."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softrobots.files import csv_text
+from softrobots.core.files import csv_text
 from softrobots.helix.pattern import Pattern
 from softrobots.helix.shapes import turning_sign
 from softrobots.helix.svg import SMALL, TEXT, Point, group, mm, polygon, polyline, rectangle, segment, text

@@ -6,9 +6,9 @@ import math
 import os
 from pathlib import Path
 
-from softrobots.checks import positive_number
-from softrobots.errors import ParameterError
-from softrobots.files import as_path, new_file, write_text
+from softrobots.core.checks import positive_number
+from softrobots.core.errors import ParameterError
+from softrobots.core.files import as_path, new_file, write_text
 from softrobots.helix.pattern import Pattern, checked_pattern
 from softrobots.helix.template import Window, svg_text, table_text
 

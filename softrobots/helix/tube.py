@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, common_shape, non_negative_array, positive_array
+from softrobots.core.checks import FloatArray, common_shape, non_negative_array, positive_array
 from softrobots.helix.shapes import HelixShape, checked_actuator, checked_angle, checked_shape, length_ratio, turning_sign
 
 

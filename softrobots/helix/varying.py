@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, choice, finite_array, finite_number, positive_number, read_only
-from softrobots.errors import MissingDependency, ParameterError
+from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, positive_number, read_only
+from softrobots.core.errors import MissingDependency, ParameterError
 from softrobots.helix.paths import actuator_curvature_torsion
 from softrobots.helix.profiles import Profile, checked_profile, sample_positions
 from softrobots.helix.shapes import PATHS, turning_sign

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, finite_array, finite_number, non_negative_number, positive_number
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, finite_array, finite_number, non_negative_number, positive_number
+from softrobots.core.errors import ParameterError
 
 SHEAR_COEFFICIENT = 0.5
 """Shear coefficient `j` of a circular thin tube [-], [Troise 2021] section 2.1 after Cowper."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import FloatArray, finite_array, non_negative_number, positive_number
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_number
+from softrobots.core.errors import ParameterError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.checks import FloatArray, finite_array, positive_number
-from softrobots.errors import ParameterError
+from softrobots.core.checks import FloatArray, finite_array, positive_number
+from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam.beam import required_pressure, wrinkling_moment
 
 

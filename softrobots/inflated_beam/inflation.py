@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from softrobots.checks import non_negative_number, positive_number
-from softrobots.errors import ParameterError
+from softrobots.core.checks import non_negative_number, positive_number
+from softrobots.core.errors import ParameterError
 
 
 def volume(length: float, radius: float) -> float:

@@ -5,19 +5,11 @@ A robot is a dataclass here, a xacro file, and a line in `ROBOTS`.
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol
 
+from softrobots.description.sources import Robot
 from softrobots.robots.helix_tube import HelixTube
 from softrobots.robots.inflatable_arm import InflatableArm
 from softrobots.robots.pcc_arm import PccArm
-
-
-class Robot(Protocol):
-    """Anything that describes itself as URDF."""
-
-    def urdf(self) -> str:
-        """Return the robot as URDF text."""
-
 
 ROBOTS: Mapping[str, Callable[[], Robot]] = {
     "inflatable_arm": InflatableArm,

@@ -11,12 +11,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softrobots import helix
-from softrobots.checks import FloatArray, choice, positive_integer, positive_number
-from softrobots.errors import ParameterError, StraightTube
+from softrobots.constant_curvature.strain_chain import LARGEST_BENDING, in_range
+from softrobots.core.checks import FloatArray, choice, positive_integer, positive_number
+from softrobots.core.errors import ParameterError, StraightTube
 from softrobots.helix.shapes import checked_actuator
 from softrobots.robots.parameters import Bounds, check_fields, colours, expanded, xacro_arguments
 from softrobots.robots.pcc_arm import CHAINS, HINGE_RULES
-from softrobots.strain_chain import LARGEST_BENDING, in_range
 
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""

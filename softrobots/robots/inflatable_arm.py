@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softrobots import inflated_beam
-from softrobots.errors import ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.robots.parameters import Bounds, PerPart, check_fields, check_lengths, colours, expanded, xacro_arguments
 
 

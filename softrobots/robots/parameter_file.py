@@ -23,10 +23,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from softrobots.bounded_reading import read_text
-from softrobots.errors import FileFormatError, NameNotFound, ParameterError
-from softrobots.files import as_path, write_text
-from softrobots.json_text import parse_json
+from softrobots.core.bounded_reading import read_text
+from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
+from softrobots.core.files import as_path, write_text
+from softrobots.core.json_text import parse_json
 from softrobots.robots import ROBOTS, Robot
 
 LARGEST_FILE = 100_000

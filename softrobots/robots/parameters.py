@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.checks import finite_array, finite_number
-from softrobots.description import expand
-from softrobots.errors import ParameterError
-from softrobots.paths import xacro_folder
+from softrobots.core.checks import finite_array, finite_number
+from softrobots.core.errors import ParameterError
+from softrobots.description.expansion import expand
+from softrobots.description.paths import xacro_folder
 
 MOST_PARTS = 1000
 """Links or segments of a robot: xacro spends minutes on so many."""

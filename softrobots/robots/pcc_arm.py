@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softrobots.checks import choice, finite_array, finite_number, positive_integer
 from softrobots.constant_curvature import AZIMUTHS, muscle_residual
-from softrobots.errors import ParameterError
+from softrobots.core.checks import choice, finite_array, finite_number, positive_integer
+from softrobots.core.errors import ParameterError
 from softrobots.robots.parameters import (
     Bounds,
     PerPart,

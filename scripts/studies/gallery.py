@@ -1,0 +1,134 @@
+"""The scenes of the documentation: a viewer for each, of which scripts make pictures and pages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots import inflated_beam
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.description.composition import fix_joints, mount
+from softrobots.description.third_party import UR5, robot_file
+from softrobots.model.loader import load_model
+from softrobots.robots import HelixTube, InflatableArm, PccArm
+from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.loads import EARTH_GRAVITY
+from softrobots.statics.trajectory import Trajectory, follow_trajectory
+from softrobots.view.viewer import Viewer, view
+from studies.ur5.bench import UR5Bench
+from studies.ur5.bench_run import push_link
+
+
+class Exhibit(NamedTuple):
+    """A scene of the documentation."""
+
+    make: Callable[[], Viewer]
+    """Opens the viewer; close it, or use it in a `with` statement."""
+    title: str
+    """Title of its page."""
+    share: float = 0.0
+    """Share of its animation at which its picture is taken, from 0 to 1."""
+
+
+def circle(steps: int = 120) -> FloatArray:
+    """Targets on a slanted ellipse in front of the inflatable arm, the first one again at the end, shape (steps + 1, 3) [m]."""
+    angle = 2.0 * np.pi * np.arange(steps + 1) / steps
+    return np.column_stack([0.7 + 0.25 * np.cos(angle), 0.25 * np.sin(angle), 0.35 + 0.25 * np.sin(angle)])
+
+
+def circling_arm(force: float, duration: float = 6.0) -> Viewer:
+    """The inflatable arm moves a weight along `circle`, with its sag compensated.
+
+    Args:
+        force: Weight on the tip [N].
+        duration: Time of a turn [s].
+
+    Returns:
+        The viewer.
+
+    Raises:
+        ViewerError: If its server does not start.
+    """
+    model, targets = load_model(InflatableArm()), circle()
+    times = np.linspace(0.0, duration, len(targets))
+    viewer = view(model, follow_trajectory(model, targets, (0.0, 0.0, -force), times=times, elbow="up", progress="path"))
+    viewer.look_from((0.36, -0.98, 0.48), (0.15, 0.0, 0.2))
+    return viewer
+
+
+def moving_pcc_arm(duration: float = 6.0, frames: int = 90) -> Viewer:
+    """The arm of pneumatic muscles under its weight and a force, led through muscle lengths that bend it all around.
+
+    Args:
+        duration: Time until the lengths are what they were at first [s].
+        frames: How many equilibria, evenly spaced.
+
+    Returns:
+        The viewer.
+
+    Raises:
+        ViewerError: If its server does not start.
+    """
+    robot = PccArm()
+    model = load_model(robot)
+    azimuths = np.array(robot.muscle_azimuths)
+    states: list[Equilibrium] = []
+    for turn in 2.0 * np.pi * np.arange(frames + 1) / frames:
+        low = 0.515 - 0.02 * np.cos(azimuths - turn)
+        high = 0.515 - 0.03 * np.cos(azimuths - turn)  # in axes turned by the offset of the second segment
+        start = states[-1].q_springs if states else None
+        states.append(solve_equilibrium(model, (*low, *high), (3.0, 2.0, -3.0), gravity=EARTH_GRAVITY, q_springs0=start))
+    tips = np.array([state.tip_position for state in states])
+    times = np.linspace(0.0, duration, len(states))
+    viewer = view(model, Trajectory(read_only(times), read_only(tips), tuple(states), "newton"))
+    viewer.look_from((0.5, -1.0, 0.8), (0.05, 0.0, 0.42))
+    return viewer
+
+
+def sagging_helix_tube() -> Viewer:
+    """A helical tube of three and a half turns that hangs out sideways under its own weight, near wrinkling at its base."""
+    model = load_model(HelixTube(length=2.0, elastic_sections=32, pressure=6e3))
+    return view(model, solve_equilibrium(model, (), gravity=EARTH_GRAVITY))
+
+
+def growing_helix_tube() -> Viewer:
+    """The same tube with the axis of the helix upright, as it grows."""
+    tube = HelixTube(length=2.0, elastic_sections=32, upright="axis")
+    viewer = view(load_model(tube))
+    viewer.animate_growth(tube)
+    return viewer
+
+
+def characterisation_bench() -> Viewer:
+    """A UR5 pushes an inflated link through wrinkling (needs example-robot-data)."""
+    row = inflated_beam.TABLE_3[2]
+    link = InflatableArm(link_lengths=(0.6,), stiffness=row.stiffness, pressure=row.pressure, max_moment=row.max_moment)
+    bench = UR5Bench(link=link)
+    viewer = view(bench.model, push_link(bench, np.linspace(0.0, bench.push_end(), 41), progress=True).trajectory())
+    viewer.look_from(*bench.camera)
+    return viewer
+
+
+def ur5_with_soft_arm() -> Viewer:
+    """A UR5 carries the inflatable arm with 1 kg at its tip (needs example-robot-data)."""
+    arm = fix_joints(InflatableArm(), {"motor_1": 0.0, "motor_2": math.pi / 2, "motor_3": 0.0})
+    model = load_model(mount(robot_file(UR5), "tool0", arm, xyz=(0.0, 0.0, 0.165)))
+    pose, payload = (0.0, -2.1, 1.9, 0.2, math.pi / 2, 0.0), (0.0, 0.0, -9.81)
+    return view(model, solve_equilibrium(model, pose, payload, gravity=EARTH_GRAVITY))
+
+
+EXHIBITS = {
+    "inflatable_arm": Exhibit(lambda: circling_arm(18.0), "Inflatable arm, 18 N on the tip, sag compensated", 0.04),
+    "wrinkling_arm": Exhibit(
+        lambda: circling_arm(24.0), "Inflatable arm, 24 N on the tip: stretched out, link 1 wrinkles", 0.04
+    ),
+    "pcc_arm": Exhibit(moving_pcc_arm, "PCC arm led through muscle lengths, own weight and 4.7 N on the tip", 0.8),
+    "helix_tube": Exhibit(sagging_helix_tube, "Helical tube under its own weight"),
+    "helix_growth": Exhibit(growing_helix_tube, "Growth of the helical tube", 0.45),
+    "ur5_bench": Exhibit(characterisation_bench, "UR5 pushes an inflated link at 30 kPa", 0.8),
+    "ur5_with_soft_arm": Exhibit(ur5_with_soft_arm, "UR5 with a soft arm, 1 kg at its tip"),
+}
+"""The scenes by name."""

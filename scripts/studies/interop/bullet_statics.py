@@ -1,0 +1,57 @@
+"""Equilibria in PyBullet, which has no joint springs, by the Python file of `softrobots.export.to_pybullet`, which has them."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import ModuleType
+
+import numpy as np
+
+from softrobots.cli.tools.known_tools import find_tool
+from softrobots.core.errors import NotConverged
+from studies.interop.outcomes import SECONDS, Outcome, Question
+
+
+def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
+    """Run the file until its robot is at rest, at PyBullet's default time step of 1/240 s.
+
+    Args:
+        question: The text of the file, and the load.
+        seconds: How long at most [s].
+
+    Returns:
+        Where it ends.
+
+    Raises:
+        MissingDependency: If PyBullet is not installed.
+        NotConverged: If the robot still moves then; `best` is None.
+    """
+    pybullet = find_tool("PyBullet").load()
+    file = _imported(question.text)
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        pybullet.setGravity(*(question.gravity or (0.0, 0.0, 0.0)), physicsClientId=client)
+        robot = file.load(client)
+        began = time.perf_counter()
+        try:
+            joints = file.settle(robot, question.force, question.tip, seconds)
+        except RuntimeError as error:
+            raise NotConverged(f"PyBullet: {error}", best=None, residual=float("inf"), iterations=0) from error
+        elapsed = time.perf_counter() - began
+        speed = float(np.abs(file.state(robot)[1]).max(initial=0.0))
+        contacts = len(pybullet.getContactPoints(robot.body, physicsClientId=client) or ())
+        return Outcome(joints, speed, contacts, 0, elapsed)
+    finally:
+        pybullet.disconnect(client)
+
+
+def _imported(text: str) -> ModuleType:
+    """The file as a module; a data class looks its module up while it is made."""
+    made = ModuleType("robot_for_pybullet")
+    sys.modules[made.__name__] = made
+    try:
+        exec(compile(text, f"{made.__name__}.py", "exec"), made.__dict__)
+    finally:
+        del sys.modules[made.__name__]
+    return made

@@ -1,0 +1,292 @@
+"""What is asked of the solvers in a soak, and what they say."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.run.compiled_model import CompiledModel, compile_model
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import NotConverged, SoftRobotsError
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
+from softrobots.statics.load_estimation import LoadEstimate, estimate_load
+from studies.soak.families import Family
+from studies.soak.plain_statics import Case, PlainStatics
+
+SECONDS = 30.0
+"""A call that takes longer counts as one that hangs [s]."""
+
+STABLE, UNSTABLE = "stable", "not stable"
+"""Outcomes of answers: certified stable, or in balance and said not to be stable."""
+
+STARTS = 4
+"""Searches of an inverse kinematics."""
+
+_TOGETHER = 900.0  # seconds for a batch, with what numba takes for a robot that is new to it
+_ODD = 10  # every so many cases get torques that may come from no force, or a target that may be out of reach
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a solver said of a case."""
+
+    row: int
+    """Row of the case in its chunk."""
+    outcome: str
+    """`STABLE`, `UNSTABLE`, or the name of an error or a status."""
+    springs: FloatArray | None = None
+    """Elastic coordinates; None without an answer."""
+    changed: dict[str, FloatArray] = field(default_factory=dict)
+    """What the solver sought of the case: "motors" or "forces"."""
+    claims: dict[str, FloatArray] = field(default_factory=dict)
+    """What must be true of it: "motor_torques", and "tip", with how exactly in `within`."""
+    within: float = 1e-9
+    """How exactly the claims hold [m or N m]."""
+    iterations: int = 0
+    """What it took."""
+    seconds: float = 0.0
+    """How long it took [s]."""
+    broken: str = ""
+    """The law that is broken already."""
+
+
+class Hang(BaseException):
+    """A call that takes too long; nobody but us catches it."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Interrupt what takes too long, in the main thread of a process."""
+
+    def stop(number: int, frame: Any) -> None:
+        raise Hang
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _asked(row: int, ask: Callable[[int], dict[str, Any]]) -> Answer:
+    """Ask a solver about one case; whatever it raises becomes part of the answer."""
+    begun = time.perf_counter()
+    try:
+        with limited(SECONDS):
+            said = ask(row)
+    except Hang:
+        said = {"outcome": "hang", "broken": f"no answer after {SECONDS:g} s"}
+    except SoftRobotsError as error:
+        said = {"outcome": type(error).__name__, "broken": _wrong_error(error)}
+        if isinstance(error, NotConverged):
+            said["iterations"] = error.iterations
+    except Exception as error:
+        said = {"outcome": type(error).__name__, "broken": f"{type(error).__name__} is no error of softrobots: {error}"}
+    return Answer(row, seconds=time.perf_counter() - begun, **said)
+
+
+def _wrong_error(error: SoftRobotsError) -> str:
+    """What is wrong with an error; nothing by default."""
+    if not isinstance(error, NotConverged):
+        return ""
+    best = error.best
+    if isinstance(best, IkSolution | LoadEstimate):
+        best = best.equilibrium
+    if not isinstance(best, Equilibrium):
+        return "the error carries no best iterate"
+    numbers = (best.q_springs, best.q_motors, best.tip_position, best.residual, error.residual)
+    return "" if all(np.all(np.isfinite(one)) for one in numbers) else "the best iterate of the error is not finite"
+
+
+def _gravity(case: Case, row: int) -> FloatArray | None:
+    return case.gravity[row] if case.gravity[row].any() else None
+
+
+def _wrench(case: Case, row: int) -> FloatArray:
+    return np.concatenate([case.forces[row], case.moments[row]])
+
+
+def _told(found: Equilibrium, iterations: int) -> dict[str, Any]:
+    numbers = (found.q_springs, found.q, found.spring_torques, found.motor_torques, found.tangent_stiffness, found.tip_position)
+    broken = "" if all(np.isfinite(one).all() for one in numbers) else "a number that is not finite"
+    torques = found.motor_torques[: len(found.model.structure.motor_joints)]
+    return {
+        "outcome": STABLE if found.stable else UNSTABLE,
+        "springs": found.q_springs,
+        "claims": {"motor_torques": torques, "tip": found.tip_position},
+        "iterations": iterations,
+        "broken": broken if found.converged else "an answer above the tolerance",
+    }
+
+
+def solve(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
+    """Equilibria one by one."""
+
+    def ask(row: int) -> dict[str, Any]:
+        found = solve_equilibrium(statics.model, case.motors[row], wrench=_wrench(case, row), gravity=_gravity(case, row))
+        return _told(found, found.iterations)
+
+    return [_asked(row, ask) for row in rows]
+
+
+def estimate(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
+    """The load from the motor torques that it makes, or from some."""
+
+    def ask(row: int) -> dict[str, Any]:
+        motors, gravity = case.motors[row], _gravity(case, row)
+        torques = solve_equilibrium(statics.model, motors, case.forces[row], gravity=gravity, tolerance=1e-13).motor_torques
+        if row % _ODD == 0:
+            torques = torques + np.random.default_rng(row).normal(size=len(torques)) * 10.0
+        found = estimate_load(statics.model, motors, torques, gravity=gravity)
+        size = 1e-10 * max(float(np.linalg.norm(torques)), 1e-3)
+        hidden = len(found.unobservable_directions) > 0
+        told = _told(found.equilibrium, found.iterations)
+        told["claims"] = {"tip": found.equilibrium.tip_position} | ({} if hidden else {"motor_torques": torques})
+        return told | {"changed": {"forces": found.force}, "within": 1e-9 + 2.0 * size}
+
+    return [_asked(row, ask) for row in rows]
+
+
+def _target(statics: PlainStatics, case: Case, row: int) -> FloatArray:
+    """A point that the tip can reach, if the robot settles there; or some point."""
+    found = solve_equilibrium(statics.model, case.motors[row], case.forces[row], gravity=_gravity(case, row))
+    away = np.random.default_rng(row).normal(size=3) if row % _ODD == 0 else np.zeros(3)
+    return found.tip_position + away
+
+
+def reach(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
+    """Motors that put the tip somewhere."""
+
+    def ask(row: int) -> dict[str, Any]:
+        target = _target(statics, case, row)
+        found = solve_ik(statics.model, target, case.forces[row], gravity=_gravity(case, row), starts=STARTS)
+        told = _told(found.equilibrium, found.iterations)
+        told["claims"]["tip"] = target
+        low, high = statics.model.motor_limits.T
+        if np.any((found.q_motors < low) | (found.q_motors > high)):
+            told["broken"] = "a motor beyond its limits"
+        return told | {"changed": {"motors": found.q_motors}, "within": 2e-9}
+
+    return [_asked(row, ask) for row in rows]
+
+
+@lru_cache(maxsize=8)
+def _compiled(model: SoftModel, compiler: bool) -> CompiledModel:
+    return compile_model(model, backend=None if compiler else "python")
+
+
+Ask = Callable[[CompiledModel, Any, FloatArray | None], Any]
+
+
+def _asked_together(
+    family: Family, statics: PlainStatics, case: Case, rows: Sequence[int], ask: Ask, told: Callable[..., dict[str, Any]]
+) -> list[Answer]:
+    """Ask a batch of the cases with weight, and one of those without."""
+    made: list[Answer] = []
+    chosen = np.array(rows)
+    heavy = case.gravity[chosen].any(axis=1)
+    for weight in (False, True):
+        part = chosen[heavy == weight]
+        if not len(part):
+            continue
+        begun = time.perf_counter()
+        try:
+            with limited(_TOGETHER):
+                batch = ask(_compiled(statics.model, family.compiler), part, case.gravity[part[0]] if weight else None)
+        except (Exception, Hang) as error:
+            made += [Answer(row, type(error).__name__, broken=f"a batch raises {error!r}") for row in part.tolist()]
+            continue
+        seconds = (time.perf_counter() - begun) / len(part)
+        errors = ("residual", "unexplained", "tip_error")  # infinite where there is no answer
+        for place, row in enumerate(part.tolist()):
+            certified = bool(batch.certified[place])
+            numbers = [np.asarray(getattr(batch, name))[place] for name in vars(batch) if certified or name not in errors]
+            fine = all(np.isfinite(one).all() for one in numbers)
+            said = {"springs": batch.q_springs[place], **told(batch, place)} if certified else {}
+            outcome = STABLE if certified else Status(int(batch.status[place])).name
+            made.append(Answer(row, outcome, seconds=seconds, broken="" if fine else "a number that is not finite", **said))
+    return made
+
+
+def batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
+    """Equilibria, compiled."""
+    return _asked_together(
+        family,
+        statics,
+        case,
+        rows,
+        lambda fast, part, gravity: fast.equilibria(case.motors[part], case.forces[part], gravity=gravity),
+        lambda found, place: {"claims": {"tip": found.tip_positions[place]}},
+    )
+
+
+def _settled(fast: CompiledModel, statics: PlainStatics, case: Case, part: Any, gravity: FloatArray | None) -> Any:
+    """Tips and motor torques of equilibria, by plain statics."""
+    found = fast.equilibria(case.motors[part], case.forces[part], gravity=gravity)
+    return statics.balance(Case(*(array[part] for array in case)), found.q_springs)
+
+
+def estimate_batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
+    """Loads from motor torques, compiled."""
+    measured = np.zeros((len(case.motors), statics.model.n_motors))
+    asked: list[int] = []
+
+    def ask(fast: CompiledModel, part: Any, gravity: FloatArray | None) -> Any:
+        measured[part] = _settled(fast, statics, case, part, gravity).motor_torques
+        for row in part[part % _ODD == 0].tolist():
+            measured[row] += np.random.default_rng(row).normal(size=measured.shape[1]) * 10.0
+        asked[:] = part.tolist()
+        return fast.estimate_loads(case.motors[part], measured[part], gravity=gravity)
+
+    def told(found: Any, place: int) -> dict[str, Any]:
+        torques = measured[asked[place]]
+        size = 1e-10 * max(float(np.linalg.norm(torques)), 1e-3)
+        return {"claims": {"motor_torques": torques}, "changed": {"forces": found.forces[place]}, "within": 1e-9 + 2.0 * size}
+
+    return _asked_together(family, statics, case, rows, ask, told)
+
+
+def reach_batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
+    """Motors that put the tip somewhere, compiled."""
+    targets: dict[int, FloatArray] = {}
+    asked: list[int] = []
+
+    def ask(fast: CompiledModel, part: Any, gravity: FloatArray | None) -> Any:
+        tips = _settled(fast, statics, case, part, gravity).tip
+        for row, tip in zip(part.tolist(), tips, strict=True):
+            targets[row] = tip + (np.random.default_rng(row).normal(size=3) if row % _ODD == 0 else 0.0)
+        asked[:] = part.tolist()
+        wanted = np.array([targets[row] for row in asked])
+        start = np.clip(case.motors[part] + 0.2, *statics.model.motor_limits.T)
+        return fast.inverse_kinematics(wanted, case.forces[part], q_motors0=start, gravity=gravity)
+
+    return _asked_together(
+        family,
+        statics,
+        case,
+        rows,
+        ask,
+        lambda found, place: {
+            "claims": {"tip": targets[asked[place]]},
+            "changed": {"motors": found.q_motors[place]},
+            "within": 2e-9,
+        },
+    )
+
+
+Job = Callable[[Family, PlainStatics, Case, Sequence[int]], list[Answer]]
+
+JOBS: dict[str, Job] = {job.__name__: job for job in (solve, batch, estimate, estimate_batch, reach, reach_batch)}
+"""By name."""

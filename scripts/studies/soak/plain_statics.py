@@ -1,0 +1,298 @@
+"""The statics once more, written plainly: what answers of the solvers are checked against.
+
+Of a model it takes the rigid bodies (placements, axes, masses), the names and numbers of springs, sections and muscles as the
+description has them, and nothing of the solvers: forces and moments are summed up from the tip to the base, a section is the
+matrix exponential of its strain, its joints come from that pose by the formulas of
+`softrobots.constant_curvature.strain_chain`, and derivatives of those are complex steps. Where muscle lengths are given,
+strains come from the model's elastic coordinates as the solvers have them; whether these keep the lengths, and whether all that
+the lengths leave free is in balance, is seen by the rows of the muscles here. Whole batches of cases are worked on at once;
+there is no limit to the number of joints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray
+from softrobots.model.soft_model import SoftModel
+from studies.soak.plain_sections import section_joints, section_slopes
+
+_STEP = 1e-5  # of central differences, [rad or m]; leaves 1e-10 of the load
+
+
+class Case(NamedTuple):
+    """Cases of one robot, one row each."""
+
+    motors: FloatArray
+    """Actuator coordinates, shape (n, n_motors) [rad, m or N]."""
+    forces: FloatArray
+    """Force on the tip, shape (n, 3) [N]."""
+    gravity: FloatArray
+    """Gravity, shape (n, 3) [m/s^2]."""
+    moments: FloatArray
+    """Moment on the tip, shape (n, 3) [N m]."""
+
+    def row(self, number: int) -> Case:
+        """One case, as a batch of one."""
+        return Case(*(array[number : number + 1] for array in self))
+
+    def repeated(self, count: int) -> Case:
+        """A batch of one, many times."""
+        return Case(*(np.repeat(array, count, axis=0) for array in self))
+
+
+class Balance(NamedTuple):
+    """Robots under load, one row each."""
+
+    residual: FloatArray
+    """What is out of balance in the elastic coordinates, shape (n, n_springs) [N m or N]."""
+    imbalance: FloatArray
+    """Size of what is out of balance in all that given muscle lengths leave free, shape (n,) [N m]."""
+    size: FloatArray
+    """Size of the load, `|f| reach + |moment| + |g|`, with tensions times the reach, shape (n,) [N m]."""
+    motor_torques: FloatArray
+    """Load on the motor joints, shape (n, n_motor_joints) [N m or N]."""
+    tip: FloatArray
+    """The tip, shape (n, 3) [m]."""
+    rounding: FloatArray
+    """How exact the residual is, for stiff springs that are bent, shape (n,) [N m]."""
+    held: FloatArray
+    """How far muscles are from their given lengths at most, shape (n,) [m]; 0 without given lengths."""
+
+
+class PlainStatics:
+    """The statics of a robot, written plainly."""
+
+    def __init__(self, model: SoftModel) -> None:
+        """Take the constants."""
+        self.model = model
+        """The robot."""
+        rigid = model.pinocchio
+        self._count = rigid.njoints
+        self._parents = [int(parent) for parent in rigid.parents]
+        self._places = [int(rigid.joints[number].idx_v) if number else -1 for number in range(self._count)]
+        self._rotations = [np.array(placement.rotation) for placement in rigid.jointPlacements]
+        self._translations = [np.array(placement.translation) for placement in rigid.jointPlacements]
+        self._axes = [(False, np.zeros(3)), *(_axis(rigid, number) for number in range(1, self._count))]
+        self._masses = [(float(body.mass), np.array(body.lever)) for body in rigid.inertias]
+        tip = rigid.frames[model.frame_id(model.tip)]
+        self._tip_parent, self._tip = int(tip.parentJoint), np.array(tip.placement.translation)
+        parts = model.structure.parts
+        numbers = {str(name): number for number, name in enumerate(rigid.names)}
+        column = {name: self._places[number] for name, number in numbers.items()}
+        springs = sorted(parts.springs, key=lambda name: numbers[name])
+        sections = sorted(parts.sections, key=lambda tag: numbers[tag.joints[0]])
+        self._motor_columns = [column[name] for name in sorted(parts.motors, key=lambda name: numbers[name])]
+        self._spring_columns = [column[name] for name in springs]
+        self._section_columns = np.array([[column[name] for name in tag.joints] for tag in sections], dtype=int).reshape(-1, 6)
+        self._lengths = np.array([tag.length for tag in sections])
+        rest = [[*(strain * tag.length for strain in tag.rest[:3]), (tag.rest[3] - 1.0) * tag.length] for tag in sections]
+        self._rest_sections = np.array(rest).reshape(-1, 4)
+        stiffness = [[tag.bending_stiffness] * 2 + [tag.torsional_stiffness, tag.axial_stiffness] for tag in sections]
+        by_section = np.array(stiffness).reshape(-1, 4) / self._lengths[:, None]
+        self._stiffness = np.concatenate([[parts.springs[name].stiffness for name in springs], by_section.ravel()])
+        self._rest = np.concatenate([[parts.springs[name].rest for name in springs], self._rest_sections.ravel()])
+        names = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in ("bend_x", "bend_y", "twist", "stretch"))]
+        self._plateaus = [
+            ([names.index(names_of) for names_of in self._names(group)], group.max_moment)
+            for group in model.spring_groups
+            if group.max_moment is not None
+        ]
+        self._muscles = self._muscle_rows(names)
+        self._lengths_given = len(model.muscles) > 0 and model.muscle_input == "lengths"
+        zero = np.zeros(model.n_springs)
+        motors = np.array(model.relaxed_motors)
+        origin = np.array(model.structure.strains(motors, zero))
+        units = np.eye(model.n_springs)
+        self._free = np.array([model.structure.strains(motors, unit) - origin for unit in units]).reshape(-1, len(names))
+        self._left_free = _null_space(self._muscles) if self._lengths_given else np.eye(len(names))
+
+    def _names(self, group: Any) -> list[str]:
+        return [self.model.spring_joints[place] for place in group.springs]
+
+    def _muscle_rows(self, names: Sequence[str]) -> FloatArray:
+        """Derivative of the muscle lengths with respect to springs and sections, shape (n_muscles, n)."""
+        parts = self.model.structure.parts
+        rows = np.zeros((len(self.model.muscles), len(names)))
+        for row, muscle in zip(rows, self.model.muscles, strict=True):
+            arms = {
+                "bend_x": muscle.distance * math.sin(muscle.azimuth),
+                "bend_y": -muscle.distance * math.cos(muscle.azimuth),
+                "stretch": 1.0,
+            }
+            for tag in parts.sections:
+                for strain, arm in arms.items() if tag.segment == muscle.segment else ():
+                    row[names.index(f"{tag.name}_{strain}")] = arm
+            for lumped in parts.lumped_sections:
+                for strain, arm in arms.items() if lumped.segment == muscle.segment else ():
+                    if strain in lumped.joints:
+                        row[names.index(lumped.joints[strain])] = arm
+        return rows
+
+    def balance(self, case: Case, springs: FloatArray) -> Balance:
+        """Sum up the loads.
+
+        Args:
+            case: Actuators and loads, n rows.
+            springs: Elastic coordinates, shape (n, n_springs).
+
+        Returns:
+            What is out of balance, n rows.
+        """
+        strains = self._strains(case.motors, springs)
+        torques, size, tip = self._torques(case, strains)
+        rows = self._spring_loads(strains)
+        rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(np.abs(rows) @ np.abs(self._left_free.T), axis=1)
+        count = len(self._spring_columns)
+        rows[:, :count] -= torques[:, self._spring_columns]
+        if len(self._lengths):
+            z = strains[:, count:].reshape(len(strains), -1, 4)
+            at_joints = torques[:, self._section_columns]
+            rows[:, count:] -= np.einsum("nsj,nsjz->nsz", at_joints, section_slopes(z, self._lengths)).reshape(len(z), -1)
+        held = np.zeros(len(strains))
+        if len(self._muscles):
+            given = case.motors[:, len(self._motor_columns) :]
+            if self._lengths_given:
+                rest = np.array([muscle.rest_length for muscle in self.model.muscles])
+                held = np.abs(rest + strains @ self._muscles.T - given).max(axis=1)
+            else:
+                rows += given @ self._muscles
+                size = size + np.abs(given).sum(axis=1) * self.model.reach
+        imbalance = np.linalg.norm(rows @ self._left_free.T, axis=1)
+        return Balance(rows @ self._free.T, imbalance, size, torques[:, self._motor_columns], tip, rounding, held)
+
+    def tangent(self, case: Case, springs: FloatArray) -> FloatArray:
+        """Tangent stiffness of one case by central differences, shape (n_springs, n_springs).
+
+        Args:
+            case: A batch of one.
+            springs: Elastic coordinates, shape (n_springs,).
+        """
+        count = len(springs)
+        steps = _STEP * np.eye(count)
+        around = np.concatenate([springs + steps, springs - steps])
+        residual = self.balance(case.repeated(2 * count), around).residual
+        return np.asarray((residual[:count] - residual[count:]).T / (2.0 * _STEP))
+
+    def softest(self, case: Case, springs: FloatArray) -> tuple[float, float]:
+        """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, and how exact it is.
+
+        Args:
+            case: A batch of one.
+            springs: Elastic coordinates, shape (n_springs,).
+        """
+        stiffness = np.einsum("is,s,is->i", self._free, self._stiffness, self._free)
+        softness = 1.0 / np.sqrt(stiffness)
+        scaled = softness[:, None] * self.tangent(case, springs) * softness
+        size = float(self.balance(case, springs[None]).size[0])
+        error = 1e-9 * (1.0 + size / float(stiffness.min())) * len(springs)
+        return float(np.linalg.eigvals(scaled).real.min()), error
+
+    def _strains(self, motors: FloatArray, springs: FloatArray) -> FloatArray:
+        if not self._lengths_given:
+            return springs
+        return np.array([self.model.structure.strains(*row) for row in zip(motors, springs, strict=True)])
+
+    def _spring_loads(self, strains: FloatArray) -> FloatArray:
+        loads = self._stiffness * (strains - self._rest)
+        for places, largest in self._plateaus:
+            moment = np.linalg.norm(loads[:, places], axis=1)
+            loads[:, places] *= np.where(moment > largest, largest / np.maximum(moment, largest), 1.0)[:, None]
+        return np.asarray(loads)
+
+    def _torques(self, case: Case, strains: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Load on every joint, shape (n, nv); the size of the load; and the tip."""
+        joints = self._joints(case.motors, strains)
+        n = len(joints)
+        turns: list[FloatArray] = [np.tile(np.eye(3), (n, 1, 1))]
+        points: list[FloatArray] = [np.zeros((n, 3))]
+        for number in range(1, self._count):
+            parent = self._parents[number]
+            turn = turns[parent] @ self._rotations[number]
+            point = points[parent] + turns[parent] @ self._translations[number]
+            slides, axis = self._axes[number]
+            coordinate = joints[:, self._places[number]]
+            if slides:
+                point = point + (turn @ axis) * coordinate[:, None]
+            else:
+                turn = turn @ _turns(axis, coordinate)
+            turns.append(turn)
+            points.append(point)
+        tip = points[self._tip_parent] + turns[self._tip_parent] @ self._tip
+        pulled = self._carried(turns, points, tip, case.forces, case.moments, None)
+        weighed = self._carried(turns, points, tip, np.zeros((n, 3)), np.zeros((n, 3)), case.gravity)
+        norm = np.linalg.norm
+        size = norm(case.forces, axis=1) * self.model.reach + norm(case.moments, axis=1) + norm(weighed, axis=1)
+        return pulled + weighed, size, tip
+
+    def _carried(
+        self,
+        turns: list[FloatArray],
+        points: list[FloatArray],
+        tip: FloatArray,
+        force: FloatArray,
+        moment: FloatArray,
+        gravity: Any,
+    ) -> FloatArray:
+        """Torque that each joint must carry, from the tip to the base."""
+        n = len(tip)
+        forces: list[FloatArray] = [np.zeros((n, 3)) for _ in range(self._count)]
+        moments: list[FloatArray] = [np.zeros((n, 3)) for _ in range(self._count)]  # about the origin of the world
+        forces[self._tip_parent] = np.array(force)
+        moments[self._tip_parent] = moment + np.cross(tip, force)
+        torques = np.zeros((n, self.model.pinocchio.nv))
+        for number in range(self._count - 1, 0, -1):
+            if gravity is not None:
+                mass, lever = self._masses[number]
+                weight = mass * gravity
+                forces[number] = forces[number] + weight
+                moments[number] = moments[number] + np.cross(points[number] + turns[number] @ lever, weight)
+            slides, axis = self._axes[number]
+            carried = forces[number] if slides else moments[number] - np.cross(points[number], forces[number])
+            torques[:, self._places[number]] = np.einsum("ni,ni->n", turns[number] @ axis, carried)
+            parent = self._parents[number]
+            forces[parent] = forces[parent] + forces[number]
+            moments[parent] = moments[parent] + moments[number]
+        return torques
+
+    def _joints(self, motors: FloatArray, strains: FloatArray) -> FloatArray:
+        """Joint positions in the order of Pinocchio's velocities, shape (n, nv)."""
+        joints = np.zeros((len(strains), self.model.pinocchio.nv))
+        count = len(self._spring_columns)
+        joints[:, self._motor_columns] = motors[:, : len(self._motor_columns)]
+        joints[:, self._spring_columns] = strains[:, :count]
+        if len(self._lengths):
+            z = strains[:, count:].reshape(len(strains), -1, 4)
+            at_rest = section_joints(self._rest_sections, self._lengths)
+            joints[:, self._section_columns] = (section_joints(z, self._lengths) - at_rest).real
+        return joints
+
+
+def _turns(axis: FloatArray, angles: FloatArray) -> FloatArray:
+    """Rotations about an axis, shape (n, 3, 3)."""
+    x, y, z = axis
+    spin = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    made = np.eye(3) + np.sin(angles)[:, None, None] * spin + (1.0 - np.cos(angles))[:, None, None] * (spin @ spin)
+    return np.asarray(made)
+
+
+def _null_space(rows: FloatArray) -> FloatArray:
+    """Directions of length 1 that change none of the rows, shape (k, n), by singular values."""
+    _, values, directions = np.linalg.svd(rows)
+    rank = int(np.count_nonzero(values > values.max(initial=0.0) * 1e-12))
+    return np.asarray(directions[rank:])
+
+
+def _axis(rigid: Any, number: int) -> tuple[bool, FloatArray]:
+    """Whether a joint slides, and its axis in its own frame."""
+    joint = rigid.joints[number]
+    data = joint.createData()
+    joint.calc(data, pin.neutral(rigid))
+    motion = np.asarray(data.S, dtype=np.float64).reshape(6)
+    slides = not np.any(motion[3:])
+    return slides, np.array(motion[:3] if slides else motion[3:])

@@ -1,0 +1,143 @@
+"""The laws that every answer in a soak must obey, and the count of what was found."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import MOMENT_FLOOR, TOLERANCE
+from studies.soak.families import Family, draw_cases
+from studies.soak.jobs import JOBS, STABLE, Answer
+from studies.soak.plain_statics import Case, PlainStatics
+
+MOST_ITERATIONS = 200
+"""Largest number of evaluations, or of steps of a search."""
+
+ROOM = 1.01
+"""Largest residual over its tolerance; a hundredth is left for the rounding of the second evaluation."""
+
+WORST = 1e300
+"""Stands for a residual that is no number."""
+
+LARGEST_TANGENT = 200
+"""Springs of the largest robot whose tangent stiffness is made anew: its differences take some seconds."""
+
+HELD = 1e-9
+"""Largest distance of a muscle from its given length [m]."""
+
+
+@dataclass
+class Tally:
+    """What a family came to."""
+
+    cases: int = 0
+    """Number of cases."""
+    outcomes: Counter[str] = field(default_factory=Counter)
+    """How many ended how."""
+    residual: float = 0.0
+    """Largest residual over its tolerance, by plain statics."""
+    tangents: int = 0
+    """How many tangent stiffnesses were made anew."""
+    iterations: int = 0
+    """Most iterations."""
+    slowest: float = 0.0
+    """Longest time of a case [s]; of a batch, its part."""
+    seconds: float = 0.0
+    """Time of all in the solvers [s]."""
+    broken: list[tuple[int, str]] = field(default_factory=list)
+    """Cases that break a law: number and law."""
+
+    def add(self, other: Tally) -> None:
+        """Add another part of the same family."""
+        self.cases += other.cases
+        self.outcomes.update(other.outcomes)
+        self.residual = max(self.residual, other.residual)
+        self.tangents += other.tangents
+        self.iterations = max(self.iterations, other.iterations)
+        self.slowest = max(self.slowest, other.slowest)
+        self.seconds += other.seconds
+        self.broken += other.broken
+
+    def as_json(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {**vars(self), "outcomes": dict(sorted(self.outcomes.items()))}
+
+
+def judge(family: Family, seed: int, chunk: int, rows: Sequence[int]) -> tuple[Tally, list[Answer]]:
+    """Draw the cases of a chunk, solve some of them, and check what is said.
+
+    Args:
+        family: The family.
+        seed: Of all random numbers.
+        chunk: Number of the chunk.
+        rows: The rows that are asked for.
+
+    Returns:
+        The count, and the answers.
+    """
+    random = family.random(seed, chunk)
+    model = family.robot(random)
+    case = draw_cases(family, model, random)
+    statics = PlainStatics(model)
+    begun = time.perf_counter()
+    answers = JOBS[family.job](family, statics, case, rows)
+    tally = Tally(cases=len(answers), seconds=time.perf_counter() - begun)
+    for answer in answers:
+        tally.outcomes[answer.outcome] += 1
+        tally.iterations = max(tally.iterations, answer.iterations)
+        tally.slowest = max(tally.slowest, answer.seconds)
+        found = [answer.broken] if answer.broken else []
+        if answer.iterations > MOST_ITERATIONS:
+            found.append(f"{answer.iterations} iterations")
+        tally.broken += [(family.chunk * chunk + answer.row, told) for told in found]
+    answered = [answer for answer in answers if answer.springs is not None]
+    if answered:
+        _check(tally, family, chunk, statics, case, answered)
+    return tally, answers
+
+
+def _check(tally: Tally, family: Family, chunk: int, statics: PlainStatics, case: Case, answers: list[Answer]) -> None:
+    """Check answers against plain statics."""
+    rows = [answer.row for answer in answers]
+    asked = Case(*(array[rows] for array in case))
+    for place, answer in enumerate(answers):
+        for name, value in answer.changed.items():
+            getattr(asked, name)[place] = value
+    springs = np.array([answer.springs for answer in answers])
+    balance = statics.balance(asked, springs)
+    tolerance = np.maximum(TOLERANCE * np.maximum(balance.size, MOMENT_FLOOR), statics.model.rounding)
+    residual = np.maximum(balance.imbalance - balance.rounding, 0.0) / tolerance
+    residual = np.nan_to_num(residual, nan=WORST, posinf=WORST)
+    tally.residual = max(tally.residual, float(residual.max()))
+    for place, answer in enumerate(answers):
+        broken = []
+        if not residual[place] <= ROOM:
+            broken.append(f"said to be {answer.outcome}, {residual[place]:.3g} times the tolerance out of balance")
+        if not balance.held[place] <= HELD:
+            broken.append(f"a muscle is {balance.held[place]:.3g} m from its length")
+        for name, claim in answer.claims.items():
+            error = float(np.abs(getattr(balance, name)[place] - claim).max(initial=0.0))
+            room = answer.within + (1e-12 * float(balance.size[place]) if name == "motor_torques" else 0.0)
+            if not error <= room:
+                broken.append(f"the {name.replace('_', ' ')} is off by {error:.3g}")
+        if answer.row % family.tangents == 0 and springs.shape[1] <= LARGEST_TANGENT and residual[place] < WORST:
+            tally.tangents += 1
+            softest, error = statics.softest(asked.row(place), springs[place])
+            if (softest < -error) if answer.outcome == STABLE else (softest > error):
+                broken.append(f"said to be {answer.outcome}, least eigenvalue {softest:.3g} within {error:.1g}")
+        tally.broken += [(family.chunk * chunk + answer.row, told) for told in broken]
+
+
+def said(model: SoftModel, case: Case, answers: Sequence[Answer]) -> str:
+    """What is printed of cases that are run again."""
+    lines = [repr(model)]
+    for answer in answers:
+        lines += [f"{name}: {array[answer.row].tolist()}" for name, array in case._asdict().items()]
+        lines += [f"{name}: {value}" for name, value in vars(answer).items()]
+    return "\n".join(lines)

@@ -1,0 +1,185 @@
+"""`softrobots doctor`: what is installed, whether the shipped files are up to date, and whether the tools agree on them."""
+
+from __future__ import annotations
+
+import argparse
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import softrobots
+from softrobots.cli.reports.answers import add_json, aligned, tell
+from softrobots.cli.tools.checks import row_problems
+from softrobots.cli.tools.kinematics import KinematicsRow, compare_kinematics
+from softrobots.cli.tools.known_tools import installed_tools
+from softrobots.cli.tools.packages import extra_states, package_states
+from softrobots.compiled.run.machines import available_backend, cache_folder, cache_is_kept
+from softrobots.core.errors import SoftRobotsError, ViewerError
+from softrobots.description.paths import urdf_folder, xacro_folder
+from softrobots.robots import ROBOTS
+from softrobots.robots.generated import generated_files
+from softrobots.view.browser import find_chromium
+from softrobots.view.meshcat_page.server import end_server, start_server
+
+_PAGE_TIME = 10.0  # [s], longest wait for the page
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "doctor",
+        help="tell what is installed, and whether files and tools agree",
+        description="Tell which packages are installed and which extras are complete, whether the page of the viewer can be "
+        "served (a server is started on loopback, asked for its page and ended), whether the shipped URDF files are what xacro "
+        "generates, and how far yourdfpy's kinematics of them is from Pinocchio's. Exit status 0 if all that is required is "
+        "fine, 1 if not.",
+    )
+    parser.add_argument("--all", action="store_true", help="compare the kinematics of every installed tool (of yourdfpy)")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+class _Report(NamedTuple):
+    """What is found out, step by step."""
+
+    answer: dict[str, Any]
+    """For a machine."""
+    lines: list[str]
+    """For a person."""
+    wrong: list[str]
+    """What is required and not fine."""
+
+    def add(self, title: str, rows: Sequence[tuple[str, ...]]) -> None:
+        """Add a table."""
+        self.lines.extend(["", title] if title else [])
+        self.lines.extend(aligned(rows, indent="  "))
+
+
+def run(arguments: argparse.Namespace) -> bool:
+    """Print the report; return whether all that is required is there and right."""
+    report = _Report({}, [], [])
+    folder = _places(report)
+    _packages(report)
+    if folder is not None and not report.wrong:
+        _page(report)
+        _files(folder, report)
+        _kinematics(folder, installed_tools() if arguments.all else ("yourdfpy",), report)
+    report.answer.update(wrong=report.wrong, ok=not report.wrong)
+    end = ["wrong:", *(f"  {text}" for text in report.wrong)] if report.wrong else ["all well"]
+    tell(arguments, report.answer, [*report.lines, "", *end])
+    return not report.wrong
+
+
+def _places(report: _Report) -> Path | None:
+    """Versions, and where things are; the folder of the URDF files."""
+    versions = {"softrobots": softrobots.__version__, "python": platform.python_version(), "platform": platform.platform()}
+    report.answer.update(versions)
+    report.lines.append(f"softrobots {versions['softrobots']}, Python {versions['python']}, {versions['platform']}")
+    try:
+        urdf, xacro = urdf_folder(), xacro_folder()
+    except SoftRobotsError as error:
+        report.wrong.append(str(error))
+        return None
+    browser: str | None = None
+    try:
+        browser = told = find_chromium()
+    except ViewerError as error:
+        told = f"none, so no pictures of the viewer: {error}"
+    cache, kept = cache_folder(), cache_is_kept()
+    lost = "" if kept else "; for this process alone: the folder for caches cannot be written"
+    compiled = f"{cache} (compiled solvers, by {available_backend()}{lost})"
+    package = Path(softrobots.__file__).parent
+    places = {"package": package, "xacro": xacro, "urdf": urdf, "browser": browser, "cache": cache}
+    report.answer.update(places=places, cache_writable=kept, backend=available_backend())
+    report.add("", [(name, str(where)) for name, where in (places | {"browser": told, "cache": compiled}).items()])
+    return urdf
+
+
+def _packages(report: _Report) -> None:
+    """Every package, installed or not, and every extra."""
+    states = package_states()
+    extras = extra_states(states)
+    report.wrong.extend(f"{state.package.name}: {state.advice}" for state in states if not state.ok and not state.package.extra)
+    report.answer["packages"] = [
+        {**state.package._asdict(), "version": state.version, "ok": state.ok, "advice": state.advice} for state in states
+    ]
+    report.answer["extras"] = {extra.name: {**extra._asdict(), "complete": extra.complete} for extra in extras}
+    rows = []
+    for state in states:
+        package = state.package
+        advice = state.advice if package.wanted else ""
+        rows.append((package.name, state.version or "-", package.extra or "required", advice or package.purpose))
+    report.add("Packages", rows)
+    told = {extra.name: "complete" if extra.complete else f"lacks {', '.join(extra.missing)}" for extra in extras}
+    report.add("Extras: pip install 'softrobots[EXTRA]'", [(extra.name, told[extra.name], extra.purpose) for extra in extras])
+
+
+def _page(report: _Report) -> None:
+    """Whether the page of the viewer can be served: start a server, ask it for its page, end it."""
+    url, problem = "", ""
+    try:
+        server, _, url = start_server()
+    except ViewerError as error:
+        problem = str(error)
+    else:
+        try:
+            problem = _fetch(url)
+        finally:
+            end_server(server)
+    report.answer["page"] = {"served": not problem, "url": url, "problem": problem}
+    report.add("Page of the viewer", [("served" if not problem else "not served", problem or f"at {url}, and ended again")])
+    if problem:
+        report.wrong.append(f"the page of the viewer cannot be served: {problem}")
+
+
+def _fetch(url: str) -> str:
+    """What is wrong with a page on loopback; empty if it is meshcat's."""
+    from urllib.request import ProxyHandler, build_opener
+
+    try:
+        with build_opener(ProxyHandler({})).open(url, timeout=_PAGE_TIME) as answer:  # loopback needs no proxy
+            text = answer.read().decode("utf-8", "replace")
+    except OSError as error:
+        return f"{url}: {error}"
+    return "" if "meshcat" in text.lower() else f"{url} answers with something else than meshcat's page"
+
+
+def _files(folder: Path, report: _Report) -> None:
+    """The shipped URDF files against xacro."""
+    from tqdm import tqdm
+
+    rows = report.answer["urdf_files"] = []
+    for file in tqdm(generated_files(folder), total=len(ROBOTS), desc="xacro", unit="file", leave=False):
+        rows.append({"file": file.path, "up_to_date": file.up_to_date})
+        if not file.up_to_date:
+            report.wrong.append(f"{file.path} is not what xacro generates")
+    cells = [(row["file"].name, "the same" if row["up_to_date"] else "differs") for row in rows]
+    report.add("URDF files, and what xacro generates now", cells)
+
+
+def _kinematics(folder: Path, tools: Sequence[str], report: _Report) -> None:
+    """Where the tools put the links of the shipped files."""
+    from tqdm import tqdm
+
+    rows: list[KinematicsRow] = []
+    pairs = [(folder / f"{name}.urdf", tool) for name in ROBOTS for tool in tools]
+    for path, tool in tqdm(pairs, desc="kinematics", unit="robot", leave=False):
+        try:
+            rows += compare_kinematics(path, [tool])
+        except SoftRobotsError as error:
+            report.wrong.append(str(error))
+    report.answer["kinematics"] = [
+        {
+            **{name: getattr(row, name) for name in ("file", "tool", "version", "position_error", "rotation_error")},
+            "problems": row_problems(row),
+        }
+        for row in rows
+    ]
+    cells = [(row.file, row.tool, row.version, *_measured(row), *row_problems(row)) for row in rows]
+    report.add("Largest difference from Pinocchio's kinematics at 20 random configurations", cells)
+    report.wrong.extend(f"{row.file}: {text}" for row in rows for text in row_problems(row))
+
+
+def _measured(row: KinematicsRow) -> tuple[str, str, str]:
+    return f"{row.position_error:.1e} m", f"{row.rotation_error:.1e} rad", f"{row.links} links, {row.joints} joints"

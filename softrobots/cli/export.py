@@ -1,0 +1,76 @@
+"""`softrobots export`: write a robot for another tool, with its springs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from softrobots.cli.options.command_line import add_gravity, gravity_of
+from softrobots.cli.options.robot_argument import add_model, model_of, motors_of, source_of
+from softrobots.cli.reports.answers import add_json, tell
+from softrobots.core.files import new_file
+from softrobots.export.damping import DAMPING
+from softrobots.export.formats import FORMATS, export_model, guess_format
+from softrobots.export.number_sources import PackagedRobot
+
+_EXAMPLES = """examples:
+  softrobots export inflatable_arm -o arm.xml --gravity
+  softrobots export arm.urdf -o arm.sdf --welded --motors 0.3 0.6 -0.8
+  softrobots export pcc_arm_lumped --set hinges=6 -o pcc.xml
+  softrobots export pcc_arm_lumped --muscles forces --welded --motors 20 5 5 10 0 0 -o pcc.sdf
+  softrobots export helix_tube_lumped --format pybullet -o helix.py
+  softrobots export ur5.urdf --spring wrist_1_joint=40 --spring wrist_3_joint=25,0.1 --tip tool0 -o ur5.xml
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "export",
+        help="write a robot for a simulator, with its springs",
+        description="Write a robot for another tool, with springs, damping and actuators: no tool reads springs from URDF.",
+        epilog=_EXAMPLES,
+    )
+    add_model(parser)
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="the file to write (required)")
+    told = "; ".join(f"{name} ({row.suffix}): {row.meaning}" for name, row in FORMATS.items())
+    parser.add_argument("--format", choices=FORMATS, help=f"{told}. By default what the suffix of FILE says")
+    parser.add_argument(
+        "--motors", type=float, nargs="+", metavar="Q", help="motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+    )
+    parser.add_argument(
+        "--welded", action="store_true", help="fix the motors where they are, put tensions of muscles into the springs"
+    )
+    told = "of the springs: critical for the slowest mode, or that of the file (critical)"
+    parser.add_argument("--damping", choices=DAMPING, help=told)
+    add_gravity(parser)
+    parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Write the file, and tell what was written."""
+    name = arguments.format or guess_format(arguments.output)
+    given = {
+        "actuators": "welded" if arguments.welded else None,
+        "damping": arguments.damping,
+        "gravity": gravity_of(arguments),
+    }
+    options = {option: value for option, value in given.items() if value is not None}
+    new_file(arguments.output, overwrite=arguments.overwrite)  # tells at once
+    source = source_of(arguments)
+    if "robot" in FORMATS[name].options and isinstance(source, PackagedRobot):
+        options["robot"] = source  # for the sources of its numbers
+    model = model_of(arguments, source)
+    if arguments.motors is not None:
+        options["q_motors"] = motors_of(model, arguments.motors)
+    path = export_model(model, arguments.output, name, overwrite=arguments.overwrite, **options)
+    structure = model.structure
+    counts = {"sections": 0 if structure.sections is None else len(structure.section_table)}
+    counts |= {"springs": len(structure.spring_joints), "actuators": model.n_motors}
+    answer = {"files": [path], "robot": model.pinocchio.name, "format": name, **counts, "welded": arguments.welded}
+    sections = f"{counts['sections']} sections, " if counts["sections"] else ""
+    kept = f"{sections}{counts['springs']} springs, {model.n_motors}{' welded' if arguments.welded else ''} actuators"
+    tell(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])

@@ -1,0 +1,143 @@
+"""`softrobots ik`: motors that put the loaded tip at a target, or move it along a path."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import pinocchio as pin
+
+from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.plot_option import add_plot, check_plot, shape_figure, write_plot
+from softrobots.cli.options.result_file import add_output, check_output, save
+from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
+from softrobots.cli.reports.answers import add_json, tell, written_lines
+from softrobots.cli.reports.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
+from softrobots.core.checks import finite_array
+from softrobots.core.errors import ParameterError
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.inverse_kinematics import ELBOWS, solve_ik
+from softrobots.statics.time_law import read_waypoints
+from softrobots.statics.tip_search import POSITION_TOLERANCE
+from softrobots.statics.trajectory import METHODS, Trajectory, follow_trajectory
+
+_EXAMPLES = """examples:
+  softrobots ik inflatable_arm --target 0.9 0.3 0.2 --force 0 10 -15 --elbow up
+  softrobots ik inflatable_arm --waypoints path.csv --force 0 10 -15 -o followed.csv --plot poses.png
+  softrobots ik pcc_arm --target 0.3 -0.2 0.9 --orientation 0.5 0 1 --gravity
+  softrobots ik inflatable_arm --target 0.9 0.3 0.2 --gravity --json
+"""
+
+_STARTS = 24
+_GAIN = 50.0
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "ik",
+        help="find motors that put the loaded tip at a target, or along a path",
+        description="Find motor coordinates at which the loaded, deformed tip is at a target, or follows waypoints. Of the "
+        "solutions found it tells the one that changes the start least, and the others. Exit status 0 if every target is "
+        "reached, 1 if not, 2 after bad input.",
+        epilog=_EXAMPLES,
+    )
+    add_model(parser)
+    what = parser.add_mutually_exclusive_group(required=True)
+    told = "position of the loaded tip, world axes [m] (this or --waypoints is required)"
+    what.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
+    told = "CSV file of positions of the loaded tip, columns t, x, y, z [s, m]; without t 0.05 s apart"
+    what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=told)
+    how = parser.add_mutually_exclusive_group()
+    told = "direction of the tip's z axis at --target, of any length [-] (any direction)"
+    how.add_argument("--orientation", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
+    told = "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)"
+    how.add_argument("--rpy", type=float, nargs=3, metavar=("R", "P", "Y"), help=told)
+    add_loads(parser)
+    told = "where the search starts: motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+    parser.add_argument("--start", type=float, nargs="+", metavar="Q", help=told)
+    told = (
+        "side of the last motor joint, above or below the line from the first one to the tip; of a path at its start (either)"
+    )
+    parser.add_argument("--elbow", choices=ELBOWS, help=told)
+    told = "how springs settle: newton, or fixed_point, the paper's; paper: its closed loop, for --waypoints (%(default)s)"
+    parser.add_argument("--method", choices=METHODS, default="newton", help=told)
+    told = f"largest distance of the tip from a target [m] ({POSITION_TOLERANCE:g}); not for --method paper"
+    parser.add_argument("--tolerance", type=float, metavar="D", help=told)
+    parser.add_argument("--starts", type=int, metavar="N", help=f"number of searches for --target [-] ({_STARTS})")
+    parser.add_argument("--gain", type=float, metavar="K", help=f"gain of --method paper [1/s] ({_GAIN:g})")
+    told = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
+    parser.add_argument("--allow-jumps", action="store_true", help=told)
+    add_output(parser, "the solution or trajectory as NPZ, for softrobots.load_result, or a trajectory as a .csv table")
+    add_plot(parser, "the loaded shape, or the poses along the path")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Solve and tell."""
+    _refuse_contradictions(arguments)
+    check_output(arguments, ".npz", *([".csv"] if arguments.waypoints is not None else []))
+    check_plot(arguments)
+    path = None if arguments.waypoints is None else read_waypoints(arguments.waypoints)
+    model = statics_model_of(arguments)
+    options = {
+        **loads_of(arguments, model),
+        "q_motors0": None if arguments.start is None else motors_of(model, arguments.start, "--start"),
+        "elbow": arguments.elbow,
+        "method": arguments.method,
+        "tolerance": POSITION_TOLERANCE if arguments.tolerance is None else arguments.tolerance,
+    }
+    if path is None:
+        _reach(arguments, model, options)
+        return
+    gain = _GAIN if arguments.gain is None else arguments.gain
+    found = follow_trajectory(
+        model,
+        path.positions,
+        **options,
+        times=path.times,
+        gain=gain,
+        allow_jumps=arguments.allow_jumps,
+        progress="waypoints",
+    )
+    files = save(arguments, found) + write_plot(arguments, lambda: _path_figure(found))
+    lines = [*trajectory_lines(found), *written_lines(files)]
+    tell(arguments, {**trajectory_answer(found), "files": files}, lines)
+
+
+def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, Any]) -> None:
+    wanted = arguments.orientation
+    if arguments.rpy is not None:
+        wanted = pin.rpy.rpyToMatrix(*finite_array("--rpy", arguments.rpy, (3,), "rad"))
+    starts = _STARTS if arguments.starts is None else arguments.starts
+    found = solve_ik(model, arguments.target, orientation=wanted, starts=starts, **options)
+    files = save(arguments, found) + write_plot(arguments, lambda: shape_figure(found.equilibrium))
+    lines = [*solution_lines(found), *written_lines(files)]
+    tell(arguments, {**solution_answer(found), "files": files}, lines)
+
+
+def _refuse_contradictions(arguments: argparse.Namespace) -> None:
+    """Refuse options that the other options leave without effect."""
+    single = arguments.target is not None
+    paper = arguments.method == "paper"
+    given = {
+        "--orientation": (arguments.orientation is not None and not single, "--target"),
+        "--rpy": (arguments.rpy is not None and not single, "--target"),
+        "--starts": (arguments.starts is not None and not single, "--target"),
+        "--allow-jumps": (arguments.allow_jumps and single, "--waypoints"),
+        "--method": (paper and single, "--waypoints, or another method"),
+        "--gain": (arguments.gain is not None and not paper, "--method paper"),
+        "--tolerance": (arguments.tolerance is not None and paper, "another method than paper"),
+    }
+    for option, (wrong, requirement) in given.items():
+        if wrong:
+            value = getattr(arguments, option.removeprefix("--").replace("-", "_"))
+            raise ParameterError(option, value, f"given with {requirement}")
+
+
+def _path_figure(found: Trajectory) -> Any:
+    from softrobots.view.figures import plots
+
+    return plots.poses(found)

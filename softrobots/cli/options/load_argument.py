@@ -1,0 +1,57 @@
+"""What pulls on the robot of a command: `--force`, `--moment`, `--frame`, `--wrench`, `--gravity`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+
+from softrobots.cli.options.command_line import add_load, gravity_of
+from softrobots.core.checks import finite_array
+from softrobots.core.errors import ParameterError
+from softrobots.model.soft_model import SoftModel
+
+_WORDS = ("LINK", "FX", "FY", "FZ", "MX", "MY", "MZ")
+
+
+def add_loads(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the options of a load; see `loads_of`. Loads are dead: they keep their direction in the world."""
+    add_load(parser)
+    told = "moment on the tip, world axes [N m] (0 0 0)"
+    parser.add_argument("--moment", type=float, nargs=3, metavar=("MX", "MY", "MZ"), help=told)
+    parser.add_argument("--frame", metavar="LINK", help="where --force and --moment act (the tip)")
+    told = "another force [N] and moment [N m] at the origin of a link, world axes; may be given several times (none)"
+    parser.add_argument("--wrench", nargs=7, action="append", default=[], metavar=_WORDS, help=told)
+
+
+def loads_of(arguments: argparse.Namespace, model: SoftModel) -> dict[str, Any]:
+    """What `--force` and the others ask for, as arguments of `solve_equilibrium` and `solve_ik`.
+
+    Args:
+        arguments: Arguments of a parser that `add_loads` has seen.
+        model: The robot.
+
+    Raises:
+        ParameterError: If what follows a link is no finite number, or the moment is not finite.
+    """
+    wrenches: dict[str, Any] = {}
+    for link, *words in arguments.wrench:
+        wrenches[link] = wrenches.get(link, 0.0) + finite_array("--wrench", _numbers(words), (6,), "N, N m")
+    if arguments.moment is not None:
+        at = model.tip if arguments.frame is None else arguments.frame
+        moment = finite_array("--moment", arguments.moment, (3,), "N m")
+        wrenches[at] = wrenches.get(at, 0.0) + np.array([0.0, 0.0, 0.0, *moment])
+    return {
+        "force": arguments.force,
+        "wrench": wrenches or None,
+        "frame": arguments.frame,
+        "gravity": gravity_of(arguments),
+    }
+
+
+def _numbers(words: list[str]) -> list[float]:
+    try:
+        return [float(word) for word in words]
+    except ValueError as error:
+        raise ParameterError("--wrench", " ".join(words), f"{' '.join(_WORDS)}: a link and six numbers") from error

@@ -1,0 +1,203 @@
+"""Which robot a command is about: `ROBOT`, `--set NAME=VALUE`, and what must be said about other people's files."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from softrobots.cli.options.command_line import refuse_too_large
+from softrobots.cli.options.robot_parameters import NOTHING, check_names, make_robot, parse_parameters, xacro_parameters
+from softrobots.cli.reports.coordinate_units import motor_units
+from softrobots.cli.tools.kinematics import is_urdf_file
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.description.expansion import expand
+from softrobots.description.sources import read_source
+from softrobots.model.loader import load_model
+from softrobots.model.muscles import MUSCLE_INPUTS
+from softrobots.model.soft_model import SoftModel
+from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm, Robot
+from softrobots.robots.parameter_file import read_parameters
+from softrobots.robots.parameters import argument_text
+
+
+def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """Give a parser `ROBOT`, `--set` and `--parameters`; see `source_of`.
+
+    Args:
+        parser: The parser.
+        optional: Whether `ROBOT` may be left out.
+    """
+    told = f"{', '.join(ROBOTS)}; or a URDF, xacro, MJCF or SDF file"
+    parser.add_argument("robot", nargs="?" if optional else None, metavar="ROBOT", help=told)
+    parser.add_argument(
+        "--set",
+        dest="parameters",
+        nargs="+",
+        action="extend",
+        type=assignment,
+        default=[],
+        metavar="NAME=VALUE",
+        help="parameters of the robot, or arguments of the xacro file; `softrobots urdf ROBOT --list` tells names, units and "
+        "defaults",
+    )
+    told = "read such parameters from a file, YAML or JSON; --set wins (none)"
+    parser.add_argument("--parameters", dest="parameter_file", type=Path, metavar="FILE", help=told)
+
+
+def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """Give a parser `ROBOT`, `--set`, `--parameters`, `--spring`, `--tip` and `--muscles`; see `model_of`.
+
+    Args:
+        parser: The parser.
+        optional: Whether `ROBOT` may be left out.
+    """
+    add_robot(parser, optional=optional)
+    told = "a spring of a joint of somebody's file, K [N m/rad or N/m], relaxed at REST [rad or m] (0); once for each joint"
+    parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=told)
+    parser.add_argument("--tip", metavar="LINK", help="the link that is the tip (as the file says, or its only end)")
+    told = "what is given of muscles, lengths [m] or tensions [N] (%(default)s)"
+    parser.add_argument("--muscles", choices=MUSCLE_INPUTS, default="lengths", help=told)
+
+
+def assignment(word: str) -> str:
+    """A word behind `--set`; argparse gives it all the words up to the next option."""
+    name, equals, _ = word.partition("=")
+    if not equals or not name.strip():
+        raise argparse.ArgumentTypeError(f"{word!r}: NAME=VALUE is required, and ROBOT before --set")
+    return word
+
+
+def spring(word: str) -> tuple[str, tuple[float, float]]:
+    """A spring as it is typed, JOINT=K or JOINT=K,REST: the joint, and stiffness and rest."""
+    joint, equals, numbers = word.rpartition("=")
+    stiffness, _, rest = numbers.partition(",")
+    try:
+        typed = float(stiffness), float(rest or 0.0)
+    except ValueError:
+        equals = ""
+    if not joint or not equals:
+        raise argparse.ArgumentTypeError(f"{word!r}: JOINT=K or JOINT=K,REST is required")
+    return joint, typed
+
+
+def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
+    """What the arguments of `add_robot` name: a robot, the path of a URDF file, or the URDF text that another file becomes.
+
+    Args:
+        arguments: The arguments.
+
+    Raises:
+        NameNotFound: If there is no such robot, file or parameter.
+        ParameterError: If a parameter is refused, or the file of parameters is for another robot.
+        FileFormatError: If the file of parameters cannot be read.
+        DescriptionError: If xacro refuses the file, or it is of no kind that can be read.
+        MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
+    """
+    robot, parameters, said = arguments.robot, arguments.parameters, NOTHING
+    if arguments.parameter_file is not None:
+        said = read_parameters(arguments.parameter_file)
+        if said.robot not in (None, robot, Path(robot).name):
+            raise ParameterError("ROBOT", robot, f"{said.robot}, for which {arguments.parameter_file} is")
+    if robot in ROBOTS:
+        return make_robot(robot, parameters, said)
+    file = robot_file(robot)
+    if file.suffix == ".xacro":
+        known = xacro_parameters(file)
+        check_names(said, known, file.name)
+        texts = {name: argument_text(value) for name, value in said.values.items()}
+        return expand(file, texts | parse_parameters(parameters, known, file.name))
+    if arguments.parameter_file is not None:
+        raise ParameterError("--parameters", str(arguments.parameter_file), f"left out: {file} is no xacro file")
+    if parameters:
+        raise ParameterError("--set", " ".join(parameters), f"left out: {file} is no xacro file")
+    return file if is_urdf_file(file) else read_source(file)[0]
+
+
+def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = None) -> SoftModel:
+    """The model of the robot that the arguments of `add_model` name.
+
+    Args:
+        arguments: The arguments.
+        source: What `source_of` made of them, if that is known.
+
+    Raises:
+        SoftRobotsError: Whatever `source_of` and `load_model` raise.
+        ParameterError: If a joint is given two springs.
+    """
+    names = [joint for joint, _ in arguments.spring]
+    twice = next((joint for place, joint in enumerate(names) if joint in names[:place]), None)
+    if twice is not None:
+        raise ParameterError("--spring", twice, "given once for each joint")
+    if source is None:
+        source = source_of(arguments)
+    return load_model(source, springs=dict(arguments.spring) or None, tip=arguments.tip, muscles=arguments.muscles)
+
+
+def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
+    """The same model for a command that solves: a robot that is too large for that is refused before it is made.
+
+    Raises:
+        SoftRobotsError: Whatever `source_of` and `load_model` raise.
+        ParameterError: If the robot has too many joints, or a joint is given two springs.
+    """
+    source = source_of(arguments)
+    if isinstance(source, InflatableArm | PccArm | HelixTube):
+        option = "--set" if arguments.parameters else "--parameters"
+        refuse_too_large(source, option, " ".join(arguments.parameters) or str(arguments.parameter_file))
+    return model_of(arguments, source)
+
+
+def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--motors") -> FloatArray:
+    """Actuator coordinates that an option gives, relaxed without it; the error names the actuators.
+
+    Args:
+        model: The robot.
+        words: What was typed, or None.
+        option: The option, for the error.
+
+    Returns:
+        Shape (n_motors,) [rad, m or N].
+
+    Raises:
+        ParameterError: If there are more or fewer numbers than actuators, or the robot cannot take them.
+    """
+    if words is None:
+        return np.array(model.relaxed_motors)
+    check_one_each(option, words, model.motor_joints, motor_units(model))
+    return model.checked_motors(words, option)
+
+
+def check_one_each(option: str, words: Sequence[float], names: Sequence[str], units: Sequence[str]) -> None:
+    """Refuse more or fewer numbers than there are actuators; the error names those.
+
+    Args:
+        option: The option, for the error.
+        words: What was typed.
+        names: Names of the actuators.
+        units: Unit of each number.
+
+    Raises:
+        ParameterError: If the counts differ.
+    """
+    if len(words) != len(names):
+        named = ", ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
+        raise ParameterError(option, list(words), f"{len(names)} numbers: {named}" if named else "left out: it has no motors")
+
+
+def robot_file(name: str) -> Path:
+    """The file of a robot.
+
+    Raises:
+        NameNotFound: If there is none; lists the robots.
+    """
+    try:
+        found = Path(name).is_file()
+    except OSError:  # a name too long for a file, or a folder that may not be looked into
+        found = False
+    if not found:
+        raise NameNotFound("robot or file", name, ROBOTS)
+    return Path(name)

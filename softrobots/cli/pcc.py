@@ -1,0 +1,270 @@
+"""`softrobots pcc`: segments of constant curvature in closed form, from muscle lengths to arcs and poses and back."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots import constant_curvature
+from softrobots.cli.options.command_line import refuse_too_large
+from softrobots.cli.options.plot_option import add_plot, check_plot, write_plot
+from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
+from softrobots.cli.reports.facts import Fact, answer_of
+from softrobots.constant_curvature import Arc
+from softrobots.constant_curvature.poses import FRAMES
+from softrobots.core.checks import FloatArray, positive_array
+from softrobots.core.errors import ParameterError
+from softrobots.model.loader import load_model
+from softrobots.robots import PccArm
+from softrobots.statics.inverse_kinematics import solve_ik
+
+REST = float(PccArm.segment_lengths[0])
+"""Rest length of a segment if nothing is said [m]."""
+
+_EXAMPLES = """examples:
+  softrobots pcc forward 0.50 0.53 0.55  0.54 0.51 0.52            muscle lengths of two segments -> arcs, poses
+  softrobots pcc forward 0.50 0.53 0.55 --distance 0.03 --jacobian
+  softrobots pcc forward 0.5 0.52 0.5 0.48 --azimuths 0 1.5708 3.1416 -1.5708     one segment of four muscles
+  softrobots pcc inverse --arc 0.52 0.7 -0.4 --arc 0.53 0.5 1.2    arcs -> muscle lengths
+  softrobots pcc reach 0.45 -0.32 0.84 --plot arm.png              position of the tip -> muscle lengths, without load
+
+All lengths in m, all angles in rad. Defaults are those of the robot pcc_arm. These forms know no load and no weight;
+`softrobots solve pcc_arm` and `softrobots ik pcc_arm` do.
+"""
+
+_JSON = """With --json: one object with these names, and their units under "units": muscle_lengths (segment, muscle),
+muscle_extension (length over rest length, less 1), muscle_residual (segment), arc_length, arc_bending, arc_azimuth (segment),
+transforms (segment, 4, 4; end of a segment to base), tip_position, tip_direction (its z axis), jacobian (6, muscles; of
+the tip, linear rows first; null without --jacobian), target and error with reach, frame, and files (those written).
+"""
+
+
+class Chain(NamedTuple):
+    """Segments with all that describes them."""
+
+    lengths: FloatArray
+    """Muscle lengths, shape (S, N) [m]."""
+    arcs: Arc
+    """Their arcs, shape (S,)."""
+    distance: FloatArray
+    """Distance of the muscles from the backbone, shape (S,) [m]."""
+    azimuths: Sequence[float]
+    """Azimuths of the muscles of a segment, N [rad]."""
+    offsets: Sequence[float] | None
+    """Turn before each segment, S [rad]; None: the paper's."""
+    rest: FloatArray
+    """Rest length of each segment, shape (S,) [m]."""
+    frame: str
+    """The frame at the end of a segment."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "pcc",
+        help="constant curvature in closed form: muscle lengths, arcs, poses, Jacobians",
+        description="Segments of constant curvature in closed form, without load: any number of segments and muscles.",
+        epilog=_EXAMPLES,
+    )
+    forms = parser.add_subparsers(dest="form", metavar="FORM", required=True, title="forms")
+
+    forward = _form(forms, "forward", _forward, "muscle lengths -> arcs and poses")
+    told = "muscle lengths, segment by segment from the base, as many a segment as --azimuths has [m]"
+    forward.add_argument("lengths", type=float, nargs="+", metavar="L", help=told)
+    told = "largest miss of more than three muscles from those of an arc [m] (%(default)g)"
+    forward.add_argument("--tolerance", type=float, default=1e-6, metavar="T", help=told)
+
+    inverse = _form(forms, "inverse", _inverse, "arcs -> muscle lengths and poses")
+    told = "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once a segment, base to tip"
+    told += " (required)"
+    names = ("LENGTH", "BENDING", "AZIMUTH")
+    inverse.add_argument("--arc", type=float, nargs=3, action="append", required=True, dest="arcs", metavar=names, help=told)
+
+    reach = _form(forms, "reach", _reach, "position of the tip -> muscle lengths, without load")
+    reach.description = f"{reach.description} The lengths that differ least from --start, of segments that bend by less than "
+    reach.description += "170 degrees. Exit status 1 if the tip cannot get there."
+    for axis in "xyz":
+        reach.add_argument(axis, type=float, metavar=axis.upper(), help=f"position of the tip along {axis} [m]")
+    told = "number of segments (as many as --rest has, else %(const)s)"
+    reach.add_argument("--segments", type=int, metavar="N", help=told % {"const": len(PccArm.segment_lengths)})
+    told = "direction in which the tip points, any length but zero [-] (any direction)"
+    reach.add_argument("--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
+    told = "muscle lengths to change least, as in forward [m] (rest)"
+    reach.add_argument("--start", type=float, nargs="+", metavar="L", help=told)
+    for name, default in (("contraction", PccArm.muscle_contraction), ("extension", PccArm.muscle_extension)):
+        told = f"largest {name} of a muscle, relative to its rest length [-] (%(default)s)"
+        reach.add_argument(f"--{name}", type=float, default=default, metavar="C", help=told)
+
+
+def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], told: str) -> argparse.ArgumentParser:
+    """A parser with what all forms have."""
+    parser: argparse.ArgumentParser = forms.add_parser(
+        name, help=told, description=f"Constant curvature in closed form: {told}.", epilog=_JSON
+    )
+    told = f"distance of the muscles from the backbone, one number or one a segment [m] ({PccArm.muscle_distance})"
+    parser.add_argument("--distance", type=float, nargs="+", default=[PccArm.muscle_distance], metavar="D", help=told)
+    azimuths = " ".join(f"{azimuth:.4f}".rstrip("0").rstrip(".") for azimuth in constant_curvature.AZIMUTHS)
+    told = f"azimuths of the muscles of a segment in its base frame, from x towards y, three or more [rad] ({azimuths})"
+    parser.add_argument("--azimuths", type=float, nargs="+", default=list(constant_curvature.AZIMUTHS), metavar="A", help=told)
+    told = "turn about the backbone before each segment, one a segment [rad] (0, then pi/3 each)"
+    parser.add_argument("--offsets", type=float, nargs="+", metavar="A", help=told)
+    told = f"rest length of a segment and its muscles, one number or one a segment [m] ({REST})"
+    parser.add_argument("--rest", type=float, nargs="+", metavar="L", help=told)
+    if name == "reach":
+        parser.set_defaults(frame=FRAMES[0])
+    else:
+        told = "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
+        parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=told)
+    told = "also the Jacobian of the tip with respect to muscle lengths [m/m, rad/m] (not told)"
+    parser.add_argument("--jacobian", action="store_true", help=told)
+    add_plot(parser, "the smooth backbone with its muscles")
+    add_json(parser)
+    parser.set_defaults(run=run)
+    return parser
+
+
+def _forward(arguments: argparse.Namespace) -> None:
+    """Muscle lengths to arcs."""
+    check_plot(arguments)
+    lengths, count = np.array(arguments.lengths), len(arguments.azimuths)
+    if len(lengths) % count:
+        raise ParameterError("L", arguments.lengths, f"a multiple of {count} numbers, {count} muscles a segment [m]")
+    lengths = lengths.reshape(-1, count)
+    distance = _per_segment("--distance", arguments.distance, len(lengths))
+    arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths, arguments.tolerance)
+    _answer(arguments, _chain(arguments, lengths, arcs, distance), [])
+
+
+def _inverse(arguments: argparse.Namespace) -> None:
+    """Arcs to muscle lengths."""
+    check_plot(arguments)
+    arcs = Arc(*np.array(arguments.arcs).T)
+    distance = _per_segment("--distance", arguments.distance, len(arguments.arcs))
+    lengths = constant_curvature.muscles_from_arc(arcs, distance, arguments.azimuths)
+    _answer(arguments, _chain(arguments, lengths, arcs, distance), [])
+
+
+def _reach(arguments: argparse.Namespace) -> None:
+    """Position of the tip to muscle lengths: the inverse kinematics of the arm, weightless and with one section a segment."""
+    check_plot(arguments)
+    rest = arguments.rest or [REST]
+    count = arguments.segments
+    if count is None:
+        count = len(rest) if len(rest) > 1 else len(PccArm.segment_lengths)
+    if count < 1:
+        raise ParameterError("--segments", count, "at least 1")
+    distance = _per_segment("--distance", arguments.distance, count)
+    robot = PccArm(
+        segment_lengths=tuple(_per_segment("--rest", rest, count).tolist()),
+        muscle_azimuths=tuple(arguments.azimuths),
+        muscle_distance=tuple(distance.tolist()),
+        muscle_contraction=arguments.contraction,
+        muscle_extension=arguments.extension,
+        elastic_sections=1,
+        offset=PccArm.offset if arguments.offsets is None else tuple(arguments.offsets),
+    )
+    refuse_too_large(robot, "--segments", count)
+    target = (arguments.x, arguments.y, arguments.z)
+    found = solve_ik(load_model(robot), target, orientation=arguments.direction, q_motors0=arguments.start)
+    lengths = found.q_motors.reshape(count, -1)
+    arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths)
+    chain = _chain(arguments, lengths, arcs, distance)
+    tip = constant_curvature.chain_transform(arcs, chain.offsets)[:3, 3]
+    facts = [
+        Fact("target", found.target, "m", "target"),
+        Fact("error", float(np.linalg.norm(tip - found.target)), "m", "distance of the tip from it"),
+    ]
+    _answer(arguments, chain, facts)
+
+
+def _chain(arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, distance: FloatArray) -> Chain:
+    """The segments with the other options."""
+    rest = _per_segment("--rest", arguments.rest or [REST], len(lengths))
+    return Chain(lengths, arcs, distance, arguments.azimuths, arguments.offsets, rest, arguments.frame)
+
+
+def _per_segment(name: str, values: Sequence[float], count: int) -> FloatArray:
+    """One positive number for each segment, of one for all or one for each."""
+    if len(values) not in (1, count):
+        raise ParameterError(name, values, f"one number, or one for each of the {count} segments [m]")
+    return np.array(np.broadcast_to(positive_array(name, values, "m"), (count,)))
+
+
+def _answer(arguments: argparse.Namespace, chain: Chain, facts: list[Fact]) -> None:
+    """Print what there is to know of the segments, and draw them."""
+    transforms = constant_curvature.chain_transforms(chain.arcs, chain.offsets, chain.frame)
+    jacobian = None
+    if arguments.jacobian:
+        tolerance = getattr(arguments, "tolerance", 1e-6)
+        jacobian = constant_curvature.chain_muscle_jacobian(
+            chain.lengths, chain.distance, chain.azimuths, chain.offsets, chain.frame, tolerance
+        )
+    facts = [
+        Fact("muscle_lengths", chain.lengths, "m", "muscle lengths"),
+        Fact("muscle_extension", chain.lengths / chain.rest[:, None] - 1.0, "-", "extension of the muscles"),
+        Fact(
+            "muscle_residual",
+            constant_curvature.muscle_residual(chain.lengths, chain.distance, chain.azimuths),
+            "m",
+            "miss of the muscles",
+        ),
+        Fact("arc_length", chain.arcs.length, "m", "length of the backbone"),
+        Fact("arc_bending", chain.arcs.bending, "rad", "bending angle"),
+        Fact("arc_azimuth", chain.arcs.azimuth, "rad", "azimuth of the bending plane"),
+        Fact("transforms", transforms, "m", "poses of the ends of the segments"),
+        Fact("tip_position", transforms[-1, :3, 3], "m", "tip"),
+        Fact("tip_direction", transforms[-1, :3, 2], "-", "tip points along"),
+        Fact("jacobian", jacobian, "m/m (rows 1 to 3), rad/m (rows 4 to 6)" if arguments.jacobian else "", "Jacobian"),
+        *facts,
+        Fact("frame", chain.frame, "", "frame"),
+    ]
+
+    def draw() -> Any:
+        from softrobots.view.figures import pcc_plots
+
+        return pcc_plots.arm(chain.arcs, chain.distance, chain.azimuths, chain.offsets, chain.frame)
+
+    written = write_plot(arguments, draw)
+    tell(arguments, answer_of(facts) | {"files": written}, [*_lines(facts), *written_lines(written)])
+
+
+def _lines(facts: list[Fact]) -> list[str]:
+    """The answer for a person."""
+    values = {fact.name: fact.value for fact in facts}
+    arcs = zip(values["arc_length"], values["arc_bending"], values["arc_azimuth"], strict=True)
+    rows: list[tuple[str, ...]] = [("segment", "backbone [m]", "bending [rad]", "azimuth [rad]")]
+    rows += [(str(number), *map(_six, arc)) for number, arc in enumerate(arcs, start=1)]
+    told: list[tuple[str, ...]] = [("segment", "muscle lengths [m] (extension)")]
+    for number, (lengths, shares) in enumerate(zip(values["muscle_lengths"], values["muscle_extension"], strict=True), start=1):
+        muscles = (f"{length:.6f} ({100 * share:+.1f} %)" for length, share in zip(lengths, shares, strict=True))
+        told.append((str(number), "  ".join(muscles)))
+    pose = values["transforms"][-1]
+    lines = [
+        *aligned(rows),
+        "",
+        *aligned(told),
+        "",
+        f"pose of the tip in the base, {values['frame'].replace('_', '-')} frames [-, m]",
+    ]
+    lines += _matrix(pose)
+    if values["jacobian"] is not None:
+        lines += ["", "Jacobian of the tip, a column a muscle: linear [m/m], then angular [rad/m]"]
+        lines += _matrix(values["jacobian"])
+    if "target" in values:
+        lines += ["", f"misses the target by {values['error']:.1e} m"]
+    worst = float(np.max(values["muscle_residual"]))
+    if worst > 1e-12:  # three muscles always fit, up to rounding
+        lines += ["", f"the lengths miss those of the arcs by up to {worst:.3g} m"]
+    return lines
+
+
+def _matrix(matrix: FloatArray) -> list[str]:
+    rows = [tuple(map(_six, row)) for row in matrix]
+    return aligned(rows, indent="  ", right=range(len(rows[0])))
+
+
+def _six(number: float) -> str:
+    return f"{round(float(number), 6) + 0.0:.6f}"

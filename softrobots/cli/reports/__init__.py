@@ -1,0 +1,1 @@
+"""Answers of the subcommands: tables for a person, JSON for a machine."""

@@ -1,0 +1,30 @@
+"""Units of what moves a robot and of what bends in it, for answers: angles, distances and tensions lie side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from softrobots.model.soft_model import SoftModel
+
+LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
+"""Unit of the load on a coordinate, by the unit of the coordinate; the load on a given tension is the tension."""
+
+
+def motor_units(model: SoftModel) -> tuple[str, ...]:
+    """Unit of each actuator coordinate: rad or m of a joint, m or N of a muscle."""
+    return model.actuators.units
+
+
+def spring_units(model: SoftModel) -> tuple[str, ...]:
+    """Unit of each elastic coordinate, rad or m."""
+    return tuple("rad" if turns else "m" for turns in model.structure.law.turning.tolist())
+
+
+def load_units(units: Sequence[str]) -> tuple[str, ...]:
+    """Units of the loads on coordinates of these units."""
+    return tuple(LOAD_UNITS[unit] for unit in units)
+
+
+def together(units: Sequence[str]) -> str:
+    """The units of a row of numbers as one text: one unit if all have it, else one for each."""
+    return units[0] if len(set(units)) == 1 else ", ".join(units)

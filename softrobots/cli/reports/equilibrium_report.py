@@ -1,0 +1,132 @@
+"""A solved equilibrium as an answer of a command: tables and certificates for a person, and the same numbers for a machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.cli.reports.answers import aligned
+from softrobots.cli.reports.coordinate_units import load_units, motor_units, spring_units, together
+from softrobots.cli.reports.facts import Fact, answer_of, spoken
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.loads import Load
+
+
+def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
+    """Everything about an equilibrium by the names of its attributes, with `units`."""
+    model = equilibrium.model
+    load = equilibrium.load
+    facts = [
+        Fact("q_motors", equilibrium.q_motors, together(motor_units(model)), ""),
+        Fact("motor_torques", equilibrium.motor_torques, together(load_units(motor_units(model))), ""),
+        Fact("q_springs", equilibrium.q_springs, together(spring_units(model)), ""),
+        Fact("spring_torques", equilibrium.spring_torques, together(load_units(spring_units(model))), ""),
+        Fact("tip_position", equilibrium.tip_position, "m", ""),
+        Fact("transform_tip_to_world", equilibrium.transform_tip_to_world.homogeneous, "m", ""),
+        Fact("link_moments", equilibrium.link_moments, "N m", ""),
+        Fact("wrinkling_moments", wrinkling_moments(model), "N m", ""),
+        Fact("wrinkling_margins", wrinkling_margins(equilibrium), "-", ""),
+        Fact("wrinkled", equilibrium.wrinkled, "", ""),
+        Fact("saturated", list(equilibrium.saturated), "", ""),
+        Fact("muscle_lengths", equilibrium.muscle_lengths, "m", ""),
+        Fact("muscle_forces", equilibrium.muscle_forces, "N", ""),
+        Fact("stable", equilibrium.stable, "", ""),
+        Fact("conservative", equilibrium.conservative, "", ""),
+        Fact("within_limits", equilibrium.within_limits, "", ""),
+        Fact("residual", equilibrium.residual, "N m", ""),
+        Fact("tolerance", equilibrium.tolerance, "N m", ""),
+        Fact("iterations", equilibrium.iterations, "-", ""),
+        Fact("method", equilibrium.method, "", ""),
+    ]
+    names = {"motor_joints": model.motor_joints, "spring_joints": model.spring_joints, "tip": model.tip}
+    return {"robot": model.pinocchio.name, **names, "load": load_answer(load), **answer_of(facts)}
+
+
+def load_answer(load: Load) -> dict[str, Any]:
+    """Wrenches by frame [N, N m], force first, and gravity [m/s^2], None if weightless."""
+    return {"wrenches": dict(load.wrenches), "gravity": load.gravity}
+
+
+def equilibrium_lines(equilibrium: Equilibrium) -> list[str]:
+    """The same for a person: tables of motors, springs and inflated links, then where the tip is and what is certified."""
+    return [*coordinate_lines(equilibrium), "", *summary_lines(equilibrium)]
+
+
+def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
+    """Tables of the load, of motors, springs and inflated links."""
+    model = equilibrium.model
+    motors = _table("motor", model.motor_joints, equilibrium.q_motors, motor_units(model), equilibrium.motor_torques)
+    springs = _table("spring", model.spring_joints, equilibrium.q_springs, spring_units(model), equilibrium.spring_torques)
+    parts = [motors, springs, _links(equilibrium)]
+    return [*head_lines(model, equilibrium.load), *(line for part in parts if part for line in ("", *part))]
+
+
+def summary_lines(equilibrium: Equilibrium) -> list[str]:
+    """Where the tip is and what is certified."""
+    pose, margins = equilibrium.transform_tip_to_world, wrinkling_margins(equilibrium)
+    known = [margin for margin in margins if margin is not None]
+    least = f", at least {100.0 * min(known):.1f} % of the wrinkling moment is left" if known else ""
+    links = [("wrinkled", "YES: linear springs no longer hold" if equilibrium.wrinkled else f"no{least}")] if margins else []
+    steps = f"{equilibrium.iterations} iteration{'s' * (equilibrium.iterations != 1)} by {equilibrium.method}"
+    rows = [
+        ("tip position", f"{spoken(equilibrium.tip_position)} m"),
+        ("tip roll, pitch, yaw", f"{spoken(np.where(abs(rpy := pin.rpy.matrixToRpy(pose.rotation)) < 1e-15, 0.0, rpy))} rad"),
+        ("stable", "yes, certified" if equilibrium.stable else "NO: not certified"),
+        ("within limits", "yes" if equilibrium.within_limits else "NO: a motor, a muscle or a spring is beyond its limits"),
+        *links,
+        ("conservative", "yes" if equilibrium.conservative else "no: a world-fixed moment has no potential"),
+        ("residual", f"{equilibrium.residual:.2g} N m ({equilibrium.tolerance:.2g} N m allowed), {steps}"),
+    ]
+    return aligned(rows)
+
+
+def wrinkling_moments(model: SoftModel) -> list[float]:
+    """Wrinkling moment of each inflated link [N m]."""
+    return [group.wrinkling_moment for group in model.spring_groups]
+
+
+def wrinkling_margins(equilibrium: Equilibrium) -> list[float | None]:
+    """Share of the wrinkling moment that is left in each inflated link [-]; None of a link without pressure."""
+    pairs = zip(equilibrium.link_moments.tolist(), wrinkling_moments(equilibrium.model), strict=True)
+    return [1.0 - moment / limit if limit > 0.0 else None for moment, limit in pairs]
+
+
+def head_lines(model: SoftModel, load: Load) -> list[str]:
+    """The robot, and what pulls on it, a line each."""
+    rows = []
+    for frame, wrench in load.wrenches.items():
+        if wrench.any():
+            moment = f", moment {spoken(wrench[3:])} N m" if wrench[3:].any() else ""
+            rows.append((f"load on {frame}", f"force {spoken(wrench[:3])} N{moment}"))
+    gravity = "none" if load.gravity is None else f"{spoken(np.array(load.gravity))} m/s^2"
+    return aligned(
+        [("robot", f"{model.pinocchio.name} (tip: {model.tip})"), *(rows or [("load", "none")]), ("gravity", gravity)]
+    )
+
+
+def _table(what: str, names: tuple[str, ...], values: Any, units: tuple[str, ...], loads: Any) -> list[str]:
+    if not names:
+        return []
+    rows = zip(names, values, units, loads, load_units(units), strict=True)
+    cells = [(name, _fixed(value), unit, _fixed(load), load_unit) for name, value, unit, load, load_unit in rows]
+    return aligned([(what, "position", "", "load", ""), *cells], right=(1, 3))
+
+
+def _links(equilibrium: Equilibrium) -> list[str]:
+    limits, margins = wrinkling_moments(equilibrium.model), wrinkling_margins(equilibrium)
+    if not limits:
+        return []
+    rows = [("inflated link", "moment", "wrinkles at", "left")]
+    for number, (moment, limit, margin) in enumerate(zip(equilibrium.link_moments, limits, margins, strict=True), start=1):
+        plateau = "  on its plateau" if equilibrium.saturated[number - 1] else ""
+        left = ("-" if margin is None else f"{100.0 * margin:.1f} %") + plateau
+        rows.append((str(number), f"{_fixed(moment)} N m", f"{_fixed(limit)} N m", left))
+    return aligned(rows, right=(1, 2, 3))
+
+
+def _fixed(value: float) -> str:
+    """A number with six decimals, or with an exponent if that would hide it."""
+    return f"{value:.6f}" if value == 0.0 or 1e-4 <= abs(value) < 1e6 else f"{value:.2e}" if abs(value) >= 1e-15 else "0.000000"

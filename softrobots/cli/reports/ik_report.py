@@ -1,0 +1,119 @@
+"""Solutions of inverse kinematics as answers of a command, for a person and for a machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.cli.reports.answers import aligned
+from softrobots.cli.reports.coordinate_units import load_units, motor_units, spring_units, together
+from softrobots.cli.reports.equilibrium_report import (
+    coordinate_lines,
+    equilibrium_answer,
+    head_lines,
+    load_answer,
+    summary_lines,
+    wrinkling_margins,
+    wrinkling_moments,
+)
+from softrobots.cli.reports.facts import Fact, answer_of, spoken
+from softrobots.core.checks import FloatArray
+from softrobots.statics.inverse_kinematics import IkSolution
+from softrobots.statics.trajectory import Trajectory
+
+
+def solution_answer(solution: IkSolution) -> dict[str, Any]:
+    """A solution by the names of its attributes, with `units`."""
+    units = together(motor_units(solution.equilibrium.model))
+    facts = [
+        Fact("q_motors", solution.q_motors, units, ""),
+        Fact("target", solution.target, "m", ""),
+        Fact("orientation", solution.orientation, "-", ""),
+        Fact("error", solution.error, "m", ""),
+        Fact("orientation_error", solution.orientation_error, "rad", ""),
+        Fact("iterations", solution.iterations, "-", ""),
+        Fact("alternatives", solution.alternatives, units, ""),
+    ]
+    return {**answer_of(facts), "equilibrium": equilibrium_answer(solution.equilibrium)}
+
+
+def solution_lines(solution: IkSolution) -> list[str]:
+    """The same for a person."""
+    rows = [("target", f"{spoken(solution.target)} m")]
+    turned = f", {solution.orientation_error:.2g} rad" if solution.orientation is not None else ""
+    rows.append(("tip error", f"{solution.error:.2g} m{turned}, {solution.iterations} steps"))
+    rows.append(("motors", f"{spoken(solution.q_motors)} {together(motor_units(solution.equilibrium.model))}"))
+    rows += [("another solution", spoken(other)) for other in solution.alternatives]
+    return [*coordinate_lines(solution.equilibrium), "", *summary_lines(solution.equilibrium), "", *aligned(rows)]
+
+
+def trajectory_answer(found: Trajectory) -> dict[str, Any]:
+    """A trajectory by the names of its attributes, one row a waypoint, with `units`."""
+    model, equilibria = found.model, found.equilibria
+    facts = [
+        Fact("times", found.times, "s", ""),
+        Fact("targets", found.targets, "m", ""),
+        Fact("tip_positions", found.tip_positions, "m", ""),
+        Fact("tip_error", found.tip_error, "m", ""),
+        Fact("q_motors", found.q_motors, together(motor_units(model)), ""),
+        Fact("motor_torques", _motor_torques(found), together(load_units(motor_units(model))), ""),
+        Fact("q_springs", found.q_springs, together(spring_units(model)), ""),
+        Fact("link_moments", found.link_moments, "N m", ""),
+        Fact("wrinkling_moments", wrinkling_moments(model), "N m", ""),
+        Fact("wrinkling_margin", _margin(found), "-", ""),
+        Fact("required_pressure", found.required_pressure, "Pa", ""),
+        Fact("wrinkled", [equilibrium.wrinkled for equilibrium in equilibria], "", ""),
+        Fact("stable", [equilibrium.stable for equilibrium in equilibria], "", ""),
+        Fact("within_limits", [equilibrium.within_limits for equilibrium in equilibria], "", ""),
+        Fact("residual", [equilibrium.residual for equilibrium in equilibria], "N m", ""),
+        Fact("method", found.method, "", ""),
+    ]
+    names = {"motor_joints": model.motor_joints, "spring_joints": model.spring_joints, "tip": model.tip}
+    return {"robot": model.pinocchio.name, **names, "load": load_answer(equilibria[0].load), **answer_of(facts)}
+
+
+def trajectory_lines(found: Trajectory) -> list[str]:
+    """The same for a person: what each motor does and feels, and the worst of every waypoint."""
+    model, equilibria = found.model, found.equilibria
+    motors, torques = found.q_motors, _motor_torques(found)
+    rows: list[tuple[str, ...]] = [("motor", "first", "last", "least", "largest", "", "largest load", "")]
+    for place, (name, unit, load) in enumerate(
+        zip(model.motor_joints, motor_units(model), load_units(motor_units(model)), strict=True)
+    ):
+        column = motors[:, place]
+        ends = (f"{value:.6f}" for value in (column[0], column[-1], column.min(), column.max()))
+        rows.append((name, *ends, unit, f"{np.abs(torques[:, place]).max():.6f}", load))
+    count, worst = len(equilibria), int(np.argmax(found.tip_error))
+    summary = [
+        ("waypoints", f"{count}, {found.times[-1] - found.times[0]:g} s, by {found.method}"),
+        ("largest tip error", f"{found.tip_error[worst]:.2g} m at waypoint {worst + 1}"),
+        ("stable", _everywhere([equilibrium.stable for equilibrium in equilibria])),
+        ("within limits", _everywhere([equilibrium.within_limits for equilibrium in equilibria])),
+    ]
+    if found.link_moments is not None:
+        largest, margin = found.link_moments.max(axis=0), _margin(found)
+        left = "" if margin is None else f", {100.0 * margin:.1f} % of the wrinkling moment is left"
+        summary += [
+            ("not wrinkled", _everywhere([not equilibrium.wrinkled for equilibrium in equilibria])),
+            ("largest moment", f"{spoken(largest)} N m by link{left}"),
+            ("required pressure", f"{spoken(found.required_pressure)} Pa"),
+        ]
+    return [*head_lines(model, equilibria[0].load), "", *aligned(rows, right=(1, 2, 3, 4, 6)), "", *aligned(summary)]
+
+
+def _motor_torques(found: Trajectory) -> FloatArray:
+    """Load on each motor, shape (n, n_motors)."""
+    return np.array([equilibrium.motor_torques for equilibrium in found.equilibria])
+
+
+def _margin(found: Trajectory) -> float | None:
+    """Share of the wrinkling moment that is left at the worst waypoint and link; None without one."""
+    margins = [margin for equilibrium in found.equilibria for margin in wrinkling_margins(equilibrium)]
+    known = [margin for margin in margins if margin is not None]
+    return min(known) if known and len(known) == len(margins) else None
+
+
+def _everywhere(truths: list[bool]) -> str:
+    wrong = [place for place, truth in enumerate(truths, start=1) if not truth]
+    return f"NO: not at {len(wrong)} waypoints, first at waypoint {wrong[0]}" if wrong else "at every waypoint"

@@ -1,0 +1,122 @@
+"""`softrobots solve`: the equilibrium of a loaded robot, with its certificates."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.plot_option import add_plot, check_plot, shape_figure, write_plot
+from softrobots.cli.options.result_file import add_output, check_output, save
+from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
+from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
+from softrobots.cli.reports.equilibrium_report import coordinate_lines, equilibrium_answer, summary_lines
+from softrobots.cli.reports.facts import spoken
+from softrobots.core.checks import finite_array
+from softrobots.core.errors import NeutralEquilibrium, NoCriticalLoad
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import METHODS, TOLERANCE
+from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.sensitivity import compliance
+from softrobots.statics.stability import critical_load
+
+_EXAMPLES = """examples:
+  softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15
+  softrobots solve inflatable_arm --set stiffness=200 --gravity --compliance --json
+  softrobots solve inflatable_arm --critical-load -1 0 0          the force at which the straight arm buckles
+  softrobots solve inflatable_arm --force 0 10 -15 --wrench link_1 0 0 -5 0 0 0 -o sagging.npz
+  softrobots solve pcc_arm --motors 0.50 0.53 0.55 0.54 0.51 0.52 --gravity --plot shape.png
+  softrobots solve my_arm.urdf --spring wrist=40 --spring elbow=25,0.1 --tip tool --gravity
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "solve",
+        help="find the equilibrium of a loaded robot",
+        description="Find the static equilibrium of the springs at given motors, the one that energy descent reaches "
+        "from the relaxed springs. Exit status 0 if one is found, also if it is not certified stable or a link is wrinkled: "
+        "the answer says so. 1 if none is found, 2 after bad input.",
+        epilog=_EXAMPLES,
+    )
+    add_model(parser)
+    told = "motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=told)
+    add_loads(parser)
+    parser.add_argument(
+        "--method", choices=METHODS, default="newton", help="the solver; fixed_point is the paper's (%(default)s)"
+    )
+    told = "springs where the descent starts, in the order of the answer [rad or m] (relaxed)"
+    parser.add_argument("--start", type=float, nargs="+", metavar="Y", help=told)
+    told = f"largest residual, relative to the size of the load [-] ({TOLERANCE:g})"
+    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="T", help=told)
+    told = "most evaluations [-] (200 for newton, 1000 for fixed_point)"
+    parser.add_argument("--max-iterations", type=int, metavar="N", help=told)
+    told = "tell the motion of the tip per wrench added there, 6 by 6 [m/N, m/(N m); rad/N, rad/(N m)] (not told)"
+    parser.add_argument("--compliance", action="store_true", help=told)
+    told = "tell the smallest force [N] in this direction that buckles the robot, at --frame, with --gravity alone (not told)"
+    parser.add_argument("--critical-load", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
+    add_output(parser, "the equilibrium as NPZ, for softrobots.load_result")
+    add_plot(parser, "the loaded shape")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Solve and tell."""
+    check_output(arguments, ".npz")
+    check_plot(arguments)
+    model = statics_model_of(arguments)
+    motors = motors_of(model, arguments.motors)
+    start = None if arguments.start is None else finite_array("--start", arguments.start, (model.n_springs,), "rad or m")
+    found = solve_equilibrium(
+        model,
+        motors,
+        **loads_of(arguments, model),
+        method=arguments.method,
+        q_springs0=start,
+        tolerance=arguments.tolerance,
+        max_iterations=arguments.max_iterations,
+    )
+    answer, lines = equilibrium_answer(found), coordinate_lines(found)
+    told = summary_lines(found)
+    if arguments.compliance:
+        _add_compliance(model, found, answer, lines)
+    if arguments.critical_load is not None:
+        _add_critical_load(model, found, arguments, answer, told)
+    files = save(arguments, found) + write_plot(arguments, lambda: shape_figure(found))
+    answer["files"] = files
+    tell(arguments, answer, [*lines, "", *told, *written_lines(files)])
+
+
+def _add_compliance(model: SoftModel, found: Equilibrium, answer: dict[str, Any], lines: list[str]) -> None:
+    answer["units"]["compliance"] = "m/N, m/(N m); rad/N, rad/(N m)"
+    try:
+        matrix = answer["compliance"] = compliance(model, found)
+    except NeutralEquilibrium as error:
+        answer["compliance"] = None
+        lines += ["", f"compliance  none: {error}"]
+        return
+    rows = [(name, *(f"{number:.3e}" for number in row)) for name, row in zip(_MOTIONS, matrix, strict=True)]
+    lines += ["", "compliance of the tip: motion [m] and turn [rad] per force [N] and moment [N m]"]
+    lines += aligned([("", *_WRENCH), *rows], right=range(1, 7))
+
+
+_MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
+_WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
+
+
+def _add_critical_load(
+    model: SoftModel, found: Equilibrium, arguments: argparse.Namespace, answer: dict[str, Any], told: list[str]
+) -> None:
+    answer["units"] |= {"critical_load": "N", "stable_up_to": "N"}
+    direction, gravity = arguments.critical_load, found.load.gravity
+    try:
+        force = critical_load(model, found.q_motors, direction, frame=arguments.frame, gravity=gravity)
+    except NoCriticalLoad as error:
+        answer |= {"critical_load": None, "stable_up_to": error.max_force}
+        told.append(f"critical load  none: {error}")
+        return
+    answer |= {"critical_load": force, "stable_up_to": force}
+    told.append(f"critical load  {spoken(force)} N along {spoken(direction)}")

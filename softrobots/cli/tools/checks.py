@@ -1,0 +1,122 @@
+"""A look at one robot: its tags, the rules of portable URDF, and yourdfpy's kinematics against Pinocchio's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pinocchio as pin
+
+from softrobots.cli.tools.kinematics import KinematicsRow, as_file, compare_kinematics
+from softrobots.core.checks import positive_integer
+from softrobots.core.errors import DescriptionError, SoftRobotsError
+from softrobots.description.sources import read_source
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_rules import Finding, check_rules
+from softrobots.model.loader import load_model
+from softrobots.robots import Robot
+
+
+def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[Finding, ...]:
+    """Check a robot description: what is in it, every rule of portable URDF, and how tools read it.
+
+    Args:
+        source: A robot of this package, the path of a URDF file, or URDF text (starting with `<`); MJCF and SDF are translated.
+        count: Number of random configurations at which yourdfpy is compared with Pinocchio.
+
+    Returns:
+        What was looked at, and what is wrong with it. After what makes the rest impossible nothing follows.
+
+    Raises:
+        ParameterError: If `source` is something else, or `count` is not positive.
+        DescriptionError: If the file cannot be read, or is neither URDF nor MJCF or SDF that can be translated.
+        MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
+    """
+    positive_integer("count", count)
+    urdf, label = read_source(source)
+    rules = check_rules(urdf, label)
+    findings = []
+    for what, look in (("tags of softrobots", _tags), ("Pinocchio", _in_pinocchio), ("softrobots", _in_softrobots)):
+        try:
+            findings.append(Finding(what, (), (look(urdf, label),)))
+        except (SoftRobotsError, ValueError, RuntimeError) as error:
+            findings.append(Finding(what, (str(error),)))
+    tags, *loaded = findings
+    if not loaded[0].ok:
+        return (tags, *rules, *loaded)
+    return (tags, *rules, *loaded, _valid_in_yourdfpy(source), kinematics_finding(source, count))
+
+
+def kinematics_finding(source: Robot | Path | str, count: int = 20) -> Finding:
+    """Whether yourdfpy places every link where Pinocchio does.
+
+    Args:
+        source: A robot of this package, the path of a URDF file, or URDF text.
+        count: Number of random configurations.
+
+    Returns:
+        What is wrong, or how near they are.
+    """
+    try:
+        (row,) = compare_kinematics(source, ["yourdfpy"], count=count)
+    except SoftRobotsError as error:
+        return Finding("yourdfpy's kinematics", (str(error),))
+    return Finding("yourdfpy's kinematics", tuple(row_problems(row)), (f"{row_text(row)} at {count} random configurations",))
+
+
+def row_text(row: KinematicsRow) -> str:
+    """What a tool did, in a line."""
+    told = f"within {row.position_error:.1e} m and {row.rotation_error:.1e} rad of Pinocchio"
+    return f"{told}, {row.joints} of {row.joints_in_file} joints, {row.links} of {row.links + len(row.lost_links)} links"
+
+
+def row_problems(row: KinematicsRow) -> list[str]:
+    """What is wrong with a comparison; empty if the tool agrees."""
+    if row.problem:
+        return [f"{row.tool} refuses the file: {row.problem}"]
+    return [] if row.agrees else [f"{row.tool} is {row_text(row)}; all of them within {row.precision:g} are required"]
+
+
+def _tags(urdf: str, label: str) -> str:
+    tags = read_tags(urdf, label)
+    parts = {
+        "motors": list(tags.roles.values()).count("motor"),
+        "springs": len(tags.springs),
+        "inflated links": len(tags.inflated_links),
+        "sections": len(tags.sections),
+        "lumped sections": len(tags.lumped_sections),
+        "muscles": len(tags.muscles),
+    }
+    return ", ".join(f"{count} {what}" for what, count in parts.items() if count) or "none"
+
+
+def _in_pinocchio(urdf: str, label: str) -> str:
+    model = pin.buildModelFromXML(urdf)
+    moving = sum(inertia.mass for inertia in list(model.inertias)[1:])
+    return f"{model.njoints - 1} movable joints, {moving:.6g} kg that move"
+
+
+def _in_softrobots(urdf: str, label: str) -> str:
+    tags = read_tags(urdf, label)
+    if not tags.springs and not tags.sections:
+        return "no springs; load_model needs springs={joint: stiffness}"
+    how = "loads"
+    try:
+        model = load_model(urdf)
+    except DescriptionError as error:
+        if not tags.muscles:
+            raise
+        model = load_model(urdf, muscles="forces")  # e.g. one chamber of a finger: its length alone fixes no shape
+        how = f"loads if tensions are given, muscles='forces', because {str(error).partition(';')[0]}"
+    return f"{how}: {model.n_motors} motors, {model.n_springs} elastic coordinates, tip {model.tip}"
+
+
+def _valid_in_yourdfpy(source: Robot | Path | str) -> Finding:
+    import yourdfpy
+
+    with as_file(source) as (file, _):
+        try:
+            robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_collision_scene_graph=False)
+            robot.validate()
+        except Exception as error:  # yourdfpy raises what its parser raises
+            return Finding("yourdfpy", (f"refuses the file: {type(error).__name__}: {error}",))
+    return Finding("yourdfpy", tuple(str(error) for error in robot.errors), (f"valid, {len(robot.link_map)} links",))

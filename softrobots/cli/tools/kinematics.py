@@ -1,0 +1,244 @@
+"""The kinematics of a URDF file in other tools, against Pinocchio's: where each link is, at random joint coordinates."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import time
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.cli.tools.known_tools import Tool, find_tool, installed_tools
+from softrobots.cli.tools.placed_links import Poses, open_in
+from softrobots.core.checks import FloatArray, positive_integer
+from softrobots.core.errors import DescriptionError, SoftRobotsError
+from softrobots.core.xml_input import parse_xml, read_xml
+from softrobots.description.sources import read_source
+from softrobots.model.soft_model import MAX_DOF
+from softrobots.robots import Robot
+
+_WIDEST = (2.0 * np.pi, 1.0)
+"""Joints with wider limits are drawn within plus and minus these [rad, m]."""
+
+
+@dataclass(frozen=True)
+class KinematicsRow:
+    """How a tool places the links of a file."""
+
+    tool: str
+    """Name of the tool."""
+    version: str
+    """Its version."""
+    file: str
+    """Name of the robot or its file."""
+    joints: int
+    """Movable joints of the file that the tool knows."""
+    joints_in_file: int
+    """Movable joints of the file."""
+    links: int
+    """Links of the file that the tool keeps; these are compared."""
+    lost_links: tuple[str, ...]
+    """Links of the file that the tool does not keep."""
+    position_error: float
+    """Largest distance of a link from where Pinocchio has it [m]; 0 if the tool refuses the file."""
+    rotation_error: float
+    """Largest angle between a link and itself in Pinocchio [rad]; 0 if the tool refuses the file."""
+    precision: float
+    """Largest error that the tool is allowed [m and rad]."""
+    load_time: float
+    """Time to load the file [s]."""
+    pose_time: float
+    """Time to place all links once [s]."""
+    limits: str
+    """What the tool cannot do with a URDF file."""
+    problem: str = ""
+    """What the tool said when it refused the file; empty if it did not."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every link and joint is there, and every link where Pinocchio has it."""
+        complete = not self.problem and not self.lost_links and self.joints == self.joints_in_file
+        return complete and max(self.position_error, self.rotation_error) <= self.precision
+
+
+def compare_kinematics(
+    source: Robot | Path | str, tools: Sequence[str] | None = None, *, count: int = 20, seed: int = 20210312
+) -> tuple[KinematicsRow, ...]:
+    """Compare where tools place the links of a URDF with where Pinocchio places them.
+
+    Pinocchio reads the file by itself: nothing of this package stands between. Joint coordinates are drawn within the limits of
+    the file, those of mimicking joints follow.
+
+    Args:
+        source: A robot of this package, the path of a URDF file, or URDF text (starting with `<`); MJCF and SDF are translated.
+        tools: Names of tools, of `softrobots.cli.tools.known_tools.TOOLS`; by default all that are installed.
+        count: Number of random configurations.
+        seed: Seed of the draw.
+
+    Returns:
+        A row for each tool.
+
+    Raises:
+        DescriptionError: If the file cannot be read, or Pinocchio refuses it or has joints in it that are not revolute,
+            continuous, prismatic or fixed.
+        NameNotFound: If there is no such tool.
+        MissingDependency: If a tool of `tools` is not installed, or the package that reads MJCF or SDF.
+        ParameterError: If `count` is not positive, or `source` is something else.
+    """
+    positive_integer("count", count)
+    chosen = [find_tool(name) for name in (installed_tools() if tools is None else tools)]
+    for tool in chosen:
+        tool.load()
+    with as_file(source) as (file, label):
+        truth = _pinocchio_poses(file, label, count, seed)
+        return tuple(_compare(tool, file, label, truth) for tool in chosen)
+
+
+@dataclass(frozen=True)
+class _Truth:
+    joints: tuple[str, ...]
+    values: tuple[Mapping[str, float], ...]
+    poses: tuple[Poses, ...]
+
+
+def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow:
+    facts: dict[str, Any] = {
+        "tool": tool.name,
+        "version": str(tool.version),
+        "file": label,
+        "joints_in_file": len(truth.joints),
+    }
+    facts |= {"joints_in_file": len(truth.joints), "precision": tool.precision, "limits": tool.limits}
+    start = time.perf_counter()
+    try:
+        with open_in(tool.name, file) as robot:
+            loaded = time.perf_counter()
+            found = [robot.poses(values) for values in truth.values]
+            finished = time.perf_counter()
+    except SoftRobotsError:
+        raise
+    except Exception as error:  # a tool raises what it likes if it refuses a file
+        facts |= {"joints": 0, "links": 0, "lost_links": tuple(truth.poses[0]), "position_error": 0.0, "rotation_error": 0.0}
+        problem = f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else 'no reason given'}"
+        return KinematicsRow(**facts, load_time=time.perf_counter() - start, pose_time=0.0, problem=problem)
+    kept = [link for link in truth.poses[0] if link in found[0]]
+    pairs = [(here[link], there[link]) for here, there in zip(found, truth.poses, strict=True) for link in kept]
+    errors = np.array([pose_error(one, other) for one, other in pairs]).reshape(-1, 2)
+    broken = not np.all(np.isfinite(errors))
+    position, rotation = (0.0, 0.0) if broken or not len(errors) else errors.max(axis=0).tolist()
+    return KinematicsRow(
+        **facts,
+        joints=len(set(robot.joints) & set(truth.joints)),
+        links=len(kept),
+        lost_links=tuple(link for link in truth.poses[0] if link not in kept),
+        position_error=position,
+        rotation_error=rotation,
+        load_time=loaded - start,
+        pose_time=(finished - loaded) / len(truth.values),
+        problem="a pose that is not finite" if broken else "",
+    )
+
+
+def pose_error(one: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """Distance and angle between two poses.
+
+    The angle t of the rotation from one to the other follows from `|R1 - R2| = 2 sqrt(2) sin(t/2)` (Frobenius), which keeps
+    its digits at small angles, where the arccosine of the trace loses half of them.
+
+    Args:
+        one: A pose, shape (4, 4) [m].
+        other: Another, likewise.
+
+    Returns:
+        The distance of the origins [m] and the angle between the axes [rad].
+    """
+    distance = np.linalg.norm(one[:3, 3] - other[:3, 3])
+    chord = np.linalg.norm(one[:3, :3] - other[:3, :3]) / np.sqrt(8.0)
+    return float(distance), float(2.0 * np.arcsin(np.minimum(chord, 1.0)))
+
+
+@contextlib.contextmanager
+def as_file(source: Robot | Path | str) -> Iterator[tuple[Path, str]]:
+    """The URDF file of a robot, and what to call it; all but a URDF file stands in a temporary one.
+
+    Args:
+        source: A robot of this package, the path of a URDF, MJCF or SDF file, or its text (starting with `<`).
+
+    Raises:
+        ParameterError: If it is something else.
+        DescriptionError: If the file cannot be read or translated.
+        MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
+    """
+    text, label = read_source(source)
+    if label == str(source) and is_urdf_file(Path(label)):
+        yield Path(label), Path(label).stem
+        return
+    with tempfile.TemporaryDirectory(prefix="softrobots-") as folder:
+        file = Path(folder) / "robot.urdf"
+        file.write_text(text, encoding="utf-8")
+        yield file, parse_xml(text, label).get("name", label)
+
+
+def is_urdf_file(path: Path) -> bool:
+    """Whether the root tag of an XML file is that of URDF.
+
+    Raises:
+        DescriptionError: If it cannot be read, or is not XML.
+    """
+    return parse_xml(read_xml(path), str(path)).tag == "robot"
+
+
+def _pinocchio_poses(file: Path, label: str, count: int, seed: int) -> _Truth:
+    """Joint coordinates within the limits, and Pinocchio's poses of every link there."""
+    text, _ = read_source(file)
+    root = parse_xml(text, str(file))
+    try:
+        model = pin.buildModelFromUrdf(str(file))
+    except (ValueError, RuntimeError) as error:
+        raise DescriptionError(f"Pinocchio refuses {label}: {error} (its parser prints the reason on stderr)") from error
+    links = [link.get("name", "") for link in root.findall("link")]
+    joints = {name: model.joints[model.getJointId(name)] for name in model.names if name != "universe"}
+    strange = [name for name, joint in joints.items() if joint.nv != 1]
+    if strange:
+        raise DescriptionError(f"{label} has joints that are not revolute, continuous or prismatic: {', '.join(strange)}")
+    if not 0 < len(joints) <= MAX_DOF:
+        raise DescriptionError(f"{label} has {len(joints)} movable joints; from 1 to {MAX_DOF} can be compared")
+    data, rng = model.createData(), np.random.default_rng(seed)
+    values, poses = [], []
+    for _ in range(count):
+        drawn = _follow(root, {name: _draw(model, joint, rng) for name, joint in joints.items()})
+        q = pin.neutral(model)
+        for name, joint in joints.items():
+            angle = drawn[name]
+            q[joint.idx_q : joint.idx_q + joint.nq] = angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+        pin.framesForwardKinematics(model, data, q)
+        values.append(drawn)
+        poses.append({link: data.oMf[model.getFrameId(link, pin.FrameType.BODY)].homogeneous.copy() for link in links})
+    return _Truth(tuple(joints), tuple(values), tuple(poses))
+
+
+def _draw(model: Any, joint: Any, rng: np.random.Generator) -> float:
+    """A coordinate within the limits of a joint, and within `_WIDEST` if they leave a choice."""
+    if joint.nq == 2:
+        return float(rng.uniform(-np.pi, np.pi))
+    widest = _WIDEST[joint.shortname().startswith("JointModelP")]
+    low, high = float(model.lowerPositionLimit[joint.idx_q]), float(model.upperPositionLimit[joint.idx_q])
+    return float(rng.uniform(max(low, min(high, -widest)), min(high, max(low, widest))))
+
+
+def _follow(root: ElementTree.Element, drawn: Mapping[str, float]) -> dict[str, float]:
+    """The coordinates with those of mimicking joints computed, `multiplier * master + offset`."""
+    values = dict(drawn)
+    rules = {joint.get("name", ""): mimic for joint in root.findall("joint") for mimic in joint.findall("mimic")}
+    for _ in rules:  # as often as there are rules: a master may mimic another joint
+        for name, mimic in rules.items():
+            master = mimic.get("joint", "")
+            if name in values and master in values:
+                values[name] = float(mimic.get("multiplier", "1")) * values[master] + float(mimic.get("offset", "0"))
+    return values

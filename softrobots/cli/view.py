@@ -1,0 +1,253 @@
+"""`softrobots view`: a robot in the browser, still, moving, or following commands."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import tempfile
+import webbrowser
+from pathlib import Path
+from typing import Any
+
+from softrobots.cli.options.command_line import Served, address_lines
+from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.robot_argument import add_model, model_of, motors_of, source_of
+from softrobots.cli.reports.answers import add_json, tell
+from softrobots.core.checks import finite_number
+from softrobots.core.errors import ParameterError
+from softrobots.core.files import new_file
+from softrobots.model.soft_model import SoftModel
+from softrobots.robots import HelixTube
+from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.imposed_displacement import ImposedDisplacement
+from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
+from softrobots.statics.load_estimation import LoadEstimate
+from softrobots.statics.results_io import load_result
+from softrobots.statics.trajectory import Trajectory
+from softrobots.view.browser import find_chromium, take_picture
+from softrobots.view.live.input import commands_from
+from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
+from softrobots.view.viewer import Viewer, view
+
+_EXAMPLES = """examples:
+  softrobots view inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15
+  softrobots view inflatable_arm --target 0.9 0.3 0.2 --gravity --live keyboard
+  softrobots view pcc_arm --live wanted.json                   follows a file, e.g. {"force": [0, 5, 0], "gravity": true}
+  softrobots view pcc_arm --sliders
+  softrobots view helix_tube --growth --html growth.html
+  softrobots view --result trajectory.npz --picture end.png --at 1
+"""
+
+_NOT_WITH = {
+    "--result": ("ROBOT", "--set", "--parameters", "--spring", "--tip", "--motors", "--target", "--growth", "a load"),
+    "--growth": ("--motors", "--target", "a load", "--live", "--sliders"),
+    "--html": ("--live", "--sliders", "--open", "--port"),
+    "--picture": ("--live", "--sliders", "--open", "--port"),
+    "--sliders": ("--live",),
+    "--live": ("--json",),
+}
+_ONLY_WITH = {"--overwrite": ("--html", "--picture"), "--at": ("--picture",)}
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "view",
+        help="show a robot in the browser",
+        description="Show a robot in the browser, served on this machine only, until Ctrl-C: loaded, at a target, as a saved "
+        "result, growing, or following commands. Or write the page, which works offline, or a picture of it.",
+        epilog=_EXAMPLES,
+    )
+    add_model(parser, optional=True)
+    told = "motor joints, then muscles, base to tip [rad, m or N]; with --target, where the search starts (relaxed)"
+    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=told)
+    add_loads(parser)
+    told = "put the loaded tip there by inverse kinematics [m] (no target)"
+    parser.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
+    told = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
+    parser.add_argument("--result", type=Path, metavar="FILE.npz", help=told)
+    parser.add_argument("--growth", action="store_true", help="show how a helical tube grows, without load")
+    told = "follow commands (none): `keyboard`, single keys of a terminal or lines of a pipe (? lists them), or a watched file"
+    parser.add_argument("--live", metavar="keyboard|FILE", help=told)
+    parser.add_argument(
+        "--sliders", action="store_true", help="a page with sliders for motors and load (needs viser, extra viser)"
+    )
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write the page instead of serving it (served)")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="take a picture of the page with Chromium (served)")
+    told = "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)"
+    parser.add_argument("--at", type=float, metavar="SHARE", help=told)
+    parser.add_argument("--overwrite", action="store_true", help="allow --html and --picture to replace files")
+    parser.add_argument("--open", action="store_true", help="open the page in the browser of this machine")
+    parser.add_argument("--port", type=int, metavar="N", help="port of the page (the first free one from 7000; sliders: 8080)")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Show the robot until Ctrl-C, or write what is asked for."""
+    _refuse_contradictions(arguments)
+    if arguments.picture is not None and arguments.picture.suffix.lower() != ".png":
+        raise ParameterError("--picture", str(arguments.picture), "a file name that ends in .png")
+    for file in (arguments.html, arguments.picture):
+        if file is not None:
+            new_file(file, overwrite=arguments.overwrite)  # tells at once
+    if arguments.picture is not None:
+        find_chromium()
+    if arguments.growth:
+        _grow(arguments)
+        return
+    result = _result(arguments)
+    if isinstance(result, Trajectory):
+        if arguments.live is not None or arguments.sliders:
+            raise ParameterError("--result", str(arguments.result), "no trajectory where --live or --sliders move the robot")
+        with view(result.model, result, port=arguments.port) as viewer:
+            _show(arguments, viewer, result.model, f"a trajectory of {len(result.times)} waypoints")
+        return
+    equilibrium = result.equilibrium if isinstance(result, IkSolution) else result
+    if arguments.live is not None or arguments.sliders:
+        tip_force(equilibrium)  # tells at once
+    if arguments.sliders:
+        _slide(arguments, equilibrium)
+        return
+    with view(equilibrium.model, result, port=arguments.port) as viewer:
+        if arguments.live is None:
+            _show(arguments, viewer, equilibrium.model, state_line(equilibrium))
+        else:
+            _follow(arguments, viewer, LiveView(viewer, result))
+
+
+def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Trajectory:
+    """What is to be shown: a saved result, or the loaded robot."""
+    if arguments.result is None:
+        model = model_of(arguments)
+        load, motors = loads_of(arguments, model), motors_of(model, arguments.motors)
+        if arguments.target is None:
+            return solve_equilibrium(model, motors, **load)
+        return solve_ik(model, arguments.target, q_motors0=None if arguments.motors is None else motors, **load)
+    result = load_result(arguments.result)
+    if isinstance(result, ImposedDisplacement | LoadEstimate):
+        return result.equilibrium
+    if isinstance(result, Equilibrium | IkSolution | Trajectory):
+        return result
+    kind = type(result).__name__
+    raise ParameterError(
+        "--result", str(arguments.result), f"an equilibrium, a solution, an estimate or a trajectory, not a {kind}"
+    )
+
+
+def _grow(arguments: argparse.Namespace) -> None:
+    """Show how a tube grows."""
+    tube = source_of(arguments)
+    if not isinstance(tube, HelixTube) or tube.chain != "sections":
+        raise ParameterError("ROBOT", arguments.robot, "helix_tube, with chain=sections, where it is to grow")
+    model = model_of(arguments, tube)
+    with Viewer(model, port=arguments.port) as viewer:
+        viewer.animate_growth(tube)
+        _show(arguments, viewer, model, f"a tube that grows to {tube.length:g} m")
+
+
+def _slide(arguments: argparse.Namespace, equilibrium: Equilibrium) -> None:
+    """Serve a page with sliders."""
+    from softrobots.view.slider_page import SliderPage
+
+    with SliderPage(
+        equilibrium.model,
+        q_motors=equilibrium.q_motors,
+        force=tip_force(equilibrium),
+        gravity=equilibrium.load.gravity,
+        port=arguments.port,
+    ) as page:
+        _serve(arguments, page, state_line(equilibrium))
+
+
+def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, told: str) -> None:
+    """Serve a page, or write it and take its picture."""
+    if arguments.html is None and arguments.picture is None:
+        _serve(arguments, viewer, told)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        file = arguments.html or Path(folder) / "page.html"
+        page = viewer.write_html(file, title=str(model.pinocchio.name), overwrite=arguments.overwrite)
+        if arguments.picture is not None:
+            take_picture(page, arguments.picture, share=arguments.at or 0.0)
+    files = [file for file in (arguments.html, arguments.picture) if file is not None]
+    tell(arguments, {"files": files}, [told, *(f"{file}: written" for file in files)])
+
+
+def _serve(arguments: argparse.Namespace, page: Served, told: str) -> None:
+    """Tell where a page is, and serve it until Ctrl-C."""
+    with contextlib.suppress(KeyboardInterrupt):
+        _tell_address(arguments, page, told)
+        page.wait()
+
+
+def _follow(arguments: argparse.Namespace, viewer: Viewer, live: LiveView) -> None:
+    """Follow commands until they end, or Ctrl-C."""
+    with contextlib.suppress(KeyboardInterrupt):
+        _tell_address(arguments, viewer, state_line(live.equilibrium))
+        with commands_from(arguments.live, live, _tell) as commands:
+            follow(live, commands, _tell, _complain)
+
+
+def _tell_address(arguments: argparse.Namespace, page: Served, told: str) -> None:
+    answer = {"url": page.url, "port": page.port, "tunnel": page.tunnel}
+    tell(arguments, answer, [told, *address_lines(page)])
+    if arguments.open and not webbrowser.open(page.url):
+        _complain("no browser of this machine could be opened")
+
+
+def _tell(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def _complain(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
+
+
+def _refuse_contradictions(arguments: argparse.Namespace) -> None:
+    """Refuse options that do not go together, and values out of range."""
+    given = {
+        "ROBOT": arguments.robot is not None,
+        "--set": bool(arguments.parameters),
+        "--parameters": arguments.parameter_file is not None,
+        "--spring": bool(arguments.spring),
+        "--tip": arguments.tip is not None,
+        "a load": any(arguments.force)
+        or bool(arguments.wrench)
+        or arguments.moment is not None
+        or arguments.gravity is not None,
+        **{
+            f"--{name}": getattr(arguments, name) not in (None, False)
+            for name in (
+                "motors",
+                "target",
+                "result",
+                "growth",
+                "live",
+                "sliders",
+                "html",
+                "picture",
+                "at",
+                "overwrite",
+                "open",
+            )
+        },
+        "--port": arguments.port is not None,
+        "--json": arguments.json,
+    }
+    if not given["ROBOT"] and not given["--result"]:
+        raise ParameterError("ROBOT", "(nothing)", "a robot or a file, or a saved --result given instead")
+    for option, others in _NOT_WITH.items():
+        both = [other for other in others if given[option] and given[other]]
+        if both:
+            raise ParameterError(option, "given", f"given without {', '.join(both)}")
+    for option, others in _ONLY_WITH.items():
+        if given[option] and not any(given[other] for other in others):
+            raise ParameterError(option, "given", f"given together with {' or '.join(others)}")
+    if arguments.at is not None and not 0.0 <= finite_number("--at", arguments.at) <= 1.0:
+        raise ParameterError("--at", arguments.at, "from 0 to 1")
+    if arguments.port is not None and not 0 < arguments.port < 65536:
+        raise ParameterError("--port", arguments.port, "from 1 to 65535")

@@ -1,0 +1,1 @@
+"""Generated modules as freestanding C99."""

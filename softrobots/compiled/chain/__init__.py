@@ -1,0 +1,1 @@
+"""The statics of a serial chain, element by element, as traced expressions."""

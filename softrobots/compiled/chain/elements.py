@@ -1,0 +1,244 @@
+r"""Joints and sections: how they move what is beyond them, traced.
+
+All vectors are in one set of reference axes. Going from the tip to the base, what is beyond an element is known by levers: a
+load is a force `F` (the force on the tip; the acceleration of gravity) with the lever `r` of the points that it acts on, from
+the element's origin (the tip's; the sum of mass times position). A coordinate `j` of the element that turns what is beyond by
+:math:`\omega_j` and moves the lever by :math:`J_j` contributes
+
+- torque `sum J_j . F` to its own balance,
+- `c_j = sum J_j x F` to the second derivative: for every coordinate `i` nearer to the base,
+  :math:`\partial^2 (F \cdot r)/\partial q_i \partial q_j = \omega_i \cdot c_j`.
+
+Joints: `omega = z, J = z x r`, [Troise 2021] (4). Sections are the screw motions of `softrobots.constant_curvature.screws`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.compiled.chain.section_weight import weight_moment
+from softrobots.compiled.trace.expressions import Scalar, cosine, sine
+from softrobots.compiled.trace.stumpff_series import stumpff
+
+Vector = Any
+"""Array of objects (expressions or floats), shape (3,) or (3, n)."""
+
+
+class Load(NamedTuple):
+    """A dead force and what it acts on beyond an element."""
+
+    force: Vector
+    """The force [N]; for weight: gravity [m/s^2]."""
+    lever: Vector
+    """Position of the tip from the element's origin [m]; for weight: sum of mass times position [kg m]."""
+    share: Scalar
+    """How much of the lever moves with the element's origin: 1, or the mass beyond [kg]."""
+
+
+@dataclass
+class Motion:
+    """An element at its coordinates, with all that elimination needs; `k` coordinates."""
+
+    twists: Vector
+    """What is beyond turns by this per coordinate, shape (3, k)."""
+    bends: Vector
+    """`c_j` of each coordinate, shape (3, k)."""
+    moves: Vector
+    """The tip moves by this per coordinate, shape (3, k)."""
+    torque: list[Scalar]
+    """Torque of all loads on each coordinate, (k) [N m or N]."""
+    weight: list[Scalar]
+    """The part of it that is weight."""
+    curvature: Vector
+    """Second derivatives of the work of the loads within the element, shape (k, k)."""
+
+
+def vector(values: Sequence[Scalar]) -> Vector:
+    """An array of expressions."""
+    made = np.zeros(len(values), dtype=object)
+    made[:] = list(values)
+    return made
+
+
+def matrix(rows: Sequence[Sequence[Scalar]]) -> Vector:
+    """A matrix of expressions."""
+    return np.array([vector(row) for row in rows], dtype=object)
+
+
+def constants(values: Any) -> Vector:
+    """An array of constants as plain floats."""
+    return np.asarray(values, dtype=np.float64).astype(object)
+
+
+def cross(one: Vector, other: Vector) -> Vector:
+    """Vector product."""
+    return vector(
+        [
+            one[1] * other[2] - one[2] * other[1],
+            one[2] * other[0] - one[0] * other[2],
+            one[0] * other[1] - one[1] * other[0],
+        ]
+    )
+
+
+def outer(one: Vector, other: Vector) -> Vector:
+    """Product of each with each."""
+    return np.multiply.outer(one, other)
+
+
+def turned(axes: Vector, angle: Scalar) -> Vector:
+    """Axes turned about their own z."""
+    c, s = cosine(angle), sine(angle)
+    x, y, z = axes.T
+    return np.array([x * c + y * s, y * c - x * s, z], dtype=object).T
+
+
+def turning_joint(axis: Vector, loads: Sequence[Load]) -> Motion:
+    """A joint that turns about `axis`, the loads' levers from its origin."""
+    moves = [cross(axis, load.lever) for load in loads]
+    bend = sum((cross(move, load.force) for move, load in zip(moves, loads, strict=True)), constants(np.zeros(3)))
+    torques = [load.force @ move for move, load in zip(moves, loads, strict=True)]
+    return _single(axis, bend, moves[0], torques, axis @ bend)
+
+
+def sliding_joint(axis: Vector, loads: Sequence[Load]) -> Motion:
+    """A joint that slides along `axis`."""
+    force = sum((load.force * load.share for load in loads), constants(np.zeros(3)))
+    torques = [(load.force @ axis) * load.share for load in loads]
+    return _single(constants(np.zeros(3)), cross(axis, force), axis, torques, 0.0)
+
+
+def _single(twist: Vector, bend: Vector, move: Vector, torques: Sequence[Scalar], curvature: Scalar) -> Motion:
+    twists, bends, moves = (np.reshape(one, (3, 1)) for one in (twist, bend, move))
+    return Motion(twists, bends, moves, [sum(torques)], [sum(torques[1:])], matrix([[curvature]]))
+
+
+class Screw:
+    """A section at its coordinates, in the axes of its start: `u = p(z) + R(z) r` for a lever `r` at its end.
+
+    With the Stumpff functions `c_k` of `|w|^2` (see `softrobots.constant_curvature.screws`)
+
+        R(w) r = r + c1 w x r + c2 w x (w x r),    p = l (c1 e + c2 w x e + c3 w_z w),    e = e_z
+    """
+
+    def __init__(self, z: Sequence[Scalar], length: Scalar) -> None:
+        """Evaluate the motion at section coordinates `z` [rad, rad, rad, m] and rest length [m]."""
+        self._w = w = vector(z[:3])
+        self._length = z[3] + length
+        self._z = z
+        self._c = stumpff(w @ w, 7 if not _is_zero(w[2]) else 6)
+        c, across = self._c, vector([w[1], -w[0], 0.0])
+        turn = matrix([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+        twice = outer(w, w) - constants(np.eye(3)) * (w @ w)
+        self.rotation = constants(np.eye(3)) + turn * c[1] + twice * c[2]
+        """Axes of the end in those of the start, shape (3, 3)."""
+        self._direction = vector([0.0, 0.0, c[1]]) + across * c[2] + w * (w[2] * c[3])
+        self.position = self._direction * self._length
+        """The end from the start, shape (3,) [m]."""
+        self._twists = constants(np.eye(3)) + turn * c[2] + twice * c[3]
+
+    def motion(self, loads: Sequence[Load], bodies: Any, axes: Vector) -> tuple[Motion, list[Vector]]:
+        """Motion under loads, and the levers from the start.
+
+        Args:
+            loads: Loads beyond the end; levers from the end, in reference axes.
+            bodies: The section's own bodies, for the weight; see `softrobots.compiled.chain.section_weight`.
+            axes: Axes of the start in the reference axes.
+
+        Returns:
+            The motion in reference axes, and the lever of each load from the start.
+        """
+        end_axes = axes @ self.rotation
+        local = [(axes.T @ load.force, end_axes.T @ load.lever, load.share) for load in loads]
+        slopes = self._slopes()
+        moves, levers = [], []
+        for (_, lever, share), load in zip(local, loads, strict=True):
+            arm = self.rotation @ lever
+            columns = [cross(self._twists[:, j], arm) + slopes[:, j] * share for j in range(3)]
+            moves.append(np.array([*columns, slopes[:, 3] * share], dtype=object).T)
+            levers.append(load.lever + (axes @ self.position) * share)
+        curvature = self._curvature(local)
+        if len(loads) > 1:
+            own = weight_moment(self._z, self, bodies, local[1][0])
+            moves[1] = moves[1] + own.slopes
+            curvature = curvature + own.curvature
+            levers[1] = levers[1] + axes @ own.moment
+        bends = [
+            sum((cross(move[:, j], force) for move, (force, _, _) in zip(moves, local, strict=True)), constants(np.zeros(3)))
+            for j in range(4)
+        ]
+        torques = [[force @ move[:, j] for move, (force, _, _) in zip(moves, local, strict=True)] for j in range(4)]
+        twists = np.concatenate([axes @ self._twists, constants(np.zeros((3, 1)))], axis=1)
+        return (
+            Motion(
+                twists,
+                axes @ np.array(bends, dtype=object).T,
+                axes @ moves[0],
+                [sum(one) for one in torques],
+                [sum(one[1:]) for one in torques],
+                curvature,
+            ),
+            levers,
+        )
+
+    def _slopes(self) -> Vector:
+        """Derivative of the position, shape (3, 4)."""
+        w, c, length = self._w, self._c, self._length
+        d = [k * c[k + 2] - c[k + 1] for k in range(4)]
+        along = vector([0.0, 0.0, d[1]]) + vector([w[1], -w[0], 0.0]) * d[2] + w * (w[2] * d[3])
+        made = outer(along, w)
+        made = made + matrix([[0.0, c[2], 0.0], [-c[2], 0.0, 0.0], [0.0, 0.0, 0.0]])
+        made = made + outer(w, vector([0.0, 0.0, c[3]])) + constants(np.eye(3)) * (w[2] * c[3])
+        return np.concatenate([made * length, self._direction.reshape(3, 1)], axis=1)
+
+    def _curvature(self, local: Sequence[tuple[Vector, Vector, Scalar]]) -> Vector:
+        r"""Second derivatives of `sum F . u` with respect to the section coordinates, shape (4, 4).
+
+        `F . u` is `sum_k c_k G_k` with polynomials `G_k` of the rotation `w` of order `k` at most two, so that
+        `sum_k G_k (d_k 1 + e_k w w^T) + d_k (w g_k^T + g_k w^T) + c_k H_k` with `dc_k = d_k w . dw`, `dd_k = e_k w . dw`.
+        """
+        w, c, length = self._w, self._c, self._length
+        unit, axis = constants(np.eye(3)), constants([0.0, 0.0, 1.0])
+        push = sum((force * share for force, _, share in local), constants(np.zeros(3)))  # what moves the end as a whole
+        swing = vector([-push[1], push[0], 0.0])  # e x push
+        turning = sum((cross(lever, force) for force, lever, _ in local), constants(np.zeros(3)))
+        g1, slope1 = turning @ w + push[2] * length, turning
+        g2, slope2, curve2 = (swing @ w) * length, swing * length, constants(np.zeros((3, 3)))
+        for force, lever, _ in local:
+            fw, rw, fr = force @ w, lever @ w, force @ lever
+            g2 = g2 + fw * rw - (w @ w) * fr
+            slope2 = slope2 + force * rw + lever * fw - w * (2.0 * fr)
+            curve2 = curve2 + outer(force, lever) + outer(lever, force) - unit * (2.0 * fr)
+        pw = push @ w
+        g3, slope3 = w[2] * pw * length, (axis * pw + push * w[2]) * length
+        curve3 = (outer(axis, push) + outer(push, axis)) * length
+        d = [k * c[k + 2] - c[k + 1] for k in range(6 if len(c) > 7 else 5)]
+        made = constants(np.zeros((3, 3)))
+        for k, value, slope, curve in ((1, g1, slope1, None), (2, g2, slope2, curve2), (3, g3, slope3, curve3)):
+            if k == 3 and _is_zero(w[2]):  # the twist is locked, and nothing else of this term moves
+                continue
+            e = k * d[k + 2] - d[k + 1]
+            made = made + unit * (value * d[k]) + outer(w, w) * (value * e)
+            made = made + outer(w, slope * d[k]) + outer(slope * d[k], w)
+            if curve is not None:
+                made = made + curve * c[k]
+        # The elongation moves the end along the direction `p / l`; its slope is that of `push . p / l`.
+        column = self._slopes_of_direction(push)
+        return np.concatenate(
+            [np.concatenate([made, column.reshape(3, 1)], axis=1), np.append(column, 0.0).reshape(1, 4)], axis=0
+        )
+
+    def _slopes_of_direction(self, push: Vector) -> Vector:
+        w, c = self._w, self._c
+        d = [k * c[k + 2] - c[k + 1] for k in range(4)]
+        swing, pw = vector([-push[1], push[0], 0.0]), push @ w
+        radial = push[2] * d[1] + (swing @ w) * d[2] + (w[2] * pw) * d[3]
+        return w * radial + swing * c[2] + vector([0.0, 0.0, pw * c[3]]) + push * (w[2] * c[3])
+
+
+def _is_zero(value: Scalar) -> bool:
+    return isinstance(value, float) and value == 0.0

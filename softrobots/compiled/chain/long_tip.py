@@ -1,0 +1,103 @@
+r"""A look at the tip of a long chain in equilibrium: how it follows the motors, the held sums and a force.
+
+The loops of `softrobots.compiled.chain.long_chain` with tip columns, and straight-line functions around them. With the columns
+`X = K^-1 J_k^T` the elastostatic Jacobian of a motor `m` is (`softrobots.compiled.chain.tip_motion`)
+
+.. math:: E_m = J_m + \omega_m \cdot \sum_{k\,beyond} c_k X_k + c_m \cdot \varphi_m
+
+What is beyond a motor is known when the way out ends: until then the sum up to it stands there instead, subtracted.
+
+Held sums `A s = b` have multipliers: `K s' + A^T \lambda = ...`. Those of the balance are the loads on the sums, those of the
+three tip columns the derivative of the tip with respect to them: from `K X + A^T \Lambda = J_k^T`, `A X = 0` and
+`K s' + A^T \lambda' = 0`, `A s' = b'` it follows that `J_k s' = \Lambda^T b'`.
+"""
+
+from __future__ import annotations
+
+from softrobots.compiled.chain.elements import Load, vector
+from softrobots.compiled.chain.elimination import Beyond
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.passing import Passing, TipPlaces
+from softrobots.compiled.chain.recursion import Balance, leave
+from softrobots.compiled.chain.short_chain import seen_backwards
+from softrobots.compiled.chain.tip_motion import motor_of
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.trace.blocks import Block
+
+CONTROL = '''def look_at_tip(w: Array) -> None:
+    """Look how the tip follows motors, held sums and a force, from an equilibrium that was settled."""
+    begin(w)
+    enter_tip_all(w)
+    turn_round(w)
+    turn_round_tip(w)
+    leave_tip_all(w)
+    take_tip_all(w)
+    finish_tip(w)
+    for i in range(N):
+        finish_column(w, i)'''
+"""The function that goes all the ways."""
+
+
+def tip_frame(unknowns: Unknowns, layout: Layout, passing: Passing, tip: TipPlaces, *, weight: bool) -> list[Block]:
+    """Trace the straight-line functions around the loops.
+
+    Args:
+        unknowns: The chain.
+        layout: The places in the workspace.
+        passing: Places of what elements pass on.
+        tip: Places of what the look passes on and finds.
+        weight: Whether there is gravity.
+
+    Returns:
+        The functions.
+    """
+    return [_turn_round(tip), _finish(unknowns, layout, passing, tip, weight=weight), _finish_column(passing, tip)]
+
+
+def _turn_round(tip: TipPlaces) -> Block:
+    block = Block("turn_round_tip", "Begin the sums of the tip columns.")
+    block.store_all(tip.column, [0.0] * (tip.end - tip.column))
+    return block
+
+
+def _finish(unknowns: Unknowns, layout: Layout, passing: Passing, tip: TipPlaces, *, weight: bool) -> Block:
+    """Add what is beyond each motor, pass the leading motors, and turn all into world axes."""
+    block = Block("finish_tip", "Put together what the loops have found of motors and held sums.")
+    axes = vector(block.loads(passing.base, 9)).reshape(3, 3)
+    total = vector(block.loads(tip.bends, 9)).reshape(3, 3)
+    leading = [
+        unknowns.traced(row, lambda motor: block.load(motor), lambda _: 0.0, lambda _: 0.0)
+        for row in range(unknowns.leading_motors)
+    ]
+    motors = [motor for row in range(len(leading)) if (motor := motor_of(unknowns, row)) is not None]
+    loads = []
+    for place in (0, 3) if weight else (0,):
+        force, lever = block.loads(passing.force + place, 3), block.loads(passing.lever + place, 3)
+        loads.append(Load(vector(force), vector(lever), 1.0))
+    jacobian = {}
+    for element, entered, motor in zip(leading[::-1], seen_backwards(leading)[::-1], motors[::-1], strict=True):
+        left = leave(element, entered, loads, Beyond.tip(1), Balance())
+        loads = left.loads
+        jacobian[motor] = left.motion.moves[:, 0] + total @ left.motion.twists[:, 0]
+        block.store(tip.motor_torques + motor, left.motion.torque[0])
+    for motor in set(range(tip.motors)) - set(jacobian):
+        places = [axis * tip.motors + motor for axis in range(3)]
+        known, twist = ([block.load(first + place) for place in places] for first in (tip.jacobian, tip.twists))
+        jacobian[motor] = vector(known) + total @ vector(twist)
+    for motor, column in jacobian.items():
+        for axis, value in enumerate((axes @ column).tolist()):
+            block.store(tip.jacobian + axis * tip.motors + motor, value)
+    for group in range(tip.held):
+        column = vector([block.load(tip.held_columns + axis * tip.held + group) for axis in range(3)])
+        for axis, value in enumerate((axes @ column).tolist()):
+            block.store(tip.held_columns + axis * tip.held + group, value)
+    return block
+
+
+def _finish_column(passing: Passing, tip: TipPlaces) -> Block:
+    block = Block("finish_column", "Turn the tip column of an unknown into world axes.", ("i",))
+    axes = vector(block.loads(passing.base, 9)).reshape(3, 3)
+    column = vector([block.load(tip.columns + axis * tip.unknowns, "i") for axis in range(3)])
+    for axis, value in enumerate((axes @ column).tolist()):
+        block.store(tip.columns + axis * tip.unknowns, value, "i")
+    return block

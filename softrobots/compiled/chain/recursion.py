@@ -1,0 +1,208 @@
+"""From base to tip and back along a chain, traced element by element.
+
+`enter` carries the axes outwards. `leave` comes back with the loads beyond the element, eliminates its coordinates and hands
+on. Short chains are traced as a whole (`softrobots.compiled.chain.short_chain`), long ones a body for each kind of element
+(`softrobots.compiled.chain.long_chain`); the mathematics here is the same for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint
+from softrobots.compiled.chain.elimination import Beyond, Eliminated, eliminate
+from softrobots.compiled.trace.expressions import Scalar, if_less, smaller
+from softrobots.compiled.trace.stumpff_series import LARGEST
+
+
+@dataclass
+class TracedElement:
+    """An element with its numbers: constants where they are known when the code is written, table entries where not."""
+
+    kind: str
+    """`turn`, `slide` or `section`."""
+    rotation: Any
+    """Axes of its frame in those of the element before, shape (3, 3)."""
+    translation: Any
+    """Its origin there, shape (3,) [m]."""
+    bodies: list[tuple[Scalar, Any]]
+    """Mass and first moment of its bodies."""
+    mass_beyond: Scalar
+    """Mass beyond it, without its own [kg]."""
+    coordinates: list[Scalar]
+    """Joint position; section coordinates, locked ones included [rad or m]."""
+    moving: tuple[int, ...]
+    """Which of the coordinates are unknown; none for a motor."""
+    stiffness: list[Scalar]
+    """Stiffness of the unknown ones [N m/rad or N/m]."""
+    rest: list[Scalar]
+    """Where they are relaxed [rad or m]."""
+    pull: list[Scalar]
+    """Constant load on them, of muscles with a given tension [N m or N]."""
+    held: tuple[int | None, ...]
+    """By which multiplier of the segment each unknown coordinate is held, if by one."""
+    length: Scalar = 0.0
+    """Rest length of a section [m]."""
+
+
+@dataclass
+class Entered:
+    """An element on the way out."""
+
+    start: Any
+    """Axes of its frame before its own motion, shape (3, 3)."""
+    shift: Any
+    """From the origin of the element before to its own at zero, shape (3,) [m]."""
+    end: Any
+    """Axes behind it, shape (3, 3)."""
+    screw: Screw | None
+    """The motion of a section."""
+
+
+@dataclass
+class Balance:
+    """Sums over the elements that were left behind."""
+
+    energy: Scalar = 0.0
+    """Elastic energy [J]."""
+    weight: Scalar = 0.0
+    """Squared torque of the weight on all unknown coordinates."""
+    room: Scalar = 1.0
+    """Negative where a section is beyond its range."""
+
+
+@dataclass
+class Left:
+    """An element on the way back."""
+
+    motion: Motion
+    """How it moves what is beyond; unknown coordinates only, for a motor its joint."""
+    gradient: list[Scalar]
+    """Derivative of the energy with respect to its unknown coordinates."""
+    eliminated: Eliminated | None
+    """Its part of the factorisation; None for a motor."""
+    loads: list[Load]
+    """The loads with levers from the origin of the element before."""
+    beyond: Beyond
+    """What it hands on."""
+    twists: Any = None
+    """Turn per unknown coordinate, with zeros for multipliers, shape (n, k)."""
+
+
+def enter(element: TracedElement, axes: Any) -> Entered:
+    """Go through an element outwards; `axes` are those behind the element before."""
+    start, shift = axes @ element.rotation, axes @ element.translation
+    if element.kind == "section":
+        screw = Screw(element.coordinates, element.length)
+        return Entered(start, shift, start @ screw.rotation, screw)
+    end = turned(start, element.coordinates[0]) if element.kind == "turn" else start
+    return Entered(start, shift, end, None)
+
+
+def leave(
+    element: TracedElement,
+    entered: Entered,
+    loads: Sequence[Load],
+    beyond: Beyond,
+    balance: Balance,
+    *,
+    tip_columns: bool = False,
+    guard: Scalar = 0.0,
+) -> Left:
+    """Go through an element inwards.
+
+    Args:
+        element: The element.
+        entered: What the way out left.
+        loads: The force on the tip, and the weight if there is gravity, with levers from the element's end.
+        beyond: What the elements beyond hand on.
+        balance: Sums, which are added to.
+        tip_columns: Whether the motion of the tip is solved for, too: three right-hand sides after that of the balance.
+        guard: See `elimination.eliminate`.
+
+    Returns:
+        The element left behind.
+    """
+    motion, at_start = _motion(element, entered, loads)
+    moving = list(element.moving)
+    for place, row in enumerate(moving):
+        stretch = element.coordinates[row] - element.rest[place]
+        balance.energy = balance.energy + stretch * stretch * (0.5 * element.stiffness[place])
+        balance.energy = balance.energy - element.pull[place] * element.coordinates[row]
+        if len(loads) > 1:
+            balance.weight = balance.weight + motion.weight[row] * motion.weight[row]
+    if entered.screw is not None:
+        balance.room = smaller(balance.room, _room(element, entered.screw))
+    shifted = [Load(load.force, load.lever + entered.shift * load.share, load.share) for load in at_start]
+    if not moving:
+        return Left(motion, [], None, shifted, beyond)
+    motion = Motion(
+        motion.twists[:, moving],
+        motion.bends[:, moving],
+        motion.moves[:, moving],
+        [motion.torque[row] for row in moving],
+        [motion.weight[row] for row in moving],
+        motion.curvature[np.ix_(moving, moving)],
+    )
+    gradient = [
+        (element.coordinates[row] - element.rest[place]) * element.stiffness[place] - motion.torque[place] - element.pull[place]
+        for place, row in enumerate(moving)
+    ]
+    held = constants(np.zeros((len(beyond.matrix) - 3, len(moving))))
+    for place, multiplier in enumerate(element.held):
+        if multiplier is not None:
+            held[multiplier, place] = -1.0
+    twists = np.concatenate([motion.twists, held * 0.0])
+    stiffness = -motion.curvature
+    for place, own in enumerate(element.stiffness):
+        stiffness[place, place] = stiffness[place, place] + own
+    sides = [gradient, *((-motion.moves[axis]).tolist() for axis in range(3))] if tip_columns else [gradient]
+    eliminated, handed_on = eliminate(
+        beyond, twists, np.concatenate([motion.bends, held]), stiffness, sides, element.stiffness, guard=guard
+    )
+    return Left(motion, gradient, eliminated, shifted, handed_on, twists)
+
+
+def _motion(element: TracedElement, entered: Entered, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:
+    """Motion of an element, and the loads with levers from its origin at zero."""
+    if entered.screw is not None:
+        motion, levers = entered.screw.motion(loads, element.bodies, entered.start)
+        own = sum((mass for mass, _ in element.bodies), 0.0)
+        shares = [1.0, element.mass_beyond + own]
+        return motion, [
+            Load(load.force, lever, share) for load, lever, share in zip(loads, levers, shares[: len(loads)], strict=True)
+        ]
+    ((mass, first_moment),) = element.bodies
+    here = [loads[0]]
+    if len(loads) > 1:
+        lever = loads[1].lever + entered.end @ first_moment
+        here.append(Load(loads[1].force, lever, element.mass_beyond + mass))
+    axis = entered.start[:, 2]
+    if element.kind == "turn":
+        return turning_joint(axis, here), here
+    slid = [Load(load.force, load.lever + axis * (load.share * element.coordinates[0]), load.share) for load in here]
+    return sliding_joint(axis, here), slid
+
+
+def _room(element: TracedElement, screw: Screw) -> Scalar:
+    """Positive while a section is in range: less than half a turn of bending and of twist, and some length left."""
+    direction = screw.position
+    at_end = screw.rotation[:, 2] @ direction
+    size = (direction @ direction) * 1e-6
+    rooms: list[Scalar] = [
+        LARGEST
+        - (element.coordinates[0] * element.coordinates[0] + element.coordinates[1] * element.coordinates[1])
+        - element.coordinates[2] * element.coordinates[2],
+        if_less(0.0, direction[2], direction[2] * direction[2] - size, -1.0),
+        if_less(0.0, at_end, at_end * at_end - size, -1.0),
+        np.pi**2 - element.coordinates[2] * element.coordinates[2],
+        element.coordinates[3] + 0.999 * element.length,
+    ]
+    room: Scalar = rooms[0]
+    for one in rooms[1:]:
+        room = smaller(room, one)
+    return room

@@ -1,0 +1,190 @@
+"""Code for a short chain: the whole robot in one straight line.
+
+All is traced in the axes behind the leading motors, which carry the rest of the robot as one rigid body: the load is turned
+into those axes once, and their joints cost nothing afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import Load, Vector, constants, turned, vector
+from softrobots.compiled.chain.elimination import Beyond
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.recursion import Balance, Entered, Left, TracedElement, enter, leave
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Scalar
+
+
+@dataclass
+class Evaluation:
+    """A chain at given coordinates, traced; vectors in the axes behind the leading motors."""
+
+    left: list[Left]
+    """What is known of each element, the leading motors included."""
+    turns: list[list[Vector]]
+    """By element and right-hand side: the turn of all that is nearer to the base."""
+    steps: list[list[Vector]]
+    """By element and right-hand side: its part of the solution; the first side is the Newton step."""
+    gradient: list[Scalar]
+    """Derivative of the energy with respect to the unknowns: their out-of-balance torque."""
+    step: list[Scalar]
+    """Newton step of the unknowns."""
+    balance: Balance
+    """Sums over the elements."""
+    beyond: Beyond
+    """Pivots."""
+    energy: Scalar
+    """Elastic energy plus potential of the loads, up to a constant [J]."""
+    tip: Vector
+    """The tip from the origin behind the leading motors [m]."""
+    base_axes: Any
+    """Axes of the frame behind the leading motors in the world, shape (3, 3)."""
+    base: Vector
+    """Its origin in the world [m]."""
+    force: Vector
+    """The force on the tip [N]."""
+
+
+def evaluate(
+    unknowns: Unknowns,
+    block: Block,
+    layout: Layout,
+    *,
+    weight: bool,
+    at_rest: bool = False,
+    forceless: bool = False,
+    tip_columns: bool = False,
+    guarded: bool = False,
+) -> Evaluation:
+    """Trace a chain at the coordinates in the workspace.
+
+    Args:
+        unknowns: The chain.
+        block: Where its expressions belong.
+        layout: The places in the workspace.
+        weight: Whether there is gravity.
+        at_rest: Take the unknowns at rest, whatever the workspace says.
+        forceless: Take no force on the tip.
+        tip_columns: Solve for the motion of the tip, too.
+        guarded: Make pivots positive if the workspace says so.
+
+    Returns:
+        Everything about that point.
+    """
+    chain = unknowns.chain
+    rest = [float(chain.rest[strain]) for strain in unknowns.strains]
+    elements = [
+        unknowns.traced(
+            row,
+            lambda motor: block.load(motor),
+            lambda place: rest[place] if at_rest else block.load(layout.unknown + place),
+            lambda _: 0.0,
+        )
+        for row in range(len(chain.elements))
+    ]
+    leading = unknowns.leading_motors
+    base_axes, base = place_base(elements[:leading])
+    force = constants(np.zeros(3)) if forceless else base_axes.T @ vector(block.loads(layout.force, 3))
+    forces = [force, base_axes.T @ vector(block.loads(layout.gravity, 3))] if weight else [force]
+
+    axes, way_out = constants(np.eye(3)), []
+    for element in elements[leading:]:
+        way_out.append(enter(element, axes))
+        axes = way_out[-1].end
+    levers, shares = [axes @ constants(chain.tip_translation), constants(np.zeros(3))], [1.0, 0.0]
+    loads = [Load(*one) for one in zip(forces, levers, shares, strict=False)]
+    guard = block.load(layout.single("guard")) if guarded else 0.0
+
+    way_out = seen_backwards(elements[:leading]) + way_out
+    beyond, balance = Beyond.tip(4 if tip_columns else 1), Balance()
+    left: list[Left | None] = [None] * len(elements)
+    energy: Scalar = 0.0
+    tip = loads[0].lever
+    for row in reversed(range(len(elements))):
+        one = leave(elements[row], way_out[row], loads, beyond, balance, tip_columns=tip_columns, guard=guard)
+        left[row], loads, beyond = one, one.loads, one.beyond
+        if row == leading:
+            tip = loads[0].lever
+            energy = balance.energy - sum(load.force @ load.lever for load in loads)
+    return _solved(
+        unknowns,
+        [one for one in left if one is not None],
+        4 if tip_columns else 1,
+        Evaluation([], [], [], [], [], balance, beyond, energy, tip, base_axes, base, force),
+    )
+
+
+def _solved(unknowns: Unknowns, left: list[Left], sides: int, made: Evaluation) -> Evaluation:
+    """Find the steps on the second way out."""
+    turns = [constants(np.zeros(3)) for _ in range(sides)]
+    by_strain: dict[int, tuple[Scalar, Scalar]] = {}
+    for row, one in enumerate(left):
+        made.turns.append(list(turns))
+        steps: list[Vector] = [constants(np.zeros(0))] * sides
+        if one.eliminated is not None:
+            steps = [one.eliminated.steps(side, turn) for side, turn in enumerate(turns)]
+            for place, strain in enumerate(unknowns.moving(row)):
+                by_strain[strain] = (one.gradient[place], steps[0][place])
+            turns = [turn + one.twists @ step for turn, step in zip(turns, steps, strict=True)]
+        made.steps.append(steps)
+    made.left = left
+    made.gradient, made.step = ([by_strain[strain][kind] for strain in unknowns.strains] for kind in range(2))
+    return made
+
+
+def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+    """Solve for the unknowns with another right-hand side.
+
+    Args:
+        unknowns: The chain.
+        point: Its evaluation.
+        sides: Gradient of the unknowns of each element.
+
+    Returns:
+        Step of each unknown.
+    """
+    total, columns = constants(np.zeros(3)), {}
+    for row in reversed(range(len(point.left))):
+        one = point.left[row]
+        if one.eliminated is not None:
+            eliminated = one.eliminated
+            column = eliminated.reduced([value + one.twists[:, j] @ total for j, value in enumerate(sides[row])])
+            for coupling, pivot, value in zip(eliminated.coupling, eliminated.inverse_pivots, column, strict=True):
+                total = total + coupling * (pivot * value)
+            columns[row] = replace(eliminated, columns=[column])
+    turn: Vector = constants(np.zeros(3))
+    steps: dict[int, Scalar] = {}
+    for row, eliminated in sorted(columns.items()):
+        moved = eliminated.steps(0, turn)
+        turn = turn + point.left[row].twists @ moved
+        steps |= dict(zip(unknowns.moving(row), moved, strict=True))
+    return [steps[strain] for strain in unknowns.strains]
+
+
+def place_base(leading: list[TracedElement]) -> tuple[Any, Vector]:
+    """Axes, shape (3, 3), and origin, shape (3,) [m], of the frame behind the leading motors in the world."""
+    axes, origin = constants(np.eye(3)), constants(np.zeros(3))
+    for element in leading:
+        origin, axes = origin + axes @ element.translation, axes @ element.rotation
+        if element.kind == "turn":
+            axes = turned(axes, element.coordinates[0])
+        else:
+            origin = origin + axes[:, 2] * element.coordinates[0]
+    return axes, origin
+
+
+def seen_backwards(leading: list[TracedElement]) -> list[Entered]:
+    """The leading motors as seen from behind the last of them."""
+    axes, made = constants(np.eye(3)), []
+    for element in reversed(leading):
+        start = turned(axes, -element.coordinates[0]) if element.kind == "turn" else axes
+        before = start @ element.rotation.T
+        made.append(Entered(start, before @ element.translation, axes, None))
+        axes = before
+    return made[::-1]

@@ -1,0 +1,77 @@
+"""Systems of up to three equations or unknowns in closed form, traced."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import Vector, constants, cross, vector
+from softrobots.compiled.trace.expressions import Scalar
+
+_ROOT_STEPS = 5
+
+
+def solve_small(matrix: Any, right: Vector) -> Vector:
+    """Solve `matrix x = right`; least squares with more rows than columns, the smallest `x` with fewer.
+
+    Args:
+        matrix: Shape (m, n), the smaller of the two at most three.
+        right: Shape (m,).
+
+    Returns:
+        Shape (n,).
+    """
+    rows, columns = matrix.shape
+    if rows > columns:
+        return inverse_small(matrix.T @ matrix) @ (matrix.T @ right)
+    if rows < columns:
+        return matrix.T @ (inverse_small(matrix @ matrix.T) @ right)
+    return inverse_small(matrix) @ right
+
+
+def inverse_small(matrix: Any) -> Any:
+    """Inverse by cofactors, shape (n, n) with n up to three; huge but finite where there is none."""
+    n = len(matrix)
+    if n == 1:
+        return np.array([[_reciprocal(matrix[0, 0])]], dtype=object)
+    if n == 2:
+        (a, b), (c, d) = matrix
+        return np.array([[d, -b], [-c, a]], dtype=object) * _reciprocal(a * d - b * c)
+    rows = [cross(matrix[:, 1], matrix[:, 2]), cross(matrix[:, 2], matrix[:, 0]), cross(matrix[:, 0], matrix[:, 1])]
+    return np.array(rows, dtype=object) * _reciprocal(matrix[:, 0] @ rows[0])
+
+
+def _reciprocal(value: Scalar) -> Scalar:
+    return 1.0 / (value + 1e-300)  # plain floats raise at zero
+
+
+def smallest_square(matrix: Any) -> Scalar:
+    """Square of the smallest singular value, shape (m, n) with the smaller of the two at most three.
+
+    The smallest root of the characteristic polynomial of the smaller product with the transpose, by Newton from zero, which
+    comes from below; enough steps for all but a factor near one.
+    """
+    product = matrix @ matrix.T if matrix.shape[0] <= matrix.shape[1] else matrix.T @ matrix
+    n = len(product)
+    if n == 1:
+        return product[0, 0]  # type: ignore[no-any-return]
+    trace = sum((product[i, i] for i in range(1, n)), product[0, 0])
+    if n == 2:
+        pairs = product[0, 0] * product[1, 1] - product[0, 1] * product[0, 1]
+        return _smallest_root(vector([pairs, -trace, 1.0]))
+    pairs = sum((product[i, i] * product[j, j] - product[i, j] * product[i, j] for i, j in ((0, 1), (0, 2), (1, 2))), 0.0)
+    last = product[0] @ cross(product[1], product[2])
+    return _smallest_root(vector([last, -pairs, trace, -1.0]))
+
+
+def _smallest_root(coefficients: Vector) -> Scalar:
+    """Newton from zero on a polynomial with real, non-negative roots; coefficients from the constant one on."""
+    root: Scalar = 0.0
+    for _ in range(_ROOT_STEPS):
+        value, slope = constants(np.zeros(2))
+        for coefficient in coefficients[::-1]:
+            slope = slope * root + value
+            value = value * root + coefficient
+        root = root - value / (slope + 1e-300)
+    return root

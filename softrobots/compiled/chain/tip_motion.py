@@ -1,0 +1,101 @@
+r"""How the tip of a chain follows its motors while the springs give way, traced; for load estimation and inverse kinematics.
+
+With the tip's columns `X = K^-1 J_k^T` of an evaluation, the elastostatic Jacobian of [Troise 2021] (see
+`softrobots.elastostatic_jacobian`) is `E = J_m - X^T H_km`. The second derivatives `H_km` of the energy couple a motor `m`
+strain `k` beyond it by `-omega_m . c_k` and nearer to the base by `-omega_k . c_m`, so that sums over the strains give
+
+.. math:: E_m = J_m + \omega_m \cdot \sum_{k\,beyond} c_k X_k + c_m \cdot \varphi_m
+
+Its transpose tells how motor torques follow the force on the tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import Vector, constants
+from softrobots.compiled.chain.short_chain import Evaluation, solve_again
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.trace.expressions import Scalar
+from softrobots.model.serial_chain import ChainJoint
+
+
+@dataclass
+class TipMotion:
+    """The tip and the motors at an evaluated point, in the axes behind the leading motors."""
+
+    jacobian: Any
+    """Elastostatic Jacobian, shape (3, n_motors) [m/rad or m/m]."""
+    motor_torques: Vector
+    """Load on the motors, shape (n_motors,) [N m or N]."""
+    torque_change: Vector
+    """Its change when the unknowns take their Newton step, shape (n_motors,)."""
+    tip_change: Vector
+    """Change of the tip when they do, shape (3,) [m]."""
+
+
+def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
+    """Sum up how the tip follows the motors.
+
+    Args:
+        unknowns: The chain.
+        point: An evaluation with tip columns.
+
+    Returns:
+        The Jacobian, and what a Newton step changes.
+    """
+    count = unknowns.chain.n_motors
+    jacobian = constants(np.zeros((3, count)))
+    torques, changes, tip = constants(np.zeros(count)), constants(np.zeros(count)), constants(np.zeros(3))
+    beyond = [constants(np.zeros(3)) for _ in range(4)]  # sums of c x over the strains beyond, per right-hand side
+    for row in reversed(range(len(point.left))):
+        one, motor = point.left[row], motor_of(unknowns, row)
+        if motor is None:
+            beyond = [total + one.motion.bends @ step for total, step in zip(beyond, point.steps[row], strict=True)]
+            tip = tip + one.motion.moves @ point.steps[row][0]
+            continue
+        twist, bend = one.motion.twists[:, 0], one.motion.bends[:, 0]
+        follow = [twist @ total + bend @ turn[:3] for total, turn in zip(beyond, point.turns[row], strict=True)]
+        jacobian[:, motor] = one.motion.moves[:, 0] + np.array(follow[1:], dtype=object)
+        torques[motor] = one.motion.torque[0]
+        changes[motor] = follow[0]
+    return TipMotion(jacobian, torques, changes, tip)
+
+
+def step_with_motors(unknowns: Unknowns, point: Evaluation, motors: Vector) -> list[Scalar]:
+    """Newton step of the unknowns when the motors move, too.
+
+    Args:
+        unknowns: The chain.
+        point: An evaluation.
+        motors: Change of the motors, shape (n_motors,).
+
+    Returns:
+        Step of each unknown.
+    """
+    bends = constants(np.zeros(3))  # of the motors beyond
+    for row in range(len(point.left)):
+        motor = motor_of(unknowns, row)
+        if motor is not None:
+            bends = bends + point.left[row].motion.bends[:, 0] * motors[motor]
+    turn = constants(np.zeros(3))  # of the motors nearer to the base
+    sides: list[list[Scalar]] = []
+    for row, one in enumerate(point.left):
+        motor = motor_of(unknowns, row)
+        if motor is not None:
+            turn = turn + one.motion.twists[:, 0] * motors[motor]
+            bends = bends - one.motion.bends[:, 0] * motors[motor]
+            sides.append([])
+        else:
+            coupling = one.motion.bends.T @ turn + one.motion.twists.T @ bends
+            sides.append([value - by for value, by in zip(one.gradient, coupling, strict=True)])
+    return solve_again(unknowns, point, sides)
+
+
+def motor_of(unknowns: Unknowns, row: int) -> int | None:
+    """Number of the motor at an element; None if it is none."""
+    element = unknowns.chain.elements[row]
+    return element.motor if isinstance(element, ChainJoint) else None

@@ -1,0 +1,236 @@
+"""Load estimation and inverse kinematics on top of the straight-line code; kernel language, see `equilibrium_drivers`.
+
+First Newton on everything at once. What that does not settle is searched: the springs settle by descent at every step, and the
+force or the motors take damped steps (Levenberg-Marquardt) that are kept only if they come nearer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from softrobots.compiled.drivers.equilibrium_drivers import descend, go_to_start, is_usable
+from softrobots.compiled.drivers.intrinsics import Array
+from softrobots.compiled.settings import (
+    FORCE_PASSES,
+    HIDDEN,
+    LARGEST_SIZE,
+    LEAST_SIZE,
+    OBSERVABLE,
+    PASSES,
+    SEARCH_STEPS,
+    TOLERANCE,
+)
+
+# Made for each robot.
+CERTIFIED: int
+UNSTABLE: int
+NOT_A_NUMBER: int
+UNOBSERVABLE: int
+NOT_REACHED: int
+BEYOND_LIMITS: int
+UNKNOWN: int
+ERROR: int
+FORCE: int
+MODE: int
+MISSING: int
+OBSERVED: int
+DAMPING: int
+TOLERATED: int
+TORQUES: int
+TARGET: int
+FOLLOWING: int
+AHEAD: int
+BEFORE: int
+N: int
+N_MOTORS: int
+N_VARIED: int
+REACH: float
+LOWER: tuple[float, ...]
+UPPER: tuple[float, ...]
+prepare: Callable[[Array], None]
+prepare_force: Callable[[Array], None]
+first_force_pass: Callable[[Array], None]
+force_pass: Callable[[Array], None]
+look_for_force: Callable[[Array], None]
+target_step: Callable[[Array], None]
+look_for_target: Callable[[Array], None]
+
+
+def look(w: Array, varied: int) -> None:
+    """Evaluate a search for the motors (`varied` is 0) or for the force (its place)."""
+    if varied == 0:
+        look_for_target(w)
+    else:
+        look_for_force(w)
+
+
+def goal(w: Array, varied: int) -> float:
+    """Return the squared distance or torque at which a search is done."""
+    if varied == 0:
+        return w[TOLERATED] * w[TOLERATED]
+    size = LEAST_SIZE * LEAST_SIZE
+    total = 0.0
+    for i in range(N_MOTORS):
+        total += w[TORQUES + i] * w[TORQUES + i]
+    if total > LARGEST_SIZE * LARGEST_SIZE:
+        return -1.0  # never
+    if total > size:
+        size = total
+    return TOLERANCE * TOLERANCE * size
+
+
+def go_ahead(w: Array, varied: int, count: int) -> None:
+    """Remember the point and go where the last look led; motors no further than their limits."""
+    for i in range(count):
+        w[BEFORE + i] = w[varied + i]
+        w[varied + i] = w[AHEAD + i]
+        if varied == 0:
+            if w[i] < LOWER[i]:
+                w[i] = LOWER[i]
+            if w[i] > UPPER[i]:
+                w[i] = UPPER[i]
+    for i in range(N):
+        w[BEFORE + N_VARIED + i] = w[UNKNOWN + i]
+        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i]
+
+
+def remember(w: Array) -> None:
+    """Keep motors and unknowns as the point before."""
+    for i in range(N_MOTORS):
+        w[BEFORE + i] = w[i]
+    for i in range(N):
+        w[BEFORE + N_VARIED + i] = w[UNKNOWN + i]
+
+
+def leap(w: Array) -> None:
+    """Go where the last step to a target leads."""
+    for i in range(N_MOTORS):
+        w[i] = w[AHEAD + i]
+    for i in range(N):
+        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i]
+
+
+def go_back(w: Array, varied: int, count: int) -> None:
+    """Go back to the point before."""
+    for i in range(count):
+        w[varied + i] = w[BEFORE + i]
+    for i in range(N):
+        w[UNKNOWN + i] = w[BEFORE + N_VARIED + i]
+
+
+def estimated(w: Array) -> int:
+    """Return the status of a force that explains the motor torques."""
+    if w[OBSERVED] < OBSERVABLE * OBSERVABLE * REACH * REACH:
+        return UNOBSERVABLE
+    return CERTIFIED
+
+
+def search(w: Array, varied: int, count: int) -> int:
+    """Search the force or the motors from the point in the workspace; return the status."""
+    prepare(w)
+    status = descend(w)
+    if varied > 0:
+        prepare_force(w)
+    damping = 0.03 * REACH
+    least = 0.0
+    for _ in range(SEARCH_STEPS):
+        w[DAMPING] = damping
+        look(w, varied)
+        if status > UNSTABLE or w[MISSING] <= goal(w, varied) or damping > 1e3 * REACH:
+            break
+        if w[OBSERVED] < OBSERVABLE * OBSERVABLE * REACH * REACH:
+            least = OBSERVABLE * REACH
+        missing = w[MISSING]
+        go_ahead(w, varied, count)
+        prepare(w)
+        status = descend(w)
+        look(w, varied)
+        if status == CERTIFIED and w[MISSING] < missing:
+            damping *= 0.1
+            if damping < 1e-7 * REACH:
+                damping = 0.0
+            if damping < least:
+                damping = least
+        else:
+            go_back(w, varied, count)
+            prepare(w)
+            status = descend(w)
+            damping *= 10.0
+            if damping < 1e-6 * REACH:
+                damping = 1e-6 * REACH
+    if status != CERTIFIED:
+        return status
+    if varied > 0 and estimated(w) != CERTIFIED and w[MISSING] * TOLERANCE * TOLERANCE <= HIDDEN * HIDDEN * goal(w, varied):
+        return UNOBSERVABLE
+    if not w[MISSING] <= goal(w, varied):
+        return NOT_REACHED
+    return within_limits(w, varied)
+
+
+def within_limits(w: Array, varied: int) -> int:
+    """Return the status of motors that have been sought."""
+    if varied == 0:
+        for i in range(N_MOTORS):
+            if w[i] < LOWER[i] - 1e-9 or w[i] > UPPER[i] + 1e-9:
+                return BEYOND_LIMITS
+    return CERTIFIED
+
+
+def estimate(w: Array) -> int:
+    """Find the force that explains the motor torques in the workspace; return the status."""
+    for i in range(3):
+        w[FORCE + i] = 0.0
+    if not is_usable(w):
+        return NOT_A_NUMBER
+    first_force_pass(w)
+    for _ in range(FORCE_PASSES):
+        if w[MODE] > 0.5:
+            break
+        force_pass(w)
+    if w[MODE] > 0.5 and w[MODE] < 1.5:
+        return estimated(w)
+    for i in range(3):
+        w[FORCE + i] = 0.0
+    go_to_start(w)
+    return search(w, FORCE, 3)
+
+
+def step_to_target(w: Array) -> bool:
+    """Newton towards the target; tell whether it arrived. What leads to the one that follows is left ahead."""
+    w[MODE] = 0.0
+    for _ in range(PASSES):
+        target_step(w)
+        if w[MODE] > 0.5:
+            break
+        leap(w)
+    return w[MODE] > 0.5 and w[MODE] < 1.5 and within_limits(w, 0) == CERTIFIED
+
+
+def reach(w: Array) -> int:
+    """Find motors that put the tip at the target in the workspace, from those there; return the status."""
+    if not is_usable(w):
+        return NOT_A_NUMBER
+    remember(w)
+    for i in range(3):
+        w[FOLLOWING + i] = w[TARGET + i]
+    if step_to_target(w):
+        return CERTIFIED
+    go_back(w, 0, N_MOTORS)
+    return search(w, 0, N_MOTORS)
+
+
+FUNCTIONS: tuple[Callable[..., object], ...] = (
+    look,
+    goal,
+    go_ahead,
+    remember,
+    leap,
+    go_back,
+    within_limits,
+    estimated,
+    search,
+    estimate,
+    step_to_target,
+    reach,
+)
+"""All of them, each behind those that it uses."""

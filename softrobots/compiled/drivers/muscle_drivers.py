@@ -1,0 +1,31 @@
+"""What given muscles do, for callers of the C code; kernel language, see `softrobots.compiled.drivers.equilibrium_drivers`.
+
+The Python solvers do the same with matrices in `softrobots.compiled.run.actuation`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from softrobots.compiled.drivers.intrinsics import Array
+
+# Made for each robot.
+MUSCLE_PLACE: int
+MUSCLE_REST: tuple[float, ...]
+MUSCLE_BASE: tuple[float, ...]
+MUSCLE_SLOPE: tuple[float, ...]
+N: int
+N_MUSCLES: int
+
+
+def put_muscles(w: Array, muscles: Array) -> None:
+    """Write what `N_MUSCLES` muscle lengths [m] or tensions [N] do, base to tip; call it before `settle`."""
+    for i in range(N):
+        total = MUSCLE_BASE[i]
+        for j in range(N_MUSCLES):
+            total += MUSCLE_SLOPE[N_MUSCLES * i + j] * (muscles[j] - MUSCLE_REST[j])
+        w[MUSCLE_PLACE + i] = total
+
+
+FUNCTIONS: tuple[Callable[..., object], ...] = (put_muscles,)
+"""All of them."""

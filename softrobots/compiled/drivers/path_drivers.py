@@ -1,0 +1,139 @@
+"""Following a path with the tip, waypoint by waypoint; kernel language, see `equilibrium_drivers`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from softrobots.compiled.drivers.intrinsics import Array, fabs, where
+from softrobots.compiled.drivers.motor_drivers import go_back, reach, remember, step_to_target
+
+# Made for each robot.
+CERTIFIED: int
+NOT_REACHED: int
+UNKNOWN: int
+ERROR: int
+MODE: int
+MISSING: int
+TARGET: int
+FOLLOWING: int
+AHEAD: int
+BEFORE: int
+FORESEEN: int
+CORRECTION: int
+N: int
+N_MOTORS: int
+N_VARIED: int
+target_step: Callable[[Array], None]
+
+
+def near(w: Array, place: int) -> bool:
+    """Tell whether no motor has gone further than a radian from those kept at a place: another elbow or turn would be."""
+    furthest = 0.0
+    for i in range(N_MOTORS):
+        if fabs(w[i] - w[place + i]) > furthest:
+            furthest = fabs(w[i] - w[place + i])
+    return furthest <= 1.0
+
+
+def foresee(w: Array) -> None:
+    """Go where the last step leads, corrected by what the step before it was short of: then it is right to third order."""
+    for i in range(N_MOTORS):
+        w[FORESEEN + i] = w[AHEAD + i]
+        w[i] = w[AHEAD + i] + w[CORRECTION + i]
+    for i in range(N):
+        w[FORESEEN + N_VARIED + i] = w[AHEAD + N_VARIED + i]
+        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i] + w[CORRECTION + N_VARIED + i]
+
+
+def correct(w: Array, share: float) -> None:
+    """Remember what the last step was short of, or nothing."""
+    for i in range(N_MOTORS):
+        w[CORRECTION + i] = share * (w[i] - w[FORESEEN + i])
+    for i in range(N):
+        w[CORRECTION + N_VARIED + i] = share * (w[UNKNOWN + i] - w[FORESEEN + N_VARIED + i])
+
+
+def step_in_parts(w: Array, targets: Array, last: int, row: int) -> bool:
+    """Go from the last waypoint that was reached to this one through points between; tell whether it arrived.
+
+    `FORESEEN` keeps the motors at the last point between.
+    """
+    for doubling in range(1, 7):
+        parts = 1
+        for _ in range(doubling):
+            parts *= 2
+        go_back(w, 0, N_MOTORS)
+        for i in range(N_MOTORS):
+            w[FORESEEN + i] = w[i]
+        arrived = True
+        for part in range(1, parts + 1):
+            for i in range(3):
+                begin = targets[3 * last + i]
+                w[TARGET + i] = begin + (targets[3 * row + i] - begin) * part / parts
+                w[FOLLOWING + i] = w[TARGET + i]
+            if not step_to_target(w) or not near(w, FORESEEN):
+                arrived = False
+                break
+            for i in range(N_MOTORS):
+                w[FORESEEN + i] = w[i]
+        if arrived:
+            return True
+    return False
+
+
+def follow(
+    w: Array, targets: Array, count: int, motors: Array, unknowns: Array, residuals: Array, errors: Array, statuses: Array
+) -> int:
+    """Move the tip through `count` targets, each from the last; return how many it reached.
+
+    Motors and unknowns in the workspace are the start; a target is three numbers.
+    Results of each waypoint go into the arrays: `N_MOTORS` motors, `N` unknowns,
+    the squared residual, the squared distance from the target, the status.
+    """
+    reached = 0
+    last = 0
+    foreseen = 0
+    for row in range(count):
+        following = row + 1
+        if following == count:
+            following = row
+        for i in range(3):
+            w[TARGET + i] = targets[3 * row + i]
+            w[FOLLOWING + i] = targets[3 * following + i]
+        if row == 0:
+            status = reach(w)
+            target_step(w)
+            correct(w, 0.0)
+        else:
+            status = CERTIFIED
+            if step_to_target(w) and near(w, BEFORE):
+                correct(w, where(foreseen > 1, 1.0, 0.0))
+            else:
+                correct(w, 0.0)
+                if not step_in_parts(w, targets, last, row):
+                    foreseen = 0
+                    status = NOT_REACHED
+                    go_back(w, 0, N_MOTORS)
+                for i in range(3):
+                    w[TARGET + i] = targets[3 * row + i]
+                    w[FOLLOWING + i] = targets[3 * following + i]
+                w[MODE] = 0.0
+                target_step(w)
+        for i in range(N_MOTORS):
+            motors[N_MOTORS * row + i] = w[i]
+        for i in range(N):
+            unknowns[N * row + i] = w[UNKNOWN + i]
+        residuals[row] = w[ERROR]
+        errors[row] = w[MISSING]
+        statuses[row] = status
+        if status == CERTIFIED:
+            reached += 1
+            foreseen += 1
+            last = row
+            remember(w)
+            foresee(w)
+    return reached
+
+
+FUNCTIONS: tuple[Callable[..., object], ...] = (near, foresee, correct, step_in_parts, follow)
+"""All of them, each behind those that it uses."""

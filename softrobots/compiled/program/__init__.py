@@ -1,0 +1,1 @@
+"""The module that is generated for one robot: traced functions and drivers put together."""

@@ -1,0 +1,169 @@
+"""The generated module of a robot: constants, straight-line functions and drivers as one text in the kernel language."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from softrobots.compiled import settings
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.passing import TipPlaces
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.drivers import equilibrium_drivers as drivers
+from softrobots.compiled.drivers import lane_drivers, motor_drivers, muscle_drivers, path_drivers, trigonometry
+from softrobots.compiled.program.long_program import long_program
+from softrobots.compiled.program.manual import manual, public_names
+from softrobots.compiled.program.motor_program import force_blocks, target_blocks
+from softrobots.compiled.program.short_program import equilibrium_blocks
+from softrobots.compiled.statuses import Status
+from softrobots.compiled.trace.blocks import Block
+
+
+@dataclass(frozen=True)
+class Program:
+    """A generated module."""
+
+    text: str
+    """Its text."""
+    lane_text: str
+    """What follows it where many cases are worked on side by side."""
+    layout: Layout
+    """Places in the workspace."""
+    size: int
+    """Size of the workspace of one case."""
+    tip: TipPlaces | None
+    """Places of what a look at the tip finds; None for short chains, which have no such look."""
+    entry_points: tuple[str, ...]
+    """Functions that solve a case, and the places in the workspace that a caller needs."""
+
+
+def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
+    """Generate the code of a robot.
+
+    Args:
+        unknowns: The chain.
+        weight: Whether there is gravity.
+
+    Returns:
+        The program.
+    """
+    layout = Layout(unknowns.chain.n_motors, len(unknowns.strains))
+    functions, lane_functions = [*drivers.FUNCTIONS], [*lane_drivers.FUNCTIONS]
+    tables: dict[str, object] = {}
+    loops, lane_loops, entries, names = [], [], ["settle", "settle_from"], ["WORKSPACE_SIZE", "N", "N_MOTORS"]
+    tip = None
+    if len(unknowns.chain.muscle_rest):
+        tables |= _muscle_tables(unknowns, layout)
+        functions += muscle_drivers.FUNCTIONS
+        entries, names = [*entries, "put_muscles"], [*names, "N_MUSCLES"]
+    if unknowns.is_short:
+        blocks, size = equilibrium_blocks(unknowns, layout, weight=weight)
+        lanes, lane_size = blocks[1:3], size
+    else:
+        parts = long_program(unknowns, layout, weight=weight)
+        blocks, size, lanes, lane_size = parts.blocks + parts.look, parts.size, parts.blocks, parts.lane_size
+        tables |= {**parts.places, **parts.tables}
+        tip, entries = parts.tip, [*entries, "look_at_tip"]
+        loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
+    if unknowns.moved_by_motors:
+        by_force, size = force_blocks(unknowns, layout, size, weight=weight)
+        by_target = target_blocks(unknowns, layout, weight=weight)
+        lane_size, entries = size, [*entries, "estimate", "reach", "follow"]
+        blocks = blocks + by_force + by_target
+        lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
+        functions += motor_drivers.FUNCTIONS + path_drivers.FUNCTIONS
+        lane_functions += lane_drivers.MOTOR_FUNCTIONS
+    names += [*public_names(unknowns, layout, tip, weight=weight), *Status.__members__]
+    told = manual(unknowns, layout, tip, weight=weight).replace("\\", "\\\\").replace('"""', r"\"\"\"")  # names end no text
+    title = f'"""{told}\n"""'
+    text = "\n\n\n".join(
+        [
+            title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
+            *_texts(trigonometry.FUNCTIONS),
+            *(block.text() for block in blocks),
+            *loops,
+            *_texts(functions),
+        ]
+    )
+    lane_texts = [lane_block(block).text(lanes=True) for block in lanes]
+    lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *_texts(lane_functions)])
+    return Program(text + "\n", lane_text + "\n", layout, size, tip, (*entries, *names))
+
+
+def _lanes(size: int) -> int:
+    """How many cases are worked on side by side: so many that their workspaces stay in the cache of a core."""
+    count = settings.LANES
+    while count > settings.FEWEST_LANES and count * size * 8 > settings.LANE_MEMORY:
+        count //= 2
+    return count
+
+
+def lane_block(block: Block) -> Block:
+    """The same block under the name that its form for lanes has."""
+    return Block(f"{block.name}_lanes", block.purpose, block.parameters, block.trace, block.stores)
+
+
+def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, tables: dict[str, object]) -> str:
+    chain, strains = unknowns.chain, unknowns.strains
+    softest = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
+    group = {strain: row for row, one in enumerate(chain.held) for strain in one}
+    made: dict[str, object] = dict(layout.constants())
+    made |= {
+        "WORKSPACE_SIZE": size,
+        "LANE_SIZE": lane_size,
+        "LANES": _lanes(lane_size),
+        "HELD": len(chain.held),
+        **{status.name: status.value for status in Status},
+        "TOLERANCE": settings.TOLERANCE,
+        "TIGHT": settings.TIGHT,
+        "LEAST_SOFTNESS": settings.LEAST_SOFTNESS,
+        "LEAST_GUARD": settings.LEAST_GUARD,
+        "LARGEST_GUARD": settings.LARGEST_GUARD,
+        "LARGEST_STEP": settings.LARGEST_STEP,
+        "SHORT_STEP": settings.SHORT_STEP,
+        "ARMIJO": settings.ARMIJO,
+        "PASSES": settings.PASSES,
+        "FORCE_PASSES": settings.FORCE_PASSES,
+        "DESCENT_STEPS": settings.DESCENT_STEPS,
+        "SEARCH_STEPS": settings.SEARCH_STEPS,
+        "LEAST_SIZE": settings.LEAST_SIZE,
+        "OBSERVABLE": settings.OBSERVABLE,
+        "HIDDEN": settings.HIDDEN,
+        "LARGEST_SIZE": settings.LARGEST_SIZE,
+        "LARGEST_NUMBER": settings.LARGEST_NUMBER,
+        "LARGEST_POSITION": settings.LARGEST_POSITION,
+        "REACH": float(chain.reach),
+        "N_VARIED": max(layout.motors, 3),
+        "LOWER": tuple(np.maximum(chain.limits[: layout.motors, 0], -1e300).tolist()),
+        "UPPER": tuple(np.minimum(chain.limits[: layout.motors, 1], 1e300).tolist()),
+        "SPRING_ROUNDING": unknowns.spring_rounding,
+        "REST": tuple(float(chain.rest[strain]) for strain in strains),
+        "SOFTNESS": tuple((softest / float(chain.stiffness[strain])) ** 0.5 for strain in strains),
+        "GROUP": tuple(group.get(strain, -1) for strain in strains),
+    }
+    # A table has at least one number, also where nothing reads it: without motor joints, or without springs.
+    return "\n".join(f"{name} = {(0.0,) if value == () else value!r}" for name, value in (made | tables).items())
+
+
+def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
+    """What `muscle_drivers` needs: lengths put the unknowns where they have them, tensions load them."""
+    chain, strains = unknowns.chain, list(unknowns.strains)
+    if unknowns.pulled:
+        slope, base, rest = -chain.muscle_matrix[:, strains].T, np.zeros(len(strains)), np.zeros(len(chain.muscle_rest))
+    else:
+        slope, base, rest = chain.spread[strains], (chain.free @ chain.elastic @ chain.rest)[strains], chain.muscle_rest
+    return {
+        "N_MUSCLES": len(rest),
+        "MUSCLE_PLACE": layout.pull if unknowns.pulled else layout.start,
+        "MUSCLE_REST": tuple(rest.tolist()),
+        "MUSCLE_BASE": tuple(base.tolist()),
+        "MUSCLE_SLOPE": tuple((slope + 0.0).ravel().tolist()),
+    }
+
+
+def _texts(functions: Iterable[Callable[..., object]]) -> Sequence[str]:
+    return [textwrap.dedent(inspect.getsource(function)).rstrip() for function in functions]

@@ -1,0 +1,220 @@
+"""Straight-line functions that let motors or the force vary, too: load estimation and inverse kinematics.
+
+Newton on all unknowns at once. Springs must be in balance, `r = 0`, and either the motor torques be those measured, with the
+force unknown, or the tip be at its target, with the motors unknown. The strains are eliminated first
+(`softrobots.compiled.chain.elimination`); what remains are the three equations of the elastostatic Jacobian
+(`softrobots.compiled.chain.tip_motion`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import Vector, constants, vector
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.short_chain import Evaluation, evaluate
+from softrobots.compiled.chain.small_systems import smallest_square, solve_small
+from softrobots.compiled.chain.tip_motion import TipMotion, step_with_motors, tip_motion
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.program.passes import go_on
+from softrobots.compiled.program.short_program import numbers, store_tip
+from softrobots.compiled.settings import BLUR, LARGEST_SIZE, LARGEST_STEP, LEAST_SIZE, LEAST_SOFTNESS, TIGHT
+from softrobots.compiled.trace.blocks import Block, hoist
+from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
+
+
+def force_blocks(unknowns: Unknowns, layout: Layout, first: int, *, weight: bool) -> tuple[list[Block], int]:
+    """Trace the functions of load estimation.
+
+    Args:
+        unknowns: The chain.
+        layout: The places in the workspace.
+        first: First free place behind those.
+        weight: Whether there is gravity.
+
+    Returns:
+        The functions, and the next free place.
+    """
+    prepare = Block("prepare_force", "Compute what depends on motors and torques only.")
+    trace = prepare.trace
+    force_pass = Block("force_pass", "Evaluate the point, and go on to the next with another force.", trace=trace)
+    point = evaluate(unknowns, force_pass, layout, weight=weight, tip_columns=True)
+    _force_step(force_pass, layout, unknowns, point, starts=False)
+    look = Block("look_for_force", "Evaluate an equilibrium, and where a damped step of the force leads.", trace=trace)
+    _look_for_force(look, layout, unknowns, evaluate(unknowns, look, layout, weight=weight, tip_columns=True))
+    singles = [look.load(layout.single(one)) for one in ("mode", "damping")]
+    varying = [*look.loads(layout.unknown, layout.unknowns), *look.loads(layout.force, 3), *singles]
+    count = hoist([force_pass, look], prepare, varying, first)
+    start = Block("first_force_pass", "Prepare, evaluate the relaxed robot without force, and go on.", trace=trace)
+    start.stores = list(prepare.stores)
+    relaxed = evaluate(unknowns, start, layout, weight=weight, at_rest=True, forceless=True, tip_columns=True)
+    _force_step(start, layout, unknowns, relaxed, starts=True)
+    return [prepare, start, force_pass, look], first + count
+
+
+def target_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Block]:
+    """Trace the functions of inverse kinematics.
+
+    Args:
+        unknowns: The chain.
+        layout: The places in the workspace.
+        weight: Whether there is gravity.
+
+    Returns:
+        The functions.
+    """
+    step = Block(
+        "target_step", "Evaluate the point, and where a step to the target leads; from the target to the one that follows."
+    )
+    point = evaluate(unknowns, step, layout, weight=weight, tip_columns=True)
+    lane = Block("target_pass", "Evaluate the point, and go on to the target.", trace=step.trace)
+    _target_step(step, lane, layout, unknowns, point)
+    look = Block("look_for_target", "Evaluate an equilibrium, and where a damped step to the target leads.", trace=step.trace)
+    _look_for_target(look, layout, unknowns, point)
+    return [step, lane, look]
+
+
+def _force_step(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation, *, starts: bool) -> None:
+    motion = tip_motion(unknowns, point)
+    measured = vector(block.loads(layout.torques, layout.motors))
+    felt = motion.jacobian.T
+    left = measured - motion.motor_torques
+    change = solve_small(felt, left - motion.torque_change)
+    missing = _explicable(felt, left - motion.torque_change, unknowns)
+    step = _with_columns(unknowns, point, change)
+    values = numbers(unknowns, layout, block, point)
+    size = measured @ measured
+    settled_to = if_less(size, LARGEST_SIZE**2, larger(size, LEAST_SIZE**2) * TIGHT**2, -1.0)
+    settled = if_less(missing @ missing, settled_to, _balanced(values, unknowns), 0.0)
+    mode, share = _mode(block, layout, values, settled, step, starts=starts)
+    rest = [float(unknowns.chain.rest[strain]) for strain in unknowns.strains]
+    here = rest if starts else block.loads(layout.unknown, layout.unknowns)
+    force = constants(np.zeros(3)) if starts else vector(block.loads(layout.force, 3))
+    _go(block, layout.unknown, here, step, mode, share)
+    _go(block, layout.force, force, point.base_axes @ change, mode, share)
+    _store_torques(block, layout, motion, left, missing)
+    store_tip(block, layout, point)
+
+
+def _look_for_force(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
+    motion = tip_motion(unknowns, point)
+    left = vector(block.loads(layout.torques, layout.motors)) - motion.motor_torques
+    felt = motion.jacobian.T
+    damped = _damped(felt, block.load(layout.single("damping")), left)
+    block.store_all(layout.ahead, (vector(block.loads(layout.force, 3)) + point.base_axes @ damped).tolist())
+    ahead = [
+        one + by
+        for one, by in zip(block.loads(layout.unknown, layout.unknowns), _with_columns(unknowns, point, damped), strict=True)
+    ]
+    block.store_all(layout.ahead + max(layout.motors, 3), ahead)
+    _store_torques(block, layout, motion, left, _explicable(felt, left, unknowns))
+
+
+def _explicable(felt: Any, torques: Vector, unknowns: Unknowns) -> Vector:
+    """What a force can do about torques: of more than three motors, the part that a force can give."""
+    if len(torques) <= 3:
+        return torques
+    return felt @ _damped(felt, BLUR * float(unknowns.chain.reach), torques)
+
+
+def _store_torques(block: Block, layout: Layout, motion: TipMotion, left: Vector, missing: Vector) -> None:
+    """Write what is left of the torques, and how strongly the motors feel a force; fewer than three never feel all of it."""
+    block.store(layout.single("missing"), missing @ missing)
+    block.store(layout.single("unexplained"), left @ left)
+    block.store(layout.single("observed"), smallest_square(motion.jacobian) if layout.motors >= 3 else 0.0)
+
+
+def _target_step(step: Block, lane: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
+    motion = tip_motion(unknowns, point)
+    missing, next_missing = (_missing(step, place, point) for place in (layout.target, layout.following))
+    values = numbers(unknowns, layout, step, point)
+    distance = missing @ missing
+    tolerated = step.load(layout.single("tolerated"))
+    settled = if_less(tolerated * tolerated, distance, 0.0, _balanced(values, unknowns))
+    for block in (step, lane):
+        # The next target is wanted as soon as this one is reached; a lane has only one.
+        wanted = (
+            missing
+            if block is lane
+            else vector([if_less(0.5, settled, a, b) for a, b in zip(next_missing, missing, strict=True)])
+        )
+        motors = solve_small(motion.jacobian, wanted - motion.tip_change)
+        strains = step_with_motors(unknowns, point, motors)
+        mode, share = _mode(block, layout, values, settled, [*strains, *motors], starts=False)
+        here = [vector(block.loads(*one)) for one in ((0, layout.motors), (layout.unknown, layout.unknowns))]
+        if block is lane:
+            _go(block, 0, here[0], motors, mode, share)
+            _go(block, layout.unknown, here[1], strains, mode, share)
+        else:
+            block.store_all(layout.ahead, (here[0] + motors * share).tolist())
+            block.store_all(layout.ahead + max(layout.motors, 3), (here[1] + vector(strains) * share).tolist())
+        block.store(layout.single("missing"), distance)
+        store_tip(block, layout, point)
+
+
+def _look_for_target(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
+    motion = tip_motion(unknowns, point)
+    missing = _missing(block, layout.target, point)
+    motors = _damped(motion.jacobian, block.load(layout.single("damping")), missing)
+    strains = step_with_motors(unknowns, point, motors)
+    block.store_all(layout.ahead, (vector(block.loads(0, layout.motors)) + motors).tolist())
+    ahead = vector(block.loads(layout.unknown, layout.unknowns)) + vector(strains)
+    block.store_all(layout.ahead + max(layout.motors, 3), ahead.tolist())
+    block.store(layout.single("missing"), missing @ missing)
+    block.store(layout.single("observed"), smallest_square(motion.jacobian))
+
+
+def _missing(block: Block, place: int, point: Evaluation) -> Vector:
+    """From the tip to a target, in the axes behind the leading motors [m]."""
+    return point.base_axes.T @ (vector(block.loads(place, 3)) - point.base) - point.tip
+
+
+def _damped(matrix: object, damping: Scalar, right: Vector) -> Vector:
+    """Levenberg-Marquardt step `M^T (M M^T + damping^2)^-1 right`, in whichever of its two forms is smaller."""
+    m = np.asarray(matrix, dtype=object)
+    rows, columns = m.shape
+    square = constants(np.eye(min(rows, columns))) * (damping * damping)
+    if rows <= columns:
+        return m.T @ solve_small(m @ m.T + square, right)
+    return solve_small(m.T @ m + square, m.T @ right)
+
+
+def _with_columns(unknowns: Unknowns, point: Evaluation, force: Vector) -> list[Scalar]:
+    """Newton step of the unknowns when the force changes, too."""
+    made: dict[int, Scalar] = {}
+    for row, steps in enumerate(point.steps):
+        for place, strain in enumerate(unknowns.moving(row)):
+            made[strain] = steps[0][place] + sum((steps[1 + axis][place] * force[axis] for axis in range(3)), 0.0)
+    return [made[strain] for strain in unknowns.strains]
+
+
+def _balanced(values: dict[str, Scalar], unknowns: Unknowns) -> Scalar:
+    """1 where the springs are in balance, else 0."""
+    return if_less(values["error"], larger(values["size"] * TIGHT**2, unknowns.spring_rounding**2), 1.0, 0.0)
+
+
+def _mode(
+    block: Block, layout: Layout, values: dict[str, Scalar], settled: Scalar, step: Sequence[Scalar], *, starts: bool
+) -> tuple[Scalar, Scalar]:
+    """Write what becomes of a case; return that and the share of the step to go. See `softrobots.compiled.program.passes`."""
+    signs = if_less(absolute(values["negatives"]), 0.5, 1.0, 0.0)
+    stable = if_less(LEAST_SOFTNESS, values["softest"], signs, 0.0)
+    length = sum((one * one for one in step), 0.0)
+    going = if_less(length, 1e6, 2.0 - 2.0 * stable, 2.0)
+    mode: Scalar = if_less(0.5, settled, 2.0 - stable, going)
+    if not starts:
+        mode = if_less(1.5, block.load(layout.single("mode")), 2.0, mode)
+    block.store(layout.single("mode"), mode)
+    block.store(layout.single("error"), values["error"])
+    return mode, LARGEST_STEP / square_root(larger(length, LARGEST_STEP**2))
+
+
+def _go(
+    block: Block, place: int, here: Sequence[Scalar] | Vector, step: Sequence[Scalar] | Vector, mode: Scalar, share: Scalar
+) -> None:
+    """Write where a case goes on, if it does."""
+    for number, (one, by) in enumerate(zip(here, step, strict=True)):
+        block.store(place + number, go_on(mode, one, share, by))

@@ -1,0 +1,99 @@
+"""The state machine of a Newton pass, traced: what every lane does with the point that it has evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.settings import ARMIJO, LARGEST_STEP, LEAST_SOFTNESS, ROUNDING, TIGHT
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
+
+
+def point_numbers(
+    *,
+    slope: Scalar,
+    error: Scalar,
+    length: Scalar,
+    energy: Scalar,
+    elastic: Scalar,
+    load: Scalar,
+    room: Scalar,
+    softest: Scalar,
+    negatives: Scalar,
+) -> dict[str, Scalar]:
+    """The single numbers of a point from sums over the chain.
+
+    Args:
+        slope: Derivative of the energy along the Newton step.
+        error: Squared out-of-balance torque.
+        length: Squared Newton step.
+        energy: Elastic energy plus potential [J].
+        elastic: Elastic energy [J].
+        load: Squared size of the load [N^2 m^2].
+        room: Room of the sections in their range.
+        softest: Smallest pivot.
+        negatives: Number of pivots that are not positive.
+    """
+    return {
+        "energy": if_less(room, 0.0, 1e300, energy),
+        "slope": slope,
+        "error": error,
+        "length": length,
+        "size": load,
+        "rounding": (square_root(load) + absolute(elastic) * 2.0 + absolute(energy)) * ROUNDING,
+        "softest": softest,
+        "negatives": negatives,
+        "room": room,
+    }
+
+
+def decide(
+    block: Block,
+    layout: Layout,
+    point: dict[str, Scalar],
+    *,
+    held: int,
+    spring_rounding: float,
+    mode: Scalar,
+    bound: Scalar,
+) -> tuple[Scalar, Scalar]:
+    """Decide what becomes of a case.
+
+    Mode 0 goes on, 1 is settled and stable, 2 is left to the descent: where pivots are not positive, a section is beyond its
+    range, the energy does not fall as it should, or a number is none.
+
+    Args:
+        block: The block that the pass is traced in.
+        layout: The places in the workspace.
+        point: The numbers of the point, see `point_numbers`.
+        held: Number of multipliers.
+        spring_rounding: Rounding of the spring torques [N m].
+        mode: Mode before.
+        bound: Largest energy that the point may have [J].
+
+    Returns:
+        The mode, and the share of the step to go if it is 0.
+    """
+    error, length, energy = point["error"], point["length"], point["energy"]
+    settled_to = larger(point["size"] * TIGHT**2, spring_rounding**2)
+    all_signs = if_less(absolute(point["negatives"] - float(held)), 0.5, 1.0, 0.0)
+    sound = if_less(point["size"], 1e300, if_less(point["room"], 0.0, 0.0, all_signs), 0.0)
+    stable = if_less(LEAST_SOFTNESS, point["softest"], sound, 0.0)
+    going = if_less(energy, bound, 2.0 - 2.0 * stable, 2.0)
+    new_mode = if_less(1.5, mode, 2.0, if_less(error, settled_to, 2.0 - stable, going))
+    share = LARGEST_STEP / square_root(larger(length, LARGEST_STEP**2))
+    block.store(layout.single("mode"), new_mode)
+    block.store(layout.single("bound"), energy + point["slope"] * share * ARMIJO + point["rounding"])
+    block.store(layout.single("error"), error)
+    return new_mode, share
+
+
+def go_on(mode: Scalar, here: Scalar, share: Scalar, step: Scalar) -> Scalar:
+    """Where a number goes: a share of its step on, if the case goes on."""
+    return if_less(mode, 0.5, here + share * step, here)
+
+
+def dot(one: Sequence[Scalar], other: Sequence[Scalar]) -> Scalar:
+    """Sum of products."""
+    return sum((a * b for a, b in zip(one, other, strict=True)), 0.0)

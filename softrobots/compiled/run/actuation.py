@@ -1,0 +1,124 @@
+"""From actuator and elastic coordinates to what generated code works on, and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.settings import LARGEST_POSITION
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
+from softrobots.model.soft_model import SoftModel
+
+
+class Actuation:
+    """Motors go in as they are. Muscle tensions become constant loads on the strains, muscle lengths a start that has them."""
+
+    def __init__(self, model: SoftModel, unknowns: Unknowns) -> None:
+        """Prepare the maps, all linear."""
+        self._model, self._chain, self._strains = model, unknowns.chain, list(unknowns.strains)
+        chain = unknowns.chain
+        self._count = chain.n_motors
+        self._plain = len(chain.held) == 0 and len(self._strains) == len(chain.stiffness)
+        self._tensions = len(chain.muscle_rest) > 0 and chain.muscle_input == "forces"
+        self._lengths = len(chain.muscle_rest) > 0 and not self._tensions
+        self._relaxed = chain.free @ model.rest  # strains of relaxed elastic coordinates, muscles at rest
+
+    def put(self, run: Any, w: Any, motors: FloatArray) -> None:
+        """Write one case into a workspace, with its start."""
+        layout = run.layout
+        run.put(w, 0, motors[: self._count])
+        if self._tensions:
+            run.put(w, layout.pull, self._pulls(motors[None]))
+        if self._lengths:
+            run.put(w, layout.start, self._starts(motors[None]))
+
+    def jacobian(self, run: Any, w: Any) -> FloatArray:
+        """Elastostatic Jacobian of all actuators where a workspace has been looked at, shape (3, n_motors)."""
+        tip, chain = run.program.tip, self._chain
+        joints = _rows(w, tip.jacobian, self._count)
+        if self._lengths:
+            return np.concatenate([joints, _rows(w, tip.held_columns, tip.held) @ chain.held_slope], axis=1)
+        if self._tensions:  # a tension adds the energy t A s
+            by_force = _rows(w, tip.columns, tip.unknowns)
+            return np.concatenate([joints, -by_force @ chain.muscle_matrix[:, self._strains].T], axis=1)
+        return joints
+
+    def loads(self, run: Any, w: Any) -> FloatArray:
+        """Load on motor joints and muscles of given length there, shape (n_motors,) [N m or N].
+
+        The multipliers tell what holds the sums beyond what their even spread takes, see `long_chain`.
+        """
+        tip, chain = run.program.tip, self._chain
+        joints = _rows(w, tip.motor_torques, self._count, 1)[0]
+        if self._lengths:
+            first = [self._strains.index(group[0]) for group in chain.held]
+            spread = _rows(w, run.layout.start, len(self._strains), 1)[0] - chain.rest[self._strains]
+            held = _rows(w, tip.held_loads, tip.held, 1)[0] - (chain.stiffness[self._strains] * spread)[first]
+            return np.concatenate([joints, held @ chain.held_slope])
+        return np.asarray(joints)
+
+    def rows(self, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Motor joints, loads of tensions and starts of many cases; without muscles the latter have no rows."""
+        nothing = np.zeros((0, len(self._strains)))
+        pulls = self._pulls(motors) if self._tensions else nothing
+        starts = self._starts(motors) if self._lengths else nothing
+        return np.ascontiguousarray(motors[:, : self._count]), pulls, starts
+
+    def unsuited(self, motors: FloatArray) -> Any:
+        """Which rows no shape of the robot has, or are too large to compute with, truth values."""
+        made = np.zeros(len(motors), dtype=bool)
+        joints = motors[:, : self._count]
+        if joints.size and not (joints.min() >= -LARGEST_POSITION and joints.max() <= LARGEST_POSITION):
+            made |= ~np.all(np.abs(joints) <= LARGEST_POSITION, axis=1)
+        if self._lengths:
+            made |= [not (np.all(np.isfinite(row)) and self._model.actuators.admit(row)) for row in motors]
+        return made
+
+    def checked(self, q_motors: Any, field: str = "q_motors") -> FloatArray:
+        """Return actuators of one case as `SoftModel.checked_motors` does.
+
+        Raises:
+            ParameterError: If that refuses them, or a motor joint is too far to compute with.
+        """
+        motors = self._model.checked_motors(q_motors, field)
+        if np.any(np.abs(motors[: self._count]) > LARGEST_POSITION):
+            raise ParameterError(
+                field, q_motors, f"within +-{LARGEST_POSITION:g} rad or m at motor joints, for compiled solvers"
+            )
+        return motors
+
+    def unknowns(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Unknown strains of one case from its elastic coordinates, shape (n,)."""
+        return np.asarray(self.of_elastic(motors[None], elastic[None])[0])
+
+    def of_elastic(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Unknown strains of many cases, shape (n, n_unknowns)."""
+        if self._plain:
+            return elastic
+        strains = elastic @ self._chain.free.T
+        if self._lengths:
+            strains = strains + (motors[:, self._count :] - self._chain.muscle_rest) @ self._chain.spread.T
+        return np.asarray(strains[:, self._strains])
+
+    def elastic(self, unknowns: FloatArray) -> FloatArray:
+        """Elastic coordinates from the unknowns, shape (..., n_springs); locked strains are at rest."""
+        if self._plain:
+            return unknowns
+        strains = np.tile(self._chain.rest, (*unknowns.shape[:-1], 1))
+        strains[..., self._strains] = unknowns
+        return np.asarray(strains @ self._chain.elastic.T)
+
+    def _pulls(self, motors: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(-(motors[:, self._count :] @ self._chain.muscle_matrix)[:, self._strains])
+
+    def _starts(self, motors: FloatArray) -> FloatArray:
+        change = motors[:, self._count :] - self._chain.muscle_rest
+        return np.ascontiguousarray((self._relaxed + change @ self._chain.spread.T)[:, self._strains])
+
+
+def _rows(w: Any, place: int, count: int, rows: int = 3) -> FloatArray:
+    """Part of a workspace as a matrix."""
+    return np.array(w[place : place + rows * count], dtype=np.float64).reshape(rows, count)

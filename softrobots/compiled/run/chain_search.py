@@ -1,0 +1,282 @@
+"""Load estimation and inverse kinematics of long chains and of those with muscles.
+
+The searches of `softrobots.statics.force_search` and `softrobots.statics.tip_search`, which the solvers on Pinocchio use, too;
+here generated code settles the springs and looks at the tip (`softrobots.compiled.chain.long_tip`). A step costs some tens of
+microseconds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.batches import statuses_of
+from softrobots.compiled.run.results import MotorBatch
+from softrobots.compiled.settings import HIDDEN, LEAST_SIZE, SEARCH_STEPS
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.force_search import Directions, search_force, torque_tolerance
+from softrobots.statics.tip_search import LocalSolution, advance, search
+
+_ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]
+
+
+class ChainState(NamedTuple):
+    """A robot whose springs have settled."""
+
+    w: Any
+    """The workspace, its own."""
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n_springs,) [rad or m]."""
+
+
+class ChainSearch:
+    """Searches for the force or the actuators; the counterpart of the functions in `motor_drivers`."""
+
+    def __init__(self, model: SoftModel, actuation: Actuation, run: Any) -> None:
+        """Search with the functions of a program that looks at the tip."""
+        self.model, self.actuation, self.run = model, actuation, run
+
+    def settle(
+        self, q_motors: FloatArray, force: FloatArray, gravity: FloatArray, start: FloatArray
+    ) -> tuple[Status, ChainState]:
+        """Let the springs settle from given elastic coordinates."""
+        run, layout = self.run, self.run.layout
+        w = run.workspace()
+        self.actuation.put(run, w, q_motors)
+        run.put(w, layout.force, force)
+        run.put(w, layout.gravity, gravity)
+        run.put(w, layout.unknown, self.actuation.unknowns(q_motors, start))
+        status = Status(run.settle_from(w))
+        return status, ChainState(w, self.actuation.elastic(self.unknowns(w)))
+
+    def unknowns(self, w: Any) -> FloatArray:
+        """Unknown strains, shape (n,)."""
+        return self._part(w, self.run.layout.unknown, self.run.layout.unknowns)
+
+    def tip(self, w: Any) -> FloatArray:
+        """The loaded tip, shape (3,) [m]."""
+        return self._part(w, self.run.layout.tip, 3)
+
+    def residual(self, w: Any) -> float:
+        """Norm of the out-of-balance torque [N m]."""
+        return math.sqrt(w[self.run.layout.single("error")])
+
+    def jacobian(self, w: Any) -> FloatArray:
+        """Elastostatic Jacobian of all actuators, shape (3, n_motors); looks at the tip."""
+        self.run.look_at_tip(w)
+        return self.actuation.jacobian(self.run, w)
+
+    def estimate(self, q_motors: FloatArray, torques: FloatArray, gravity: FloatArray) -> tuple[Status, Any]:
+        """Find the force that explains motor torques.
+
+        Args:
+            q_motors: Actuators, shape (n_motors,).
+            torques: Their loads, shape (n_motors,) [N m or N].
+            gravity: Gravity, shape (3,) [m/s^2].
+
+        Returns:
+            The status, and a workspace as `motor_drivers.estimate` leaves it.
+        """
+        problem = _MeasuredTorques(self, q_motors, torques, gravity)
+        status, state = self.settle(q_motors, np.zeros(3), gravity, self.model.rest)
+        single = self.run.layout.single
+        if status != Status.CERTIFIED:
+            return status, state.w
+        _, state, spent = search_force(problem, problem.looked_at(state), SEARCH_STEPS)
+        left, values, _, observable = problem.directions(state)
+        unexplained = problem.unexplained(state)
+        missing = float(np.linalg.norm(left[:, : len(values)].T @ unexplained))
+        size = max(float(np.linalg.norm(torques)), LEAST_SIZE)
+        state.w[single("unexplained")], state.w[single("missing")] = float(unexplained @ unexplained), missing**2
+        whole = len(values) == 3  # fewer actuators never feel all of a force
+        state.w[single("observed")] = float(values[-1]) ** 2 if whole else 0.0
+        state.w[single("spent")] = float(spent)
+        if not (whole and observable.all()) and missing <= HIDDEN * size:
+            return Status.UNOBSERVABLE, state.w
+        return Status.CERTIFIED if missing <= problem.tolerance else Status.NOT_REACHED, state.w
+
+    def reach(
+        self,
+        target: FloatArray,
+        force: FloatArray,
+        gravity: FloatArray,
+        q_motors: FloatArray,
+        start: FloatArray,
+        tolerance: float,
+    ) -> tuple[Status, LocalSolution[ChainState]]:
+        """Find actuators that put the tip at a target, from given ones.
+
+        Args:
+            target: The target, shape (3,) [m].
+            force: Force on the tip, shape (3,) [N].
+            gravity: Gravity, shape (3,) [m/s^2].
+            q_motors: Actuators to start from, shape (n_motors,).
+            start: Elastic coordinates to start from, shape (n_springs,).
+            tolerance: Largest distance from the target [m].
+
+        Returns:
+            The status, and where the search ended.
+        """
+        tip = _SoughtTip(self.model, self, force, gravity, target)
+        first = self.model.actuators.go(q_motors, np.zeros(len(q_motors)))  # within the limits
+        status, state = self.settle(first, force, gravity, start)
+        found = search(tip, first, start, tolerance=tolerance) if status == Status.CERTIFIED else None
+        if found is None:
+            return status, LocalSolution(first, state, float(np.linalg.norm(tip.missing(state))))
+        return self._arrived(found, tolerance), found
+
+    def follow(
+        self, targets: FloatArray, force: FloatArray, gravity: FloatArray, q_motors: FloatArray, tolerance: float
+    ) -> tuple[MotorBatch, int]:
+        """Move the tip through targets, shape (n, 3) [m], each step from the last; see `reach`.
+
+        Returns:
+            One row a waypoint, with the last one that was reached where no continuous motion leads on; and the steps to the
+            first.
+        """
+        status, here = self.reach(targets[0], force, gravity, q_motors, self.model.rest, tolerance)
+        tip, last, first = _SoughtTip(self.model, self, force, gravity, targets[0]), targets[0], here
+        made, statuses = [here], [status]
+        for target in targets[1:] if status == Status.CERTIFIED else ():
+            there = advance(tip, last, target, here, tolerance)
+            if there is None:
+                away = float(np.linalg.norm(target - self.tip(here.state.w)))
+                made.append(replace(here, error=away))
+                statuses.append(Status.NOT_REACHED)
+            else:
+                here, last = there, target
+                made.append(here)
+                statuses.append(self._arrived(here, tolerance))
+        batch = MotorBatch(
+            read_only(np.array([one.state.q_springs for one in made])),
+            statuses_of(np.array(statuses, dtype=np.uint8)),
+            read_only(np.array([self.residual(one.state.w) for one in made])),
+            read_only(np.array([one.q_motors for one in made])),
+            read_only(np.array([one.error for one in made])),
+        )
+        return batch, first.iterations
+
+    def estimate_batch(
+        self,
+        motors: FloatArray,
+        torques: FloatArray,
+        gravity: FloatArray,
+        forces: FloatArray,
+        unknowns: FloatArray,
+        residuals: FloatArray,
+        unexplained: FloatArray,
+        observed: FloatArray,
+        statuses: Any,
+        first: int,
+        last: int,
+    ) -> None:
+        """See `lane_drivers.estimate_batch`."""
+        layout = self.run.layout
+        for row in range(first, last):
+            statuses[row], w = self.estimate(motors[row], torques[row], gravity)
+            unknowns[row], forces[row] = self.unknowns(w), self._part(w, layout.force, 3)
+            residuals[row], unexplained[row], observed[row] = (
+                math.sqrt(w[layout.single(name)]) for name in ("error", "unexplained", "observed")
+            )
+
+    def reach_batch(
+        self,
+        targets: FloatArray,
+        forces: FloatArray,
+        gravity: FloatArray,
+        motors: FloatArray,
+        unknowns: FloatArray,
+        residuals: FloatArray,
+        errors: FloatArray,
+        statuses: Any,
+        tolerance: float,
+        first: int,
+        last: int,
+    ) -> None:
+        """See `lane_drivers.reach_batch`."""
+        for row in range(first, last):
+            start = self.actuation.elastic(unknowns[row])
+            statuses[row], found = self.reach(targets[row], forces[row], gravity, motors[row], start, tolerance)
+            motors[row], unknowns[row], errors[row] = found.q_motors, self.unknowns(found.state.w), found.error
+            residuals[row] = self.residual(found.state.w)
+
+    def _arrived(self, found: LocalSolution[ChainState], tolerance: float) -> Status:
+        if not found.arrived(tolerance):
+            return Status.NOT_REACHED
+        low, high = self.model.motor_limits.T
+        outside = np.any((found.q_motors < low - _ROUNDING) | (found.q_motors > high + _ROUNDING))
+        return Status.BEYOND_LIMITS if outside else Status.CERTIFIED
+
+    def _part(self, w: Any, place: int, count: int) -> FloatArray:
+        return np.array(w[place : place + count], dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class _MeasuredTorques:
+    """What `search_force` needs; states that it gets have been looked at."""
+
+    chain: ChainSearch
+    motors: FloatArray
+    torques: FloatArray
+    gravity: FloatArray
+
+    @property
+    def reach(self) -> float:
+        return self.chain.model.reach
+
+    @property
+    def tolerance(self) -> float:
+        return torque_tolerance(self.torques)
+
+    def looked_at(self, state: ChainState) -> ChainState:
+        self.chain.run.look_at_tip(state.w)
+        return state
+
+    def equilibrium(self, force: FloatArray, near: ChainState) -> ChainState | None:
+        status, state = self.chain.settle(self.motors, force, self.gravity, near.q_springs)
+        return self.looked_at(state) if status == Status.CERTIFIED else None
+
+    def unexplained(self, state: ChainState) -> FloatArray:
+        return np.asarray(self.torques - self.chain.actuation.loads(self.chain.run, state.w))
+
+    def directions(self, state: ChainState) -> Directions:
+        return Directions.of(self.chain.actuation.jacobian(self.chain.run, state.w).T, self.reach)
+
+
+@dataclass(frozen=True, eq=False)
+class _SoughtTip:
+    """What `tip_search` needs: see `tip_search.SoughtTip`."""
+
+    model: SoftModel
+    chain: ChainSearch
+    force: FloatArray
+    gravity: FloatArray
+    target: FloatArray
+
+    @property
+    def rows(self) -> int:
+        return 3
+
+    def towards(self, position: FloatArray) -> _SoughtTip:
+        return replace(self, target=position)
+
+    def settle(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ChainState] | None:
+        if not self.model.actuators.admit(q_motors):
+            return None
+        status, state = self.chain.settle(q_motors, self.force, self.gravity, start)
+        if status != Status.CERTIFIED:
+            return None
+        return LocalSolution(q_motors, state, float(np.linalg.norm(self.missing(state))))
+
+    def missing(self, state: ChainState) -> FloatArray:
+        return np.asarray(self.target - self.chain.tip(state.w))
+
+    def motion(self, state: ChainState) -> tuple[FloatArray, FloatArray]:
+        """How the tip follows; that the springs follow, too, is what their first Newton step finds by itself."""
+        return self.chain.jacobian(state.w), np.zeros((len(state.q_springs), self.model.n_motors))

@@ -1,0 +1,139 @@
+"""Answers of the compiled solvers: plain arrays, one case or many."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray, read_only
+
+
+class CompiledEquilibrium:
+    """An equilibrium, certified stable.
+
+    For everything else about it (motor torques, tangent stiffness, pictures, files), hand its `q_springs` to
+    `softrobots.solve_equilibrium(..., q_springs0=...)`, which then only checks them.
+    """
+
+    __slots__ = ("_actuation", "_layout", "_motors", "_workspace")
+
+    def __init__(self, workspace: Any, layout: Layout, actuation: Actuation, motors: FloatArray | None = None) -> None:
+        """Keep the workspace of the solver, and the actuators where they are not all in it; both are the caller's own."""
+        self._workspace = workspace
+        self._layout = layout
+        self._actuation = actuation
+        self._motors = motors
+
+    def __repr__(self) -> str:
+        """Elastic coordinates and residual."""
+        return f"CompiledEquilibrium(q_springs={self.q_springs.tolist()}, residual={self.residual:.3g})"
+
+    @property
+    def q_motors(self) -> FloatArray:
+        """Actuator coordinates, motor joints and then muscles, shape (n_motors,) [rad, m or N], read-only."""
+        return self._part(0, self._layout.motors) if self._motors is None else read_only(np.array(self._motors))
+
+    @property
+    def force(self) -> FloatArray:
+        """Force on the tip, shape (3,) [N], world axes, read-only."""
+        return self._part(self._layout.force, 3)
+
+    @property
+    def q_springs(self) -> FloatArray:
+        """Elastic coordinates as `SoftModel.spring_joints` names them, shape (n_springs,) [rad or m], read-only."""
+        unknowns = self._part(self._layout.unknown, self._layout.unknowns)
+        return read_only(self._actuation.elastic(unknowns))
+
+    @property
+    def tip_position(self) -> FloatArray:
+        """The loaded tip, shape (3,) [m], world axes, read-only."""
+        return self._part(self._layout.tip, 3)
+
+    @property
+    def residual(self) -> float:
+        """Norm of the out-of-balance torque of the elastic coordinates [N m]."""
+        return self._root("error")
+
+    def _root(self, name: str) -> float:
+        return math.sqrt(self._workspace[self._layout.single(name)])
+
+    def _part(self, place: int, count: int) -> FloatArray:
+        return read_only(np.array(self._workspace[place : place + count], dtype=np.float64))
+
+
+class CompiledLoadEstimate(CompiledEquilibrium):
+    """A force that explains motor torques, with the robot in equilibrium under it."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        """The force."""
+        return f"CompiledLoadEstimate(force={self.force.tolist()})"
+
+    @property
+    def unexplained(self) -> float:
+        """Norm of the motor torques that the force does not explain [N m]."""
+        return self._root("unexplained")
+
+    @property
+    def observability(self) -> float:
+        """Smallest singular value of the elastostatic Jacobian [m]: how strongly the motors feel the force at least."""
+        return self._root("observed")
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """What all batches tell: one row a case."""
+
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n, n_springs) [rad or m]."""
+    status: Any
+    """`Status` of each case, shape (n,), small integers; only rows with `Status.CERTIFIED` are answers."""
+    residual: FloatArray
+    """Norm of the out-of-balance torque, shape (n,) [N m]; infinite where the input was no number."""
+
+    @property
+    def certified(self) -> Any:
+        """Which cases are answered, shape (n,), truth values."""
+        return self.status == Status.CERTIFIED
+
+    def counts(self) -> dict[Status, int]:
+        """How many cases ended how; statuses that did not occur are left out."""
+        values, numbers = np.unique(self.status, return_counts=True)
+        return {Status(value): int(number) for value, number in zip(values.tolist(), numbers.tolist(), strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumBatch(Batch):
+    """Equilibria of many cases."""
+
+    tip_positions: FloatArray
+    """The loaded tip, shape (n, 3) [m], world axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadBatch(Batch):
+    """Forces that explain motor torques, of many cases."""
+
+    forces: FloatArray
+    """Force on the tip, shape (n, 3) [N], world axes."""
+    unexplained: FloatArray
+    """Norm of the motor torques that the force does not explain, shape (n,) [N m]."""
+    observability: FloatArray
+    """Smallest singular value of the elastostatic Jacobian, shape (n,) [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotorBatch(Batch):
+    """Motors that put the loaded tip at targets: many independent ones, or the waypoints of a path."""
+
+    q_motors: FloatArray
+    """Motor positions, shape (n, n_motors) [rad or m]."""
+    tip_error: FloatArray
+    """Distance of the loaded tip from its target, shape (n,) [m]."""

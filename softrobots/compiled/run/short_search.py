@@ -1,0 +1,55 @@
+"""Load estimation and inverse kinematics of short chains: Newton's method on all unknowns, generated as straight-line code."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.batches import statuses_of
+from softrobots.compiled.run.results import MotorBatch
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.model.soft_model import SoftModel
+
+
+class ShortSearch:
+    """Searches by the functions of `motor_drivers` and `path_drivers`; `ChainSearch` for short chains."""
+
+    def __init__(self, model: SoftModel, actuation: Actuation, run: Any) -> None:
+        """Search with the functions of a program that has searches of its own."""
+        self._model, self._actuation, self._run = model, actuation, run
+        self.estimate_batch, self.reach_batch = run.estimate_batch, run.reach_batch
+
+    def estimate(self, q_motors: FloatArray, torques: FloatArray, gravity: FloatArray) -> tuple[Status, Any]:
+        """Find the force that explains motor torques; see `ChainSearch.estimate`."""
+        run = self._run
+        w = run.workspace()
+        self._actuation.put(run, w, q_motors)
+        run.put(w, run.layout.torques, torques)
+        run.put(w, run.layout.gravity, gravity)
+        return Status(run.estimate(w)), w
+
+    def follow(
+        self, targets: FloatArray, force: FloatArray, gravity: FloatArray, q_motors: FloatArray, tolerance: float
+    ) -> tuple[MotorBatch, int]:
+        """Move the tip through targets, shape (n, 3) [m], each step from the last; see `ChainSearch.follow`."""
+        run, layout, count = self._run, self._run.layout, len(targets)
+        w = run.workspace()
+        self._actuation.put(run, w, q_motors)
+        run.put(w, layout.force, force)
+        run.put(w, layout.gravity, gravity)
+        run.put(w, layout.unknown, self._actuation.unknowns(q_motors, self._model.rest))
+        w[layout.single("tolerated")] = float(tolerance)
+        found, unknowns = run.array(count * len(q_motors)), run.array(count * layout.unknowns)
+        residuals, errors, statuses = run.array(count), run.array(count), run.array(count)
+        run.follow(w, run.flat(targets), count, found, unknowns, residuals, errors, statuses)
+        batch = MotorBatch(
+            read_only(self._actuation.elastic(np.reshape(unknowns, (count, layout.unknowns)))),
+            statuses_of(np.asarray(statuses, dtype=np.uint8)),
+            read_only(np.sqrt(residuals)),
+            read_only(np.reshape(found, (count, len(q_motors)))),
+            read_only(np.sqrt(errors)),
+        )
+        return batch, int(w[layout.single("spent")])

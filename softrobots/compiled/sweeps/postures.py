@@ -1,0 +1,131 @@
+"""Postures to start inverse kinematics from: the unloaded arm at a table of motor angles, by elbow and by side.
+
+The same point is reached with the elbow up or down, and forwards or over the back. Each of these is a branch of its own, and a
+search that starts on one of them stays there as a rule, so every branch gets its own start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
+from softrobots.model.soft_model import SoftModel
+
+if TYPE_CHECKING:
+    from softrobots.compiled.run.compiled_model import CompiledModel
+
+_SHOULDER, _ELBOW = 64, 48  # angles in the table: a start is within a few hundredths of the reach of its target
+_FREE = 1e6  # [rad], instead of no limit
+_ROUND_OFF = 1e-9  # [rad], how far beyond its limit a motor may end
+
+
+class Branch(NamedTuple):
+    """Postures of one kind at zero angle of motor 1, and where they put the tip."""
+
+    q_motors: FloatArray
+    """Motor angles, shape (n, 3) [rad]."""
+    radius: FloatArray
+    """Distance of the tip from the axis of motor 1, shape (n,) [m]."""
+    height: FloatArray
+    """Height of the tip, shape (n,) [m]."""
+    azimuth: FloatArray
+    """Angle of the tip about the axis of motor 1, shape (n,) [rad]."""
+
+    def starts(self, targets: FloatArray) -> FloatArray:
+        """The posture whose tip is nearest to each target, turned towards it, shape (n_targets, 3) [rad].
+
+        Motor 1 may end up beyond its limits.
+        """
+        radius, height = np.hypot(targets[:, 0], targets[:, 1]), targets[:, 2]
+        apart = (radius[:, None] - self.radius) ** 2 + (height[:, None] - self.height) ** 2
+        nearest = apart.argmin(axis=1)
+        made = self.q_motors[nearest]
+        made[:, 0] = np.arctan2(targets[:, 1], targets[:, 0]) - self.azimuth[nearest]
+        return np.asarray(made)
+
+
+def check_arm(model: SoftModel) -> None:
+    """Refuse robots that are no arm of inflated links with three motors.
+
+    Raises:
+        ParameterError: If the robot has not three turning motors, the first about the vertical through the base, or not every
+            spring belongs to an inflated link.
+        DescriptionError: If it is no serial chain.
+    """
+    springs = sorted(place for group in model.spring_groups for place in group.springs)
+    if model.n_motors != 3 or model.muscles or not springs or springs != list(range(model.n_springs)):
+        raise ParameterError("model", model, "an arm with three motors whose springs are those of inflated links")
+    first, turning = model.chain().elements[0], model.actuators.turning
+    upright = np.abs(first.rotation[:, 2] - (0.0, 0.0, 1.0)).max() < 1e-12 and np.abs(first.translation[:2]).max() < 1e-12
+    if getattr(first, "motor", None) != 0 or not upright or not all(turning):
+        raise ParameterError("model", model, "an arm whose motors turn, the first about the vertical through the base")
+
+
+def branches(model: SoftModel, compiled: CompiledModel) -> tuple[Branch, ...]:
+    """Tables of postures within the motor limits: elbow bent up or down, tip before or behind the axis of motor 1.
+
+    An arm whose motors turn all round and whose springs rest at zero stands over its back exactly as it stands forwards, so it
+    has two branches rather than four.
+
+    Args:
+        model: An arm that `check_arm` accepts.
+        compiled: Its compiled form.
+
+    Returns:
+        The branches that have any posture.
+    """
+    limits = np.clip(model.motor_limits, -np.pi, np.pi)
+    same_behind = not model.rest.any() and bool(np.all(limits[:, 0] <= -np.pi) and np.all(limits[:, 1] >= np.pi))
+    shoulder, elbow = _between(limits[1], _SHOULDER), _between(limits[2], _ELBOW)
+    motors = np.stack(np.meshgrid([0.0], shoulder, elbow, indexing="ij"), axis=-1).reshape(-1, 3)
+    tips = compiled.equilibria(motors, np.zeros((len(motors), 3))).tip_positions
+    radius, azimuth = np.hypot(tips[:, 0], tips[:, 1]), np.arctan2(tips[:, 1], tips[:, 0])
+    before = np.abs(azimuth) <= 0.5 * np.pi
+    found = []
+    for side in (before,) if same_behind else (before, ~before):
+        for bent in (motors[:, 2] < 0.0, motors[:, 2] >= 0.0):
+            kept = side & bent
+            if kept.any():
+                found.append(Branch(motors[kept], radius[kept], tips[kept, 2], azimuth[kept]))
+    return tuple(found)
+
+
+def starts(model: SoftModel, tables: Sequence[Branch], targets: FloatArray) -> FloatArray:
+    """Poses to start from: the relaxed arm, for each branch and target, within the motor limits.
+
+    Args:
+        model: The arm.
+        tables: Its branches.
+        targets: Targets, shape (n, 3) [m].
+
+    Returns:
+        Motor angles and then springs, branch by branch, shape (n_branches * n, n_motors + n_springs) [rad].
+    """
+    motors = np.concatenate([branch.starts(targets) for branch in tables])
+    return np.hstack([within_turns(model, motors)[0], np.tile(model.rest, (len(motors), 1))])
+
+
+def within_turns(model: SoftModel, q_motors: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Turn motors by whole turns towards their limits.
+
+    Args:
+        model: The robot.
+        q_motors: Motor angles, shape (n, n_motors) [rad].
+
+    Returns:
+        The angles, and which rows are within the limits, shape (n,).
+    """
+    low, high = np.clip(model.motor_limits, -_FREE, _FREE).T
+    turns = np.rint((q_motors - 0.5 * (low + high)) / (2.0 * np.pi))
+    turned = np.where((q_motors < low) | (q_motors > high), q_motors - 2.0 * np.pi * turns, q_motors)
+    return turned, ((turned >= low - _ROUND_OFF) & (turned <= high + _ROUND_OFF)).all(axis=1)
+
+
+def _between(limits: FloatArray, count: int) -> FloatArray:
+    """Centres of `count` equal intervals between two limits."""
+    return np.asarray(limits[0] + (np.arange(count) + 0.5) * ((limits[1] - limits[0]) / count))

@@ -1,0 +1,190 @@
+"""Straight-line code from traced expressions: functions without branches, in the kernel language.
+
+A `Block` is a function `name(w: Array, ...)` that reads elements of the workspace `w` and of tables, and writes at its end.
+It is the unit that back ends vectorise: the text is the same for one case (`w[7]`), for a NumPy array per element, and for
+lanes (`w[7 * LANES + lane]` within a loop over `lane`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from softrobots.compiled.trace.expressions import Expression, Scalar, Trace, in_order, operands
+
+WORKSPACE = "w"
+"""Name of the workspace in generated code."""
+
+_WIDEST = 88  # characters of an expression, beyond which its parts get names
+_STRENGTH = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3}  # how strongly an operation binds; calls and names most
+
+
+@dataclass
+class Block:
+    """A function without branches that is being traced."""
+
+    name: str
+    """Name of the function."""
+    purpose: str
+    """What it does, for its docstring."""
+    parameters: tuple[str, ...] = ()
+    """Names of integer parameters after the workspace."""
+    trace: Trace = field(default_factory=Trace)
+    """Its expressions."""
+    stores: list[tuple[str, int, Scalar]] = field(default_factory=list)
+    """What it writes: base, offset, value."""
+
+    def load(self, offset: int, base: str = "") -> Expression:
+        """An element of the workspace."""
+        return self.trace.load(WORKSPACE, base, offset)
+
+    def loads(self, offset: int, count: int, base: str = "") -> list[Expression]:
+        """Several of them, one after the other."""
+        return [self.load(offset + place, base) for place in range(count)]
+
+    def table(self, table: str, offset: int, base: str) -> Expression:
+        """An element of a table."""
+        return self.trace.load(table, base, offset)
+
+    def store(self, offset: int, value: Scalar, base: str = "") -> None:
+        """Write an element of the workspace, when all is computed."""
+        self.stores.append((base, offset, value))
+
+    def store_all(self, offset: int, values: Sequence[Scalar], base: str = "") -> None:
+        """Write several, one after the other."""
+        for place, value in enumerate(values):
+            self.store(offset + place, value, base)
+
+    def text(self, *, lanes: bool = False) -> str:
+        """The function.
+
+        Args:
+            lanes: For many cases at once: every element of the workspace is `LANES` numbers, and a loop goes over them.
+        """
+        head = ", ".join([f"{WORKSPACE}: Array", *(f"{name}: int" for name in self.parameters)])
+        indent = "    "
+        lines = [f"def {self.name}({head}) -> None:", f'{indent}"""{self.purpose}"""']
+        if lanes:
+            lines.append(f"{indent}for lane in range(LANES):")
+            indent += "    "
+        body = [f"{indent}{line}" for line in _statements(self.stores, lanes)]
+        return "\n".join([*lines, *(body or [f"{indent}pass"])])
+
+    def operations(self) -> int:
+        """Number of arithmetic operations."""
+        return sum(one.operation != "load" for one in in_order([value for _, _, value in self.stores]))
+
+
+def hoist(
+    blocks: Sequence[Block],
+    before: Block,
+    varying: Sequence[Expression],
+    first: int,
+    base: str = "",
+    overwritten: Sequence[Expression] = (),
+) -> int:
+    """Take what does not depend on the `varying` elements out of blocks, into one that runs before them.
+
+    Args:
+        blocks: The blocks, of one trace; they read the values instead, from then on.
+        before: The block that computes and stores them, of the same trace.
+        varying: The elements of the workspace that change between two runs of the blocks.
+        first: Place in the workspace from which values can be kept.
+        base: Name of an integer parameter to which that place is relative, or empty.
+        overwritten: Elements that `before` can read, and that hold something else when the blocks run.
+
+    Returns:
+        How many values are kept.
+    """
+    trace = before.trace
+    expressions = in_order([value for block in blocks for _, _, value in block.stores])
+    moving = {one.number for one in varying}
+    for one in expressions:
+        if any(argument.number in moving for argument in operands(one)):
+            moving.add(one.number)
+    kept: dict[int, Expression] = {}
+    gone = {one.number for one in overwritten}
+
+    def standing(value: Expression) -> Expression:
+        """The value itself if it moves or is an element anyway, else the element that keeps it."""
+        if value.number in moving or (value.operation == "load" and value.number not in gone):
+            return value
+        if value.operation == "neg":  # no work; keep what it is made of
+            return trace.make("neg", standing(value.arguments[0]))
+        if value.number not in kept:
+            before.store(first + len(kept), value, base)
+            kept[value.number] = trace.load(WORKSPACE, base, first + len(kept))
+        return kept[value.number]
+
+    made: dict[int, Expression] = {}
+
+    def changed(value: Scalar) -> Scalar:
+        if not isinstance(value, Expression):
+            return value
+        return made[value.number] if value.number in made else standing(value)
+
+    for one in expressions:
+        if one.number in moving and one.operation != "load":
+            made[one.number] = trace.make(one.operation, *(changed(argument) for argument in one.arguments))
+    for block in blocks:
+        block.stores = [(place, offset, changed(value)) for place, offset, value in block.stores]
+    return len(kept)
+
+
+def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool) -> Iterator[str]:
+    expressions = in_order([value for _, _, value in stores])
+    uses = Counter(one.number for expression in expressions for one in operands(expression))
+    uses.update(value.number for _, _, value in stores if isinstance(value, Expression))
+    texts: dict[int, tuple[str, int]] = {}  # by number: text and how strongly it binds
+    written = {(base, offset) for base, offset, _ in stores}
+    names = 0
+    for expression in expressions:
+        text, strength = _text(expression, texts, lanes)
+        # An element that is written at the end is read first, whatever its order in the text.
+        changed = (
+            expression.operation == "load" and expression.arguments[0] == WORKSPACE and expression.arguments[1:] in written
+        )
+        shared = uses[expression.number] > 1 and expression.operation != "neg"
+        if changed or shared or len(text) > _WIDEST:
+            yield f"x{names} = {text}"
+            text, strength = f"x{names}", 4
+            names += 1
+        texts[expression.number] = (text, strength)
+    for base, offset, value in stores:
+        text = texts[value.number][0] if isinstance(value, Expression) else repr(float(value))
+        yield f"{_element(WORKSPACE, base, offset, lanes)} = {text}"
+
+
+def _text(expression: Expression, texts: dict[int, tuple[str, int]], lanes: bool) -> tuple[str, int]:
+    """Text of an expression from the texts of its arguments, and how strongly it binds."""
+    operation, arguments = expression.operation, expression.arguments
+    if operation == "load":
+        array, base, offset = arguments
+        return _element(array, base, offset, lanes), 4
+
+    def part(argument: Scalar, strength: int) -> str:
+        text, binds = texts[argument.number] if isinstance(argument, Expression) else _constant(argument)
+        return text if binds >= strength else f"({text})"
+
+    if operation == "if_less":
+        one, other, then, otherwise = (part(argument, 0) for argument in arguments)
+        return f"where({one} < {other}, {then}, {otherwise})", 4
+    strength = _STRENGTH.get(operation)
+    if strength is None:
+        return f"{operation}({part(arguments[0], 0)})", 4
+    if operation == "neg":
+        return f"-{part(arguments[0], 4)}", strength
+    stronger = strength + (operation in ("-", "/"))
+    return f"{part(arguments[0], strength)} {operation} {part(arguments[1], stronger)}", strength
+
+
+def _constant(value: float) -> tuple[str, int]:
+    return repr(float(value)), 4 if value >= 0.0 else 3
+
+
+def _element(array: str, base: str, offset: int, lanes: bool) -> str:
+    index = str(offset) if not base else base if offset == 0 else f"{base} + {offset}"
+    if lanes and array == WORKSPACE:
+        index = f"{index} * LANES + lane" if not base or offset == 0 else f"({index}) * LANES + lane"
+    return f"{array}[{index}]"

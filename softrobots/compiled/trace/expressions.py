@@ -1,0 +1,232 @@
+"""Scalar expressions that are traced instead of computed: constants fold, equal expressions are shared, slopes are exact.
+
+A `Trace` makes the inputs; arithmetic on them makes `Expression` objects, each at most once. A constant is a plain float, so
+that ordinary code (also on NumPy arrays of objects, with `@`) computes with constants and expressions alike: what is zero or
+one in a robot costs nothing in the code that `softrobots.compiled.trace.blocks` writes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+Scalar: TypeAlias = "Expression | float"
+"""An expression, or a constant."""
+
+COMMUTATIVE = ("+", "*")
+"""Operations whose two arguments may change places."""
+
+
+class Trace:
+    """The expressions of one piece of code."""
+
+    def __init__(self) -> None:
+        """Begin without expressions."""
+        self._made: dict[tuple[Any, ...], Expression] = {}
+
+    def load(self, array: str, base: str, offset: int) -> Expression:
+        """Element `base + offset` of an array; `base` is the name of an integer parameter, or empty."""
+        return self.make("load", array, base, offset)
+
+    def make(self, operation: str, *arguments: Any) -> Expression:
+        """The expression of an operation, made anew only if there is none like it."""
+        if operation in COMMUTATIVE and _order(arguments[1]) < _order(arguments[0]):
+            arguments = arguments[::-1]
+        key = (operation, *((id(one) if isinstance(one, Expression) else one) for one in arguments))
+        found = self._made.get(key)
+        if found is None:
+            found = self._made[key] = Expression(self, operation, arguments, len(self._made))
+        return found
+
+
+class Expression:
+    """A number that is known only when the code runs."""
+
+    __slots__ = ("arguments", "number", "operation", "trace")
+
+    def __init__(self, trace: Trace, operation: str, arguments: tuple[Any, ...], number: int) -> None:
+        """Keep what makes it; `Trace.make` calls this."""
+        self.trace = trace
+        self.operation = operation
+        self.arguments = arguments
+        self.number = number
+
+    def __repr__(self) -> str:
+        """Operation and arguments, one level deep."""
+        shown = (f"#{one.number}" if isinstance(one, Expression) else repr(one) for one in self.arguments)
+        return f"#{self.number} = {self.operation}({', '.join(shown)})"
+
+    def __neg__(self) -> Scalar:
+        if self.operation == "neg":
+            return _part(self)
+        if self.operation == "-":
+            return self.trace.make("-", self.arguments[1], self.arguments[0])
+        return self.trace.make("neg", self)
+
+    def __add__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Expression):
+            other = float(other)
+            return self if other == 0.0 else self.trace.make("+", self, other)
+        if other.operation == "neg":
+            return self - _part(other)
+        if self.operation == "neg":
+            return other - _part(self)
+        return self.trace.make("+", self, other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Expression):
+            return self + (-float(other))
+        if other is self:
+            return 0.0
+        if other.operation == "neg":
+            return self + _part(other)
+        return self.trace.make("-", self, other)
+
+    def __rsub__(self, other: float) -> Scalar:
+        return -self if other == 0.0 else self.trace.make("-", float(other), self)
+
+    def __mul__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Expression):
+            other = float(other)
+            if other == 0.0:
+                return 0.0
+            if other == 1.0:
+                return self
+            if other == -1.0:
+                return -self
+            if self.operation == "neg":
+                return _part(self) * -other
+            return self.trace.make("*", self, other)
+        if self.operation == "neg":
+            return -(_part(self) * other)
+        if other.operation == "neg":
+            return -(self * _part(other))
+        return self.trace.make("*", self, other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Expression):
+            return self * (1.0 / float(other))
+        return self.trace.make("/", self, other)
+
+    def __rtruediv__(self, other: float) -> Scalar:
+        return 0.0 if other == 0.0 else self.trace.make("/", float(other), self)
+
+
+def _part(negated: Expression) -> Expression:
+    """What a negated expression is the negative of."""
+    part: Expression = negated.arguments[0]
+    return part
+
+
+def _order(argument: Any) -> int:
+    """Place of an argument of a commutative operation: constants first, then by age."""
+    return argument.number if isinstance(argument, Expression) else -1
+
+
+def sine(angle: Scalar) -> Scalar:
+    """Sine of an angle [rad]."""
+    return angle.trace.make("sine", angle) if isinstance(angle, Expression) else math.sin(angle)
+
+
+def cosine(angle: Scalar) -> Scalar:
+    """Cosine of an angle [rad]."""
+    return angle.trace.make("cosine", angle) if isinstance(angle, Expression) else math.cos(angle)
+
+
+def square_root(value: Scalar) -> Scalar:
+    """Square root."""
+    return value.trace.make("sqrt", value) if isinstance(value, Expression) else math.sqrt(value)
+
+
+def absolute(value: Scalar) -> Scalar:
+    """Absolute value."""
+    return value.trace.make("fabs", value) if isinstance(value, Expression) else abs(value)
+
+
+def if_less(one: Scalar, other: Scalar, then: Scalar, otherwise: Scalar) -> Scalar:
+    """`then` where `one < other`, else (and where one of them is no number) `otherwise`; both are computed."""
+    for side in (one, other):
+        if isinstance(side, Expression):
+            return side.trace.make("if_less", one, other, then, otherwise)
+    return then if float(one) < float(other) else otherwise  # type: ignore[arg-type]
+
+
+def smaller(one: Scalar, other: Scalar) -> Scalar:
+    """The smaller of two numbers."""
+    return if_less(one, other, one, other)
+
+
+def larger(one: Scalar, other: Scalar) -> Scalar:
+    """The larger of two numbers."""
+    return if_less(other, one, one, other)
+
+
+def operands(expression: Expression) -> list[Expression]:
+    """The arguments of an expression that are expressions."""
+    return [one for one in expression.arguments if isinstance(one, Expression)]
+
+
+def in_order(roots: Sequence[Scalar]) -> list[Expression]:
+    """All expressions that `roots` are made of, themselves included, each after its arguments."""
+    seen: set[int] = set()
+    found: list[Expression] = []
+    pending: list[tuple[Expression, bool]] = [(root, False) for root in reversed(roots) if isinstance(root, Expression)]
+    while pending:
+        expression, ready = pending.pop()
+        if ready:
+            found.append(expression)
+        elif expression.number not in seen:
+            seen.add(expression.number)
+            pending.append((expression, True))
+            pending += ((one, False) for one in reversed(operands(expression)))
+    return found
+
+
+def gradient(value: Scalar, variables: Sequence[Expression]) -> list[Scalar]:
+    """Derivatives of an expression with respect to some of the expressions that it is made of (reverse accumulation)."""
+    slopes: dict[int, Scalar] = {}
+    if isinstance(value, Expression):
+        slopes[value.number] = 1.0
+        kept = {one.number for one in variables}
+        for expression in reversed(in_order([value])):
+            slope = slopes.get(expression.number, 0.0)
+            if expression.number not in kept and not (isinstance(slope, float) and slope == 0.0):
+                for one, share in _shares(expression):
+                    slopes[one.number] = slopes.get(one.number, 0.0) + slope * share
+    return [slopes.get(one.number, 0.0) for one in variables]
+
+
+def _shares(expression: Expression) -> list[tuple[Expression, Scalar]]:
+    """Derivative of an operation with respect to each argument that is an expression."""
+    arguments = expression.arguments
+    one, two = arguments[0], arguments[1] if len(arguments) > 1 else 0.0
+    shares: tuple[Scalar, ...]
+    match expression.operation:
+        case "load":
+            return []
+        case "neg":
+            shares = (-1.0,)
+        case "+":
+            shares = (1.0, 1.0)
+        case "-":
+            shares = (1.0, -1.0)
+        case "*":
+            shares = (two, one)
+        case "/":
+            shares = (1.0 / two, -(expression / two))
+        case "sqrt":
+            shares = (0.5 / expression,)
+        case "sine":
+            shares = (cosine(one),)
+        case "cosine":
+            shares = (-sine(one),)
+        case "fabs":
+            shares = (if_less(one, 0.0, -1.0, 1.0),)
+        case _:  # if_less
+            shares = (0.0, 0.0, if_less(one, two, 1.0, 0.0), if_less(one, two, 0.0, 1.0))
+    return [(argument, share) for argument, share in zip(arguments, shares, strict=True) if isinstance(argument, Expression)]

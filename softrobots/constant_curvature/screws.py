@@ -1,0 +1,128 @@
+r"""The screw motion along a section of constant strain, with first and second derivative.
+
+A section has the *section coordinates* `z = h (kx, ky, tau, stretch - 1)`: the rotation over its length about x, y (bending)
+and z (twist) [rad], and its elongation [m], at rest length `h`. Its end stands in the frame of its start at
+
+.. math:: \exp\left(\begin{bmatrix} [\omega] & \ell e_z \\ 0 & 0 \end{bmatrix}\right) = (R, p), \qquad
+   \omega = z_{0..2}, \quad \ell = h + z_3
+
+    R = 1 + c_1 [w] + c_2 [w]^2,    p = l d,    d = c_1 e_z + c_2 w x e_z + c_3 w_z w
+
+with the Stumpff functions `c_k` of `|w|^2`, for which `dc_k = d_k w . dw` and `d_k = k c_{k+2} - c_{k+1}`. Everything is smooth
+through straight. All is vectorised over leading axes; twists are linear part first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softrobots.constant_curvature.stumpff import stumpff
+from softrobots.core.checks import FloatArray
+
+_UNITS = np.eye(3)
+_AXIS = _UNITS[2]
+_CROSS_AXIS = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # columns e_j x e_z
+
+
+def skew(vectors: FloatArray) -> FloatArray:
+    """Matrices `[v]` with `[v] u = v x u`, shape (..., 3, 3), of vectors of shape (..., 3)."""
+    made = np.zeros((*vectors.shape, 3))
+    made[..., 2, 1], made[..., 0, 2], made[..., 1, 0] = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    made[..., 1, 2], made[..., 2, 0], made[..., 0, 1] = -vectors[..., 0], -vectors[..., 1], -vectors[..., 2]
+    return made
+
+
+class Screw:
+    """End of a section in the frame of its start, and how it moves with the section coordinates."""
+
+    def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
+        """Evaluate the motion.
+
+        Args:
+            z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
+            rest_length: Rest length `h`, shape (...) [m].
+        """
+        self._omega = omega = z[..., :3]
+        self._length = np.asarray(rest_length + z[..., 3])[..., None]
+        self._c = c = stumpff(np.asarray((omega * omega).sum(axis=-1)), 7)[..., None]
+        self._turn = turn = skew(omega)
+        self._turn_twice = turn @ turn
+        self.rotation: FloatArray = _UNITS + c[1, ..., None] * turn + c[2, ..., None] * self._turn_twice
+        """Axes of the end in those of the start, shape (..., 3, 3)."""
+        self._across = omega @ _CROSS_AXIS.T  # w x e_z
+        self._direction = c[1] * _AXIS + c[2] * self._across + c[3] * omega[..., 2:] * omega
+        self.position: FloatArray = self._length * self._direction
+        """Position of the end in the frame of the start, shape (..., 3) [m]."""
+
+    def twists(self) -> FloatArray:
+        r"""Twist of the end per section coordinate, in the axes of the end, linear part first, shape (..., 6, 4).
+
+        The columns of :math:`h\,T(h\xi)B`: angular `1 - c_2 [w] + c_3 [w]^2`, linear `R^T dp/dz`.
+        """
+        omega, c = self._omega, self._c
+        d = _slopes(c, 3)
+        along = d[1] * _AXIS + d[2] * self._across + d[3] * omega[..., 2:] * omega
+        slope = along[..., :, None] * omega[..., None, :] + c[2, ..., None] * _CROSS_AXIS
+        slope += c[3, ..., None] * (omega[..., :, None] * _AXIS + omega[..., 2, None, None] * _UNITS)
+        moved = np.concatenate(
+            [self._length[..., None] * slope, self._direction[..., None]], axis=-1
+        )  # dp/dz, axes of the start
+        made = np.zeros((*omega.shape[:-1], 6, 4))
+        made[..., :3, :] = np.swapaxes(self.rotation, -1, -2) @ moved
+        made[..., 3:, :3] = _UNITS - c[2, ..., None] * self._turn + c[3, ..., None] * self._turn_twice
+        return made
+
+    def curvature(self, twists: FloatArray, covector: FloatArray) -> FloatArray:
+        r"""Derivative of `covector . twists` with respect to the section coordinates at constant covector.
+
+        Element `[a, b]` is :math:`\lambda \cdot \partial S_a / \partial z_b`. (Contracting before differentiating leaves
+        matrices where the second derivative itself is a field of tensors; unit covectors give that.)
+
+        Args:
+            twists: What `twists` returned, shape (..., 6, 4).
+            covector: Wrench in the axes of the end, linear part first, shape (..., 6).
+
+        Returns:
+            Shape (..., 4, 4); not symmetric.
+        """
+        force, moment = covector[..., :3], covector[..., 3:]
+        made = np.zeros((*covector.shape[:-1], 4, 4))
+        # Linear part R^T p': the Hessian of g . p with g = R f held, and the turn of the axes.
+        hessian, slope = self._position_hessian((self.rotation @ force[..., None])[..., 0])
+        made[..., :3, :3] = hessian + self._angular_slope(moment)
+        made[..., 3, :3] = made[..., :3, 3] = slope
+        made[..., :3] -= np.swapaxes(twists[..., :3, :], -1, -2) @ (skew(force) @ twists[..., 3:, :3])
+        return made
+
+    def _position_hessian(self, pull: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Second derivative of `pull . p` with respect to `w`, and of `w` and the length, shapes (..., 3, 3) and (..., 3)."""
+        omega, c = self._omega, self._c
+        d = _slopes(c, 5)
+        e = [None, *(k * d[k + 2] - d[k + 1] for k in (1, 2, 3))]
+        aside = pull @ _CROSS_AXIS  # pull . (w x e_z) = aside . w
+        across, along = (aside * omega).sum(-1, keepdims=True), (pull * omega).sum(-1, keepdims=True)
+        values = (pull[..., 2:], across, omega[..., 2:] * along)  # pull . v of the three terms c_k v
+        turning = along * _AXIS + omega[..., 2:] * pull  # slope of the last one
+        first, second = (sum(f[k] * v for k, v in zip((1, 2, 3), values, strict=True)) for f in (d, e))
+        mixed = 0.5 * second * omega + d[2] * aside + d[3] * turning
+        outer = mixed[..., :, None] * omega[..., None, :] + c[3, ..., None] * pull[..., :, None] * _AXIS
+        hessian = first[..., None] * _UNITS + outer + np.swapaxes(outer, -1, -2)
+        return self._length[..., None] * hessian, first * omega + c[2] * aside + c[3] * turning
+
+    def _angular_slope(self, moment: FloatArray) -> FloatArray:
+        """Derivative of `moment . T` with `T = 1 - c_2 [w] + c_3 [w]^2`, shape (..., 3, 3)."""
+        omega, c = self._omega, self._c
+        d = _slopes(c, 3)
+        turned = (self._turn @ moment[..., None])[..., 0]
+        turned_twice = (self._turn_twice @ moment[..., None])[..., 0]
+        along = (omega * moment).sum(-1)[..., None, None]
+        made = (d[2] * turned + d[3] * turned_twice)[..., :, None] * omega[..., None, :] - c[2, ..., None] * skew(moment)
+        outer = omega[..., :, None] * moment[..., None, :]
+        made += c[3, ..., None] * (along * _UNITS + outer - 2.0 * np.swapaxes(outer, -1, -2))
+        return np.asarray(made)
+
+
+def _slopes(c: FloatArray, highest: int) -> FloatArray:
+    """`d_k` with `dc_k = d_k w . dw`, up to `highest`, shape (highest + 1, ...)."""
+    orders = np.arange(highest + 1).reshape(-1, *(1,) * (c.ndim - 1))
+    return np.asarray(orders * c[2 : highest + 3] - c[1 : highest + 2])

@@ -1,0 +1,53 @@
+r"""Stumpff functions: sine and cosine divided by powers of their angle, smooth through zero.
+
+.. math:: c_k(x) = \sum_{j \ge 0} \frac{(-x)^j}{(2j + k)!}, \qquad x = \theta^2
+
+so that `c_0 = cos(theta)`, `c_1 = sin(theta)/theta`, `c_2 = (1 - cos(theta))/theta^2`, `c_3 = (theta - sin(theta))/theta^3`.
+Arcs and screws are sums of them, and so are all derivatives: `dc_k/dx = (k c_{k+2} - c_{k+1}) / 2`. Nothing is divided by an
+angle, so that straight is a point like any other.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+
+_SERIES_UP_TO = 40.0  # of x: there the terms of the series still fall from the first on
+_TERMS = ((1.0, 9), (_SERIES_UP_TO, 24))  # up to which x how many
+
+
+def stumpff(x: FloatArray, highest: int) -> FloatArray:
+    """Evaluate `c_0` to `c_highest`.
+
+    Up to an angle of 2 pi the two highest functions come from their alternating series, the others from
+    `c_k = 1/k! - x c_{k+2}` downwards; beyond, all come from sine and cosine upwards. Both lose no more than rounding.
+
+    Args:
+        x: Squares of the angle, any shape [rad^2], not negative.
+        highest: Largest index, at least 1.
+
+    Returns:
+        Shape (highest + 1, *x.shape).
+    """
+    values = np.zeros((highest + 1, *x.shape))
+    small = np.minimum(x, _SERIES_UP_TO)
+    largest = float(small.max(initial=0.0))
+    terms = _TERMS[0][1] if largest <= _TERMS[0][0] else _TERMS[1][1]
+    for k in (highest, highest - 1):
+        total = np.ones_like(small)
+        for j in range(terms, 0, -1):
+            total = 1.0 - small / ((2 * j + k) * (2 * j + k - 1)) * total
+        values[k] = total / math.factorial(k)
+    for k in range(highest - 2, -1, -1):
+        values[k] = 1.0 / math.factorial(k) - small * values[k + 2]
+    large = x > _SERIES_UP_TO
+    if np.any(large):
+        angle = np.sqrt(x[large])
+        upwards = [np.cos(angle), np.sin(angle) / angle]
+        for k in range(highest - 1):
+            upwards.append((1.0 / math.factorial(k) - upwards[k]) / x[large])
+        values[:, large] = upwards
+    return values

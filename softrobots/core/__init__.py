@@ -1,0 +1,1 @@
+"""Checks of input, errors, safe files and records; no robotics."""

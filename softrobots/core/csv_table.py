@@ -1,0 +1,114 @@
+"""Columns of numbers out of a CSV file whose first line names them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from array import array
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.core.bounded_reading import opened
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import FileFormatError
+
+LARGEST_FILE = 100_000_000
+"""Bytes of a file."""
+
+MOST_ROWS = 1_000_000
+"""Rows of numbers in a file."""
+
+_LONGEST_LINE = 1_000_000  # characters
+
+
+class Table(NamedTuple):
+    """Some columns of a file."""
+
+    columns: tuple[str, ...]
+    """Their names."""
+    numbers: FloatArray
+    """What they hold, all finite, shape (n_rows, n_columns)."""
+    lines: Sequence[int]
+    """The line of the file on which each row ends, from 1."""
+
+
+def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()) -> Table:
+    """Read columns of a CSV file by name.
+
+    Other columns are ignored, and so are lines with nothing in them. Every other line must have as many cells as the first: one
+    with more or fewer is damaged, or has decimal commas.
+
+    Args:
+        path: The file, in UTF-8.
+        required: Columns that it must have, each once.
+        optional: Columns that it may have, once.
+
+    Returns:
+        The columns that it has, those of `optional` first.
+
+    Raises:
+        FileFormatError: If the file cannot be read or is too large, lacks a column or has it twice, or (naming the line) has a
+            cell that is no finite number, or more or fewer cells than the first line.
+    """
+    numbers, lines = array("d"), array("q")
+    with opened(path) as file, io.TextIOWrapper(file, encoding="utf-8-sig", newline="") as text:
+        reader = csv.reader(_lines(path, text), skipinitialspace=True)
+        try:
+            names = [name.strip() for name in next(reader, [])]
+            columns = _columns(path, names, required, optional)
+            places = [names.index(name) for name in columns]
+            for cells in reader:
+                if not any(cell.strip() for cell in cells):
+                    continue
+                where = f"{path}, line {reader.line_num}"
+                if len(cells) != len(names):
+                    raise FileFormatError(f"{where}: {len(cells)} cells; {len(names)} are required")
+                if len(lines) == MOST_ROWS:
+                    raise FileFormatError(f"{where}: more than {MOST_ROWS} rows, which is the most that is read")
+                numbers.extend(_number(f"{where}: {names[place]}", cells[place]) for place in places)
+                lines.append(reader.line_num)
+        except csv.Error as error:
+            raise FileFormatError(f"{path}, line {reader.line_num}: {error}") from error
+    table = np.array(numbers, dtype=np.float64).reshape(-1, len(columns))
+    return Table(columns, table, lines)
+
+
+def _lines(path: Path, file: io.TextIOWrapper) -> Iterator[str]:
+    """The lines of a text with their ends, none of them too long, and all together not too long."""
+    size = 0
+    while line := file.readline(_LONGEST_LINE + 1):
+        size += len(line)
+        if len(line) > _LONGEST_LINE:
+            raise FileFormatError(f"{path} has a line of more than {_LONGEST_LINE} characters, which is the most that is read")
+        if size > LARGEST_FILE:
+            raise FileFormatError(f"{path} has more than {LARGEST_FILE} characters, which is the most that is read")
+        if "\0" in line:
+            raise FileFormatError(f"{path} is no text in UTF-8: it holds a character of number 0")
+        yield line
+
+
+def _columns(path: Path, names: Sequence[str], required: Sequence[str], optional: Sequence[str]) -> tuple[str, ...]:
+    """Which columns are there, checked."""
+    if any(names.count(name) != 1 for name in required) or any(names.count(name) > 1 for name in optional):
+        named = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
+        may = f", and {', '.join(optional)} at most once" if optional else ""
+        raise FileFormatError(
+            f"{path}, line 1: it names {named[:500] or 'nothing'}; {', '.join(required)} are required, each once{may}"
+        )
+    return (*(name for name in optional if name in names), *required)
+
+
+def _number(what: str, cell: str) -> float:
+    """A cell as a number; Python's own reader also takes `1_000` and digits of other scripts."""
+    try:
+        value = float(cell) if cell.isascii() and "_" not in cell else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        shown = cell if len(cell) <= 60 else f"{cell[:57]}..."
+        raise FileFormatError(f"{what} = {shown!r}; a finite number is required")
+    return value

@@ -1,0 +1,88 @@
+"""JSON as the standard has it: finite numbers, no name twice in an object, not nested without end."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from softrobots.core.bounded_reading import read_text
+from softrobots.core.errors import FileFormatError
+
+DEEPEST = 40
+"""How many arrays and objects may be inside each other."""
+
+
+def parse_json(text: str) -> Any:
+    """The value of a JSON text.
+
+    Python's own reader also takes NaN and Infinity, reads 1e999 as infinite, and of two members of one name keeps the last.
+
+    Args:
+        text: The text.
+
+    Returns:
+        Dictionaries, lists, texts, finite numbers, truth values and None, nested at most `DEEPEST` deep.
+
+    Raises:
+        FileFormatError: If it is no such text.
+    """
+    try:
+        value = json.loads(text, object_pairs_hook=_object, parse_constant=_refuse)
+    except FileFormatError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(f"it is no JSON: {error}") from error
+    _check(value)
+    return value
+
+
+def read_json(path: Path, largest: int) -> Any:
+    """The value in a JSON file.
+
+    Args:
+        path: The file, in UTF-8.
+        largest: How many bytes it may have.
+
+    Returns:
+        As `parse_json`.
+
+    Raises:
+        FileFormatError: If the file cannot be read, is larger, or is no such text.
+    """
+    text = read_text(path, largest)
+    try:
+        return parse_json(text)
+    except FileFormatError as error:
+        raise FileFormatError(f"cannot read {path}: {error}") from error
+
+
+def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    made = dict(members)
+    if len(made) < len(members):
+        twice = next(name for name, count in Counter(name for name, _ in members).items() if count > 1)
+        raise FileFormatError(f"an object has two members called {twice[:60]!r}")
+    return made
+
+
+def _refuse(word: str) -> Any:
+    raise FileFormatError(f"{word} is no number of JSON")
+
+
+def _check(value: Any) -> None:
+    """Refuse what is nested too deep, or a number too large, without recursion."""
+    level, depth = [value], 0
+    while level:
+        if depth > DEEPEST:
+            raise FileFormatError(f"arrays or objects are inside each other more than {DEEPEST} deep")
+        inner: list[Any] = []
+        for item in level:
+            if isinstance(item, dict):
+                inner += item.values()
+            elif isinstance(item, list):
+                inner += item
+            elif isinstance(item, int | float) and not abs(item) <= sys.float_info.max:
+                raise FileFormatError(f"a number is larger than {sys.float_info.max:g}")
+        level, depth = inner, depth + 1

@@ -1,0 +1,282 @@
+"""Putting two robots together: a soft arm on a link of another robot, as one URDF.
+
+xacro joins the two descriptions (`xacro/mounted.urdf.xacro`); here they are made ready for that: names get a prefix, and text
+that xacro would evaluate is quoted.
+"""
+
+from __future__ import annotations
+
+import glob
+import re
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.dom import minidom
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import finite_array, finite_number, read_only
+from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
+from softrobots.description.expansion import expand
+from softrobots.description.paths import xacro_folder
+from softrobots.description.renaming import children, ours, prefix_names, shift_segments, used_names
+from softrobots.description.rigid_tree import Joint, Placement, RigidTree, number_text
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.sources import Robot, read_source
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_tags import NAMESPACE, RobotTags
+
+_WORLD = "world"
+_JOINT_DETAILS = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")
+
+
+def mount(
+    parent_urdf: Robot | Path | str,
+    link: str,
+    robot: Robot | Path | str,
+    *,
+    prefix: str = "soft_",
+    xyz: Any = (0.0, 0.0, 0.0),
+    rpy: Any = (0.0, 0.0, 0.0),
+    name: str | None = None,
+) -> str:
+    """Mount a robot on a link of another one.
+
+    The carrier stays as it is. All names of the mounted robot get the prefix, wherever they stand; its segments are numbered on
+    from those of the carrier. If its root is a link `world` without mass and shape that carries one fixed joint, that link goes
+    and the joint starts at `link`. Its tip becomes the tip of the whole, by a tag that `load_model` reads
+    (`<softrobots:tip link=../>`); a mounted robot with several ends and no `tip` leaves the tip where it was. Of two tags
+    `<mujoco>` the carrier's stays. Relative paths of meshes in files are written out, so that they are found from everywhere.
+
+    Args:
+        parent_urdf: The carrier: a robot of this package, the path of a URDF file, or URDF text (what `load_model` takes).
+        link: Link of the carrier.
+        robot: The robot to be mounted, likewise.
+        prefix: Put before every name of the mounted robot; letters, digits and underscores.
+        xyz: Where the root of the mounted robot is in the frame of `link`, shape (3,) [m].
+        rpy: How it is turned there, roll, pitch, yaw, shape (3,) [rad].
+        name: Name of the whole; by default `<carrier>_with_<robot>`.
+
+    Returns:
+        URDF text, for `load_model` and every tool that reads URDF.
+
+    Raises:
+        ParameterError: If an argument has the wrong type or shape or is not finite, or prefix or name is not of letters, digits
+            and underscores.
+        NameNotFound: If the carrier has no such link; lists its links.
+        DescriptionError: If a description cannot be read or is no URDF, if a name is in both of them after prefixing, if they
+            declare an XML namespace differently, or if one has sections of constant strain and the other lumped ones.
+    """
+    position, angles = finite_array("xyz", xyz, (3,), "m"), finite_array("rpy", rpy, (3,), "rad")
+    if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z0-9_]*", prefix):
+        raise ParameterError("prefix", prefix, "text of letters, digits and underscores")
+    carrier, child = _read(parent_urdf, "parent_urdf"), _read(robot, "robot")
+    links = [body.name for body in carrier.tree.bodies]
+    if link not in links:
+        raise NameNotFound("link", str(link), links)
+    whole = f"{carrier.tree.name or 'robot'}_with_{child.tree.name or 'robot'}" if name is None else name
+    if not isinstance(whole, str) or (name is not None and not re.fullmatch(r"\w+", name, re.ASCII)):
+        raise ParameterError("name", name, "text of letters, digits and underscores")
+    _check_kinds(carrier, child)
+    tip = child.tip
+    pose = Placement(read_only(position), read_only(np.asarray(pin.rpy.rpyToMatrix(*angles))))
+    base = _joint_on_world(child)
+    if base is None:
+        root, joint = child.tree.root, "mount"
+    else:
+        root, joint = base.child, base.name
+        if np.any(base.placement.position) or np.any(base.placement.rotation != np.eye(3)):
+            pose = pose @ base.placement
+            position, angles = pose.position, pose.rpy
+    prefix_names(child.dom, prefix)  # first: what refers to the joint on the world gets its new name, too
+    _prepare_child(child, base, carrier, prefix)
+    for tag in ours(carrier.dom, "tip") if tip is not None else ():
+        carrier.dom.removeChild(tag)
+    _check_names(carrier, child, prefix, prefix + joint)
+    _check_namespaces(carrier, child)
+    arguments = {
+        "name": whole,
+        "link": link,
+        "root": prefix + root,
+        "joint": prefix + joint,
+        "xyz": number_text(position),
+        "rpy": number_text(angles),
+        "tip": "" if tip is None else prefix + tip,
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        for argument, part in (("carrier", carrier), ("robot", child)):
+            file = Path(folder) / f"{argument}.urdf"
+            _quote(part.dom)
+            # ASCII, because xacro reads in the encoding of the system; and it takes brackets in file names for patterns.
+            file.write_bytes(part.dom.toxml().encode("ascii", "xmlcharrefreplace"))
+            arguments[argument] = glob.escape(str(file))
+        text = expand(xacro_folder() / "mounted.urdf.xacro", arguments)
+    read_tags(text, f"{carrier.label} with {child.label} on {link}")
+    return text
+
+
+def fix_joints(robot: Robot | Path | str, positions: Mapping[str, float]) -> str:
+    """Make motor joints fixed at given positions, e.g. those of an arm that another robot carries.
+
+    Args:
+        robot: A robot of this package, the path of a URDF file, or URDF text.
+        positions: Position by joint name [rad or m].
+
+    Returns:
+        URDF text in which these joints are fixed, and their links stand where the joints had moved them.
+
+    Raises:
+        ParameterError: If an argument has the wrong type, or a position is not finite or beyond the limits of its joint.
+        NameNotFound: If there is no such movable joint.
+        DescriptionError: If the description cannot be read, or a joint has a spring, is part of a section, is mimicked by
+            another joint that moves, or is neither revolute, continuous nor prismatic.
+    """
+    if not isinstance(positions, Mapping):
+        raise ParameterError("positions", positions, "a mapping {joint: position}")
+    part = _read(robot, "robot")
+    movable = {joint.name: joint for joint in part.tree.joints if joint.movable}
+    inside = {name for section in part.tags.sections for name in section.joints}
+    elements = {e.getAttribute("name"): e for e in children(part.dom) if e.tagName == "joint"}
+    mimics = [(m.getAttribute("joint"), n) for n, e in elements.items() for m in e.getElementsByTagName("mimic")]
+    for name, value in positions.items():
+        if name not in movable:
+            raise NameNotFound("movable joint", str(name), movable)
+        joint, where = movable[name], f"joint {name} of {part.label}"
+        position = finite_number(f"positions[{name!r}]", value, "rad or m")
+        if not joint.limits[0] <= position <= joint.limits[1]:
+            raise ParameterError(f"positions[{name!r}]", value, f"within the limits {list(joint.limits)}")
+        if name in part.tags.springs or name in inside:
+            raise DescriptionError(f"{where} is elastic; only joints without a spring can be fixed")
+        following = [follower for followed, follower in mimics if followed == name and follower not in positions]
+        if following:
+            raise DescriptionError(f"{where} is mimicked by {', '.join(following)}; fix that, too")
+        if joint.kind not in ("revolute", "continuous", "prismatic"):
+            raise DescriptionError(f"{where} is {joint.kind}; revolute, continuous and prismatic joints can be fixed")
+    for name, value in positions.items():
+        _fix(part.document, elements[name], movable[name], float(value))
+    return part.document.toxml()
+
+
+class _Part(NamedTuple):
+    """A description, read in three ways."""
+
+    label: str
+    document: minidom.Document
+    dom: minidom.Element
+    tree: RigidTree
+    tags: RobotTags
+
+    @property
+    def tip(self) -> str | None:
+        """The link that is its tip; None if it has several ends."""
+        names = [body.name for body in self.tree.bodies]
+        ends = [name for name in names if not self.tree.joints_of(name)]
+        if self.tags.tip is not None:
+            return self.tags.tip
+        return "tip" if "tip" in names else ends[0] if len(ends) == 1 else None
+
+
+def _read(source: Any, field: str) -> _Part:
+    """Read a description and refuse what is no URDF."""
+    text, label = read_source(source, field)
+    tags = read_tags(text, label)  # refuses what is no URDF
+    document = minidom.parseString(text.encode("utf-8"))
+    (dom,) = children(document)
+    both = {e.getAttribute("name") for e in children(dom) if e.tagName == "link"}
+    both &= {e.getAttribute("name") for e in children(dom) if e.tagName == "joint"}
+    if both:
+        raise DescriptionError(f"{label} has links and joints that have the same name: {', '.join(sorted(both))}")
+    return _Part(label, document, dom, read_rigid_tree(text, label), tags)
+
+
+def _joint_on_world(part: _Part) -> Joint | None:
+    """The only joint on a root `world` that is nothing else than the place where the robot stands; None otherwise."""
+    root = part.tree.body(part.tree.root)
+    joints = part.tree.joints_of(root.name)
+    empty = root.name == _WORLD and root.mass == 0.0 and not root.visuals and not root.collisions
+    empty = empty and part.tip != root.name
+    return joints[0] if empty and len(joints) == 1 and not joints[0].movable else None
+
+
+def _prepare_child(child: _Part, base: Joint | None, carrier: _Part, prefix: str) -> None:
+    """Take out what the whole has once, or not at all; names have their prefix already."""
+    gone = ours(child.dom, "tip")
+    for element in children(child.dom):
+        if base is not None and (element.tagName, element.getAttribute("name")) in (
+            ("link", prefix + _WORLD),
+            ("joint", prefix + base.name),
+        ):
+            gone.append(element)
+        if base is not None and element.tagName == "gazebo" and element.getAttribute("reference") == prefix + _WORLD:
+            gone.append(element)
+        if element.tagName == "mujoco" and any(other.tagName == "mujoco" for other in children(carrier.dom)):
+            gone.append(element)
+    for element in gone:
+        child.dom.removeChild(element)
+    numbers = [tag.segment for tag in carrier.tags.sections] + [tag.segment for tag in carrier.tags.lumped_sections]
+    shift_segments(child.dom, max(numbers, default=0))
+
+
+def _check_kinds(carrier: _Part, child: _Part) -> None:
+    for one, other in ((carrier, child), (child, carrier)):
+        if one.tags.sections and other.tags.lumped_sections:
+            raise DescriptionError(
+                f"{one.label} has sections of constant strain and {other.label} has lumped ones; a robot has one kind: make "
+                'both with chain="sections", or both with chain="lumped"'
+            )
+
+
+def _check_names(carrier: _Part, child: _Part, prefix: str, joint: str) -> None:
+    above, below = used_names(carrier.dom), used_names(child.dom)
+    below["link or joint"][joint] = "joint"
+    for kind, names in below.items():
+        for name in names:
+            if name in above.get(kind, {}) and not (kind == "material" and above[kind][name] == names[name]):
+                told = "a material of another colour" if kind == "material" else f"a {kind}"
+                raise DescriptionError(
+                    f"{carrier.label} already has {told} called {name!r}, as {child.label} with the prefix {prefix!r}; "
+                    "choose another prefix"
+                )
+
+
+def _check_namespaces(carrier: _Part, child: _Part) -> None:
+    declared = {"xmlns:softrobots": NAMESPACE}
+    for part in (carrier, child):
+        for attribute, value in part.dom.attributes.items():
+            if attribute.startswith("xmlns:") and attribute != "xmlns:xacro" and declared.setdefault(attribute, value) != value:
+                raise DescriptionError(
+                    f"{part.label} declares {attribute}={value!r}, which stands for {declared[attribute]!r} here; rename it"
+                )
+
+
+def _quote(node: Any) -> None:
+    """Quote dollar signs in attributes and texts, which xacro would evaluate, and drop comments that are orders to it."""
+    for inner in list(node.childNodes):
+        if inner.nodeType == inner.ELEMENT_NODE:
+            _quote(inner)
+        elif inner.nodeType == inner.TEXT_NODE:
+            inner.data = _quoted(inner.data)
+        elif inner.nodeType == inner.COMMENT_NODE and "xacro:eval-comments" in inner.data:
+            node.removeChild(inner)
+    for attribute, value in list(node.attributes.items()):
+        node.setAttribute(attribute, _quoted(value))
+
+
+def _quoted(text: str) -> str:
+    return text.replace("$", "${'$'}")
+
+
+def _fix(document: minidom.Document, element: minidom.Element, joint: Joint, position: float) -> None:
+    element.setAttribute("type", "fixed")
+    for inner in children(element):
+        if inner.tagName in _JOINT_DETAILS or inner.namespaceURI == NAMESPACE:
+            element.removeChild(inner)
+    if position == 0.0:
+        return
+    placed = joint.placement_at(position)
+    origins = [inner for inner in children(element) if inner.tagName == "origin"]
+    origin = origins[0] if origins else element.appendChild(document.createElement("origin"))
+    origin.setAttribute("xyz", number_text(placed.position))
+    origin.setAttribute("rpy", number_text(placed.rpy))

@@ -1,0 +1,144 @@
+"""MJCF, the format of MuJoCo: the compiled model as bodies and joints of URDF.
+
+MuJoCo compiles the file, so defaults, classes, degrees, inertia from geoms, includes and nested frames are its own. Coordinates
+are MuJoCo's `qpos`, also where `ref` is not zero: the placement of a joint carries `-ref`. `stiffness` and `springref` become
+springs; hinges and slides without stiffness are motors. The gravity of the file is not read.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import LARGEST, read_only
+from softrobots.core.errors import DescriptionError, MissingDependency
+from softrobots.core.xml_input import parse_xml
+from softrobots.description.readers.mjcf_limits import check_mjcf
+from softrobots.description.readers.mjcf_refusals import driven_joint, joint_name, not_carried
+from softrobots.description.readers.mjcf_shapes import visible_shapes
+from softrobots.description.readers.tree_builder import Motion, TreeBuilder
+from softrobots.description.rigid_tree import Body, Placement, RigidTree
+from softrobots.description.urdf_tags import SpringTag
+
+
+def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
+    """Read MJCF.
+
+    A body without a name is called `body_<number>`, a joint `joint_<number>`, as MuJoCo counts them. A body with several
+    joints gets a link before each but the last, `<body>_<joint>`, with a little of the body's mass where that changes nothing
+    (`softrobots.description.readers.shared_mass`), else without mass. A hinge beside the origin of its body gets a link without
+    mass at its anchor. A site with a name becomes a link without mass, unless a body has that name. The tip is the body or site
+    called `tip`, or the only moving body at the end of the tree. Of shapes, visible boxes, cylinders, spheres and mesh files
+    are read, and capsules as cylinders.
+
+    What does not bear on a loaded robot at rest is left out: contacts, damping polynomials, armature, sensors, actuators at
+    zero. A position actuator of a joint without stiffness says nothing: that joint is a motor.
+
+    Args:
+        text: The document.
+        source: Where it comes from, for errors.
+        path: Its file, for what it includes.
+
+    Returns:
+        The tree; its root is the link `world`.
+
+    Raises:
+        MissingDependency: If MuJoCo is not installed (extra `interop`).
+        DescriptionError: If MuJoCo refuses it, it has no bodies, a number is not finite, it has what is listed in
+            `softrobots.description.readers.mjcf_refusals`, or it asks for more than
+            `softrobots.description.readers.mjcf_limits` lets through.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise MissingDependency("mujoco", "interop") from error
+    check_mjcf(parse_xml(text, source), source, path)
+    try:
+        model = mujoco.MjModel.from_xml_string(text) if path is None else mujoco.MjModel.from_xml_path(str(path))
+    except Exception as error:  # ValueError, RuntimeError, mujoco.FatalError, and what its compiler runs into
+        reason = " ".join(str(error).split())
+        raise DescriptionError(f"MuJoCo {mujoco.__version__} refuses {source}: {reason}") from error
+    reasons = not_carried(mujoco, model)
+    if reasons:
+        raise DescriptionError(f"{source} has what does not become a robot of springs and motors: {'; '.join(reasons)}")
+    shapes = visible_shapes(mujoco, model, text, path)
+    bodies = [_body_name(model, number) for number in range(model.nbody)]
+    joints = [joint_name(model, number) for number in range(model.njnt)]
+    builder = TreeBuilder(_model_name(model), source, bodies, joints)
+    for number, name in enumerate(bodies):
+        body = Body(
+            name,
+            float(model.body_mass[number]),
+            Placement.turned(model.body_ipos[number], model.body_iquat[number]),
+            read_only(np.diag(model.body_inertia[number])),
+            shapes[number],
+        )
+        if number == 0:
+            builder.draw_on_world(body)
+            continue
+        motions, end = _motions(mujoco, model, number, source)
+        builder.add(body, bodies[model.body_parentid[number]], motions, end)
+    for number in range(model.nsite):
+        site = model.site(number)
+        if site.name:
+            builder.add_frame(site.name, bodies[model.site_bodyid[number]], Placement.turned(site.pos, site.quat))
+    return builder.tree()
+
+
+def _motions(mujoco: Any, model: Any, body: int, source: str) -> tuple[list[Motion], Placement]:
+    """Degrees of freedom of a body, and the body in the frame of the last one: all about one anchor after another."""
+    place = Placement.turned(model.body_pos[body], model.body_quat[body])
+    motions: list[Motion] = []
+    first = int(model.body_jntadr[body])
+    for joint in range(first, first + int(model.body_jntnum[body])):
+        slides = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        kind = "prismatic" if slides else "revolute"
+        axis, anchor = np.array(model.jnt_axis[joint]), np.zeros(3) if slides else np.array(model.jnt_pos[joint])
+        reference = float(model.qpos0[model.jnt_qposadr[joint]])
+        if not abs(reference) <= LARGEST:
+            raise DescriptionError(
+                f"{source}: the joint {joint_name(model, joint)} has ref = {reference}; up to {LARGEST:g} is read"
+            )
+        dof = int(model.jnt_dofadr[joint])
+        motions.append(
+            Motion(
+                joint_name(model, joint),
+                kind,
+                place @ Placement(anchor) @ Placement.moved(kind, axis, -reference),
+                axis,
+                tuple(model.jnt_range[joint].tolist()) if model.jnt_limited[joint] else (-np.inf, np.inf),
+                _effort(mujoco, model, joint),
+                np.inf,
+                float(model.dof_damping[dof]),
+                _spring(model, joint),
+            )
+        )
+        place = Placement(-anchor)
+    return motions, place
+
+
+def _spring(model: Any, joint: int) -> SpringTag | None:
+    stiffness = float(model.jnt_stiffness[joint])
+    return SpringTag(stiffness, float(model.qpos_spring[model.jnt_qposadr[joint]])) if stiffness != 0.0 else None
+
+
+def _effort(mujoco: Any, model: Any, joint: int) -> float:
+    """Largest torque of the actuators of a joint; infinite if none is said."""
+    if model.jnt_actfrclimited[joint]:
+        return float(np.abs(model.jnt_actfrcrange[joint]).max())
+    limits = [
+        float(np.abs(model.actuator_forcerange[number]).max() * abs(model.actuator_gear[number, 0]))
+        for number in np.flatnonzero(model.actuator_forcelimited).tolist()
+        if driven_joint(mujoco, model, number) == joint
+    ]
+    return max(limits, default=np.inf)
+
+
+def _body_name(model: Any, number: int) -> str:
+    return str(model.body(number).name) or f"body_{number}"
+
+
+def _model_name(model: Any) -> str:
+    return bytes(model.names).split(b"\0", 1)[0].decode("utf-8", "replace")

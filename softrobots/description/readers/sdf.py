@@ -1,0 +1,234 @@
+"""SDF, the format of Gazebo: what Drake's parser makes of it as bodies and joints of URDF.
+
+Drake resolves the poses, the frames that they and the axes are expressed in, and nested models. `spring_stiffness` and
+`spring_reference` of revolute, continuous and prismatic joints become springs; other movable joints are motors. Coordinates are
+those of the SDF joints. The gravity of a world is not read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import read_only
+from softrobots.core.errors import DescriptionError, MissingDependency
+from softrobots.core.xml_input import parse_xml
+from softrobots.description.readers.drake_log import warnings_of_drake
+from softrobots.description.readers.sdf_refusals import not_carried
+from softrobots.description.readers.sdf_shapes import placement_of, visible_shapes
+from softrobots.description.readers.sdf_text import without_drawings
+from softrobots.description.readers.tree_builder import Motion, TreeBuilder
+from softrobots.description.rigid_tree import Body, Placement, RigidTree
+from softrobots.description.urdf_structure import MOST_LINKS
+from softrobots.description.urdf_tags import SpringTag
+
+_MOST = {"link": MOST_LINKS, "model": 100, "frame": 1000}  # Drake takes 10 ms for a model, and for frames their number squared
+_KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
+
+
+class _Edge(NamedTuple):
+    """A joint of Drake as seen from the world: it may have been written the other way round."""
+
+    joint: Any
+    parent: Any
+    child: Any
+    reversed: bool
+
+
+def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
+    """Read SDF.
+
+    The file has one model that moves; static models of a world come along as part of the world. Links, joints and frames keep
+    their names; those of a nested model get its name in front, `arm__link`, those of a static one beside the robot, too. A
+    joint off the origin of its child link gets a link without mass. Frames of the file become links without mass. The tip is
+    the link or frame called `tip`, or the only moving link at the end of the tree. Visible boxes, cylinders, spheres and mesh
+    files are read, and capsules as cylinders; meshes whose files are missing are left out.
+
+    Contacts, damping, plugins and controllers are left out.
+
+    Args:
+        text: The document.
+        source: Where it comes from, for errors.
+        path: Its file, for the meshes that it names.
+
+    Returns:
+        The tree; its root is the link `world`.
+
+    Raises:
+        MissingDependency: If Drake is not installed (extra `interop`).
+        DescriptionError: If Drake refuses it, finds no model or an inertia that no body has; if several models move or a body
+            is not fixed to the world; if bodies form a loop; or if there are other joints than revolute, continuous,
+            prismatic and fixed ones, other force elements than springs, constraints, or what is listed in
+            `softrobots.description.readers.sdf_refusals`.
+    """
+    try:
+        from pydrake.multibody.parsing import Parser
+        from pydrake.multibody.plant import MultibodyPlant
+    except ImportError as error:
+        raise MissingDependency("drake", "interop") from error
+    root = parse_xml(text, source)
+    for kind, most in _MOST.items():
+        count = sum(1 for _ in root.iter(kind))
+        if count > most:
+            raise DescriptionError(f"{source} has {count} {kind}s; at most {most} are read")
+    reasons = not_carried(root)
+    plant = MultibodyPlant(1e-3)  # discrete, because a continuous one takes no constraints
+    if not reasons:
+        try:
+            with warnings_of_drake(shown=True) as warnings:
+                Parser(plant).AddModelsFromString(without_drawings(text), "sdf")
+        except (Exception, SystemExit) as error:  # RuntimeError; SystemExit is what its assertions become in Python
+            raise DescriptionError(f"Drake refuses {source}: {' '.join(str(error).split())}") from error
+        reasons = [*_not_supported(plant), *(line for line in warnings if "invalid inertia" in line)]
+    if reasons:
+        raise DescriptionError(f"{source} has what does not become a robot of springs and motors: {'; '.join(reasons)}")
+    return _tree(plant, source, {str(frame.get("name")) for frame in root.iter("frame")}, visible_shapes(text, path))
+
+
+def _tree(plant: Any, source: str, frames: set[str], shapes: dict[str, list[Any]]) -> RigidTree:
+    edges = _edges(plant, source)
+    model = _moving_model(plant, edges, source)
+    names = {edge.child.index(): _name(plant, edge.child, model) for edge in edges}
+    names[plant.world_body().index()] = "world"
+    springs, efforts = _springs(plant), _efforts(plant)
+    builder = TreeBuilder(
+        model, source, names.values(), [_name(plant, edge.joint, model) for edge in edges if edge.joint.num_velocities()]
+    )
+    for edge in edges:
+        motions, end = _motions(edge, _name(plant, edge.joint, model), springs, efforts)
+        body = _body(edge.child, names[edge.child.index()], shapes)
+        builder.add(body, names[edge.parent.index()], motions, end)
+    for frame in _items(plant.get_frame, "FrameIndex", plant.num_frames()):
+        if frame.name() in frames and not frame.is_body_frame():
+            place = placement_of(frame.GetFixedPoseInBodyFrame())
+            builder.add_frame(_name(plant, frame, model), names[frame.body().index()], place)
+    return builder.tree()
+
+
+def _edges(plant: Any, source: str) -> list[_Edge]:
+    """Joints from the world outwards; every body is at the end of exactly one."""
+    left = list(_items(plant.get_joint, "JointIndex", plant.num_joints()))
+    reached, edges = {plant.world_body().index()}, []
+    while True:
+        joint = next((j for j in left if {j.parent_body().index(), j.child_body().index()} & reached), None)
+        if joint is None:
+            break
+        left.remove(joint)
+        backward = joint.child_body().index() in reached
+        if backward and joint.parent_body().index() in reached:
+            raise DescriptionError(f"{source} has a loop of bodies that joint {joint.name()} closes; a tree is required")
+        near, far = (joint.parent_body(), joint.child_body())[:: -1 if backward else 1]
+        reached.add(far.index())
+        edges.append(_Edge(joint, near, far, backward))
+    bodies = _items(plant.get_body, "BodyIndex", plant.num_bodies())
+    loose = [body.scoped_name().get_full() for body in bodies if body.index() not in reached]
+    if loose:
+        raise DescriptionError(
+            f"{source} has bodies that are not fixed to the world ({_some(loose)}): a floating base is not at rest under a "
+            "load; add a fixed joint with the parent world"
+        )
+    return edges
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+
+
+def _moving_model(plant: Any, edges: list[_Edge], source: str) -> str:
+    """Name of the one model that has movable joints, or of the first one if nothing moves."""
+    models = [(_top(plant, edge.child), edge.joint.num_velocities() > 0) for edge in edges]
+    moving = list(dict.fromkeys(name for name, moves in models if moves))
+    if len(moving) > 1:
+        raise DescriptionError(f"{source} has {len(moving)} models that move ({', '.join(moving)}); one is required in a file")
+    if not models:
+        raise DescriptionError(f"{source} has no models with links")
+    return moving[0] if moving else models[0][0]
+
+
+def _not_supported(plant: Any) -> Iterator[str]:
+    for joint in _items(plant.get_joint, "JointIndex", plant.num_joints()):
+        if joint.type_name() not in _KINDS:
+            told = f"joint {joint.name()} of kind {joint.type_name()}"
+            yield f"{told} (revolute, continuous, prismatic and fixed ones are supported)"
+    for element in _items(plant.get_force_element, "ForceElementIndex", plant.num_force_elements()):
+        kind = type(element).__name__
+        if kind not in ("UniformGravityFieldElement", "RevoluteSpring", "PrismaticSpring"):
+            yield f"a force element {kind} (only joints have springs)"
+    if plant.num_constraints():
+        yield f"{plant.num_constraints()} constraints (loops and couplings are not supported)"
+
+
+def _motions(
+    edge: _Edge, name: str, springs: dict[Any, SpringTag], efforts: dict[Any, float]
+) -> tuple[list[Motion], Placement]:
+    joint = edge.joint
+    start, end = (
+        placement_of(joint.frame_on_parent().GetFixedPoseInBodyFrame()),
+        placement_of(joint.frame_on_child().GetFixedPoseInBodyFrame()),
+    )
+    if joint.num_velocities() == 0:
+        joined = start @ placement_of(joint.X_FM()) @ end.inverse
+        return [], joined.inverse if edge.reversed else joined
+    axis = np.array(joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis())
+    if edge.reversed:  # the same motion seen from the other side
+        start, end, axis = end, start, -axis
+    motion = Motion(
+        name,
+        _KINDS[joint.type_name()],
+        start,
+        axis,
+        (float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])),
+        efforts.get(joint.index(), np.inf),
+        float(joint.velocity_upper_limits()[0]),
+        float(joint.default_damping_vector()[0]),
+        springs.get(joint.index()),
+    )
+    return [motion], end.inverse
+
+
+def _springs(plant: Any) -> dict[Any, SpringTag]:
+    springs = {}
+    for element in _items(plant.get_force_element, "ForceElementIndex", plant.num_force_elements()):
+        if type(element).__name__ not in ("RevoluteSpring", "PrismaticSpring"):
+            continue
+        rest = "nominal_angle" if type(element).__name__ == "RevoluteSpring" else "nominal_position"
+        stiffness, reference = (  # older versions of Drake call them as the prismatic spring still does
+            float((getattr(element, f"default_{field}", None) or getattr(element, field))()) for field in ("stiffness", rest)
+        )
+        if stiffness > 0.0:
+            springs[element.joint().index()] = SpringTag(stiffness, reference)
+    return springs
+
+
+def _efforts(plant: Any) -> dict[Any, float]:
+    actuators = (plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices())
+    return {actuator.joint().index(): float(actuator.effort_limit()) for actuator in actuators}
+
+
+def _body(body: Any, name: str, shapes: dict[str, list[Any]]) -> Body:
+    inertia = body.default_spatial_inertia()
+    mass = float(inertia.get_mass())
+    drawn = tuple(shapes.get(body.scoped_name().get_full(), ()))
+    if mass == 0.0:
+        return Body(name, 0.0, Placement(), read_only(np.zeros((3, 3))), drawn)
+    about_centre = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
+    return Body(name, mass, Placement(read_only(np.array(inertia.get_com()))), read_only(np.array(about_centre)), drawn)
+
+
+def _name(plant: Any, thing: Any, model: str) -> str:
+    """Name of a body, joint or frame; with those of the models that it is in, below the robot's own."""
+    within = str(plant.GetModelInstanceName(thing.model_instance())).split("::")
+    return "__".join([*(within[1:] if within[0] == model else within), str(thing.name())])
+
+
+def _top(plant: Any, thing: Any) -> str:
+    return str(plant.GetModelInstanceName(thing.model_instance())).split("::")[0]
+
+
+def _items(get: Any, index: str, count: int) -> Iterator[Any]:
+    from pydrake.multibody import tree
+
+    return (get(getattr(tree, index)(number)) for number in range(count))

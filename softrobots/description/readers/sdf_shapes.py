@@ -1,0 +1,73 @@
+"""What Drake draws of an SDF file, as far as URDF has such shapes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import read_only
+from softrobots.description.mesh_files import DRAWN_FILES
+from softrobots.description.readers.drake_log import warnings_of_drake
+from softrobots.description.readers.sdf_text import with_found_meshes
+from softrobots.description.rigid_tree import Placement, Shape
+
+
+def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
+    """Visual shapes of every link.
+
+    Args:
+        text: An SDF document that Drake takes.
+        path: Its file, for the meshes that it names.
+
+    Returns:
+        Shapes by scoped name of the link, `model::link`, without meshes whose files are missing; none at all if Drake cannot
+        read one of them.
+    """
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+    from pydrake.multibody.tree import BodyIndex
+    from pydrake.systems.framework import DiagramBuilder
+
+    builder = DiagramBuilder()  # owns the other two
+    plant, scene = AddMultibodyPlantSceneGraph(builder, 1e-3)
+    parser = Parser(plant)
+    try:
+        with warnings_of_drake(shown=False):
+            parser.AddModelsFromString(with_found_meshes(text, None if path is None else path.parent), "sdf")
+    except (Exception, SystemExit):  # SystemExit: what its assertions become in Python
+        return {}
+    inspector, shapes = scene.model_inspector(), {}
+    for number in range(plant.num_bodies()):
+        body = plant.get_body(BodyIndex(number))
+        drawn = [_shape(inspector, geometry) for geometry in plant.GetVisualGeometriesForBody(body)]
+        shapes[body.scoped_name().get_full()] = [shape for shape in drawn if shape is not None]
+    return shapes
+
+
+def placement_of(pose: Any) -> Placement:
+    """A `RigidTransform` of Drake as a placement."""
+    return Placement(read_only(np.array(pose.translation())), read_only(np.array(pose.rotation().matrix())))
+
+
+def _shape(inspector: Any, geometry: Any) -> Shape | None:
+    shape, pose = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
+    place = placement_of(pose)
+    kind, rgba = type(shape).__name__, _colour(inspector.GetIllustrationProperties(geometry))
+    if kind == "Box":
+        return Shape("box", (shape.width(), shape.depth(), shape.height()), place, rgba)
+    if kind == "Sphere":
+        return Shape("sphere", (shape.radius(),), place, rgba)
+    if kind in ("Cylinder", "Capsule"):
+        return Shape("cylinder", (shape.radius(), shape.length()), place, rgba)
+    if kind == "Mesh" and shape.source().is_path() and shape.extension() in DRAWN_FILES:
+        return Shape("mesh", tuple(np.array(shape.scale3()).tolist()), place, rgba, str(shape.source().path()))
+    return None
+
+
+def _colour(properties: Any) -> tuple[float, ...] | None:
+    if properties is None or not properties.HasProperty("phong", "diffuse"):
+        return None
+    colour = properties.GetProperty("phong", "diffuse")
+    return tuple(round(float(value), 6) for value in (colour.r(), colour.g(), colour.b(), colour.a()))

@@ -1,0 +1,194 @@
+r"""Bodies and joints of another format put together as a `RigidTree`, as URDF counts them.
+
+In URDF a joint is at the origin of the link that it carries, and carries it alone. Elsewhere a joint has an anchor of its own,
+and a body may have several joints:
+
+.. math:: X_{PB}(q) = A_1 J_1(q_1) A_2 J_2(q_2) \ldots A_n J_n(q_n) C
+
+with `A_i` from one joint frame to the next and `C` from the last one to the body. Each `J_i` but the last gets a link of its
+own. A last hinge with `C` off its axis gets one too, to which the body is fixed; otherwise `C` goes before `J_n`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softrobots.core.checks import LARGEST, FloatArray, read_only
+from softrobots.core.errors import DescriptionError
+from softrobots.description.readers.shared_mass import give_mass, gyration, small_ball
+from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree
+from softrobots.description.urdf_tags import SpringTag
+
+_ROUNDING = 1e-12  # [m]; a joint that is less beside the origin of its body is at it
+_UNIT = 1e-6  # by how much the length of an axis may differ from 1
+_X_AXIS = read_only(np.array([1.0, 0.0, 0.0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One degree of freedom between a body and its parent."""
+
+    name: str
+    """Name of the joint."""
+    kind: str
+    """"revolute" or "prismatic"."""
+    start: Placement
+    """Its frame in the one before it (of the previous joint, or of the parent body), at zero."""
+    axis: FloatArray
+    """Unit axis in its frame, shape (3,)."""
+    limits: tuple[float, float]
+    """Lowest and highest coordinate [rad or m]; infinite where there is none."""
+    effort: float
+    """Largest torque or force [N m or N]."""
+    velocity: float
+    """Largest speed [rad/s or m/s]."""
+    damping: float
+    """Viscous damping [N m s/rad or N s/m]."""
+    spring: SpringTag | None
+    """Its spring."""
+
+
+class TreeBuilder:
+    """Collects bodies and joints, parents first."""
+
+    def __init__(self, name: str, source: str, bodies: Iterable[str], joints: Iterable[str]) -> None:
+        """Start with an empty world.
+
+        Args:
+            name: Name of the robot.
+            source: Where it comes from, for errors.
+            bodies: Names of all bodies to come; made-up links get others.
+            joints: Names of all joints to come.
+
+        Raises:
+            DescriptionError: If a name is there twice: that of the file is the one that another body or joint is given.
+        """
+        bodies, joints = list(bodies), list(joints)
+        for names in (bodies, joints):
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise DescriptionError(
+                    f"{source} has a name {', '.join(twice)} that is also made up for a part without one or in a nested model; "
+                    "choose another"
+                )
+        self._name, self._source = name, source
+        self._links, self._names = {"world", *bodies}, set(joints)
+        self._bodies: list[Body] = [Body("world", 0.0, Placement(), read_only(np.zeros((3, 3))))]
+        self._joints: list[Joint] = []
+        self._springs: dict[str, SpringTag] = {}
+        self._moving: set[str] = set()
+        self._carriers: set[str] = set()
+
+    def draw_on_world(self, world: Body) -> None:
+        """Give the world its shapes."""
+        self._bodies[0] = replace(self._bodies[0], visuals=world.visuals)
+
+    def add(self, body: Body, parent: str, motions: Sequence[Motion], end: Placement) -> None:
+        """Add a body.
+
+        Args:
+            body: The body.
+            parent: Body that it hangs on.
+            motions: Degrees of freedom from the parent to it; none if it is fixed.
+            end: The body in the frame of the last of them, or in its parent.
+
+        Raises:
+            DescriptionError: If a number is not finite, or a joint has no axis, as where its length overflows.
+        """
+        self._check(f"the body {body.name}", body.mass, body.centre.position, body.centre.rotation, body.inertia)
+        self._check(f"the body {body.name}", end.position, end.rotation)
+        for motion in motions:
+            bounds = np.array([bound for bound in motion.limits if not np.isinf(bound)])
+            self._check(f"the joint {motion.name}", motion.start.position, motion.start.rotation, motion.axis, bounds)
+            self._check(f"the joint {motion.name}", motion.damping)
+            if not abs(np.linalg.norm(motion.axis) - 1.0) <= _UNIT:
+                raise DescriptionError(
+                    f"{self._source}: the joint {motion.name} has the axis {motion.axis.tolist()}; a direction is required"
+                )
+        self._carriers.add(parent)
+        if motions or parent in self._moving:
+            self._moving.add(body.name)
+        if not motions:
+            self._fix(body, parent, end)
+            return
+        last = motions[-1]
+        beside = last.kind == "revolute" and float(np.linalg.norm(np.cross(last.axis, end.position))) > _ROUNDING
+        if not beside:
+            turned = end.rotation.T @ last.axis
+            last, end = replace(last, start=last.start @ end, axis=read_only(turned / np.linalg.norm(turned))), Placement()
+        motions = [*motions[:-1], last]
+        body, shares = self._shared(body, motions, end)
+        for motion, mass, following in zip(motions[:-1], shares, motions[1:], strict=True):
+            name = self._free_name(self._links, f"{body.name}_{motion.name}")
+            self._bodies.append(small_ball(name, mass, following.start.position, gyration(body)))
+            self._move(motion, parent, name)
+            parent = name
+        if beside:
+            name = self._free_name(self._links, f"{body.name}_{last.name}")
+            self._bodies.append(small_ball(name, 0.0, np.zeros(3), 0.0))
+            self._move(last, parent, name)
+            self._fix(body, name, end)
+        else:
+            self._bodies.append(body)
+            self._move(last, parent, body.name)
+
+    def add_frame(self, name: str, parent: str, placement: Placement) -> None:
+        """Add a link without mass that only marks a place on a body; not if another link has its name."""
+        if name in self._links:
+            return
+        self._links.add(name)
+        self._fix(small_ball(name, 0.0, np.zeros(3), 0.0), parent, placement)
+
+    def tree(self) -> RigidTree:
+        """Return the tree; its tip is the link called `tip`, or the only moving body that carries none.
+
+        Raises:
+            DescriptionError: If there is nothing but the world.
+        """
+        if len(self._bodies) == 1:
+            raise DescriptionError(f"{self._source} has no bodies")
+        ends = self._moving - self._carriers
+        tip = "tip" if "tip" in self._links else next(iter(ends)) if len(ends) == 1 else None
+        return RigidTree(self._name, tuple(self._bodies), tuple(self._joints), dict(self._springs), tip)
+
+    def _shared(self, body: Body, motions: Sequence[Motion], end: Placement) -> tuple[Body, list[float]]:
+        """Let the body give a mass to each link before a hinge whose axis, with all that follow, meets it at one point."""
+        takers = 0
+        for motion in reversed(motions[1:]):
+            if motion.kind != "revolute":
+                break
+            takers += 1
+            if np.any(motion.start.position):
+                break
+        point = -end.rotation.T @ end.position
+        lighter, each = give_mass(body, point, takers)
+        return lighter, [0.0] * (len(motions) - 1 - takers) + [each] * takers
+
+    def _move(self, motion: Motion, parent: str, child: str) -> None:
+        spring = motion.spring
+        effort, velocity = (value if value > 0.0 else LARGEST for value in (motion.effort, motion.velocity))
+        made = (motion.start, motion.axis, motion.limits, effort, velocity, motion.damping)
+        self._joints.append(Joint(motion.name, motion.kind, parent, child, *made))
+        if spring is not None:
+            self._springs[motion.name] = spring
+
+    def _fix(self, body: Body, parent: str, placement: Placement) -> None:
+        self._bodies.append(body)
+        name = self._free_name(self._names, f"{body.name}_fixed")
+        self._joints.append(Joint(name, "fixed", parent, body.name, placement, _X_AXIS, (0.0, 0.0), 0.0, 0.0, 0.0))
+
+    def _check(self, what: str, *values: FloatArray | float) -> None:
+        if not all(np.all(np.abs(value) <= LARGEST) for value in values):
+            raise DescriptionError(f"{self._source}: {what} has a number that is not finite or beyond {LARGEST:g}")
+
+    @staticmethod
+    def _free_name(taken: set[str], wanted: str) -> str:
+        name, number = wanted, 1
+        while name in taken:
+            number += 1
+            name = f"{wanted}_{number}"
+        taken.add(name)
+        return name

@@ -1,0 +1,104 @@
+"""Other names for all that a robot description names, so that two of them fit into one.
+
+Names of links, joints, materials, sections, muscles and lines are prefixed wherever they stand: in `parent`, `child` and
+`mimic`, in the tags of this package, as the reference of a `gazebo` tag, and in tags that are not of URDF (transmissions,
+plugins, collision filters): there an attribute or a text that equals a name is taken for that name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.dom import minidom
+
+from softrobots.description.urdf_tags import COORDINATES, NAMESPACE
+
+_NAMED_BY_US = ("section", "lumped_section", "muscle", "line")
+_LISTS = ("name", "springs", "joints", "link", *COORDINATES)  # attributes of our tags that hold names, one or several
+_NO_NAMES = ("type", "value", "filename")  # attributes of foreign tags that hold none
+
+
+def children(element: minidom.Element | minidom.Document) -> list[minidom.Element]:
+    """Elements directly inside an element, or the root of a document."""
+    return [node for node in element.childNodes if node.nodeType == node.ELEMENT_NODE]
+
+
+def ours(robot: minidom.Element, name: str = "*") -> list[minidom.Element]:
+    """Tags of this package directly inside a description, all or those of one name."""
+    tags = [element for element in children(robot) if element.namespaceURI == NAMESPACE]
+    return [element for element in tags if name in ("*", element.localName)]
+
+
+def used_names(robot: minidom.Element) -> dict[str, dict[str, str]]:
+    """Names that must not come twice in one description, by their kind; each with what it stands for.
+
+    Kinds are "link or joint", "material", "section", "muscle or line", and the tags of what else has a name. A material stands
+    for its colour.
+    """
+    made: dict[str, dict[str, str]] = {"link or joint": {}, "material": {}, "section": {}, "muscle or line": {}}
+    for element in children(robot):
+        if element.namespaceURI == NAMESPACE or not element.hasAttribute("name"):
+            continue
+        kind = "link or joint" if element.tagName in ("link", "joint") else element.tagName
+        made.setdefault(kind, {})[element.getAttribute("name")] = element.tagName
+    for material in robot.getElementsByTagName("material"):
+        inside = " ".join(child.toxml() for child in children(material))
+        if material.getAttribute("name") and (inside or material.getAttribute("name") not in made["material"]):
+            made["material"][material.getAttribute("name")] = " ".join(inside.split())
+    for tag in _NAMED_BY_US:
+        kind = "section" if tag.endswith("section") else "muscle or line"
+        made[kind] |= {element.getAttribute("name"): tag for element in ours(robot, tag)}
+    return made
+
+
+def prefix_names(robot: minidom.Element, prefix: str) -> None:
+    """Put a prefix before every name of a description, in place.
+
+    Args:
+        robot: Its root element.
+        prefix: The prefix.
+    """
+    known = {name for names in used_names(robot).values() for name in names}
+    known |= {element.getAttribute("name") for element in robot.getElementsByTagName("actuator")} - {""}
+    for element in ours(robot):
+        for attribute in _LISTS:
+            if element.hasAttribute(attribute):
+                names = (prefix + name for name in element.getAttribute(attribute).split())
+                element.setAttribute(attribute, " ".join(names))
+    for element in children(robot):
+        if element.namespaceURI == NAMESPACE:
+            continue
+        if element.tagName in ("link", "joint", "material"):
+            for inner in (element, *_plain(element)):
+                _prefix_urdf(inner, prefix)
+        else:
+            for inner in (element, *_plain(element)):
+                _prefix_foreign(inner, prefix, known)
+
+
+def shift_segments(robot: minidom.Element, shift: int) -> None:
+    """Add a number to the number of every segment of a description, in place."""
+    for tag in _NAMED_BY_US:
+        for element in ours(robot, tag):
+            element.setAttribute("segment", str(int(element.getAttribute("segment")) + shift))
+
+
+def _plain(element: minidom.Element) -> Iterator[minidom.Element]:
+    """Elements anywhere inside, but those of this package."""
+    return (inner for inner in element.getElementsByTagName("*") if inner.namespaceURI != NAMESPACE)
+
+
+def _prefix_urdf(element: minidom.Element, prefix: str) -> None:
+    attribute = {"parent": "link", "child": "link", "mimic": "joint"}.get(element.tagName, "name")
+    if element.tagName in ("link", "joint", "material", "visual", "collision", "parent", "child", "mimic") and (
+        element.getAttribute(attribute)
+    ):
+        element.setAttribute(attribute, prefix + element.getAttribute(attribute))
+
+
+def _prefix_foreign(element: minidom.Element, prefix: str, known: set[str]) -> None:
+    for attribute, value in list(element.attributes.items()):
+        if value in known and attribute not in _NO_NAMES:
+            element.setAttribute(attribute, prefix + value)
+    only = element.firstChild if len(element.childNodes) == 1 else None
+    if only is not None and only.nodeType == only.TEXT_NODE and only.data.strip() in known:
+        only.data = prefix + only.data.strip()

@@ -1,0 +1,179 @@
+"""The rigid bodies and joints of a description as plain data, between the formats; `rigid_tree_urdf` does URDF.
+
+Pinocchio merges bodies behind fixed joints and knows no shapes of its own; other formats want every link as it was written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.description.urdf_tags import SpringTag
+
+SOLIDS = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
+"""Shapes that need no file, with the attributes that hold their sizes in URDF."""
+
+_NO_ROTATION = read_only(np.eye(3))
+_ORIGIN = read_only(np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a frame is in another one."""
+
+    position: FloatArray = field(default_factory=lambda: _ORIGIN)
+    """Its origin, shape (3,) [m]."""
+    rotation: FloatArray = field(default_factory=lambda: _NO_ROTATION)
+    """Its axes as columns, shape (3, 3)."""
+
+    @staticmethod
+    def turned(position: FloatArray, quaternion: FloatArray) -> Placement:
+        """Placement from a position, shape (3,) [m], and a quaternion w, x, y, z, shape (4,)."""
+        w, x, y, z = (float(value) for value in quaternion)
+        rotation = np.asarray(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix())
+        return Placement(read_only(np.array(position, dtype=np.float64)), read_only(rotation))
+
+    @staticmethod
+    def moved(kind: str, axis: FloatArray, position: float) -> Placement:
+        """What a joint does: a slide along its axis, or a turn about it.
+
+        Args:
+            kind: "prismatic", or what turns.
+            axis: Unit axis, shape (3,).
+            position: How far [m or rad].
+        """
+        if kind == "prismatic":
+            return Placement(read_only(position * axis))
+        return Placement(rotation=read_only(np.asarray(pin.exp3(position * axis))))
+
+    @property
+    def inverse(self) -> Placement:
+        """Placement of the other frame in this one."""
+        return Placement(read_only(-self.rotation.T @ self.position), read_only(self.rotation.T.copy()))
+
+    @property
+    def rpy(self) -> FloatArray:
+        """Roll, pitch, yaw as URDF counts them, shape (3,) [rad]."""
+        return np.asarray(pin.rpy.matrixToRpy(self.rotation))
+
+    @property
+    def quaternion(self) -> FloatArray:
+        """The rotation as a unit quaternion w, x, y, z, shape (4,)."""
+        x, y, z, w = pin.Quaternion(self.rotation).coeffs()
+        return np.array([w, x, y, z])
+
+    def __matmul__(self, inner: Placement) -> Placement:
+        """Placement of a frame that is placed at `inner` in this one."""
+        return Placement(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A geometric shape of a body."""
+
+    kind: str
+    """"box", "cylinder" (along z), "sphere" or "mesh"."""
+    size: tuple[float, ...]
+    """Edges of a box, radius and length of a cylinder, radius of a sphere [m]; scale of a mesh along x, y, z."""
+    placement: Placement
+    """Where its centre is in the body."""
+    rgba: tuple[float, ...] | None = None
+    """Red, green, blue, opacity in [0, 1]; None if not said."""
+    filename: str = ""
+    """File of a mesh, as the description spells it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body: a link."""
+
+    name: str
+    """Name."""
+    mass: float
+    """Mass [kg]; 0 if the description gives none."""
+    centre: Placement
+    """Centre of mass, and the axes in which `inertia` is written."""
+    inertia: FloatArray
+    """Inertia about the centre of mass in those axes, shape (3, 3) [kg m^2]."""
+    visuals: tuple[Shape, ...] = ()
+    """What is drawn."""
+    collisions: tuple[Shape, ...] = ()
+    """What collides."""
+
+    @property
+    def inertia_in_body(self) -> FloatArray:
+        """Inertia about the centre of mass in the axes of the body itself, shape (3, 3) [kg m^2]."""
+        return self.centre.rotation @ self.inertia @ self.centre.rotation.T
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint, movable or fixed."""
+
+    name: str
+    """Name."""
+    kind: str
+    """"revolute", "continuous", "prismatic" or "fixed"; others as the description spells them."""
+    parent: str
+    """Body that it hangs on."""
+    child: str
+    """Body that it carries; its frame is that of the joint."""
+    placement: Placement
+    """Where the child is in the parent while the joint is at zero."""
+    axis: FloatArray
+    """Unit axis in the child, shape (3,)."""
+    limits: tuple[float, float]
+    """Lowest and highest coordinate [rad or m]; infinite where there is none."""
+    effort: float
+    """Largest torque or force [N m or N]."""
+    velocity: float
+    """Largest speed [rad/s or m/s]."""
+    damping: float
+    """Viscous damping [N m s/rad or N s/m]."""
+
+    @property
+    def movable(self) -> bool:
+        """Whether it moves."""
+        return self.kind != "fixed"
+
+    def placement_at(self, position: float) -> Placement:
+        """Where the child is in the parent while the joint is at a position [rad or m]."""
+        return self.placement @ Placement.moved(self.kind, self.axis, position)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidTree:
+    """Bodies and joints of one robot."""
+
+    name: str
+    """Name of the robot."""
+    bodies: tuple[Body, ...]
+    """Bodies, each before its children."""
+    joints: tuple[Joint, ...]
+    """Joints, each before those that its child carries."""
+    springs: Mapping[str, SpringTag]
+    """Joint springs by joint name."""
+    tip: str | None = None
+    """Body that is the tip unless the caller says another; None if that is not told."""
+
+    @property
+    def root(self) -> str:
+        """Name of the body that no joint carries."""
+        return self.bodies[0].name
+
+    def body(self, name: str) -> Body:
+        """Body of that name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    def joints_of(self, body: str) -> tuple[Joint, ...]:
+        """Joints that hang on a body."""
+        return tuple(joint for joint in self.joints if joint.parent == body)
+
+
+def number_text(values: Iterable[float]) -> str:
+    """Numbers separated by spaces, so that reading them gives the same numbers back."""
+    return " ".join(repr(float(value) + 0.0) for value in values)  # without -0.0

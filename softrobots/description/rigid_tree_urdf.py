@@ -1,0 +1,219 @@
+"""Rigid bodies and joints out of URDF text, and back: what exporters read, and what readers of other formats write."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import LARGEST, FloatArray, read_only
+from softrobots.core.errors import DescriptionError
+from softrobots.core.xml_input import parse_xml
+from softrobots.description.rigid_tree import SOLIDS, Body, Joint, Placement, RigidTree, Shape, number_text
+from softrobots.description.urdf_tags import NAMESPACE, SpringTag
+
+_SHAPES = (*SOLIDS, "mesh")
+
+
+def read_rigid_tree(urdf: str, source: str = "the URDF") -> RigidTree:
+    """Read bodies and joints out of URDF text that Pinocchio accepts.
+
+    Springs are not read: `SoftModel.spring_table` has them, also those that the caller said.
+
+    Args:
+        urdf: The whole document.
+        source: Where it comes from, for errors.
+
+    Returns:
+        The tree, every parent before its children.
+
+    Raises:
+        DescriptionError: If the text is no URDF, has no single root, or a number is none.
+    """
+    root = parse_xml(urdf, source)
+    try:
+        colours = {element.get("name", ""): element.find("color") for element in root.iter("material") if len(element)}
+        bodies = {element.get("name", ""): _body(element, colours) for element in root.findall("link")}
+        joints = [_joint(element) for element in root.findall("joint")]
+    except (ValueError, IndexError) as error:
+        raise DescriptionError(f"{source} cannot be read: {error}") from error
+    carried = {joint.child for joint in joints}
+    roots = [name for name in bodies if name not in carried]
+    if root.tag != "robot" or len(roots) != 1:
+        raise DescriptionError(f"{source} has the root links {', '.join(roots) or '(none)'}; one is required")
+    order, ordered = [roots[0]], []
+    for name in order:
+        below = [joint for joint in joints if joint.parent == name]
+        ordered += below
+        order += [joint.child for joint in below]
+    if len(order) != len(bodies) or any(name not in bodies for name in order):
+        raise DescriptionError(f"{source} is no tree: {len(order)} of its {len(bodies)} links hang on {roots[0]}")
+    return RigidTree(root.get("name", ""), tuple(bodies[name] for name in order), tuple(ordered), {})
+
+
+def write_rigid_tree(tree: RigidTree) -> str:
+    """Write a tree as URDF text, springs as tags of ours, all numbers with full precision.
+
+    Args:
+        tree: Bodies, joints and springs.
+
+    Returns:
+        URDF text, with the hints that keep links and springs in MuJoCo and Gazebo's parser. A joint without finite limits
+        becomes continuous if it turns.
+    """
+    ElementTree.register_namespace("softrobots", NAMESPACE)
+    robot = ElementTree.Element("robot", {"name": tree.name or "robot"})
+    ElementTree.SubElement(
+        ElementTree.SubElement(robot, "mujoco"), "compiler", {"discardvisual": "false", "fusestatic": "false"}
+    )
+    for body in tree.bodies:
+        link = ElementTree.SubElement(robot, "link", {"name": body.name})
+        if body.mass > 0.0:
+            inertial = ElementTree.SubElement(link, "inertial")
+            _write_placement(inertial, body.centre)
+            ElementTree.SubElement(inertial, "mass", {"value": repr(float(body.mass))})
+            entries = {
+                f"i{a}{b}": body.inertia["xyz".index(a), "xyz".index(b)] for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
+            }
+            ElementTree.SubElement(inertial, "inertia", {name: repr(float(value)) for name, value in entries.items()})
+        for kind, shapes in (("visual", body.visuals), ("collision", body.collisions)):
+            for shape in shapes:
+                _write_shape(ElementTree.SubElement(link, kind), shape)
+    for joint in tree.joints:
+        _write_joint(ElementTree.SubElement(robot, "joint", {"name": joint.name}), joint, tree.springs.get(joint.name))
+    for name, spring in tree.springs.items():
+        _write_hints(robot, name, springStiffness=repr(float(spring.stiffness)), springReference=repr(float(spring.rest)))
+    for joint in tree.joints:
+        if joint.child == (tree.tip or "tip") and joint.kind == "fixed":
+            _write_hints(robot, joint.name, preserveFixedJoint="true")
+    if tree.tip is not None:
+        ElementTree.SubElement(robot, f"{{{NAMESPACE}}}tip", {"link": tree.tip})
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding="unicode") + "\n"
+
+
+def _numbers(element: ElementTree.Element | None, attribute: str, default: str) -> FloatArray:
+    """Numbers of an attribute, as many as the default has."""
+    text = default if element is None else element.get(attribute, default)
+    numbers = [float(part) for part in text.split()]
+    if len(numbers) != len(default.split()):
+        raise ValueError(f"{attribute} = {text!r}; {len(default.split())} numbers are required")
+    return np.array(numbers)
+
+
+def _placement(element: ElementTree.Element) -> Placement:
+    origin = element.find("origin")
+    rpy = _numbers(origin, "rpy", "0 0 0")
+    return Placement(read_only(_numbers(origin, "xyz", "0 0 0")), read_only(np.asarray(pin.rpy.rpyToMatrix(*rpy))))
+
+
+_Colours = Mapping[str, ElementTree.Element | None]  # by name of the material
+
+
+def _body(link: ElementTree.Element, colours: _Colours) -> Body:
+    inertial = link.find("inertial")
+    shapes = {kind: tuple(_shape(element, colours) for element in link.findall(kind)) for kind in ("visual", "collision")}
+    name = link.get("name", "")
+    if inertial is None:
+        return Body(name, 0.0, Placement(), np.zeros((3, 3)), shapes["visual"], shapes["collision"])
+    moments = inertial.find("inertia")
+    xx, xy, xz, yy, yz, zz = (_numbers(moments, f"i{axes}", "0")[0] for axes in ("xx", "xy", "xz", "yy", "yz", "zz"))
+    inertia = read_only(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    mass = float(_numbers(inertial.find("mass"), "value", "0")[0])
+    return Body(name, mass, _placement(inertial), inertia, shapes["visual"], shapes["collision"])
+
+
+def _shape(element: ElementTree.Element, colours: _Colours) -> Shape:
+    geometry = element.find("geometry")
+    found = next(iter(geometry)) if geometry is not None and len(geometry) else None
+    if found is None or found.tag not in _SHAPES:
+        raise ValueError(f"a shape {found.tag if found is not None else '(none)'}; one of {', '.join(_SHAPES)} is required")
+    if found.tag == "mesh":
+        size = _numbers(found, "scale", "1 1 1")
+    else:
+        size = np.concatenate([_numbers(found, name, "1 1 1" if name == "size" else "1") for name in SOLIDS[found.tag]])
+    material, colour = element.find("material"), element.find("material/color")
+    if material is not None and colour is None:
+        colour = colours.get(material.get("name", ""))
+    rgba = None if colour is None else tuple(_numbers(colour, "rgba", "1 1 1 1").tolist())
+    return Shape(found.tag, tuple(size.tolist()), _placement(element), rgba, found.get("filename", ""))
+
+
+def _joint(element: ElementTree.Element) -> Joint:
+    axis = _numbers(element.find("axis"), "xyz", "1 0 0")
+    length = float(np.linalg.norm(axis))
+    kind, limit, dynamics = element.get("type", ""), element.find("limit"), element.find("dynamics")
+    bounded = kind in ("revolute", "prismatic")
+    low, high = (
+        float(_numbers(limit, name, "0")[0]) if bounded else sign * np.inf for name, sign in (("lower", -1.0), ("upper", 1.0))
+    )
+    low, high = (-np.inf if low <= -LARGEST else low), (np.inf if high >= LARGEST else high)
+    return Joint(
+        element.get("name", ""),
+        kind,
+        link_at(element, "parent"),
+        link_at(element, "child"),
+        _placement(element),
+        read_only(axis / length if length > 0.0 else axis),
+        (low, high),
+        float(_numbers(limit, "effort", "inf")[0]),
+        float(_numbers(limit, "velocity", "inf")[0]),
+        float(_numbers(dynamics, "damping", "0")[0]),
+    )
+
+
+def link_at(joint: ElementTree.Element, end: str) -> str:
+    """Name of the link at an end of a joint of URDF, "parent" or "child"; empty if it has none."""
+    element = joint.find(end)
+    return "" if element is None else element.get("link", "")
+
+
+def _write_placement(element: ElementTree.Element, placement: Placement) -> None:
+    ElementTree.SubElement(element, "origin", {"xyz": number_text(placement.position), "rpy": number_text(placement.rpy)})
+
+
+def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
+    _write_placement(element, shape.placement)
+    made = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
+    if shape.kind == "mesh":
+        made.set("filename", shape.filename)
+        made.set("scale", number_text(shape.size))
+    elif shape.kind == "box":
+        made.set("size", number_text(shape.size))
+    else:
+        for name, value in zip(SOLIDS[shape.kind], shape.size, strict=True):
+            made.set(name, repr(float(value)))
+    if shape.rgba is not None:
+        name = "colour_" + "_".join(f"{value:.6g}" for value in shape.rgba)
+        material = ElementTree.SubElement(element, "material", {"name": name})
+        ElementTree.SubElement(material, "color", {"rgba": number_text(shape.rgba)})
+
+
+def _write_hints(robot: ElementTree.Element, joint: str, **hints: str) -> None:
+    """Tell Gazebo's parser about a joint."""
+    element = ElementTree.SubElement(robot, "gazebo", {"reference": joint})
+    for name, value in hints.items():
+        ElementTree.SubElement(element, name).text = value
+
+
+def _write_joint(element: ElementTree.Element, joint: Joint, spring: SpringTag | None) -> None:
+    bounded = bool(np.any(np.isfinite(joint.limits)))  # one without a bound on one side gets a very large one
+    element.set("type", "continuous" if joint.kind == "revolute" and not bounded else joint.kind)
+    _write_placement(element, joint.placement)
+    ElementTree.SubElement(element, "parent", {"link": joint.parent})
+    ElementTree.SubElement(element, "child", {"link": joint.child})
+    if not joint.movable:
+        return
+    ElementTree.SubElement(element, "axis", {"xyz": number_text(joint.axis)})
+    limit = {"effort": repr(min(joint.effort, LARGEST)), "velocity": repr(min(joint.velocity, LARGEST))}
+    if bounded or joint.kind == "prismatic":  # URDF has no prismatic joint without limits
+        low, high = np.clip(joint.limits, -LARGEST, LARGEST)
+        limit |= {"lower": repr(float(low)), "upper": repr(float(high))}
+    ElementTree.SubElement(element, "limit", limit)
+    ElementTree.SubElement(element, "dynamics", {"damping": repr(float(joint.damping)), "friction": "0.0"})
+    ElementTree.SubElement(element, f"{{{NAMESPACE}}}role", {"value": "spring" if spring else "motor"})
+    if spring:
+        numbers = {"stiffness": repr(float(spring.stiffness)), "rest": repr(float(spring.rest))}
+        ElementTree.SubElement(element, f"{{{NAMESPACE}}}spring", numbers)

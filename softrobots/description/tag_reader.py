@@ -1,0 +1,227 @@
+"""Springs, sections, muscles and roles read out of a URDF, with every mistake in them named."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
+
+from softrobots.core.checks import LARGEST
+from softrobots.core.errors import DescriptionError
+from softrobots.core.xml_input import number_in, parse_xml
+from softrobots.description.expansion import XACRO_NAMESPACE
+from softrobots.description.urdf_structure import check_structure
+from softrobots.description.urdf_tags import (
+    COORDINATES,
+    NAMESPACE,
+    ROLES,
+    InflatedLinkTag,
+    LineTag,
+    LumpedSectionTag,
+    MuscleTag,
+    RobotTags,
+    SectionTag,
+    SpringTag,
+)
+
+
+def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
+    """Read springs, roles, sections, muscles and inflated links out of URDF text.
+
+    Args:
+        urdf_text: The whole document.
+        source: Where it comes from, for the errors.
+
+    Returns:
+        The tags; all empty for a file that has none.
+
+    Raises:
+        DescriptionError: If the text is no URDF (see `softrobots.description.urdf_structure.check_structure`), or a tag of ours
+            is malformed.
+    """
+    root = parse_xml(urdf_text, source)
+    if root.tag != "robot":
+        raise DescriptionError(f"{source} has the root tag <{root.tag}>; <robot> is required")
+    if any(str(element.tag).startswith(f"{{{XACRO_NAMESPACE}}}") for element in root.iter()):
+        raise DescriptionError(
+            f"{source} is an unexpanded xacro file; expand it first (softrobots.description.expansion.expand)"
+        )
+    springs: dict[str, SpringTag] = {}
+    roles: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        _read_joint(joint, source, springs, roles)
+    sections = tuple(_section(element, source, roles) for element in _ours(root, "section"))
+    elastic = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in COORDINATES)]
+    tags = RobotTags(
+        springs=springs,
+        roles=roles,
+        inflated_links=tuple(_inflated_link(element, source, elastic) for element in _ours(root, "inflated_link")),
+        sections=sections,
+        lumped_sections=tuple(_lumped_section(element, source, springs) for element in _ours(root, "lumped_section")),
+        muscles=tuple(_muscle(element, source) for element in _ours(root, "muscle")),
+        lines=tuple(_line(element, source) for element in _ours(root, "line")),
+        mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
+        tip=_tip(root, source),
+    )
+    _check_together(tags, source)
+    check_structure(root, source)
+    return tags
+
+
+def _ours(element: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    return element.findall(f"{{{NAMESPACE}}}{name}")
+
+
+def _read_joint(joint: ElementTree.Element, source: str, springs: dict[str, SpringTag], roles: dict[str, str]) -> None:
+    name = joint.get("name", "")
+    for tag_name in ("spring", "role"):
+        if len(_ours(joint, tag_name)) > 1:
+            raise DescriptionError(f"joint {name} in {source} has more than one {tag_name}; one is required")
+    for spring in _ours(joint, "spring"):
+        where = f"the spring of joint {name} in {source}"
+        springs[name] = SpringTag(_positive(spring, "stiffness", where), _number(spring, "rest", where))
+    for role in _ours(joint, "role"):
+        value = role.get("value", "")
+        if value not in ROLES:
+            raise DescriptionError(f"joint {name} in {source} has the role {value!r}; one of {', '.join(ROLES)} is required")
+        if (value == "spring") != (name in springs):
+            raise DescriptionError(
+                f"joint {name} in {source} has the role {value!r} and {'a' if name in springs else 'no'} spring"
+            )
+        roles[name] = value
+
+
+def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[str]) -> InflatedLinkTag:
+    names = tuple(element.get("springs", "").split())
+    missing = [name for name in names if name not in springs]
+    if not names or missing:
+        raise DescriptionError(
+            f"an inflated_link of {source} names the springs {' '.join(names) or '(none)'}; "
+            f"springs that exist are required: {', '.join(springs) or 'none'}"
+        )
+    where = f"the inflated_link of {' '.join(names)} in {source}"
+    most = _positive(element, "max_moment", where) if "max_moment" in element.attrib else None
+    made = InflatedLinkTag(names, _number(element, "radius", where), _number(element, "pressure", where), most)
+    if made.radius <= 0.0 or made.pressure < 0.0:
+        raise DescriptionError(f"{where} has radius {made.radius} and pressure {made.pressure}; required > 0 and >= 0")
+    return made
+
+
+def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]) -> SectionTag:
+    name = element.get("name", "")
+    where = f"the section {name!r} of {source}"
+    joints = tuple(element.get("joints", "").split())
+    if len(joints) != 6 or any(roles.get(joint) != "section" for joint in joints):
+        raise DescriptionError(
+            f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
+        )
+    return SectionTag(
+        name,
+        _segment(element, where),
+        joints,
+        _positive(element, "length", where),
+        _positive(element, "EI", where),
+        _positive(element, "GJ", where),
+        _positive(element, "EA", where),
+        _rest(element, where),
+        _positive(element, "radius", where),
+    )
+
+
+def _rest(element: ElementTree.Element, where: str) -> tuple[float, ...]:
+    rest = element.get("rest", "").split()
+    numbers = tuple(number_in(text) for text in rest)
+    if len(numbers) != 4 or any(map(math.isnan, numbers)) or numbers[3] <= 0.0:
+        raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
+    return numbers
+
+
+def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> LumpedSectionTag:
+    name = element.get("name", "")
+    where = f"the lumped section {name!r} of {source}"
+    joints = {key: element.get(key, "") for key in COORDINATES if element.get(key)}
+    missing = [key for key in ("bend_x", "bend_y") if key not in joints]
+    strangers = [joint for joint in joints.values() if joint not in springs]
+    if missing or strangers or len(set(joints.values())) != len(joints):
+        raise DescriptionError(
+            f"{where} names the joints {joints}; bend_x and bend_y, each a spring joint of its own, are required "
+            f"(twist and stretch may follow)"
+        )
+    length, hinge, radius = (_positive(element, key, where) for key in ("length", "hinge", "radius"))
+    return LumpedSectionTag(name, _segment(element, where), joints, length, hinge, _rest(element, where), radius)
+
+
+def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
+    name = element.get("name", "")
+    where = f"the muscle {name!r} of {source}"
+    positive = {key: _positive(element, key, where) for key in ("distance", "rest_length", "shortest", "longest", "strongest")}
+    if not positive["shortest"] < positive["longest"]:
+        raise DescriptionError(f"{where} is shortest at {positive['shortest']} and longest at {positive['longest']} m")
+    return MuscleTag(name, _segment(element, where), _number(element, "azimuth", where), **positive)
+
+
+def _line(element: ElementTree.Element, source: str) -> LineTag:
+    name = element.get("name", "")
+    where = f"the line {name!r} of {source}"
+    return LineTag(name, _segment(element, where), _number(element, "azimuth", where), _positive(element, "distance", where))
+
+
+def _tip(root: ElementTree.Element, source: str) -> str | None:
+    named = [element.get("link", "") for element in _ours(root, "tip")]
+    links = [link.get("name", "") for link in root.findall("link")]
+    if len(named) > 1 or any(name not in links for name in named):
+        raise DescriptionError(
+            f"{source} names the tips {', '.join(map(repr, named))}; one link is required: {', '.join(links) or 'none'}"
+        )
+    return named[0] if named else None
+
+
+def _check_together(tags: RobotTags, source: str) -> None:
+    """Names are unique, no joint serves twice, and muscles run along segments that exist."""
+    if tags.sections and tags.lumped_sections:
+        raise DescriptionError(f"{source} has sections and lumped sections; one kind is required")
+    _unique("section", [*(tag.name for tag in tags.sections), *(tag.name for tag in tags.lumped_sections)], source)
+    _unique("muscle", [*(tag.name for tag in tags.muscles), *(tag.name for tag in tags.lines)], source)
+    used = [joint for tag in tags.sections for joint in tag.joints]
+    used += [joint for lumped in tags.lumped_sections for joint in lumped.joints.values()]
+    _unique("joint of a section", used, source)
+    orphans = [name for name, role in tags.roles.items() if role == "section" and name not in used]
+    if orphans:
+        raise DescriptionError(f"{source} has joints with the role 'section' that no section names: {', '.join(orphans)}")
+    segments = {tag.segment for tag in tags.sections} | {tag.segment for tag in tags.lumped_sections}
+    named = [("muscle", tag.name, tag.segment) for tag in tags.muscles]
+    for what, name, segment in [*named, *(("line", tag.name, tag.segment) for tag in tags.lines)]:
+        if segment not in segments:
+            raise DescriptionError(
+                f"the {what} {name!r} of {source} runs along segment {segment}; "
+                f"available: {', '.join(map(str, sorted(segments))) or 'none'}"
+            )
+
+
+def _unique(what: str, names: Sequence[str], source: str) -> None:
+    twice = {name for name in names if names.count(name) > 1}
+    if twice or "" in names:
+        raise DescriptionError(f"{source} uses a {what} name twice or leaves it empty: {', '.join(sorted(twice)) or '(empty)'}")
+
+
+def _segment(element: ElementTree.Element, where: str) -> int:
+    text = element.get("segment", "")
+    if not text.isascii() or not text.isdigit() or not 0 < int(text) < 10_000:
+        raise DescriptionError(f"{where} has segment = {text!r}; a number from 1 is required")
+    return int(text)
+
+
+def _positive(element: ElementTree.Element, attribute: str, where: str) -> float:
+    value = _number(element, attribute, where)
+    if value < 1.0 / LARGEST:
+        raise DescriptionError(f"{where} has {attribute} {value}; a positive one is required, at least {1.0 / LARGEST:g}")
+    return value
+
+
+def _number(element: ElementTree.Element, attribute: str, where: str) -> float:
+    text = element.get(attribute)
+    value = number_in(text)
+    if math.isnan(value):
+        given = text if text is None else text[:100]
+        raise DescriptionError(f"{where} has {attribute} = {given!r}; a finite number is required, at most {LARGEST:g} in size")
+    return value

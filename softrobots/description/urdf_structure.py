@@ -1,0 +1,151 @@
+"""What every URDF must be before Pinocchio reads it: a tree of links that have names, with numbers that are numbers.
+
+Pinocchio's parser refuses less than this, and takes what it does not understand for something else. Measured: of a link whose
+mass is `1,5`, `nan` or empty it drops the mass without a word; links that carry each other in a circle vanish, as does a joint
+called `universe`; of a link with two parents it takes one; a mass may be negative; and a chain of 4000 links ends the process.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+from softrobots.core.checks import LARGEST
+from softrobots.core.errors import DescriptionError
+from softrobots.core.xml_input import number_in
+
+MOST_LINKS = 2000
+"""Links that a robot may have; where every one hangs on the next, Pinocchio's parser has about 2 kB of stack for each."""
+
+_ORIGIN = {"xyz": 3, "rpy": 3}
+_OF_LINKS: Mapping[str, Mapping[str, int]] = {
+    "origin": _ORIGIN,
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+}
+_OF_JOINTS: Mapping[str, Mapping[str, int]] = {
+    "origin": _ORIGIN,
+    "axis": {"xyz": 3},
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+    "dynamics": {"damping": 1, "friction": 1},
+    "mimic": {"multiplier": 1, "offset": 1},
+}
+_OF_SHAPES: Mapping[str, Mapping[str, int]] = {
+    "origin": _ORIGIN,
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+    "mesh": {"scale": 0},  # as many as there are: four are about, and harmless
+}
+_TAKEN = "universe"  # what Pinocchio calls the place where the robot stands
+
+
+def check_structure(root: ElementTree.Element, source: str) -> None:
+    """Refuse a URDF that is no tree, or has names or numbers that parsers take for something else.
+
+    Args:
+        root: The root element.
+        source: Where it comes from, for errors.
+
+    Raises:
+        DescriptionError: If it has no links or more than `MOST_LINKS`; if a link or joint has no name or that of another, or a
+            joint is called `universe`; if a joint has not one parent and one child that exist; if the links are no tree; if a
+            number is none or beyond 1e30; if a mass is negative, or the axis of a joint is zero.
+    """
+    check_link_count(root, source)
+    links, joints = root.findall("link"), root.findall("joint")
+    if not links:
+        raise DescriptionError(f"{source} has no links; from 1 to {MOST_LINKS} are required")
+    for kind, elements in (("link", links), ("joint", joints)):
+        _check_names(kind, elements, source)
+    for link in links:
+        where = f"link {link.get('name')} of {source}"
+        for element in link:
+            if element.tag == "inertial":
+                _check_numbers(where, element, _OF_LINKS)
+            elif element.tag in ("visual", "collision"):
+                _check_numbers(where, element.iter(), _OF_SHAPES)
+        for mass in link.findall("inertial/mass"):
+            if number_in(mass.get("value")) < 0.0:
+                raise DescriptionError(f"{where} has the mass {mass.get('value')}; it is negative")
+    for joint in joints:
+        where = f"joint {joint.get('name')} of {source}"
+        _check_numbers(where, joint, _OF_JOINTS)
+        axis = joint.find("axis")
+        moves = axis is not None and joint.get("type") != "fixed" and "xyz" in axis.attrib
+        if axis is not None and moves and math.hypot(*map(float, axis.get("xyz", "").split())) < 1.0 / LARGEST:
+            raise DescriptionError(f"{where} has the axis {axis.get('xyz')}, which has no direction")
+    _check_tree({link.get("name", "") for link in links}, joints, source)
+
+
+def check_link_count(root: ElementTree.Element, source: str) -> None:
+    """Refuse more links than Pinocchio's parser survives.
+
+    Args:
+        root: The root element.
+        source: Where it comes from, for errors.
+
+    Raises:
+        DescriptionError: If it has more than `MOST_LINKS`.
+    """
+    count = sum(1 for _ in root.iter("link"))
+    if count > MOST_LINKS:
+        raise DescriptionError(f"{source} has {count} links; at most {MOST_LINKS} are read")
+
+
+def _check_names(kind: str, elements: Iterable[ElementTree.Element], source: str) -> None:
+    names = Counter(element.get("name", "") for element in elements)
+    for name, count in names.items():
+        if count > 1 or not name:
+            raise DescriptionError(f"{source} has a {kind} without a name, or several that are called {name!r}")
+    if kind == "joint" and _TAKEN in names:
+        raise DescriptionError(f"{source} has a joint called {_TAKEN!r}, Pinocchio's own name for the world; rename it")
+
+
+def _check_numbers(where: str, elements: Iterable[ElementTree.Element], table: Mapping[str, Mapping[str, int]]) -> None:
+    for element in elements:
+        for attribute, count in table.get(str(element.tag), {}).items():
+            text = element.get(attribute)
+            if text is None:
+                continue
+            parts, most = text.split(), math.inf if element.tag == "limit" else LARGEST  # very large limits stand for none
+            if (count and len(parts) != count) or any(math.isnan(number_in(part, most)) for part in parts):
+                numbers = "a number" if count == 1 else f"{count or 3} numbers"
+                size = "" if most == math.inf else f" up to {most:g} in size"
+                raise DescriptionError(
+                    f"{where} has {attribute} = {text[:100]!r} in <{element.tag}>; {numbers}{size} "
+                    f"{'is' if count == 1 else 'are'} required"
+                )
+
+
+def _check_tree(links: set[str], joints: Iterable[ElementTree.Element], source: str) -> None:
+    below: dict[str, list[str]] = {name: [] for name in links}
+    carried: dict[str, str] = {}
+    for joint in joints:
+        name = joint.get("name", "")
+        ends = {end: [element.get("link", "") for element in joint.findall(end)] for end in ("parent", "child")}
+        for end, named in ends.items():
+            if len(named) != 1 or named[0] not in links:
+                raise DescriptionError(
+                    f"joint {name} of {source} has the {end} {', '.join(named) or '(none)'}; one link that exists is required"
+                )
+        (parent,), (child,) = ends["parent"], ends["child"]
+        if child in carried:
+            raise DescriptionError(f"link {child} of {source} hangs on two joints, {carried[child]} and {name}")
+        carried[child] = name
+        below[parent].append(child)
+    roots = sorted(links - carried.keys())
+    if len(roots) != 1:
+        told = ", ".join(roots[:5]) + (", ..." if len(roots) > 5 else "")
+        raise DescriptionError(
+            f"{source} has {len(roots)} root links ({told or 'none'}): links that no joint carries; one is required"
+        )
+    order = list(roots)
+    for name in order:
+        order += below[name]
+    if len(order) != len(links):
+        lost = sorted(links - set(order))[:5]
+        raise DescriptionError(f"{source} has links that carry each other in a circle: {', '.join(lost)}")

@@ -1,0 +1,143 @@
+"""Our own tags in a URDF: springs, sections, muscles and roles, as plain data (`tag_reader` reads them)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+NAMESPACE = "urn:softrobots:urdf"
+"""XML namespace of the tags."""
+
+ROLES = ("motor", "spring", "section", "locked")
+"""What a movable joint can be."""
+
+COORDINATES = ("bend_x", "bend_y", "twist", "stretch")
+"""The coordinates of a section, `softrobots.constant_curvature.strain_chain.STRAINS`."""
+
+
+@dataclass(frozen=True)
+class SpringTag:
+    """A linear joint spring, `torque = stiffness (q - rest)`."""
+
+    stiffness: float
+    """Stiffness [N m/rad], or [N/m] at a prismatic joint; positive."""
+    rest: float
+    """Coordinate at which the spring is relaxed [rad or m]."""
+
+
+@dataclass(frozen=True)
+class InflatedLinkTag:
+    """The springs that stand for one inflated link, and what sets its wrinkling moment."""
+
+    springs: tuple[str, ...]
+    """Names of the spring joints, or of coordinates of a section, `<section>_bend_x` and so on."""
+    radius: float
+    """Tube radius [m]."""
+    pressure: float
+    """Gauge pressure [Pa]."""
+    max_moment: float | None = None
+    """Largest moment of the link, beyond wrinkling [N m]; None: its springs are linear."""
+
+
+@dataclass(frozen=True)
+class SectionTag:
+    """A section of constant strain: six joints that follow four section coordinates."""
+
+    name: str
+    """Name of the section, and of the link at its end."""
+    segment: int
+    """Number of the segment that it is part of, from 1."""
+    joints: tuple[str, ...]
+    """Its six joints, base to tip; `softrobots.constant_curvature.strain_chain.JOINTS` in that order."""
+    length: float
+    """Rest length [m]."""
+    bending_stiffness: float
+    """EI [N m^2]."""
+    torsional_stiffness: float
+    """GJ [N m^2]."""
+    axial_stiffness: float
+    """EA [N]."""
+    rest: tuple[float, ...]
+    """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
+    radius: float
+    """Radius of the body, for pictures [m]."""
+
+
+@dataclass(frozen=True)
+class LumpedSectionTag:
+    """A section lumped into spring joints at its middle."""
+
+    name: str
+    """Name of the section."""
+    segment: int
+    """Number of the segment that it is part of, from 1."""
+    joints: Mapping[str, str]
+    """Spring joint by section coordinate, `STRAINS`; `twist` and `stretch` may be missing."""
+    length: float
+    """Rest length [m]."""
+    hinge: float
+    """Length of rod from the start of the section to the joints [m]."""
+    rest: tuple[float, ...]
+    """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
+    radius: float
+    """Radius of the body, for pictures [m]."""
+
+
+@dataclass(frozen=True)
+class MuscleTag:
+    """A muscle along a segment, parallel to its backbone."""
+
+    name: str
+    """Name of the muscle."""
+    segment: int
+    """Number of the segment, from 1."""
+    azimuth: float
+    """Where it runs, from the x axis of the segment towards y [rad]."""
+    distance: float
+    """Distance from the backbone [m]."""
+    rest_length: float
+    """Length while the segment is straight and as long as at rest [m]."""
+    shortest: float
+    """Lower limit of its length [m]."""
+    longest: float
+    """Upper limit of its length [m]."""
+    strongest: float
+    """Largest tension, and push, that it can exert [N]."""
+
+
+@dataclass(frozen=True)
+class LineTag:
+    """A line along a segment, parallel to its backbone, that is drawn and does nothing: the actuator of a helix."""
+
+    name: str
+    """Name of the line."""
+    segment: int
+    """Number of the segment, from 1."""
+    azimuth: float
+    """Where it runs, from the x axis of the segment towards y [rad]."""
+    distance: float
+    """Distance from the backbone [m]."""
+
+
+@dataclass(frozen=True)
+class RobotTags:
+    """Everything softrobots reads from a URDF beyond what Pinocchio reads."""
+
+    springs: Mapping[str, SpringTag]
+    """Springs by joint name."""
+    roles: Mapping[str, str]
+    """Role by joint name, one of `ROLES`."""
+    inflated_links: tuple[InflatedLinkTag, ...]
+    """Inflated links, base to tip."""
+    sections: tuple[SectionTag, ...]
+    """Sections of constant strain, in the order of the file."""
+    lumped_sections: tuple[LumpedSectionTag, ...]
+    """Lumped sections, in the order of the file."""
+    muscles: tuple[MuscleTag, ...]
+    """Muscles, in the order of the file."""
+    lines: tuple[LineTag, ...]
+    """Lines, in the order of the file."""
+    mimics: tuple[str, ...]
+    """Names of the joints that mimic another joint."""
+    tip: str | None = None
+    """Name of the link that is the tip unless the caller says another; None if the file does not tell."""

@@ -1,5 +1,0 @@
-"""Compiled solvers of serial chains: equilibria, loads and inverse kinematics, single and in batches."""
-
-from softrobots.kernels.statuses import Status
-
-__all__ = ["Status"]

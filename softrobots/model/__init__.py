@@ -1,0 +1,1 @@
+"""`SoftModel`: Pinocchio, joints and their roles, elastic coordinates, spring laws, actuators, and the loader."""

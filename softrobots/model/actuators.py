@@ -1,0 +1,135 @@
+"""The actuators of a robot, motor joints and then muscles: their limits, and which of their positions go together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.description.urdf_tags import MuscleTag
+from softrobots.model.muscle_lengths import MuscleLengths
+
+
+class Actuators:
+    """Motor joints, then muscles of which lengths or tensions are given."""
+
+    def __init__(
+        self,
+        joints: Sequence[str],
+        joint_limits: FloatArray,
+        turning: Sequence[bool],
+        muscles: Sequence[MuscleTag],
+        muscle_rest: FloatArray,
+        softness: FloatArray,
+        held: MuscleLengths | None,
+    ) -> None:
+        """Collect them.
+
+        Args:
+            joints: Names of the motor joints.
+            joint_limits: Their limits, shape (m, 2) [rad or m].
+            turning: Which of them turn.
+            muscles: The muscles.
+            muscle_rest: Their rest lengths, shape (n,) [m].
+            softness: Bending of the segment of each muscle per moment at its end, shape (n,) [rad/(N m)].
+            held: The muscles as lengths; None if their tensions are given or there are none.
+        """
+        self._held = held
+        lengths = held is not None
+        distance = np.array([muscle.distance for muscle in muscles])
+        self.muscle_lengths = read_only(np.array([(m.shortest, m.longest) for m in muscles]).reshape(-1, 2))
+        """Limits of the muscle lengths, shape (n_muscles, 2) [m]."""
+        self.muscle_forces = read_only(np.array([(-m.strongest, m.strongest) for m in muscles]).reshape(-1, 2))
+        """Limits of the muscle tensions, shape (n_muscles, 2) [N]."""
+        self.names = (*joints, *(muscle.name for muscle in muscles))
+        """Name of each."""
+        self.limits = read_only(np.concatenate([joint_limits, self.muscle_lengths if lengths else self.muscle_forces]))
+        """Lower and upper limits, shape (n_motors, 2) [rad, m or N]."""
+        self.scale = read_only(np.concatenate([np.ones(len(joints)), distance if lengths else 1.0 / (softness * distance)]))
+        """Change of each that moves the robot about as much as a radian, shape (n_motors,) [rad, m or N]."""
+        self.turning = np.array([*turning, *(False for _ in muscles)], dtype=bool)
+        """Which of them turn rather than slide or pull, shape (n_motors,), truth values."""
+        self.units = (*("rad" if turns else "m" for turns in turning), *("m" if lengths else "N" for _ in muscles))
+        """Unit of each."""
+        self.basis = read_only(np.diag(self.scale) if held is None else held.basis(self.scale))
+        """Independent changes, shape (n_motors, n), each about a radian's worth of motion."""
+        self.independent = self.basis.shape[0] == self.basis.shape[1]
+        """Whether each can be set by itself; more than three muscles along a segment must fit together."""
+        relaxed = np.concatenate([np.zeros(len(joints)), muscle_rest if lengths else np.zeros(len(muscles))])
+        self.relaxed = read_only(np.clip(relaxed, *self.limits.T))
+        """Joints at zero, muscles at rest or without tension, as near as the limits allow, shape (n_motors,) [rad, m or N]."""
+        self._unit = "rad" if not muscles else "m" if lengths else "N"
+
+    def checked(self, value: Any, field: str) -> FloatArray:
+        """Return positions that the robot can take, as a new array.
+
+        Args:
+            value: Positions, shape (n_motors,) [rad, m or N].
+            field: Name of the parameter, for the error.
+
+        Raises:
+            ParameterError: If the shape differs, a number is not finite, or no shape of the robot has such muscle lengths.
+        """
+        motors = finite_array(field, value, (len(self.names),), self._unit)
+        if self._held is not None:
+            self._held.check(field, motors)
+        return motors
+
+    def admit(self, motors: FloatArray) -> bool:
+        """Whether some shape of the robot has these positions, shape (n_motors,)."""
+        return self._held is None or self._held.refusal(motors) is None
+
+    def draw(self, random: np.random.Generator) -> FloatArray | None:
+        """Draw positions uniformly within the limits (continuous joints: one turn), shape (n_motors,).
+
+        Muscle lengths are made to fit together. None if no shape of the robot has what was drawn.
+        """
+        low, high = self.limits.T
+        drawn = random.uniform(np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi))
+        if self._held is not None:
+            drawn = self._held.consistent(drawn)
+        return drawn if self.admit(drawn) and np.all((drawn >= low) & (drawn <= high)) else None
+
+    def go(self, motors: FloatArray, step: FloatArray) -> FloatArray:
+        """Go a step, as far as the limits allow.
+
+        Independent actuators stop one by one. Muscle lengths that must fit together stop together. Segments that would bend
+        beyond the range of their sections bend up to it.
+
+        Args:
+            motors: Positions within the limits, shape (n_motors,).
+            step: The step, shape (n_motors,).
+
+        Returns:
+            Shape (n_motors,).
+        """
+        low, high = self.limits.T
+        if self.independent:
+            moved = np.clip(motors + step, low, high)
+        else:
+            ahead = np.where(step > 0.0, high - motors, motors - low)
+            share = float(np.min(np.where(step == 0.0, np.inf, ahead / np.maximum(np.abs(step), 1e-300)), initial=1.0))
+            moved = motors + max(share, 0.0) * step
+        return np.asarray(moved if self._held is None else self._held.within_range(moved))
+
+    def active_limits(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Limits that are reached: of actuators, and the range of sections with given muscle lengths.
+
+        Args:
+            motors: Positions, shape (n_motors,).
+
+        Returns:
+            Outward normals, and rows whose outer product with themselves is the second derivative of the limited quantity (zero
+            for the flat limits of actuators), each shape (n, n_motors).
+        """
+        low, high = self.limits.T
+        slack, units = 1e-12 * self.scale, np.diag(1.0 / self.scale)
+        rows = [-units[motors <= low + slack], units[motors >= high - slack]]
+        curvatures = [np.zeros_like(row) for row in rows]
+        if self._held is not None:
+            normals, bends = self._held.reached_range(motors)
+            rows.append(normals)
+            curvatures.append(bends)
+        return np.concatenate(rows), np.concatenate(curvatures)

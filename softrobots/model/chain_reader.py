@@ -1,0 +1,157 @@
+"""From a Pinocchio model to a `softrobots.model.serial_chain.SerialChain`: each joint turned so that its axis is z.
+
+A frame of the chain stands where Pinocchio's frame of the same joint does, with axes `A` in it such that `A e_z` is the axis
+of the joint. What Pinocchio places at `(R, p)` in its frame is at `(A^T R, A^T p)` in the frame of the chain. For an axis along
+x, y or z, `A` is a signed permutation, so that zeros stay exact.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.errors import DescriptionError
+from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain
+from softrobots.model.springs import LinearSprings, SpringLaw
+from softrobots.model.structure import Structure
+
+_ROUNDING = 4e-16  # of sines and cosines of quarter turns, as URDF's roll, pitch and yaw give them
+
+
+def read_chain(pinocchio_model: Any, structure: Structure, springs: SpringLaw, tip_frame: int, reach: float) -> SerialChain:
+    """Read a robot as a serial chain.
+
+    Pinocchio's workspace is not made, so the chain may have any length. That the six joints of a section are the chain of
+    `strain_chain`, one behind the other with the rest shape in their origins, is what `load_model` has checked.
+
+    Args:
+        pinocchio_model: The rigid bodies.
+        structure: Which joints are motors, springs and sections; the muscles.
+        springs: The law of the springs.
+        tip_frame: Number of the tip among Pinocchio's frames.
+        reach: Scale of residuals [m].
+
+    Returns:
+        The chain from base to tip.
+
+    Raises:
+        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, or if the springs are not
+            linear.
+    """
+    name = str(pinocchio_model.name)
+    if not isinstance(springs, LinearSprings):
+        raise DescriptionError(
+            f"an inflated link of {name} has max_moment; compiled solvers need linear springs (solve_equilibrium takes the "
+            "others, too)"
+        )
+    tip = pinocchio_model.frames[tip_frame]
+    elements, axes = _elements(pinocchio_model, _path(pinocchio_model, tip.parentJoint, str(tip.name)), structure)
+    tip_rotation, tip_translation = _placed(tip.placement, axes)
+    count, muscles = len(structure.strain_law.names), len(structure.muscles)
+    held = structure.held
+    return SerialChain(
+        name=name,
+        elements=elements,
+        tip_rotation=tip_rotation,
+        tip_translation=tip_translation,
+        stiffness=read_only(np.array(structure.strain_law.stiffness)),
+        rest=read_only(np.array(structure.strain_law.rest)),
+        reach=reach,
+        n_motors=len(structure.motor_joints),
+        limits=structure.actuators.limits,
+        muscle_input=structure.parts.muscle_input,
+        muscle_rest=structure.muscle_rest,
+        muscle_matrix=structure.muscle_matrix,
+        held=() if held is None else held.groups,
+        held_slope=read_only(np.zeros((0, muscles))) if held is None else held.slopes,
+        elastic=read_only(np.eye(count)) if held is None else held.elastic,
+        spread=read_only(np.zeros((count, muscles))) if held is None else held.spread,
+        free=read_only(np.eye(count)) if held is None else held.free,
+    )
+
+
+def _path(model: Any, last: int, tip: str) -> list[int]:
+    """Numbers of the joints from base to `last`."""
+    path: list[int] = []
+    while last > 0:
+        path.append(last)
+        last = model.parents[last]
+    path.reverse()
+    stray = [str(model.names[number]) for number in sorted(set(range(1, model.njoints)) - set(path))]
+    if stray:
+        raise DescriptionError(
+            f"{model.name} has joints that are not between base and tip ({tip}): {', '.join(stray)}; compiled solvers need one "
+            "serial chain from base to tip (load_model(motors=...) locks the other joints)"
+        )
+    return path
+
+
+def _elements(model: Any, path: list[int], structure: Structure) -> tuple[tuple[Element, ...], FloatArray]:
+    """The elements, and the axes of the last frame of the chain in Pinocchio's of the same joint, shape (3, 3)."""
+    motors = {joint: place for place, joint in enumerate(structure.motor_joints)}
+    strains = {joint: place for place, joint in enumerate(structure.spring_joints)}
+    sections = {row.joint_names[0]: number for number, row in enumerate(structure.section_table)} if structure.sections else {}
+    made: list[Element] = []
+    axes: FloatArray = np.eye(3)
+    neutral = pin.neutral(model)
+    while path:
+        joint = str(model.names[path[0]])
+        rotation, translation = _placed(model.jointPlacements[path[0]], axes)
+        if joint in sections:
+            row = structure.section_table[sections[joint]]
+            numbers, path = path[: len(JOINTS)], path[len(JOINTS) :]
+            back = pin.rpy.rpyToMatrix(-float(row.rest_joints[0]), 0.0, 0.0)  # the origin of the first joint carries its rest
+            axes = np.eye(3)
+            bodies = tuple(_body(model.inertias[number], axes) for number in numbers)
+            strain = len(structure.spring_joints) + len(STRAINS) * sections[joint]
+            made.append(ChainSection(row.name, _snapped(rotation @ back), translation, row.length, strain, bodies))
+        else:
+            number, path = path[0], path[1:]
+            slides, axes = _axes(model, number, neutral)
+            places = motors.get(joint), strains.get(joint)
+            body = _body(model.inertias[number], axes)
+            made.append(ChainJoint(joint, _snapped(rotation @ axes), translation, slides, *places, body))
+    return tuple(made), axes
+
+
+def _axes(model: Any, number: int, neutral: FloatArray) -> tuple[bool, FloatArray]:
+    """Whether a joint slides, and axes whose z is its axis, shape (3, 3)."""
+    joint = model.joints[number]
+    data = joint.createData()  # of this joint alone
+    joint.calc(data, neutral)
+    motion = np.asarray(data.S, dtype=np.float64)
+    slides = not np.any(motion[3:])
+    if joint.nv != 1 or (np.any(motion[:3]) and not slides):
+        raise DescriptionError(
+            f"joint {model.names[number]} of {model.name} is a {joint.shortname()}; compiled solvers take revolute, continuous "
+            "and prismatic joints"
+        )
+    return slides, _with_z(_snapped((motion[:3] if slides else motion[3:]).reshape(3)))
+
+
+def _with_z(axis: FloatArray) -> FloatArray:
+    """Right-handed axes with z along a unit vector, shape (3, 3); a signed permutation if that is along x, y or z."""
+    y = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    y /= np.linalg.norm(y)
+    return np.stack([np.cross(y, axis), y, axis], axis=1)
+
+
+def _placed(placement: Any, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rotation and translation of a placement in Pinocchio's frame, seen from the frame of the chain with `axes` there."""
+    return _snapped(axes.T @ _snapped(placement.rotation)), _snapped(axes.T @ placement.translation)
+
+
+def _snapped(array: FloatArray) -> FloatArray:
+    """Read-only copy; entries that miss 0, 1 or -1 by rounding are put there."""
+    whole = np.round(array)
+    near = (np.abs(array - whole) <= _ROUNDING) & (np.abs(whole) <= 1.0)
+    return read_only(np.where(near, whole, array) + 0.0)  # + 0.0: no zero is negative
+
+
+def _body(inertia: Any, axes: FloatArray) -> ChainBody:
+    mass = float(inertia.mass)
+    return ChainBody(mass, read_only(axes.T @ (mass * np.asarray(inertia.lever)) + 0.0))

@@ -1,0 +1,193 @@
+"""Loading a robot into a `SoftModel`: ours, or anybody's URDF, MJCF or SDF, with springs of the file or said by the caller."""
+
+from __future__ import annotations
+
+import copyreg
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.constant_curvature.strain_chain import joint_positions
+from softrobots.core.checks import choice, finite_number, positive_number
+from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
+from softrobots.description.sources import Robot, read_source
+from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_tags import RobotTags, SectionTag, SpringTag
+from softrobots.model.coordinates import rest_coordinates
+from softrobots.model.muscles import MUSCLE_INPUTS
+from softrobots.model.soft_model import SoftModel
+from softrobots.model.structure import Parts
+
+
+def load_model(
+    source: Robot | Path | str,
+    *,
+    springs: Mapping[str, float | tuple[float, float]] | None = None,
+    motors: Sequence[str] | None = None,
+    tip: str | None = None,
+    muscles: str = "lengths",
+) -> SoftModel:
+    """Load a robot: ours, or anybody's URDF, MJCF or SDF.
+
+    The root tag tells the kind. MJCF (`stiffness`, `springref`; needs MuJoCo) and SDF (`spring_stiffness`,
+    `spring_reference`; needs Drake) are translated: `urdf` of the model is the translation, coordinates are those of the file
+    (`qpos`, joint angle). See `softrobots.description.readers.mjcf.read_mjcf` and `softrobots.description.readers.sdf.read_sdf`
+    for names, and for what is refused because it bears on the statics and we do not have it. The gravity of a file is not ours:
+    without `gravity=` the robot is weightless.
+
+    Args:
+        source: A robot of this package, a path (`Path` or text), or the text of a description (starting with `<`).
+        springs: For files without springs of their own: `{joint: stiffness}` or `{joint: (stiffness, rest)}`
+            [N m/rad or N/m; rad or m]. Given, it replaces the springs in the file. `{}` says that the robot is rigid.
+        motors: Names of the motor joints; movable joints that are neither motor, spring nor part of a section are then locked
+            at zero. By default every movable joint without a spring is a motor.
+        tip: Name of the tip frame; by default the one that the file names, `tip`, or the only link at the end of the tree.
+        muscles: What is given of the muscles, if the robot has any: their "lengths" [m] or the "forces" they pull with [N].
+
+    Returns:
+        The model.
+
+    Raises:
+        DescriptionError: If the file cannot be read, is of another kind or has what we do not have, has no springs and none
+            are given, has joints other than revolute, continuous and prismatic, has a spring on a fixed joint, would have a
+            motor that mimics another joint, has a section whose joints are not the chain that its tag describes, has muscles
+            that do not fix the shape of their segment, or has no single end.
+        MissingDependency: If it is MJCF or SDF, and MuJoCo or Drake is not installed (extra `interop`).
+        NameNotFound: If a named joint or frame does not exist.
+        ParameterError: If a stiffness is not positive, a rest coordinate is not finite, a joint is named twice or belongs to a
+            section, or `muscles` is none of the choices.
+    """
+    choice("muscles", muscles, MUSCLE_INPUTS)
+    urdf, label = read_source(source)
+    tags = read_tags(urdf, label)
+    try:
+        model = pin.buildModelFromXML(urdf)
+    except (ValueError, RuntimeError) as error:
+        raise DescriptionError(f"Pinocchio refuses {label}: {error} (its parser prints the reason on stderr)") from error
+    movable = [name for name in model.names if name != "universe"]
+    in_sections = {name for section in tags.sections for name in section.joints}
+    free = [name for name in movable if name not in in_sections]
+    spring_tags = _springs_said(springs, free) if springs is not None else dict(tags.springs)
+    if springs is None and not spring_tags and not tags.sections:
+        raise DescriptionError(
+            f"{label} has no joint springs; give springs={{joint: stiffness}} for its movable joints "
+            f"({', '.join(movable) or 'none'}), or springs={{}} for a rigid robot"
+        )
+    stray = [name for name in (*spring_tags, *in_sections) if name not in movable]
+    if stray:
+        raise DescriptionError(
+            f"{label} has a spring or a section on {', '.join(stray)}, which cannot move; movable: {', '.join(movable)}"
+        )
+    motor_names = _motors_said(motors, free, spring_tags, tags)
+    coupled = [name for name in tags.mimics if name in motor_names or name in spring_tags or name in in_sections]
+    if coupled:
+        raise DescriptionError(
+            f"{label} has joints that mimic others ({', '.join(coupled)}); they cannot be motors or springs: name the motors, "
+            "motors=[...], and the rest is locked"
+        )
+    locked = [name for name in free if name not in spring_tags and name not in motor_names]
+    if locked:
+        model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], pin.neutral(model))
+    _check_joints(model, label)
+    for section in tags.sections:
+        _check_section(model, section, label)
+    lumped = [section for section in tags.lumped_sections if all(name in spring_tags for name in section.joints.values())]
+    if tags.muscles and len(lumped) < len(tags.lumped_sections):
+        raise DescriptionError(f"{label} has muscles along lumped sections; each joint of those needs a spring")
+    return SoftModel(
+        pinocchio_model=model,
+        urdf=urdf,
+        parts=Parts(spring_tags, motor_names, tags.sections, lumped, tags.muscles, tags.lines, muscles),
+        inflated_links=tags.inflated_links,
+        tip=_tip(model, tags.tip if tip is None else tip, label),
+    )
+
+
+def _springs_said(springs: Any, movable: Sequence[str]) -> dict[str, SpringTag]:
+    if not isinstance(springs, Mapping):
+        raise ParameterError("springs", springs, "a mapping {joint: stiffness} or {joint: (stiffness, rest)}")
+    said = {}
+    for name, value in springs.items():
+        if name not in movable:
+            raise NameNotFound("movable joint", str(name), movable)
+        stiffness, rest = value if isinstance(value, tuple | list) and len(value) == 2 else (value, 0.0)
+        field = f"springs[{name!r}]"
+        said[name] = SpringTag(positive_number(field, stiffness, "N m/rad or N/m"), finite_number(field, rest, "rad or m"))
+    return said
+
+
+def _motors_said(motors: Any, movable: Sequence[str], springs: Mapping[str, SpringTag], tags: RobotTags) -> list[str]:
+    if motors is None:
+        return [name for name in movable if name not in springs and tags.roles.get(name, "motor") != "locked"]
+    if isinstance(motors, str) or not isinstance(motors, Sequence):
+        raise ParameterError("motors", motors, "a list of joint names")
+    for name in motors:
+        if name not in movable:
+            raise NameNotFound("movable joint", str(name), movable)
+        if name in springs:
+            raise ParameterError("motors", name, "a joint without a spring")
+    if len(set(motors)) != len(motors):
+        raise ParameterError("motors", motors, "names without repetition")
+    return list(motors)
+
+
+def _check_joints(model: Any, label: str) -> None:
+    for name in list(model.names)[1:]:  # the first is the universe
+        joint = model.joints[model.getJointId(name)]
+        if joint.nv != 1 or joint.nq not in (1, 2):
+            raise DescriptionError(
+                f"joint {name} of {label} is a {joint.shortname()}; revolute, continuous and prismatic joints are supported"
+            )
+        low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+        if joint.nq == 1 and low > high:
+            raise DescriptionError(f"joint {name} of {label} has the lower limit {low} above the upper one, {high}")
+
+
+def _check_section(model: Any, section: SectionTag, label: str) -> None:
+    """Refuse six joints that are not the chain of `strain_chain` with the rest shape of the section in its origins."""
+    numbers = [model.getJointId(name) for name in section.joints]
+    _, u2, chord, r1, r2, r3 = joint_positions(rest_coordinates([section]), np.array([section.length]))[0]
+    origins = [None, pin.SE3(pin.rpy.rpyToMatrix(0.0, u2, 0.0), np.zeros(3)), pin.SE3(np.eye(3), np.array([0.0, 0.0, chord]))]
+    origins += [pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.zeros(3)) for rpy in ((r1, 0.0, 0.0), (0.0, r2, 0.0), (0.0, 0.0, r3))]
+    kinds = ("RX", "RY", "PZ", "RX", "RY", "RZ")
+    for place, (number, kind, origin) in enumerate(zip(numbers, kinds, origins, strict=True)):
+        name = section.joints[place]
+        if model.joints[number].shortname() != f"JointModel{kind}":
+            told = f"a {model.joints[number].shortname()}, required: JointModel{kind}"
+        elif place > 0 and model.parents[number] != numbers[place - 1]:
+            told = f"not a child of joint {section.joints[place - 1]}"
+        elif origin is not None and not model.jointPlacements[number].isApprox(origin, 1e-9):
+            told = "not where the rest shape of the section puts it"
+        else:
+            continue
+        raise DescriptionError(f"joint {name} of section {section.name} of {label} is {told}")
+
+
+def _tip(model: Any, tip: str | None, label: str) -> str:
+    bodies = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
+    if tip is not None:
+        if not isinstance(tip, str) or not model.existFrame(tip):
+            raise NameNotFound("frame", str(tip), bodies)
+        return tip
+    if "tip" in bodies:
+        return "tip"
+    parents = {frame.parentFrame for frame in model.frames}
+    leaves = [frame.name for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY and i not in parents]
+    if len(leaves) != 1:
+        told = ", ".join(leaves[:20]) + (", ..." if len(leaves) > 20 else "")
+        raise DescriptionError(f"{label} has {len(leaves)} ends ({told}); say which frame is the tip: tip=...")
+    return str(leaves[0])
+
+
+def _rebuild(urdf: str, springs: dict[str, tuple[float, float]], motors: tuple[str, ...], tip: str, muscles: str) -> SoftModel:
+    return load_model(urdf, springs=springs, motors=motors, tip=tip, muscles=muscles)
+
+
+def _reduce(model: SoftModel) -> tuple[Any, ...]:
+    return _rebuild, (model.urdf, model.spring_table, model.structure.motor_joints, model.tip, model.muscle_input)
+
+
+copyreg.pickle(SoftModel, _reduce)  # as the URDF and what was said about it; Pinocchio workspaces are not carried along

@@ -1,0 +1,264 @@
+"""Muscles of given length: what they hold of a robot's shape, and what they leave free; see `softrobots.model.muscles`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.constant_curvature.strain_chain import LARGEST_BENDING
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.errors import DescriptionError, ParameterError
+from softrobots.description.urdf_tags import MuscleTag
+from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
+from softrobots.model.joint_loads import JointLoad
+from softrobots.model.muscles import HELD, ElasticLaw, Segments, muscle_arms
+
+CONSISTENT = 1e-6
+"""Muscle lengths of a segment that miss those of the nearest arc by more than this are refused [m]."""
+
+_LEAST_LENGTH = 0.01  # of a section, relative to its rest length
+
+
+class MuscleLengths:
+    """Coordinates of a robot whose muscles hold given lengths: motors, then lengths, are given; what lengths leave is free."""
+
+    def __init__(
+        self,
+        inner: Coordinates,
+        tags: Sequence[MuscleTag],
+        segments: Segments,
+        law: ElasticLaw,
+        section_lengths: Mapping[int, float],
+        largest_bending: float | None = None,
+    ) -> None:
+        """Find the free coordinates.
+
+        Args:
+            inner: The robot without muscles.
+            tags: The muscles.
+            segments: Which of its elastic coordinates belong to which segment.
+            law: Stiffness of its elastic coordinates.
+            section_lengths: Rest length of the sections of each segment [m].
+            largest_bending: Bending of one section that lengths may ask for [rad]; `LARGEST_BENDING` by default.
+
+        Raises:
+            DescriptionError: If the muscles of a segment do not fix its bending and elongation.
+        """
+        self._inner, self._law, self._segments, self._section_lengths = inner, law, segments, section_lengths
+        self._largest_bending = LARGEST_BENDING if largest_bending is None else largest_bending
+        self._tags = tuple(tags)
+        self._rest_lengths = np.array([tag.rest_length for tag in tags])
+        count = len(law.names)
+        spread = np.zeros((count, len(tags)))
+        self._misfit = np.zeros((len(tags), len(tags)))
+        groups, slopes, modes, names, turning = [], [], [], [], []
+        self._bent: list[tuple[int, Any, Any]] = []
+        for segment in sorted({tag.segment for tag in tags}):
+            about_x, about_y = (np.array(segments[segment][key], dtype=int) for key in ("bend_x", "bend_y"))
+            self._bent.append((segment, about_x, about_y))
+            rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
+            places = {key: list(segments[segment][key]) for key in HELD if key in segments[segment]}
+            arms = muscle_arms([tags[row] for row in rows])[:, [HELD.index(key) for key in places]]
+            if np.linalg.matrix_rank(arms, tol=1e-9 * float(np.abs(arms).max())) < len(places):
+                raise DescriptionError(
+                    f"the {len(rows)} muscles of segment {segment} do not fix its bending and elongation; "
+                    f"three or more at different azimuths are required, or their tensions, load_model(..., muscles='forces')"
+                )
+            inverse = np.linalg.pinv(arms)
+            self._misfit[np.ix_(rows, rows)] = np.eye(len(rows)) - arms @ inverse
+            for key, row_of_inverse in zip(places, inverse, strict=True):
+                softness = 1.0 / law.stiffness[places[key]]
+                spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
+                slope = np.zeros(len(tags))
+                slope[rows] = row_of_inverse
+                groups.append(tuple(places[key]))
+                slopes.append(slope)
+                basis = _differences(law.stiffness[places[key]])
+                for number, mode in enumerate(basis.T, start=1):
+                    column = np.zeros(count)
+                    column[places[key]] = mode
+                    modes.append(column)
+                    names.append(f"segment_{segment}_{key}_mode_{number}")
+                    turning.append(key != "stretch")
+        held = {place for group in groups for place in group}
+        free = [place for place in range(count) if place not in held]
+        self.groups = tuple(groups)
+        """Elastic coordinates of the robot without muscles whose sum the lengths hold, group by group."""
+        self.slopes = read_only(np.array(slopes).reshape(-1, len(tags)))
+        """Derivative of those sums with respect to the lengths, shape (n_groups, n_muscles) [rad/m or -]."""
+        self.spread = read_only(spread)
+        """Elastic coordinates of the robot without muscles by change of the lengths, shape (count, n_muscles)."""
+        self.free = read_only(np.concatenate([np.eye(count)[free], np.array(modes).reshape(-1, count)]).T)
+        """The same by free coordinates, shape (count, n)."""
+        stiffness = np.einsum("ik,i,ik->k", self.free, law.stiffness, self.free)
+        rest = (law.stiffness * law.rest) @ self.free / stiffness
+        self.elastic = read_only((self.free * law.stiffness[:, None]).T / stiffness[:, None])
+        """Free coordinates by those without muscles, shape (n, count): `elastic @ free = 1`, `elastic @ spread = 0`."""
+        angles = np.array([*(law.turning[place] for place in free), *turning], dtype=bool)
+        self.law = ElasticLaw((*(law.names[place] for place in free), *names), stiffness, np.asarray(rest), angles)
+        """Stiffness of the free coordinates."""
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleLengthPoint:
+        """Go to given coordinates."""
+        count = len(motors) - len(self._tags)
+        strains = self.strains(motors, elastic)
+        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self.spread, self.free, self._law, strains)
+
+    def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
+        change = motors[len(motors) - len(self._tags) :] - self._rest_lengths
+        return np.asarray(self.spread @ change + self.free @ elastic)
+
+    def consistent(self, motors: FloatArray) -> FloatArray:
+        """Nearest motors and lengths that arcs explain, shape (n_motors,)."""
+        made = np.array(motors)
+        lengths = made[len(motors) - len(self._tags) :]
+        lengths -= self._misfit @ (lengths - self._rest_lengths)
+        return made
+
+    def basis(self, scale: FloatArray) -> FloatArray:
+        """Independent changes of motors and lengths, of size `scale`, shape (n_motors, n)."""
+        count = len(scale) - len(self._tags)
+        consistent = np.eye(len(self._tags)) - self._misfit
+        if not np.any(np.abs(self._misfit) > 1e-12):
+            return np.diag(scale)
+        values, vectors = np.linalg.eigh(consistent)
+        directions = np.asarray(vectors[:, values > 0.5])
+        made = np.zeros((len(scale), count + directions.shape[1]))
+        made[:count, :count] = np.diag(scale[:count])
+        made[count:, count:] = scale[count:, None] * directions
+        return made
+
+    def check(self, field: str, motors: FloatArray) -> None:
+        """Refuse lengths that no shape of the robot has.
+
+        Raises:
+            ParameterError: If a length is not positive, if no arc explains the lengths of a segment, or if they would bend a
+                section beyond the range of the chain or leave it without length.
+        """
+        requirement = self.refusal(motors)
+        if requirement is not None:
+            raise ParameterError(field, motors, requirement)
+
+    def refusal(self, motors: FloatArray) -> str | None:
+        """What lengths would have to be, if no shape of the robot has the given ones; None if one has."""
+        lengths = motors[len(motors) - len(self._tags) :]
+        if np.any(lengths <= 0.0):
+            return "positive muscle lengths [m]"
+        change = lengths - self._rest_lengths
+        misfit = np.abs(self._misfit @ change)
+        if misfit.max() > CONSISTENT:
+            segment = self._tags[int(np.argmax(misfit))].segment
+            stretch = "" if "stretch" in self._segments[segment] else ", without elongation (this chain has no stretch joints)"
+            return (
+                f"muscle lengths that one arc a segment explains{stretch}; those of segment {segment} miss the nearest arc by "
+                f"{misfit.max():.3g} m, allowed {CONSISTENT:g} m"
+            )
+        spread = self.spread @ change
+        for segment, bending, _ in self._bendings(motors):
+            stretches = self._segments[segment].get("stretch")
+            length = self._section_lengths[segment]
+            if stretches is not None and length + float(spread[list(stretches)].min()) <= _LEAST_LENGTH * length:
+                return (
+                    f"long enough to leave segment {segment} a length: sections of {length:.4g} m would be pressed to nothing"
+                )
+            if bending > self._largest_bending * (1.0 + 1e-9):
+                return (
+                    f"within the chain's range: segment {segment} would bend by {bending:.4g} rad a section, allowed "
+                    f"{self._largest_bending:.4g} rad (more sections a segment allow more)"
+                )
+        return None
+
+    def within_range(self, motors: FloatArray) -> FloatArray:
+        """Actuators with each segment bent no further than its sections may, its mean length kept, shape (n_motors,)."""
+        made = np.array(motors)
+        first = len(motors) - len(self._tags)
+        for segment, bending, _ in self._bendings(motors):
+            if bending > self._largest_bending:
+                rows = [first + row for row, tag in enumerate(self._tags) if tag.segment == segment]
+                arms = muscle_arms([tag for tag in self._tags if tag.segment == segment])
+                rest = self._rest_lengths[[row - first for row in rows]]
+                sums = np.linalg.lstsq(arms, made[rows] - rest, rcond=None)[0]
+                made[rows] -= arms[:, :2] @ sums[:2] * (1.0 - self._largest_bending / bending)
+        return made
+
+    def reached_range(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Slopes of the bending of segments that have reached the range of their sections; see `Actuators.active_limits`."""
+        slopes, bends = [], []
+        count = len(motors)
+        for _, bending, (x, y) in self._bendings(motors):
+            if bending >= self._largest_bending * (1.0 - 1e-9):
+                spread = self.spread[[x, y]] @ (motors[count - len(self._tags) :] - self._rest_lengths)
+                along, across = np.zeros(count), np.zeros(count)
+                along[count - len(self._tags) :] = (spread[0] * self.spread[x] + spread[1] * self.spread[y]) / bending
+                across[count - len(self._tags) :] = (spread[0] * self.spread[y] - spread[1] * self.spread[x]) / bending
+                slopes.append(along)
+                bends.append(across / np.sqrt(bending))
+        return np.array(slopes).reshape(-1, count), np.array(bends).reshape(-1, count)
+
+    def _bendings(self, motors: FloatArray) -> list[tuple[int, float, tuple[int, int]]]:
+        """Each segment with muscles: number, largest bending of a section [rad], places of the two bendings of that section."""
+        spread = self.spread @ (motors[len(motors) - len(self._tags) :] - self._rest_lengths)
+        found = []
+        for segment, about_x, about_y in self._bent:
+            bendings = np.hypot(spread[about_x], spread[about_y])
+            most = int(bendings.argmax())
+            found.append((segment, float(bendings[most]), (int(about_x[most]), int(about_y[most]))))
+        return found
+
+
+class MuscleLengthPoint(NamedTuple):
+    """A robot with held muscle lengths."""
+
+    inner: Point
+    """The robot without muscles."""
+    spread: FloatArray
+    """Derivative of its elastic coordinates with respect to the lengths."""
+    free: FloatArray
+    """The same with respect to the free coordinates."""
+    law: ElasticLaw
+    """Its stiffness."""
+    strains: FloatArray
+    """Its elastic coordinates."""
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions."""
+        return self.inner.joints
+
+    @property
+    def valid(self) -> bool:
+        """Whether the chain can be there."""
+        return self.inner.valid
+
+    def reduce(self, joints: JointLoad) -> ReducedLoad:
+        """Carry over to lengths and free coordinates; the load on a muscle is its tension, spring-back included."""
+        load = self.inner.reduce(joints)
+        unbalanced = load.elastic - self.law.stiffness * (self.strains - self.law.rest)
+        half = self.free.T @ load.derivative
+        return ReducedLoad(
+            np.concatenate([load.motors, unbalanced @ self.spread]),
+            load.elastic @ self.free,
+            half @ self.free,
+            np.concatenate([self.free.T @ load.coupling, half @ self.spread], axis=1),
+            load.potential,
+            load.scale,
+        )
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Combine the columns of the strains."""
+        motors, elastic = self.inner.columns(jacobian)
+        return np.concatenate([motors, elastic @ self.spread], axis=1), elastic @ self.free
+
+
+def _differences(stiffness: FloatArray) -> FloatArray:
+    """Orthonormal columns without sum, shape (n, n - 1), that make the stiffness diagonal; cosines where it is uniform."""
+    n = len(stiffness)
+    places = (np.arange(n) + 0.5)[:, None]
+    cosines = np.sqrt(2.0 / n) * np.cos(np.pi * places * np.arange(1, n) / n)
+    if np.ptp(stiffness) <= 1e-12 * float(stiffness.max()):
+        return np.asarray(cosines)
+    vectors: Any = np.linalg.eigh(cosines.T @ (stiffness[:, None] * cosines))[1]
+    return np.asarray(cosines @ vectors)

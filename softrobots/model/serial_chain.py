@@ -1,0 +1,109 @@
+"""A robot as a serial chain, base to tip: all that the compiled solvers know of it.
+
+Plain data without Pinocchio. Every joint turns about, or slides along, the z axis of its own frame; whatever else a description
+says (axes, fixed links, bodies that are welded together) is in the constant placements between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+from softrobots.core.checks import FloatArray
+
+
+class ChainBody(NamedTuple):
+    """Mass that moves with a frame of the chain."""
+
+    mass: float
+    """Mass [kg]."""
+    first_moment: FloatArray
+    """Mass times centre of mass, in the axes of the frame and from its origin, shape (3,) [kg m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChainJoint:
+    """A joint that turns about, or slides along, the z axis of its frame."""
+
+    name: str
+    """Name of the joint."""
+    rotation: FloatArray
+    """Axes of its frame at zero in those of the element before (the world's for the first), shape (3, 3)."""
+    translation: FloatArray
+    """Origin of its frame at zero in the frame of the element before, shape (3,) [m]."""
+    slides: bool
+    """Whether it slides rather than turns."""
+    motor: int | None
+    """Its place among the motor joints; None for a spring."""
+    strain: int | None
+    """Its place among the strains (see `SerialChain.stiffness`); None for a motor."""
+    body: ChainBody
+    """What moves with its frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChainSection:
+    """A section of constant strain; see `softrobots.constant_curvature.strain_chain`."""
+
+    name: str
+    """Name of the section."""
+    rotation: FloatArray
+    """Axes of its start in those of the element before, shape (3, 3)."""
+    translation: FloatArray
+    """Its start in the frame of the element before, shape (3,) [m]."""
+    length: float
+    """Rest length [m]."""
+    strain: int
+    """Place of the first of its four section coordinates among the strains."""
+    bodies: tuple[ChainBody, ...]
+    """What moves with the frames behind its six joints `strain_chain.JOINTS`, in the axes that those joints make from the axes
+    of the start; the last is the end of the section."""
+
+
+Element: TypeAlias = ChainJoint | ChainSection
+"""Joint or section."""
+
+
+@dataclass(frozen=True, eq=False)
+class SerialChain:
+    """The elements from base to tip, with springs and muscles.
+
+    Strains are the coordinates of spring joints and sections before muscles are laid over them: spring joints, base to tip,
+    then four a section. Where muscle lengths are given, sums of strains are held, and the elastic coordinates are combinations
+    of the strains; otherwise they are the strains.
+    """
+
+    name: str
+    """Name of the robot."""
+    elements: tuple[Element, ...]
+    """Joints and sections, base to tip."""
+    tip_rotation: FloatArray
+    """Axes of the tip in those of the last element, shape (3, 3)."""
+    tip_translation: FloatArray
+    """The tip in the frame of the last element, shape (3,) [m]."""
+    stiffness: FloatArray
+    """Stiffness of the strains, shape (n_strains,) [N m/rad or N/m]."""
+    rest: FloatArray
+    """Relaxed strains, shape (n_strains,) [rad or m]."""
+    reach: float
+    """Scale of residuals, `SoftModel.reach` [m]."""
+    n_motors: int
+    """Number of motor joints, without muscles."""
+    limits: FloatArray
+    """Lower and upper limit of the actuators, motor joints and then muscles, shape (n_actuators, 2) [rad, m or N]."""
+    muscle_input: str
+    """What is given of the muscles, "lengths" or "forces"."""
+    muscle_rest: FloatArray
+    """Muscle lengths where the strains are zero, shape (n_muscles,) [m]."""
+    muscle_matrix: FloatArray
+    """Derivative of the muscle lengths with respect to the strains, shape (n_muscles, n_strains)."""
+    held: tuple[tuple[int, ...], ...]
+    """Groups of strains whose sum the given muscle lengths hold, base to tip; empty without given lengths."""
+    held_slope: FloatArray
+    """Derivative of those sums with respect to the muscle lengths, shape (n_groups, n_muscles)."""
+    elastic: FloatArray
+    """Elastic coordinates by strains, shape (n_springs, n_strains); the identity without given lengths."""
+    spread: FloatArray
+    """Part of the strains that muscle lengths prescribe, by their change from rest, shape (n_strains, n_muscles)."""
+    free: FloatArray
+    """Part of the strains by elastic coordinates, shape (n_strains, n_springs)."""

@@ -1,0 +1,56 @@
+"""Growth of a helical tube at its tip: grown length as a coordinate of one chain.
+
+The tube everts: new wall comes out at the tip, and what has come out does not move along the tube again. So of `n` sections the
+first ones are whole, one is coming out, and the others wait at the tip, as short as the chain allows. All of them are section
+coordinates of the chain of the whole tube: `m(z)` needs no other robot for another length. (A robot of its own, with its own
+weight and stiffness, is `HelixTube.grown(length)`.)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softrobots import helix
+from softrobots.core.checks import FloatArray, non_negative_number, positive_number
+from softrobots.core.errors import ParameterError
+from softrobots.robots import HelixTube
+
+SHORTEST = 0.002
+"""Share of its length that a section which has not come out keeps; a section of no length has no chord."""
+
+
+def grown_coordinates(tube: HelixTube, length: float, front: float = 0.0) -> FloatArray:
+    """Section coordinates of a tube that has grown to a length.
+
+    Args:
+        tube: The whole tube, with chain="sections".
+        length: Length of the uninflated tube that has come out [m], from `SHORTEST` of the whole to the whole.
+        front: Length of uninflated tube behind the tip over which the helix forms [m]: there the contraction rises from that of
+            the tube to 1 at the tip, where the tube is straight; 0: formed as it comes out.
+
+    Returns:
+        Section coordinates, shape (n_sections, 4) [rad, rad, rad, m]. Without a front all sections end on the
+        helix, the last at the length that has come out.
+
+    Raises:
+        ParameterError: If the tube is no `HelixTube` or lumped, or a length is out of range.
+    """
+    if not isinstance(tube, HelixTube):
+        raise ParameterError("tube", tube, "a HelixTube")
+    if tube.chain != "sections":
+        raise ParameterError("tube", tube.chain, 'a HelixTube with chain="sections"; between hinges nothing can grow')
+    grown = positive_number("length", length, "m")
+    if not SHORTEST * tube.length <= grown <= tube.length:
+        raise ParameterError("length", length, f"from {SHORTEST * tube.length} m to the length of the tube, {tube.length} m")
+    front = non_negative_number("front", front, "m")
+    count = tube.n_sections
+    waiting = grown * count / tube.length - count * SHORTEST
+    shares = SHORTEST + np.clip(waiting - (1.0 - SHORTEST) * np.arange(count), 0.0, 1.0 - SHORTEST)
+    pieces = shares * tube.length / count
+    to_tip = np.maximum(grown - np.cumsum(pieces) + 0.5 * pieces, 0.0)  # from the middle of each section
+    formed = np.minimum(to_tip, front) / front if front > 0.0 else np.ones(count)
+    contraction = 1.0 + (tube.contraction - 1.0) * formed
+    rest = tube.centre_length / count
+    lengths = helix.centre_length(contraction, tube.angle, pieces)
+    curvature, torsion = helix.actuator_curvature_torsion(contraction, tube.angle, tube.diameter, "centre", tube.handedness)
+    return np.stack([np.zeros(count), curvature * lengths, torsion * lengths, lengths - rest], axis=-1)

@@ -1,0 +1,1 @@
+"""Loads, equilibria, stability, branches, sensitivities, load estimation, inverse kinematics, trajectories, workspace."""

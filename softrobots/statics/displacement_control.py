@@ -1,0 +1,170 @@
+r"""Displacement control: springs and reaction of a robot that a probe displaces, along the path from rest.
+
+A dead moment cannot hold a link on the plateau of its moment, and a dead force only where the link has turned out of its way; a
+probe can. With the reaction `F` along the probe's line and the springs `y` as unknowns the conditions are
+:math:`r(y) - F \nabla g = 0` and `g(y) = v`, where `g` is the displacement of `softrobots.statics.probes`. Newton solves
+
+.. math:: \begin{pmatrix} K_t & -a \\ a^T & 0 \end{pmatrix} \begin{pmatrix} dy \\ dF \end{pmatrix}
+          = \begin{pmatrix} -r + F a \\ v - g \end{pmatrix}
+
+with :math:`a = \nabla g` and `K_t` the tangent stiffness of springs, load and :math:`-F \nabla^2 g`. The equilibrium is stable
+under the imposed displacement when `K_t` is positive definite on the motions that `a` leaves free.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import ElasticState, elastic_state, largest_residual, scaled
+from softrobots.statics.kinematics import frame_jacobian, frame_placement
+from softrobots.statics.loads import Load
+from softrobots.statics.probes import Contact, Probe, touch
+
+GAP = 1e-12
+"""Largest distance of a probe from where it is meant to be, relative to the reach."""
+
+_LARGEST_STEP = 0.5  # [rad], norm of one Newton step
+_NEWTON_STEPS = 20
+_SHORTEST = 1e-6  # share of the way that is not halved again
+_SMALL_MOVE = 0.01  # [rad or m] of a spring: so near that no other path is meant
+_STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the springs' own stiffness
+
+
+class HeldState(NamedTuple):
+    """The robot and the probe at given springs and reaction."""
+
+    state: ElasticState
+    """The robot under load and reaction."""
+    contact: Contact
+    """Where the probe touches it."""
+    reaction: float
+    """Force along the line of the probe [N]."""
+    tangent: FloatArray
+    """Tangent stiffness, shape (n, n) [N m/rad or N/m]: with the force turning as the robot does."""
+
+    def step(self, torque: FloatArray, way: float) -> FloatArray | None:
+        """Change of springs and reaction that takes up a torque, shape (n,) [N m or N], and moves the probe by a way [m].
+
+        Shape (n + 1,); None where the path turns back.
+        """
+        n = len(torque)
+        matrix: FloatArray = np.zeros((n + 1, n + 1))
+        matrix[:n, :n], matrix[:n, n], matrix[n, :n] = self.tangent, -self.contact.gradient, self.contact.gradient
+        try:
+            return np.asarray(np.linalg.solve(matrix, np.append(torque, way)))
+        except np.linalg.LinAlgError:
+            return None
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementControl:
+    """What stays the same while one displacement is sought."""
+
+    model: SoftModel
+    """The robot."""
+    motors: FloatArray
+    """Motor coordinates, shape (n_motors,) [rad or m]."""
+    load: Load
+    """The load without the probe."""
+    probe: Probe
+    """The probe."""
+    tolerance: float
+    """Largest residual, relative to the scale of the load."""
+
+    @property
+    def largest_gap(self) -> float:
+        """Largest distance of the probe from where it is meant to be [m]."""
+        return GAP * self.model.reach
+
+    def at(self, q_springs: FloatArray, reaction: float) -> HeldState:
+        """Evaluate at springs, shape (n_springs,), and a reaction [N]."""
+        point = self.model.coordinates.at(self.motors, q_springs)
+        q = self.model.embed(point.joints)
+        jacobian = point.columns(frame_jacobian(self.model, q, self.probe.frame))[1]
+        contact = touch(self.probe, frame_placement(self.model, q, self.probe.frame), jacobian)
+        state = elastic_state(self.model, self.motors, q_springs, self.load.plus(self.probe.frame, reaction * contact.wrench))
+        return HeldState(state, contact, reaction, state.tangent - reaction * contact.turning)
+
+    def newton(self, here: HeldState, wanted: float, most: int) -> tuple[HeldState | None, int]:
+        """Newton to a displacement from nearby, and the evaluations spent; None where it does not converge in `most`."""
+        n = self.model.n_springs
+        for iteration in range(1, most + 1):
+            gap = wanted - here.contact.displacement
+            if not math.isfinite(here.state.error) or not math.isfinite(gap):
+                return None, iteration
+            settled = here.state.error <= largest_residual(self.model, here.state.scale, self.tolerance)
+            if settled and abs(gap) <= self.largest_gap:
+                return here, iteration
+            step = here.step(-here.state.residual, gap)
+            if step is None or not np.linalg.norm(step[:n]) <= _LARGEST_STEP:
+                return None, iteration
+            here = self.at(here.state.q_springs + step[:n], here.reaction + float(step[n]))
+        return None, most
+
+
+def follow(problem: DisplacementControl, here: HeldState, wanted: float, most: int) -> tuple[HeldState, int]:
+    """Go to a displacement along the path, in one step if possible.
+
+    Args:
+        problem: What stays the same.
+        here: A point of the path.
+        wanted: The displacement [m].
+        most: Most evaluations.
+
+    Returns:
+        The farthest point that was reached, and the evaluations spent.
+    """
+    origin = here.contact.displacement
+    reached, step, spent = 0.0, 1.0, 0
+    with one_blas_thread(problem.model.n_springs):
+        while reached < 1.0 and step > _SHORTEST and spent < most:
+            aim = min(1.0, reached + step)
+            part = wanted if aim == 1.0 else origin + aim * (wanted - origin)
+            there, used = problem.newton(here, part, min(_NEWTON_STEPS, most - spent))
+            spent += used
+            if there is None or not _same_path(problem, here, there):
+                step *= 0.5
+            else:
+                here, reached, step = there, aim, 2.0 * step
+    return here, spent
+
+
+def _same_path(problem: DisplacementControl, here: HeldState, there: HeldState) -> bool:
+    """Whether a step is sure to have stayed on the path: a short one, or one that went about where the path points.
+
+    A long one that ends unstable where it began stable is not: beyond the knee of a link, Newton finds the path on which a
+    second one goes limp, too, as easily as the one on which that unloads.
+    """
+    moved = there.state.q_springs - here.state.q_springs
+    if np.abs(moved).max() <= _SMALL_MOVE:
+        return True
+    model = problem.model
+    stable = [stable_while_held(model, held.tangent, held.contact.gradient) for held in (here, there)]
+    if stable[0] and not stable[1]:
+        return False
+    predicted = here.step(np.zeros(len(moved)), there.contact.displacement - here.contact.displacement)
+    if predicted is None:
+        return False
+    missed, expected = np.abs(moved - predicted[:-1]).max(), np.abs(predicted[:-1]).max()
+    return bool(missed <= max(0.5 * expected, _SMALL_MOVE))
+
+
+def stable_while_held(model: SoftModel, tangent: FloatArray, gradient: FloatArray) -> bool:
+    """Whether a symmetric tangent stiffness is positive definite on the motions that a constraint leaves free.
+
+    Args:
+        model: The robot.
+        tangent: Tangent stiffness, shape (n, n) [N m/rad or N/m].
+        gradient: Derivative of what is constrained, shape (n,) [m/rad or -].
+    """
+    softness = 1.0 / np.sqrt(model.stiffness)
+    free = np.linalg.qr((softness * gradient)[:, None], mode="complete")[0][:, 1:]
+    on_free = free.T @ scaled(tangent, model.stiffness) @ free
+    return bool(np.linalg.eigvalsh(on_free).min(initial=math.inf) > _STABLE)

@@ -1,0 +1,291 @@
+"""Static equilibrium of a robot with joint springs, as a certified result.
+
+The solvers themselves are in `softrobots.statics.elastostatics`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
+from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.elastostatics import METHODS, TOLERANCE, ElasticState, is_stable, largest_residual, settle
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import Load
+
+_NEAR_PLATEAU = 0.99  # share of the largest moment at which a link explains why there is no equilibrium
+_LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are computed from the shape
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A solved static equilibrium; knows its model, load and motors, and can be saved with `softrobots.save_result`.
+
+    Torques are loads carried, minus what spring or motor exerts.
+    """
+
+    model: SoftModel
+    """The robot."""
+    load: Load
+    """The load."""
+    method: str
+    """The solver that found it."""
+    q_motors: FloatArray
+    """Motor coordinates, shape (n_motors,) [rad or m]."""
+    q_springs: FloatArray
+    """Spring coordinates, shape (n_springs,) [rad or m]."""
+    q: FloatArray
+    """Pinocchio's configuration, shape (nq,)."""
+    spring_torques: FloatArray
+    """Torque of each spring, `k (q - rest)` if it is linear, shape (n_springs,) [N m or N]."""
+    motor_torques: FloatArray
+    """Load on each motor, `J_m^T w - g_m`, shape (n_motors,) [N m or N]."""
+    tangent_stiffness: FloatArray
+    """Derivative of the residual, shape (n_springs, n_springs)."""
+    coupling: FloatArray
+    """Derivative of the load on the elastic coordinates with respect to the actuators, shape (n_springs, n_motors)."""
+    residual: float
+    """Norm of the out-of-balance torque [N m]."""
+    tolerance: float
+    """What the residual had to stay below [N m]."""
+    iterations: int
+    """Steps that led here: evaluations of the residual, or steps of the search or estimation that it is the end of."""
+    stable: bool
+    """Certified: every eigenvalue of the tangent stiffness has a positive real part."""
+
+    @property
+    def conservative(self) -> bool:
+        """Whether the load has a potential (no world-fixed moment), so that the tangent stiffness is symmetric."""
+        return self.load.conservative
+
+    @property
+    def converged(self) -> bool:
+        """Whether the residual meets the tolerance."""
+        return self.residual <= self.tolerance
+
+    @property
+    def transform_tip_to_world(self) -> Any:
+        """Pose of the tip, a `pinocchio.SE3` of the caller's own [m]."""
+        return frame_placement(self.model, self.q, self.model.tip)
+
+    @cached_property
+    def tip_position(self) -> FloatArray:
+        """Position of the tip in the world, shape (3,) [m]."""
+        return read_only(np.array(self.transform_tip_to_world.translation))
+
+    @cached_property
+    def link_moments(self) -> FloatArray:
+        """Moment at each inflated link, both springs combined (Euclidean norm), shape (n_links,) [N m].
+
+        Empty if the model names no inflated links. A section carries the moment of its middle; what is told of it is the
+        largest along it, with the moment linear between the middles of the sections of a segment, and beyond them.
+        """
+        groups = self.model.spring_groups
+        moments = np.array([np.linalg.norm(self.spring_torques[list(group.springs)]) for group in groups])
+        for segment in {group.segment for group in groups} - {None}:
+            rows = [row for row, group in enumerate(groups) if group.segment == segment]
+            moments[rows] = _largest_along(moments[rows])
+        return read_only(moments)
+
+    @cached_property
+    def muscle_lengths(self) -> FloatArray:
+        """Length of each muscle, shape (n_muscles,) [m]."""
+        structure = self.model.structure
+        strains = structure.strains(self.q_motors, self.q_springs)
+        return read_only(np.asarray(structure.muscle_rest + structure.muscle_matrix @ strains))
+
+    @property
+    def muscle_forces(self) -> FloatArray:
+        """Tension that each muscle must exert, negative where it pushes, shape (n_muscles,) [N]."""
+        return self.motor_torques[len(self.motor_torques) - len(self.model.muscles) :]
+
+    @cached_property
+    def strains(self) -> FloatArray:
+        """Strains of each section, base to tip, shape (n_sections, 4): kx, ky, twist [rad/m], stretch [-]."""
+        structure = self.model.structure
+        lengths = np.array([section.length for section in structure.section_table]).reshape(-1, 1)
+        return read_only(structure.section_coordinates(self.q_motors, self.q_springs) / lengths + (0.0, 0.0, 0.0, 1.0))
+
+    @cached_property
+    def saturated(self) -> tuple[bool, ...]:
+        """Which inflated links are on the plateau of their moment; none of those with linear springs."""
+        beyond = self.model.springs.saturated(self.q_springs)
+        return tuple(not beyond.isdisjoint(group.springs) for group in self.model.spring_groups)
+
+    @property
+    def wrinkled(self) -> bool:
+        """Whether a link carries its wrinkling moment or more, or is on its plateau: linear springs no longer hold."""
+        moments = zip(self.link_moments, self.model.spring_groups, strict=True)
+        return any(moment >= group.wrinkling_moment for moment, group in moments) or any(self.saturated)
+
+    @property
+    def within_limits(self) -> bool:
+        """Whether every actuator and every elastic joint is within its limits; statics does not clip.
+
+        Of muscles both the length and the tension count, whichever is given.
+        """
+        structure = self.model.structure
+        joints = self.model.coordinates.at(self.q_motors, self.q_springs).joints
+        return (
+            _within(self.q_motors, self.model.motor_limits)
+            and _within(joints, structure.elastic_limits)
+            and _within(self.muscle_lengths, self.model.actuators.muscle_lengths + _LENGTH_ROUNDING)
+            and _within(self.muscle_forces, self.model.actuators.muscle_forces)
+        )
+
+    @cached_property
+    def eigenvalues(self) -> FloatArray:
+        """Real parts of the eigenvalues of the tangent stiffness, ascending, shape (n_springs,) [N m/rad]."""
+        solver = np.linalg.eigvalsh if self.conservative else np.linalg.eigvals
+        with one_blas_thread(len(self.tangent_stiffness)):
+            return read_only(np.sort(solver(self.tangent_stiffness).real))
+
+
+def solve_equilibrium(
+    model: SoftModel,
+    q_motors: Any,
+    force: Any = None,
+    *,
+    wrench: Any = None,
+    frame: str | None = None,
+    gravity: Any = None,
+    method: str = "newton",
+    q_springs0: Any = None,
+    tolerance: float = TOLERANCE,
+    max_iterations: int | None = None,
+) -> Equilibrium:
+    """Find the static equilibrium of the springs at given motor coordinates.
+
+    It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
+    has no energy, the one reached by Newton from there, or while the load grows from zero, or while the moments grow from the
+    equilibrium without them. A descent ends in a stable
+    equilibrium, or in one that is free to move without a force (a symmetric robot that has buckled can turn its bow about its
+    axis): that is not certified stable.
+
+    Args:
+        model: The robot.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        force: Force at `frame`, shape (3,) [N], world axes.
+        wrench: Wrench at `frame`, shape (6,) [N, N m], world axes, force first; or `{frame: (6,)}` for several.
+        frame: Name of the frame of `force` and `wrench`; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes, e.g. `softrobots.EARTH_GRAVITY`; None: weightless.
+        method: "newton", or "fixed_point" (the paper's, converges for small loads only).
+        q_springs0: Where to start, shape (n_springs,) [rad or m]; the relaxed springs by default.
+        tolerance: Largest residual, relative to `max(|f| reach + |moment| + |g|, 1e-3 N m)`.
+        max_iterations: Most evaluations; 200 for "newton", 1000 for "fixed_point" by default.
+
+    Returns:
+        The equilibrium with its certificate.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or out of range.
+        NameNotFound: If a frame does not exist.
+        EquilibriumNotFound: If the residual stays above the tolerance; carries the best iterate.
+    """
+    check_model(model)
+    choice("method", method, METHODS)
+    motors = model.checked_motors(q_motors)
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    start = model.rest if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
+    if q_springs0 is not None and not model.coordinates.at(motors, start).valid:
+        raise ParameterError("q_springs0", start, "within the range of every section (see strain_chain.in_range)")
+    positive_number("tolerance", tolerance)
+    most = (
+        (200 if method == "newton" else 1000) if max_iterations is None else positive_integer("max_iterations", max_iterations)
+    )
+    state, iterations, stable = settle(model, motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
+    result = equilibrium_from_state(
+        model, motors, load, state, method=method, iterations=iterations, tolerance=tolerance, stable=stable
+    )
+    if not result.converged:
+        raise EquilibriumNotFound(
+            f"no equilibrium by {method!r} in {iterations} iterations: residual {result.residual:.3g} N m, required "
+            f"{result.tolerance:.3g} N m" + _hint(result),
+            best=result,
+            residual=result.residual,
+            iterations=iterations,
+        )
+    return result
+
+
+def _hint(best: Equilibrium) -> str:
+    """What may help, for the error."""
+    ends = best.model.structure.at_range_end(best.q_motors, best.q_springs)
+    if ends:
+        return (
+            f"; the load presses {', '.join(ends)} to the end of its range (see strain_chain.in_range): more sections may help"
+        )
+    if best.method == "fixed_point":
+        return "; method='newton' converges for larger loads"
+    for moment, group in zip(best.link_moments, best.model.spring_groups, strict=True):
+        if group.max_moment is not None and moment >= _NEAR_PLATEAU * group.max_moment:
+            springs = ", ".join(best.model.spring_joints[place] for place in group.springs)
+            return (
+                f"; the link of {springs} is on the plateau of its moment, {group.max_moment:g} N m, and cannot carry a dead "
+                f"moment beyond it; solve_imposed_displacement goes on where the displacement is given"
+            )
+    if not best.conservative:
+        return "; under a world-fixed moment the load grows from zero, then the moments alone, until the path turns back"
+    return ""
+
+
+def equilibrium_from_state(
+    model: SoftModel,
+    q_motors: FloatArray,
+    load: Load,
+    state: ElasticState,
+    *,
+    method: str,
+    iterations: int,
+    tolerance: float = TOLERANCE,
+    stable: bool | None = None,
+) -> Equilibrium:
+    """Make the result object of a state; `stable` if that is known already."""
+    return Equilibrium(
+        model=model,
+        load=load,
+        method=method,
+        q_motors=read_only(q_motors),
+        q_springs=read_only(state.q_springs),
+        q=read_only(state.q),
+        spring_torques=read_only(state.spring_torques),
+        motor_torques=read_only(state.load.motors),
+        tangent_stiffness=read_only(state.tangent),
+        coupling=read_only(state.load.coupling),
+        residual=state.error,
+        tolerance=largest_residual(model, state.scale, tolerance),
+        iterations=iterations,
+        stable=is_stable(model, state.tangent, symmetric=load.conservative) if stable is None else stable,
+    )
+
+
+def check_same_model(model: SoftModel, equilibrium: Any) -> None:
+    """Refuse anything but an equilibrium of a model equal to the one given.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    check_model(model)
+    if not isinstance(equilibrium, Equilibrium):
+        raise ParameterError("equilibrium", equilibrium, "an Equilibrium of the model")
+    if equilibrium.model != model:
+        raise ParameterError("equilibrium", equilibrium.model, f"an equilibrium of the model given, {model!r}")
+
+
+def _largest_along(moments: FloatArray) -> FloatArray:
+    """Largest moment along each section of a segment, shape (n,), from the moments in their middles, base to tip."""
+    if len(moments) < 2:
+        return moments
+    between = 0.5 * (moments[1:] + moments[:-1])
+    ends = np.concatenate([[1.5 * moments[0] - 0.5 * moments[1]], between, [1.5 * moments[-1] - 0.5 * moments[-2]]])
+    return np.asarray(np.maximum(np.maximum(ends[1:], ends[:-1]), moments))
+
+
+def _within(values: FloatArray, limits: FloatArray) -> bool:
+    return bool(np.all((values >= limits[:, 0]) & (values <= limits[:, 1])))

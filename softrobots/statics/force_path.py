@@ -1,0 +1,185 @@
+r"""Equilibria under a force of any size along a line: points of a path, Newton with conditions, and following by its length.
+
+Springs `y` and force `F` are unknowns together, :math:`r(y) - F J^T d = 0`, so that a path can be followed where the force
+falls (pseudo-arclength continuation). Places on it are seen from a reference point, `(y - y_c, F / F_c - 1)`: a change of the
+force by `F_c` counts as much as a radian.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import ElasticState, elastic_state, largest_residual
+from softrobots.statics.kinematics import frame_jacobian
+from softrobots.statics.loads import Load
+
+TOLERANCE = 1e-12
+"""Largest residual of a point, relative to the scale of the load."""
+
+_NEWTON_STEPS = 15
+_GAP = 1e-12  # by which a condition may be missed [rad]
+_LONGEST = 1.0  # Newton step [rad]
+_SHORTEST = 1e-5  # step along a path [rad]
+_BEHIND = 1e-3  # step along a path behind a knee [rad]
+_TURN = 0.95  # least cosine between the directions of two steps
+_MOST_POINTS = 2000
+
+
+class PathPoint(NamedTuple):
+    """A point of a path."""
+
+    state: ElasticState
+    """The robot there."""
+    force: float
+    """The force [N]."""
+    push: FloatArray
+    """Derivative of the elastic loads with respect to it, shape (n_springs,) [m]."""
+    across: float = 0.0
+    """Torque that holds the robot in a direction, where one is given [N m]."""
+
+    @property
+    def springs(self) -> FloatArray:
+        """Elastic coordinates, shape (n_springs,) [rad or m]."""
+        return self.state.q_springs
+
+
+@dataclass(frozen=True, eq=False)
+class ForcePath:
+    """What stays the same along a path."""
+
+    model: SoftModel
+    """The robot."""
+    motors: FloatArray
+    """Actuator coordinates, shape (n_motors,)."""
+    constant: Load
+    """The load without the force."""
+    frame: str
+    """Where the force acts."""
+    unit: FloatArray
+    """Its direction, shape (3,)."""
+    springs: FloatArray
+    """Springs of the reference point, shape (n_springs,) [rad or m]."""
+    force: float
+    """Force of the reference point, above zero [N]."""
+
+    def load(self, force: float) -> Load:
+        """The load with a force [N]."""
+        return self.constant.plus(self.frame, np.concatenate([force * self.unit, np.zeros(3)]))
+
+    def point(self, springs: FloatArray, force: float) -> PathPoint:
+        """Evaluate at springs, shape (n_springs,), and a force [N]."""
+        state = elastic_state(self.model, self.motors, springs, self.load(force))
+        if not math.isfinite(state.error):
+            return PathPoint(state, force, np.zeros(len(springs)))
+        columns = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])[1]
+        return PathPoint(state, force, self.unit @ columns)
+
+    def place(self, point: PathPoint) -> FloatArray:
+        """A point as seen from the reference point, shape (n_springs + 1,)."""
+        return np.append(point.springs - self.springs, point.force / self.force - 1.0)
+
+    def at(self, place: FloatArray) -> PathPoint:
+        """The robot at such a place, in balance or not."""
+        return self.point(self.springs + place[:-1], self.force * (1.0 + float(place[-1])))
+
+    def tangent(self, point: PathPoint) -> FloatArray:
+        """Direction in which the path leaves a point whose tangent stiffness is regular, the force growing."""
+        return np.append(self.force * np.linalg.solve(point.state.tangent, point.push), 1.0)
+
+    def newton(
+        self, start: FloatArray, rows: FloatArray, aims: FloatArray, across: FloatArray | None = None
+    ) -> PathPoint | None:
+        """Newton on springs and force, and on torques across directions.
+
+        Args:
+            start: Place to start from, shape (n_springs + 1,).
+            rows: Conditions on the place, shape (1 + m, n_springs + 1).
+            aims: What rows times place must be, shape (1 + m,).
+            across: Directions in which torques hold the robot, shape (m, n_springs); none by default.
+
+        Returns:
+            The point, or None where it does not converge.
+        """
+        n, held = len(self.springs), np.zeros((0, len(self.springs))) if across is None else across
+        here, torques = self.at(start), np.zeros(len(held))
+        for _ in range(_NEWTON_STEPS):
+            if not math.isfinite(here.state.error):
+                return None
+            residual, gap = here.state.residual + torques @ held, aims - rows @ self.place(here)
+            balanced = np.linalg.norm(residual) <= largest_residual(self.model, here.state.scale, TOLERANCE)
+            if balanced and np.abs(gap).max() <= _GAP:
+                return here._replace(across=float(torques[0]) if len(torques) else 0.0)
+            matrix = np.zeros((n + len(rows), n + 1 + len(held)))
+            matrix[:n, :n], matrix[:n, n], matrix[:n, n + 1 :] = here.state.tangent, -self.force * here.push, held.T
+            matrix[n:, : n + 1] = rows
+            try:
+                step = np.linalg.solve(matrix, np.concatenate([-residual, gap]))
+            except np.linalg.LinAlgError:
+                return None
+            if not float(np.linalg.norm(step[: n + 1])) <= _LONGEST:
+                return None
+            torques = torques + step[n + 1 :]
+            here = self.at(self.place(here) + step[: n + 1])
+        return None
+
+    def follow(
+        self, first: list[PathPoint], way: FloatArray, largest_force: float, largest_step: float
+    ) -> tuple[list[PathPoint], str]:
+        """Follow the path on from its first points.
+
+        Args:
+            first: One point, or more.
+            way: Direction in which it goes on from the last, shape (n_springs + 1,).
+            largest_force: Where it ends [N].
+            largest_step: Largest distance between two points [rad].
+
+        Returns:
+            All points; and why it ends: "largest force", "zero force", "end of range", "points" or "lost".
+        """
+        points, step, way = list(first), largest_step, way / np.linalg.norm(way)
+        knee = 0  # points at the last one
+        while len(points) < _MOST_POINTS:
+            here = self.place(points[-1])
+            there = self.newton(here + step * way, way[None], np.array([way @ here + step]))
+            moved = np.zeros_like(way) if there is None else self.place(there) - here
+            if there is None or not way @ moved >= _TURN * np.linalg.norm(moved):
+                step *= 0.5
+                if step < _SHORTEST:
+                    turned = None if knee == len(points) else self._behind_knee(points[-1], way)
+                    if turned is not None:
+                        knee, way, step = len(points), turned, _BEHIND
+                        continue
+                    ends = self.model.structure.at_range_end(self.motors, points[-1].springs)
+                    return points, "end of range" if ends else "lost"
+                continue
+            if not 0.0 <= there.force <= largest_force:
+                limit, ended = (largest_force, "largest force") if there.force > largest_force else (0.0, "zero force")
+                aim = limit / self.force - 1.0
+                share = (aim - here[-1]) / moved[-1]
+                last = self.newton(here + share * moved, np.eye(len(way))[-1:], np.array([aim]))
+                return points if last is None else [*points, last], ended
+            points.append(there)
+            way, step = moved / np.linalg.norm(moved), min(1.5 * step, largest_step)
+        return points, "points"
+
+    def _behind_knee(self, here: PathPoint, way: FloatArray) -> FloatArray | None:
+        """Direction of the path where a link comes onto the plateau of its moment, or off it; None where none does.
+
+        The tangent stiffness jumps there. The direction is the one in which the new one needs no torque, and in which the link
+        bends on as before.
+        """
+        law, beyond = self.model.springs, here.springs + 10.0 * _SHORTEST * way[:-1]
+        places = sorted(law.saturated(here.springs) ^ law.saturated(beyond))
+        ahead = self.point(beyond, here.force)
+        if not places or not math.isfinite(ahead.state.error):
+            return None
+        turned = np.linalg.svd(np.column_stack([ahead.state.tangent, -self.force * ahead.push]))[2][-1]
+        bend = (here.springs - law.rest)[places]
+        same = float(bend @ way[places]) * float(bend @ turned[places])
+        return np.asarray(math.copysign(1.0, same) * turned)

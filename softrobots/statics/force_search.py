@@ -1,0 +1,99 @@
+"""Search for the force at the tip that explains motor torques; whoever settles the springs."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.statics.elastostatics import MOMENT_FLOOR, TOLERANCE
+
+OBSERVABLE = 1e-3
+"""A direction counts as unobservable when its singular value is below this share of the reach."""
+
+HIDDEN = 0.05
+"""Share of the motor torques that may stay unexplained where the motors do not feel every direction of the force."""
+
+_FIRST_DAMPING = 0.03  # of the first step, relative to the reach: keeps the force small where it is barely felt
+_LAST_DAMPING = 1e-7
+
+State = TypeVar("State")
+"""A robot in equilibrium, as a measurement knows it."""
+
+
+class Directions(NamedTuple):
+    """Singular value decomposition of the torque slope `d tau_m / d f`, shape (n_motors, 3)."""
+
+    left: FloatArray
+    """Directions of the motor torques, in columns, shape (n_motors, n_motors)."""
+    values: FloatArray
+    """Singular values, descending, shape (at most 3,) [m]."""
+    right: FloatArray
+    """Directions of the force, in rows, shape (3, 3)."""
+    observable: Any
+    """Which singular values are large enough for the direction to be felt, truth values."""
+
+    @classmethod
+    def of(cls, slope: FloatArray, reach: float) -> Directions:
+        """Decompose the slope of a robot of a given reach [m]."""
+        left, values, right = np.linalg.svd(slope)
+        return cls(left, values, right, values > OBSERVABLE * reach)
+
+
+class Measurement(Protocol[State]):
+    """Motor torques that were measured, and a robot that tells what a force would make of them."""
+
+    @property
+    def reach(self) -> float:
+        """Scale of lengths [m]."""
+
+    @property
+    def tolerance(self) -> float:
+        """Largest part of the torques that may stay unexplained [N m]."""
+
+    def equilibrium(self, force: FloatArray, near: State) -> State | None:
+        """The robot in equilibrium under a force, from a state near to it; None if it does not settle."""
+
+    def unexplained(self, state: State) -> FloatArray:
+        """Measured torques minus those of a state, shape (n_motors,)."""
+
+    def directions(self, state: State) -> Directions:
+        """How the torques follow the force."""
+
+
+def torque_tolerance(torques: FloatArray) -> float:
+    """Largest part of motor torques that may stay unexplained [N m]."""
+    return TOLERANCE * max(float(np.linalg.norm(torques)), MOMENT_FLOOR)
+
+
+def search_force(problem: Measurement[State], state: State, most: int) -> tuple[FloatArray, State, int]:
+    """Levenberg-Marquardt on the torque equation, in the observable directions of each step.
+
+    Args:
+        problem: What was measured.
+        state: The robot without a force.
+        most: Most steps.
+
+    Returns:
+        The force, shape (3,) [N], the robot under it, and the steps.
+    """
+    force, reach = np.zeros(3), problem.reach
+    damping, spent = _FIRST_DAMPING * reach, 0
+    while spent < most:
+        left, values, right, keep = problem.directions(state)
+        missing = left[:, : len(values)].T @ problem.unexplained(state)
+        size = float(np.linalg.norm(missing[keep]))
+        if size <= problem.tolerance:
+            break
+        step = right[: len(values)][keep].T @ (missing[keep] * values[keep] / (values[keep] ** 2 + damping**2))
+        trial = problem.equilibrium(force + step, state)
+        spent += 1
+        if trial is not None:
+            left_over = left[:, : len(values)].T @ problem.unexplained(trial)
+            if float(np.linalg.norm(left_over[keep])) < size:
+                force, state = force + step, trial
+                damping = 0.1 * damping if damping > _LAST_DAMPING * reach else 0.0
+                continue
+        damping = max(10.0 * damping, 10.0 * _LAST_DAMPING * reach)
+    return force, state, spent

@@ -1,0 +1,212 @@
+"""A robot that a probe displaces by a given way, as a certified result: the force follows.
+
+A dead moment cannot hold a link on the plateau of its moment, and a dead force only where the link has turned out of its way; a
+probe can. The equations and the solver are in `softrobots.statics.displacement_control`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, finite_number, positive_integer, read_only, unit_vector
+from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.displacement_control import GAP, DisplacementControl, HeldState, follow, stable_while_held
+from softrobots.statics.elastostatics import TOLERANCE
+from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state, solve_equilibrium
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import Load
+from softrobots.statics.probes import Probe, face_normal
+
+
+@dataclass(frozen=True, eq=False)
+class ImposedDisplacement:
+    """A robot that a probe holds displaced; can be saved with `softrobots.save_result`."""
+
+    probe: Probe
+    """The probe."""
+    displacement: float
+    """How far along its line the probe is [m]."""
+    reaction: float
+    """Force on the robot along that line [N], what a load cell behind the probe reads; negative: it would have to pull."""
+    load: Load
+    """The load without the probe."""
+    equilibrium: Equilibrium
+    """The robot with the reaction as a wrench at the probe's frame. *Its* certificate is about that wrench as a dead load;
+    under the imposed displacement `stable` counts."""
+    force: FloatArray
+    """Force on the robot at `contact`, shape (3,) [N], world axes; a frictionless probe has no moment there."""
+    contact: FloatArray
+    """Where the probe is, shape (3,) [m], world axes."""
+    tangent_stiffness: FloatArray
+    """Derivative of the out-of-balance torque at constant reaction, which turns with a face, shape (n_springs, n_springs)."""
+    gradient: FloatArray
+    """Derivative of the displacement with respect to the springs, shape (n_springs,) [m/rad or m/m]."""
+    gap: float
+    """Distance of the probe from where it is meant to be [m]."""
+    stable: bool
+    """Certified: the tangent stiffness is positive definite on the motions of the springs that do not move the probe."""
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self.equilibrium.model
+
+    @property
+    def q_springs(self) -> FloatArray:
+        """Spring coordinates, shape (n_springs,) [rad or m]."""
+        return self.equilibrium.q_springs
+
+    @property
+    def residual(self) -> float:
+        """Norm of the out-of-balance torque [N m]."""
+        return self.equilibrium.residual
+
+    @property
+    def q(self) -> FloatArray:
+        """Pinocchio's configuration, shape (nq,)."""
+        return self.equilibrium.q
+
+
+def solve_imposed_displacement(
+    model: SoftModel,
+    q_motors: Any,
+    displacement: float,
+    *,
+    direction: Any,
+    frame: str | None = None,
+    point: Any = (0.0, 0.0, 0.0),
+    along: Any = None,
+    gravity: Any = None,
+    start: ImposedDisplacement | None = None,
+    tolerance: float = TOLERANCE,
+    max_iterations: int = 400,
+) -> ImposedDisplacement:
+    """Find the springs and the force of a frictionless probe that displaces a point of the robot by a given way.
+
+    The displacement is counted from the equilibrium without the probe. It is imposed at once, or in steps where Newton does not
+    follow: the answer is on the path from there, or from `start`.
+
+    Args:
+        model: The robot, with at least one spring.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        displacement: How far the probe has moved along its line [m].
+        direction: Direction of that line, shape (3,), any length but zero, world axes.
+        frame: Frame that is touched; the tip by default.
+        point: The point that is touched, in the axes of the frame, shape (3,) [m]; the origin of the frame by default.
+        along: Axis of the frame, shape (3,), any length but zero, along which the probe slides on the robot: on the face that
+            holds this axis and, without the probe, is turned most towards the line. None: the probe holds to its point,
+            which is free to move across the line.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        start: A solution with the same model, motors, probe and load to start from, e.g. the last one of a sequence.
+        tolerance: Largest residual, relative to `max(|f| reach + |g|, 1e-3 N m)`.
+        max_iterations: Most evaluations.
+
+    Returns:
+        The displaced robot with its certificate.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or out of range, the springs cannot move the point
+            along the line, or `start` is of another probe, load or robot.
+        NameNotFound: If the frame does not exist.
+        EquilibriumNotFound: If the displacement cannot be reached; carries the farthest `ImposedDisplacement` on the way.
+    """
+    check_model(model)
+    motors = model.checked_motors(q_motors)
+    wanted = finite_number("displacement", displacement, "m")
+    if model.n_springs == 0:
+        raise ParameterError("model", model, "a robot with springs")
+    line = unit_vector("direction", direction)
+    touched = finite_array("point", point, (3,), "m")
+    axis = None if along is None else unit_vector("along", along)
+    most = positive_integer("max_iterations", max_iterations)
+    free = solve_equilibrium(model, motors, frame=frame, gravity=gravity, tolerance=tolerance)
+    at = model.tip if frame is None else frame
+    pose = frame_placement(model, free.q, at)
+    origin = pose.translation + pose.rotation @ touched
+    normal = None if axis is None else read_only(face_normal(pose.rotation.T @ line, axis, along))
+    probe = Probe(at, read_only(touched), read_only(line), read_only(origin), normal)
+    problem = DisplacementControl(model, motors, free.load, probe, tolerance)
+    here = problem.at(free.q_springs, 0.0)
+    if not np.linalg.norm(here.contact.gradient) > GAP * model.reach:
+        raise ParameterError(
+            "direction", direction, f"one in which the springs can move the point; it is at {origin.tolist()} m"
+        )
+    if start is not None:
+        _check_start(problem, start)
+        here = problem.at(start.q_springs, start.reaction)
+    here, spent = follow(problem, here, wanted, most)
+    reached = here.contact.displacement
+    if abs(reached - wanted) <= problem.largest_gap:
+        return _result(problem, here, wanted, spent)
+    best = _result(problem, here, reached, spent)
+    raise EquilibriumNotFound(
+        f"a displacement of {wanted:g} m was not reached in {spent} evaluations: the path was followed to {reached:.6g} m, "
+        f"where the reaction is {best.reaction:.6g} N",
+        best=best,
+        residual=best.equilibrium.residual,
+        iterations=spent,
+    )
+
+
+def _result(problem: DisplacementControl, held: HeldState, wanted: float, iterations: int) -> ImposedDisplacement:
+    """Make the result object."""
+    model, probe, contact = problem.model, problem.probe, held.contact
+    pressed = problem.load.plus(probe.frame, held.reaction * contact.wrench)
+    equilibrium = equilibrium_from_state(
+        model, problem.motors, pressed, held.state, method="newton", iterations=iterations, tolerance=problem.tolerance
+    )
+    return ImposedDisplacement(
+        probe=probe,
+        displacement=wanted,
+        reaction=held.reaction,
+        load=problem.load,
+        equilibrium=equilibrium,
+        force=read_only(held.reaction * contact.wrench[:3]),
+        contact=read_only(contact.place),
+        tangent_stiffness=read_only(held.tangent),
+        gradient=read_only(contact.gradient),
+        gap=abs(contact.displacement - wanted),
+        stable=stable_while_held(model, held.tangent, contact.gradient),
+    )
+
+
+def imposed_at(
+    model: SoftModel,
+    q_motors: FloatArray,
+    load: Load,
+    probe: Probe,
+    *,
+    q_springs: FloatArray,
+    reaction: float,
+    displacement: float,
+    iterations: int,
+) -> ImposedDisplacement:
+    """Make a result anew from its unknowns; what a saved one is loaded with.
+
+    Args:
+        model: The robot.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        load: The load without the probe.
+        probe: The probe.
+        q_springs: Spring coordinates, shape (n_springs,) [rad or m].
+        reaction: Force along the probe's line [N].
+        displacement: Where the probe is meant to be [m].
+        iterations: Evaluations that were spent.
+
+    Returns:
+        The result, whether or not it is in balance.
+    """
+    problem = DisplacementControl(model, q_motors, load, probe, TOLERANCE)
+    return _result(problem, problem.at(q_springs, reaction), displacement, iterations)
+
+
+def _check_start(problem: DisplacementControl, start: Any) -> None:
+    if not isinstance(start, ImposedDisplacement):
+        raise ParameterError("start", start, "an ImposedDisplacement")
+    same = start.probe.same_as(problem.probe) and start.load.same_as(problem.load)
+    if not (same and start.model == problem.model):
+        raise ParameterError("start", start.probe, "a solution with the same model, probe and load")

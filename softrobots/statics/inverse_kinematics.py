@@ -1,0 +1,257 @@
+"""Elastostatic inverse kinematics: actuator coordinates that put the loaded, deformed tip at a target.
+
+The search from one start is in `softrobots.statics.tip_search`; here are the starts and the choice among what they find.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
+from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.elastostatics import METHODS, ElasticState, settle
+from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import Load
+from softrobots.statics.tip_goal import Goal, LoadedTip
+from softrobots.statics.tip_search import POSITION_TOLERANCE, SAME, LocalSolution, search
+
+ELBOWS = ("up", "down")
+"""Choices of `solve_ik(elbow=...)`."""
+
+_SEED = 20210312  # of the random starts: the day the paper appeared
+
+
+@dataclass(frozen=True, eq=False)
+class IkSolution:
+    """Actuator coordinates for a target; can be saved with `softrobots.save_result`."""
+
+    target: FloatArray
+    """The target, shape (3,) [m]."""
+    orientation: FloatArray | None
+    """Wanted orientation of the tip, shape (3, 3), or direction of its z axis, shape (3,); None: any."""
+    equilibrium: Equilibrium
+    """The loaded robot at these motor coordinates."""
+    error: float
+    """Distance of the tip from the target [m]."""
+    orientation_error: float
+    """Angle between the tip and the wanted orientation [rad]; 0 if none is wanted."""
+    iterations: int
+    """Steps from the start that led here."""
+    alternatives: tuple[FloatArray, ...]
+    """Actuator coordinates of the other solutions found, each shape (n_motors,), by their distance from the start; whole turns
+    of a motor do not make another solution."""
+
+    @property
+    def q_motors(self) -> FloatArray:
+        """Actuator coordinates, shape (n_motors,) [rad, m or N]."""
+        return self.equilibrium.q_motors
+
+
+def solve_ik(
+    model: SoftModel,
+    target: Any,
+    force: Any = None,
+    *,
+    orientation: Any = None,
+    wrench: Any = None,
+    frame: str | None = None,
+    gravity: Any = None,
+    q_motors0: Any = None,
+    elbow: str | None = None,
+    method: str = "newton",
+    tolerance: float = POSITION_TOLERANCE,
+    starts: int = 24,
+) -> IkSolution:
+    """Find actuator coordinates (motor angles, muscle lengths) that put the loaded tip at a target position.
+
+    Searches from `q_motors0` and from random coordinates within the limits (always the same ones), and returns, of the
+    solutions found, the one that changes `q_motors0` least. A robot with more actuators than the target has conditions moves as
+    little as it can; if it has muscles, the first search that arrives decides.
+
+    Args:
+        model: The robot, with at least one actuator.
+        target: Target of the tip, shape (3,) [m], world axes.
+        force: Force at `frame`, shape (3,) [N], world axes.
+        orientation: How the tip must stand, for robots with the freedom: a rotation matrix (tip axes in world axes), shape
+            (3, 3), or the direction of the tip's z axis, shape (3,), any length but zero; None: anyhow.
+        wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
+        frame: Frame of `force` and `wrench`; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        q_motors0: Where to start, shape (n_motors,) [rad, m or N]; `SoftModel.relaxed_motors` by default.
+        elbow: "up" or "down": only solutions whose last motor joint lies above or below the line from the first motor joint
+            to the tip; None: any.
+        method: How the springs settle, "newton" or "fixed_point".
+        tolerance: Largest distance of the tip from the target [m].
+        starts: Number of searches, the one from `q_motors0` included.
+
+    Returns:
+        The solution.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has no actuators, or not
+            enough of them for an orientation.
+        NameNotFound: If a frame does not exist.
+        TargetUnreachable: If no search arrives; the error names the nearest point that the best one reached and carries it.
+        EquilibriumNotFound: If the springs settle at none of the starts.
+    """
+    check_model(model)
+    goal = Goal(finite_array("target", target, (3,), "m"), checked_orientation(orientation))
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    choice("method", method, METHODS)
+    if elbow is not None:
+        choice("elbow", elbow, ELBOWS)
+    positive_number("tolerance", tolerance, "m")
+    first = start_motors(model, q_motors0)
+    if elbow is not None and not _has_elbow(model):
+        raise ParameterError("elbow", elbow, "None for this robot: its last motor joint is where its first one is")
+    freedom = model.actuators.basis.shape[1]
+    if goal.rotation is not None and freedom < goal.rows:
+        raise ParameterError(
+            "orientation", orientation, f"None for this robot: it has {freedom} freedoms, {goal.rows} are needed"
+        )
+
+    def allowed(local: LocalSolution[ElasticState]) -> bool:
+        return elbow is None or elbow_side(model, local.state.q) == elbow
+
+    tip = LoadedTip(model, goal, load, method)
+    ended: list[LocalSolution[ElasticState]] = []
+    for start in _starts(model, first, positive_integer("starts", starts, 10_000)):
+        local = search(tip, start, model.rest, home=first, tolerance=tolerance)
+        if local is not None:
+            ended.append(local)
+            if model.muscles and freedom > goal.rows and local.arrived(tolerance) and allowed(local):
+                break
+    if not ended:
+        _raise_unsettled(model, first, load, method, starts)
+    sided = [local for local in ended if allowed(local)]
+    found: list[LocalSolution[ElasticState]] = []
+    for local in sorted(sided, key=lambda local: float(np.linalg.norm((local.q_motors - first) / model.motor_scale))):
+        if local.arrived(tolerance) and not any(_same_pose(model, local, other) for other in found):
+            found.append(local)
+    best = found[0] if found else min(sided or ended, key=lambda local: local.miss(model))
+    solution = IkSolution(
+        target=read_only(goal.position),
+        orientation=None if goal.rotation is None else read_only(goal.rotation),
+        equilibrium=equilibrium_from_state(model, best.q_motors, load, best.state, method=method, iterations=best.iterations),
+        error=best.error,
+        orientation_error=best.angle,
+        iterations=best.iterations,
+        alternatives=tuple(read_only(other.q_motors) for other in found[1:]),
+    )
+    if not found:
+        side = (f" with the elbow {elbow}" if elbow else "") + (
+            " in the wanted orientation" if goal.rotation is not None else ""
+        )
+        unsettled = sum(local.unsettled for local in ended)
+        raise TargetUnreachable(
+            f"the tip cannot reach {goal.position.tolist()} m{side}: the nearest of {starts} starts (seed {_SEED}) comes "
+            f"within {best.error:.6g} m{'' if goal.rotation is None else f' and {best.angle:.6g} rad'}, "
+            f"at {solution.equilibrium.tip_position.round(9).tolist()} m with motors {best.q_motors.round(6).tolist()}"
+            + ("" if sided else ", with the elbow on the other side")
+            + (f"; the springs did not settle by {method!r} at {unsettled} of the motor angles tried" if unsettled else ""),
+            best=solution,
+            residual=best.error,
+            iterations=best.iterations,
+        )
+    return solution
+
+
+def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
+    """Check where a search starts: relaxed, or as near to it as the limits allow, if nothing is said.
+
+    Raises:
+        ParameterError: If the robot has no actuators, or the start has the wrong shape, is not finite or beyond the limits.
+    """
+    if model.n_motors == 0:
+        raise ParameterError("model", model, "a robot with at least one motor or muscle")
+    low, high = model.motor_limits.T
+    if q_motors0 is None:
+        return np.array(model.relaxed_motors)
+    motors = model.checked_motors(q_motors0, "q_motors0")
+    if np.any((motors < low) | (motors > high)):
+        raise ParameterError("q_motors0", q_motors0, f"within the motor limits {model.motor_limits.tolist()}")
+    return motors
+
+
+def checked_orientation(value: Any) -> FloatArray | None:
+    """Return a wanted orientation of the tip, a direction with length 1.
+
+    Args:
+        value: A rotation matrix, shape (3, 3), a direction, shape (3,), or None.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    if value is None:
+        return None
+    given = finite_array("orientation", value, None)
+    if given.shape == (3,) and float(np.linalg.norm(given)) > 0.0:
+        return np.asarray(given / np.linalg.norm(given))
+    if given.shape == (3, 3) and np.allclose(given @ given.T, np.eye(3), rtol=0.0, atol=1e-9) and np.linalg.det(given) > 0.0:
+        return given
+    raise ParameterError(
+        "orientation", value, "a rotation matrix, shape (3, 3), or a direction different from zero, shape (3,)"
+    )
+
+
+def elbow_side(model: SoftModel, q: FloatArray) -> str:
+    """Whether the last motor joint lies above or below the line from the first motor joint to the tip: "up" or "down".
+
+    Args:
+        model: The robot, with at least one motor.
+        q: Pinocchio's configuration, shape (nq,).
+    """
+    first, last, tip = (frame_placement(model, q, name).translation for name in (*_ends(model), model.tip))
+    along = tip - first
+    length = float(along @ along)
+    offset = last - first - (along * float(along @ (last - first)) / length if length > 0.0 else 0.0)
+    return "up" if offset[2] >= 0.0 else "down"
+
+
+def _ends(model: SoftModel) -> tuple[str, str]:
+    return model.structure.motor_joints[0], model.structure.motor_joints[-1]
+
+
+def _has_elbow(model: SoftModel) -> bool:
+    """Whether the last motor joint is away from the first one."""
+    if len(model.structure.motor_joints) < 2:
+        return False
+    q = model.embed(model.coordinates.at(model.relaxed_motors, model.rest).joints)
+    first, last = (frame_placement(model, q, name).translation for name in _ends(model))
+    return float(np.linalg.norm(last - first)) > SAME * model.reach
+
+
+def _same_pose(model: SoftModel, one: LocalSolution[ElasticState], other: LocalSolution[ElasticState]) -> bool:
+    """Whether two solutions are one, up to whole turns of a motor."""
+    apart = one.q_motors - other.q_motors
+    apart = np.where(model.actuators.turning, apart - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)), apart)
+    return float(np.abs(apart / model.motor_scale).max()) <= SAME
+
+
+def _raise_unsettled(model: SoftModel, motors: FloatArray, load: Load, method: str, starts: int) -> NoReturn:
+    state, spent, _ = settle(model, motors, load, model.rest, method=method)
+    best = equilibrium_from_state(model, motors, load, state, method=method, iterations=spent)
+    hint = "; method='newton' settles larger loads" if method == "fixed_point" else ""
+    raise EquilibriumNotFound(
+        f"the springs do not settle under this load by {method!r} at any of {starts} starts{hint}",
+        best=best,
+        residual=best.residual,
+        iterations=spent,
+    )
+
+
+def _starts(model: SoftModel, first: FloatArray, count: int) -> list[FloatArray]:
+    random = np.random.default_rng(_SEED)
+    made = [first]
+    for _ in range(20 * count):  # some lengths fit together nowhere, or bend too far
+        if len(made) == count:
+            break
+        start = model.actuators.draw(random)
+        if start is not None:
+            made.append(start)
+    return made

@@ -1,0 +1,230 @@
+"""What pulls on a robot: dead wrenches at its frames, and gravity; and what they do in joint coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.errors import ParameterError
+from softrobots.model.joint_loads import JointLoad
+from softrobots.model.soft_model import SoftModel, check_model
+
+EARTH_GRAVITY = (0.0, 0.0, -9.81)
+"""Gravity on the ground, world axes [m/s^2]."""
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+def cross_matrix(vector: FloatArray) -> FloatArray:
+    """Matrix `[v]` with `[v] u = v x u`, shape (3, 3)."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _rows(wrench: FloatArray) -> FloatArray:
+    """`LoadTerm.rows` of a wrench."""
+    force, moment = wrench[:3], wrench[3:]
+    nothing = np.zeros((3, 3))
+    return np.vstack([wrench, np.hstack([cross_matrix(force).T, nothing]), np.hstack([nothing, cross_matrix(moment)])])
+
+
+_UNIT_ROWS = np.stack([_rows(unit).ravel() for unit in np.eye(6)], axis=-1)  # (42, 6): rows are linear in the wrench
+
+
+class LoadTerm(NamedTuple):
+    """One wrench of a load."""
+
+    frame: str
+    """Name of the frame."""
+    force: FloatArray
+    """Its force, shape (3,) [N]."""
+    rows: FloatArray
+    """What multiplies the Jacobian of the frame, shape (7, 6): the wrench; `-f x` on linear rows; `mu x` on angular ones."""
+    norms: tuple[float, float]
+    """Norms of force [N] and moment [N m]."""
+
+    @classmethod
+    def of(cls, frame: str, wrench: FloatArray) -> LoadTerm:
+        """Prepare a wrench, shape (6,), at a frame."""
+        fx, fy, fz, mx, my, mz = wrench.tolist()
+        return cls(frame, wrench[:3], _UNIT_ROWS.dot(wrench).reshape(7, 6), (math.hypot(fx, fy, fz), math.hypot(mx, my, mz)))
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A load case: dead wrenches (fixed in the world, they do not follow the robot) and gravity.
+
+    A force has a potential; a world-fixed *moment* has none.
+    """
+
+    wrenches: Mapping[str, FloatArray]
+    """Wrench by frame name, shape (6,): force [N] then moment [N m], world axes, at the origin of the frame; read-only."""
+    gravity: tuple[float, float, float] | None
+    """Gravity, world axes [m/s^2]; None: weightless."""
+    terms: tuple[LoadTerm, ...] = field(init=False, repr=False)
+    """The wrenches with the matrices that the statics needs of them."""
+    conservative: bool = field(init=False, repr=False)
+    """Whether the load has a potential: no moment in it."""
+
+    def __post_init__(self) -> None:
+        """Keep a read-only copy of the wrenches, and prepare them."""
+        kept, terms, conservative = {}, [], True
+        for frame, wrench in self.wrenches.items():
+            kept[frame] = read_only(np.array(wrench))
+            terms.append(LoadTerm.of(frame, kept[frame]))
+            conservative = conservative and terms[-1].norms[1] == 0.0
+        object.__setattr__(self, "wrenches", MappingProxyType(kept))
+        object.__setattr__(self, "terms", tuple(terms))
+        object.__setattr__(self, "conservative", conservative)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle with a plain dictionary."""
+        return Load, (dict(self.wrenches), self.gravity)
+
+    @classmethod
+    def of(
+        cls, model: SoftModel, force: Any = None, *, wrench: Any = None, frame: str | None = None, gravity: Any = None
+    ) -> Load:
+        """Check a load against a model.
+
+        Args:
+            model: The robot.
+            force: Force at `frame`, shape (3,) [N], world axes.
+            wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several; added to `force`.
+            frame: Name of the frame; the tip by default.
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+
+        Returns:
+            The load.
+
+        Raises:
+            ParameterError: If a shape differs or a number is not finite.
+            NameNotFound: If a frame does not exist.
+        """
+        check_model(model)
+        at = model.tip if frame is None else frame
+        model.frame_id(at)
+        total: dict[str, FloatArray] = {}
+        if force is not None:
+            total[at] = np.zeros(6)
+            total[at][:3] = finite_array("force", force, (3,), "N")
+        if wrench is not None:
+            several = wrench if isinstance(wrench, Mapping) else {at: wrench}
+            for name, value in several.items():
+                model.frame_id(name)
+                field = f"wrench[{name!r}]" if isinstance(wrench, Mapping) else "wrench"
+                total[name] = total.get(name, 0.0) + finite_array(field, value, (6,), "N, N m")
+        if gravity is None:
+            return cls(total, None)
+        x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
+        return cls(total, (x, y, z))
+
+    def same_as(self, other: Load) -> bool:
+        """Whether another load has the same wrenches and gravity."""
+        return self is other or (
+            self.gravity == other.gravity
+            and self.wrenches.keys() == other.wrenches.keys()
+            and all(np.array_equal(wrench, other.wrenches[name]) for name, wrench in self.wrenches.items())
+        )
+
+    def scaled(self, factor: float) -> Load:
+        """Return the load with every wrench and gravity multiplied by `factor`."""
+        gravity = None if self.gravity is None else tuple(factor * g for g in self.gravity)
+        return Load({name: factor * value for name, value in self.wrenches.items()}, gravity)  # type: ignore[arg-type]
+
+    def with_moments(self, factor: float) -> Load:
+        """Return the load with every moment multiplied by `factor`, forces and gravity as they are."""
+        share = np.repeat([1.0, factor], 3)
+        return Load({name: share * value for name, value in self.wrenches.items()}, self.gravity)
+
+    def plus(self, frame: str, wrench: FloatArray) -> Load:
+        """Return the load with one more wrench, shape (6,) [N, N m], at a frame."""
+        return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity)
+
+
+def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, FloatArray]:
+    """A uniform dead force along the sections of a robot, as wrenches at its sections.
+
+    Each half of a section passes its share to the nearer end (lumped: each section to its hinge), an approximation of second
+    order in the length of a section, like the chain. The half at the base loads nothing that moves.
+
+    Args:
+        model: A robot with sections.
+        force_per_length: Force per rest length, shape (3,) [N/m], world axes.
+
+    Returns:
+        Wrench, shape (6,) [N, N m], by frame: for `wrench=` of `solve_equilibrium`.
+
+    Raises:
+        ParameterError: If the robot has no sections, the shape differs or a number is not finite.
+    """
+    rows = check_model(model).structure.section_table
+    if not rows:
+        raise ParameterError("model", model, "a robot with sections (a PccArm or a HelixTube)")
+    force = finite_array("force_per_length", force_per_length, (3,), "N/m")
+    lengths = np.array([row.length for row in rows])
+    if model.structure.sections is not None:
+        lengths = 0.5 * (lengths + np.append(lengths[1:], 0.0))
+    return {row.name: np.concatenate([share * force, np.zeros(3)]) for row, share in zip(rows, lengths.tolist(), strict=True)}
+
+
+class AppliedLoad:
+    """A load on a robot, ready to be carried to its joints; belongs to the thread that made it.
+
+    (The derivatives are the closed form of the kinematic Hessian; Pinocchio's own static derivatives take the load as a
+    follower.)
+    """
+
+    def __init__(self, model: SoftModel, load: Load) -> None:
+        """Look up what stays the same while the robot moves."""
+        self._model, self._data = model.workspace(load.gravity)
+        self._load, self._nv, self._terms, self._scale = load, self._model.nv, [], 0.0
+        for term in load.terms:
+            self._terms.append((model.frame_id(term.frame), term))
+            self._scale += term.norms[0] * model.reach + term.norms[1]
+
+    def at(self, q: FloatArray) -> JointLoad:
+        """Torque of the load in joint coordinates, with its exact derivative (see `softrobots.model.joint_loads`).
+
+        Args:
+            q: Configuration, shape (nq,), finite.
+
+        Returns:
+            Torque, derivative, potential and size.
+        """
+        model, data, nv = self._model, self._data, self._nv
+        if nv == 0:  # nothing moves; Pinocchio's frame Jacobian crashes without columns
+            return JointLoad(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), None, None, 0.0, 0.0)
+        torques, angular, by_force, by_moment = [], [], [], []
+        potential, scale = 0.0, self._scale
+        for frame, term in self._terms:
+            jacobian = pin.computeFrameJacobian(model, data, q, frame, _AXES)
+            if nv == 1:  # Pinocchio answers one column with a vector
+                jacobian = jacobian.reshape(6, 1)
+            made = term.rows.dot(jacobian)
+            torques.append(made[0])
+            angular.append(jacobian[3:])
+            by_force.append(made[1:4])
+            if not self._load.conservative:
+                by_moment.append(made[4:])
+            potential -= float(term.force.dot(pin.updateFramePlacement(model, data, frame).translation))
+        gravity_derivative: FloatArray | None = None
+        if self._load.gravity is not None:
+            gravity_derivative = -pin.computeGeneralizedGravityDerivatives(model, data, q)
+            torques.append(-data.g)
+            scale += math.hypot(*data.g.tolist())
+            potential += pin.computePotentialEnergy(model, data)
+        if len(angular) != 1:  # no wrench, or several one above the other
+            angular, by_force, by_moment = (
+                [np.concatenate([np.zeros((0, nv)), *rows])] for rows in (angular, by_force, by_moment)
+            )
+        torque = sum(torques[1:], start=torques[0]) if torques else np.zeros(nv)
+        moments = None if self._load.conservative else by_moment[0]
+        return JointLoad(torque, angular[0], by_force[0], moments, gravity_derivative, potential, scale)

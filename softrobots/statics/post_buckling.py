@@ -1,0 +1,254 @@
+r"""Buckling and what comes after: every branch of equilibria that leaves the path at the critical load, followed and labelled.
+
+At the critical force `F_c` of a push along `d` the tangent stiffness `K_t` of the path from zero force (the *fundamental*
+path) is singular: `K_t v = 0`. Other equilibria leave it along the buckling modes `v`. They are found at a small distance
+`a` from it by Newton on
+
+.. math:: r(y) - F J^T d = 0, \quad v^T (y - y_c) = a
+
+for `y` and `F`, on both sides of every mode, and followed by the length of the path (pseudo-arclength continuation), so that a
+branch whose force falls is followed as well as one whose force grows. One mode makes a pitchfork: the fundamental path and two
+branches. Where two modes have the same critical force (side and up springs of equal stiffness) branches may leave in any
+direction of their plane; those that do are where the torque *across* that direction vanishes at distance `a`. It vanishes in
+some directions only if the robot tells directions apart (two springs of a universal joint do, in fourth order: eight branches);
+it vanishes in all of them if the robot is round (a section of constant strain). Then the buckled equilibria form a *ring*: each
+can be moved to the next without a force. Such an equilibrium is neutral, not stable, and the branch says so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray, positive_number, read_only, unit_vector
+from softrobots.core.errors import NeutralEquilibrium
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import scaled
+from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.force_path import ForcePath, PathPoint
+from softrobots.statics.loads import Load
+from softrobots.statics.stability import NEUTRAL, critical_point
+
+FUNDAMENTAL = "fundamental"
+"""Label of the path from zero force."""
+
+RING = "ring"
+"""Label of one of a ring of equilibria; the others are the same robot, bent in another direction."""
+
+BEYOND = 1.25
+"""How far branches are followed by default, relative to the critical force."""
+
+_AWAY = 0.03  # largest change of a spring at which a branch is sought [rad or m]
+_DIRECTIONS = 48  # of a plane of modes in which branches are sought
+_ROUND = 1e-6  # torque across a direction that counts as none, relative to the springs' at that distance
+_TIE = 0.99  # share of the largest change at which a spring is named, too
+
+
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumBranch:
+    """Equilibria under a force that grows or falls, one after the other."""
+
+    label: str
+    """`FUNDAMENTAL`; by the springs that move most when it begins, with their sign, e.g. "+spring_1_up"; or `RING`."""
+    equilibria: tuple[Equilibrium, ...]
+    """From zero force, or from the critical point, on; each tells of itself whether it is stable."""
+    forces: FloatArray
+    """Force along the direction at each of them, shape (n,) [N]."""
+    amplitude: FloatArray
+    """Distance of the springs from the critical point along the buckling modes, shape (n,) [rad or m]; 0 if none is there."""
+    energy: FloatArray
+    """Elastic energy and potential of the load, shape (n,) [J]."""
+    softest: FloatArray
+    """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, shape (n,)."""
+    ended: str
+    """Why it ends: "largest force", "zero force", "end of range" of a section, "points", or "lost"."""
+
+    @cached_property
+    def stable(self) -> Any:
+        """Which are certified stable, shape (n,), truth values."""
+        return np.array([equilibrium.stable for equilibrium in self.equilibria])
+
+    @cached_property
+    def neutral(self) -> Any:
+        """Which can be moved without a force, shape (n,), truth values: all of a ring, and the critical point itself."""
+        return np.abs(self.softest) <= NEUTRAL
+
+
+def post_buckling_branches(
+    model: SoftModel,
+    q_motors: Any,
+    direction: Any,
+    *,
+    frame: str | None = None,
+    gravity: Any = None,
+    max_force: float | None = None,
+    largest_step: float = 0.05,
+) -> tuple[EquilibriumBranch, ...]:
+    """Follow the equilibrium path under a growing force, and every branch that leaves it where it stops being stable.
+
+    At a limit point nothing branches off: the path itself turns back, and is followed as far as it goes. Where a link comes
+    onto the plateau of its moment a branch goes on.
+
+    Args:
+        model: The robot.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        direction: Direction of the force, shape (3,), any length but zero, world axes.
+        frame: Frame that is pushed; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
+        max_force: Where branches end [N]; by default `BEYOND` times the critical force.
+        largest_step: Largest distance between two points of a branch [rad]; a change of the force by the critical one counts
+            as much as a radian.
+
+    Returns:
+        The fundamental path first, then the branches, by label.
+
+    Raises:
+        ParameterError: If an argument is out of range, the model has no springs, or it is unstable under gravity alone.
+        NameNotFound: If the frame does not exist.
+        NoCriticalLoad: If the path is stable up to `max_force`, or as far as it could be followed.
+        NeutralEquilibrium: If more than two modes buckle at the same force, or a branch cannot be found where it begins.
+    """
+    positive_number("largest_step", largest_step, "rad")
+    critical = critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force)
+    most = BEYOND * critical.force if max_force is None else float(max_force)
+    constant = Load.of(model, frame=frame, gravity=gravity)
+    path = ForcePath(
+        model,
+        model.checked_motors(q_motors),
+        constant,
+        model.tip if frame is None else frame,
+        unit_vector("direction", direction),
+        critical.q_springs,
+        critical.force,
+    )
+    with one_blas_thread(model.n_springs):
+        origin, here = path.point(critical.origin, 0.0), path.point(critical.q_springs, critical.force)
+        modes = _modes(path, here) if critical.crosses else np.zeros((0, model.n_springs))
+        found = [_told(path, FUNDAMENTAL, modes, *path.follow([origin], path.tangent(origin), most, largest_step))]
+        for label, there in sorted(_leaving(path, modes), key=lambda one: one[0]):
+            points, ended = path.follow([here, there], path.place(there), most, largest_step)
+            found.append(_told(path, label, modes, points, ended))
+    return tuple(found)
+
+
+def _modes(path: ForcePath, critical: PathPoint) -> FloatArray:
+    """Buckling modes at the critical point, orthonormal, shape (1 or 2, n_springs)."""
+    stiffness = path.model.stiffness
+    values, vectors = np.linalg.eigh(scaled(critical.state.tangent, stiffness))
+    soft = vectors[:, values <= NEUTRAL] / np.sqrt(stiffness)[:, None]
+    if soft.shape[1] > 2:
+        raise NeutralEquilibrium(
+            f"{soft.shape[1]} modes buckle at {critical.force:.6g} N; branches are sought where one or two do"
+        )
+    return np.asarray(np.linalg.qr(soft)[0].T)
+
+
+def _leaving(path: ForcePath, modes: FloatArray) -> list[tuple[str, PathPoint]]:
+    """The first point of each branch that leaves the critical point, with its label."""
+    if len(modes) < 2:
+        ways = [sign * mode for mode in modes for sign in (-1.0, 1.0)]
+        points = [(way, _at_distance(path, way)) for way in ways]
+        return _all_found(path, len(ways), [(_name(path.model, way), point) for way, point in points if point is not None])
+
+    def at(angle: float) -> tuple[FloatArray, PathPoint | None]:
+        along = np.cos(angle) * modes[0] + np.sin(angle) * modes[1]
+        return along, _at_distance(path, along, np.cos(angle) * modes[1] - np.sin(angle) * modes[0])
+
+    between = 2.0 * np.pi / _DIRECTIONS
+    around = [(angle, *at(angle)) for angle in (between * (np.arange(_DIRECTIONS) + 0.5)).tolist()]
+    known = [(angle, along, point) for angle, along, point in around if point is not None]
+    _all_found(path, len(around), known)
+    crossings = (
+        at(_zero(lambda angle: _across(at(angle)[1]), low, low + (high - low) % (2.0 * np.pi)))
+        for (low, _, one), (high, _, other) in zip(known, [*known[1:], *known[:1]], strict=True)
+        if one.across * other.across < 0.0 and (high - low) % (2.0 * np.pi) < 1.5 * between
+    )
+    if all(abs(point.across) <= _ROUND * _torque_at(path, along) for _, along, point in known):
+        # Nearly round: one that nothing holds across.
+        balanced = (point for _, _, point in known if point.across == 0.0)
+        found = next(balanced, None) or next((point for _, point in crossings if point is not None), None)
+        return [(RING, known[0][2] if found is None else found)]
+    return _all_found(path, 4, [(_name(path.model, along), point) for along, point in crossings if point is not None])
+
+
+def _all_found(path: ForcePath, least: int, found: list[Found]) -> list[Found]:
+    """Refuse to leave out a branch: a crossing has branches on both sides, and a plane of modes at least four.
+
+    Raises:
+        NeutralEquilibrium: If there are fewer.
+    """
+    if len(found) < least:
+        raise NeutralEquilibrium(f"not all branches that leave the path at {path.force:.6g} N could be found")
+    return found
+
+
+def _distance(model: SoftModel, along: FloatArray) -> float:
+    """Distance along a unit vector at which branches are sought: before a link comes onto the plateau of its moment."""
+    stiffness = model.stiffness
+    knees = [
+        group.max_moment / float(stiffness[group.springs[0]]) for group in model.spring_groups if group.max_moment is not None
+    ]
+    return min([_AWAY, *(0.5 * knee for knee in knees)]) / float(np.abs(along).max())
+
+
+def _torque_at(path: ForcePath, along: FloatArray) -> float:
+    """Torque of the springs there."""
+    return float(np.linalg.norm(path.model.stiffness * along)) * _distance(path.model, along)
+
+
+def _at_distance(path: ForcePath, along: FloatArray, across: FloatArray | None = None) -> PathPoint | None:
+    """The equilibrium at a distance from the critical point, held across by a torque if a direction across is given."""
+    held = np.zeros((0, len(along))) if across is None else across[None]
+    rows = np.concatenate([along[None], held])
+    aims = np.zeros(len(rows))
+    aims[0] = _distance(path.model, along)
+    return path.newton(np.append(aims[0] * along, 0.0), np.column_stack([rows, np.zeros(len(rows))]), aims, held)
+
+
+def _told(path: ForcePath, label: str, modes: FloatArray, points: list[PathPoint], ended: str) -> EquilibriumBranch:
+    equilibria = tuple(
+        equilibrium_from_state(path.model, path.motors, path.load(point.force), point.state, method="newton", iterations=number)
+        for number, point in enumerate(points)
+    )
+    away = [float(np.linalg.norm(modes @ (point.springs - path.springs))) for point in points]
+    softest = [float(np.linalg.eigvalsh(scaled(point.state.tangent, path.model.stiffness))[0]) for point in points]
+    return EquilibriumBranch(
+        label=label,
+        equilibria=equilibria,
+        forces=read_only(np.array([point.force for point in points])),
+        amplitude=read_only(np.array(away)),
+        energy=read_only(np.array([point.state.energy for point in points])),
+        softest=read_only(np.array(softest)),
+        ended=ended,
+    )
+
+
+def _name(model: SoftModel, along: FloatArray) -> str:
+    """The springs that move most along a direction, with their signs."""
+    largest = float(np.abs(along).max())
+    names = zip(model.spring_joints, along.tolist(), strict=True)
+    return " ".join(f"{'+' if value > 0.0 else '-'}{name}" for name, value in names if abs(value) >= _TIE * largest)
+
+
+def _across(point: PathPoint | None) -> float:
+    return math.nan if point is None else point.across
+
+
+def _zero(function: Callable[[float], float], low: float, high: float) -> float:
+    """Bisect a sign change."""
+    sign = function(low) > 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        low, high = (middle, high) if (function(middle) > 0.0) == sign else (low, middle)
+    return 0.5 * (low + high)

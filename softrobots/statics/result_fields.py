@@ -1,0 +1,265 @@
+"""What a file of results holds, kind by kind: results to named arrays, and back.
+
+A file holds the robot (URDF and springs), the load and the coordinates. Everything else is computed again on loading, and a
+file whose coordinates are not in the balance that it claims is refused.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import choice, finite_array, finite_number, increasing, read_only
+from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.json_text import parse_json
+from softrobots.model.loader import load_model
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import METHODS, elastic_state, largest_residual
+from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_at
+from softrobots.statics.inverse_kinematics import IkSolution, checked_orientation
+from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
+from softrobots.statics.load_estimation import LoadEstimate, estimate_at
+from softrobots.statics.loads import Load
+from softrobots.statics.probes import Probe
+from softrobots.statics.tip_goal import Goal
+from softrobots.statics.trajectory import Trajectory
+from softrobots.statics.workspace import Workspace, workspace_at
+from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
+
+Result = Equilibrium | IkSolution | ImposedDisplacement | LoadEstimate | Trajectory | Workspace | WorkspaceMap
+"""What can be saved."""
+
+_LONGEST_WORD = 80  # characters
+_SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
+
+
+def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
+    wrenches = {name: wrench.tolist() for name, wrench in load.wrenches.items()}
+    said = {
+        "springs": model.spring_table,
+        "motors": model.structure.motor_joints,
+        "tip": model.tip,
+        "muscles": model.muscle_input,
+    }
+    return {
+        "urdf": np.array(model.urdf),
+        "model": np.array(json.dumps(said)),
+        "load": np.array(json.dumps({"wrenches": wrenches, "gravity": load.gravity})),
+    }
+
+
+def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
+    said, loaded = (parse_json(_text(fields, name)) for name in ("model", "load"))
+    springs = {str(name): (float(k), float(rest)) for name, (k, rest) in said["springs"].items()}
+    urdf = _text(fields, "urdf")
+    if not urdf.startswith("<"):
+        raise FileFormatError("its urdf is no URDF text")  # but a path, as far as load_model knows
+    model = load_model(urdf, springs=springs, motors=said["motors"], tip=said["tip"], muscles=said.get("muscles", "lengths"))
+    return model, Load.of(model, wrench=loaded["wrenches"], gravity=loaded["gravity"])
+
+
+def _text(fields: Mapping[str, Any], name: str) -> str:
+    """A single text."""
+    if fields[name].shape != () or fields[name].dtype.kind != "U":
+        raise FileFormatError(f"its {name} is no text")
+    return str(fields[name])
+
+
+def _word(fields: Mapping[str, Any], name: str) -> str:
+    """What somebody calls something, on one line."""
+    word = _text(fields, name)
+    if not 0 < len(word) <= _LONGEST_WORD or not word.isprintable():
+        raise FileFormatError(f"its {name} must be 1 to {_LONGEST_WORD} printable characters")
+    return word
+
+
+def _counts(field: Any) -> list[int]:
+    """Integers, zero or above."""
+    if field.dtype.kind not in "iu" or field.ndim != 1 or field.min(initial=0) < 0:
+        raise FileFormatError("it counts in something else than integers, zero or above")
+    return [int(number) for number in field]
+
+
+def _pack_rows(equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
+    first = equilibria[0]
+    if any(not e.load.same_as(first.load) for e in equilibria):
+        raise ParameterError("result", first.model, "equilibria under one load; these have several")
+    return _pack_model(first.model, first.load) | {
+        "q_motors": np.array([e.q_motors for e in equilibria]),
+        "q_springs": np.array([e.q_springs for e in equilibria]),
+        "residual": np.array([e.residual for e in equilibria]),
+        "tolerance": np.array([e.tolerance for e in equilibria]),
+        "iterations": np.array([e.iterations for e in equilibria]),
+        "solver": np.array([e.method for e in equilibria]),
+    }
+
+
+def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
+    model, load = _unpack_model(fields)
+    count = len(fields["q_motors"])
+    if count == 0 or any(len(fields[name]) != count for name in ("q_springs", "residual", "tolerance", "iterations", "solver")):
+        raise FileFormatError("its arrays must have one row for each of at least one configuration")
+    motors = finite_array("q_motors", fields["q_motors"], (count, model.n_motors))
+    springs = finite_array("q_springs", fields["q_springs"], (count, model.n_springs), "rad")
+    residual, tolerance = (finite_array(name, fields[name], (count,), "N m") for name in ("residual", "tolerance"))
+    iterations, solvers = _counts(fields["iterations"]), fields["solver"].tolist()
+    for solver in set(solvers):
+        choice("solver", solver, _SOLVERS)
+    equilibria = []
+    for row in range(count):
+        model.checked_motors(motors[row])
+        state = elastic_state(model, motors[row], springs[row], load)
+        made = equilibrium_from_state(model, motors[row], load, state, method=solvers[row], iterations=iterations[row])
+        # Rounding differs between machines; a coordinate that was shifted by 1e-9 rad shows up above this.
+        if made.residual > 1.001 * residual[row] + largest_residual(model, state.scale, 1e-12):
+            raise FileFormatError(
+                f"its row {row} claims a residual of {residual[row]:.3g} N m, but it is {made.residual:.3g} N m"
+            )
+        equilibria.append(replace(made, tolerance=float(tolerance[row])))
+    return tuple(equilibria)
+
+
+def _pack_solution(solution: IkSolution) -> dict[str, Any]:
+    return _pack_rows((solution.equilibrium,)) | {
+        "target": solution.target,
+        **({} if solution.orientation is None else {"orientation": solution.orientation}),
+        "error": np.array(solution.error),
+        "steps": np.array(solution.iterations),
+        "alternatives": np.array(solution.alternatives).reshape(-1, len(solution.q_motors)),
+    }
+
+
+def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
+    (equilibrium,) = _unpack_rows(fields)
+    target = finite_array("target", fields["target"], (3,), "m")
+    others = finite_array("alternatives", fields["alternatives"], (None, equilibrium.model.n_motors), "rad")
+    for other in others:
+        equilibrium.model.checked_motors(other, "alternatives")
+    orientation = checked_orientation(fields["orientation"]) if "orientation" in fields else None
+    translation, turn = Goal(target, orientation).missing(equilibrium.model, equilibrium.q)
+    if abs(float(fields["error"]) - float(np.linalg.norm(translation))) > 1e-9 * equilibrium.model.reach:
+        raise FileFormatError(f"its tip is {np.linalg.norm(translation):.3g} m from the target, not {fields['error']:.3g} m")
+    return IkSolution(
+        target=read_only(target),
+        orientation=None if orientation is None else read_only(orientation),
+        equilibrium=equilibrium,
+        error=float(np.linalg.norm(translation)),
+        orientation_error=float(np.linalg.norm(turn)),
+        iterations=_counts(fields["steps"].reshape(1))[0],
+        alternatives=tuple(map(read_only, others)),
+    )
+
+
+def _pack_imposed(result: ImposedDisplacement) -> dict[str, Any]:
+    probe = result.probe
+    return (
+        _pack_rows((result.equilibrium,))
+        | _pack_model(result.model, result.load)
+        | {
+            "frame": np.array(probe.frame),
+            "point": probe.point,
+            "direction": probe.direction,
+            "origin": probe.origin,
+            **({} if probe.normal is None else {"normal": probe.normal}),
+            "displacement": np.array(result.displacement),
+            "reaction": np.array(result.reaction),
+        }
+    )
+
+
+def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
+    model, load = _unpack_model(fields)
+    point, direction, origin = (read_only(finite_array(name, fields[name], (3,))) for name in ("point", "direction", "origin"))
+    normal = read_only(finite_array("normal", fields["normal"], (3,))) if "normal" in fields else None
+    made = imposed_at(
+        model,
+        model.checked_motors(fields["q_motors"][0]),
+        load,
+        Probe(_text(fields, "frame"), point, direction, origin, normal),
+        q_springs=finite_array("q_springs", fields["q_springs"][0], (model.n_springs,), "rad"),
+        reaction=finite_number("reaction", fields["reaction"], "N"),
+        displacement=finite_number("displacement", fields["displacement"], "m"),
+        iterations=_counts(fields["iterations"])[0],
+    )
+    claimed = 1.001 * float(fields["residual"][0]) + 1e-2 * made.equilibrium.tolerance
+    if not (made.residual <= claimed and made.gap <= 1e-11 * model.reach):
+        raise FileFormatError(
+            f"its residual is {made.residual:.3g} N m, and the probe is {made.gap:.3g} m from where it claims to be"
+        )
+    return replace(made, equilibrium=replace(made.equilibrium, tolerance=float(fields["tolerance"][0])))
+
+
+def _pack_estimate(estimate: LoadEstimate) -> dict[str, Any]:
+    return _pack_rows((estimate.equilibrium,)) | {
+        "force": estimate.force,
+        "frame": np.array(estimate.frame),
+        "measured_torques": estimate.measured_torques,
+        "estimation": np.array(estimate.method),
+        **({} if estimate.torque_std is None else {"torque_std": estimate.torque_std}),
+    }
+
+
+def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
+    (equilibrium,) = _unpack_rows(fields)
+    motors = (equilibrium.model.n_motors,)
+    return estimate_at(
+        equilibrium,
+        frame=_text(fields, "frame"),
+        motor_torques=finite_array("measured_torques", fields["measured_torques"], motors, "N m"),
+        force=finite_array("force", fields["force"], (3,), "N"),
+        torque_std=finite_array("torque_std", fields["torque_std"], motors, "N m") if "torque_std" in fields else None,
+        method=choice("estimation", _text(fields, "estimation"), ESTIMATIONS),
+    )
+
+
+def _pack_trajectory(trajectory: Trajectory) -> dict[str, Any]:
+    rows = _pack_rows(trajectory.equilibria)
+    return rows | {"times": trajectory.times, "targets": trajectory.targets, "following": np.array(trajectory.method)}
+
+
+def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
+    equilibria = _unpack_rows(fields)
+    return Trajectory(
+        times=read_only(increasing("times", finite_array("times", fields["times"], (len(equilibria),), "s"), "s")),
+        targets=read_only(finite_array("targets", fields["targets"], (len(equilibria), 3), "m")),
+        equilibria=equilibria,
+        method=_word(fields, "following"),
+    )
+
+
+def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
+    names = ("q_motors", "q_springs", "tip_positions", "manipulability")
+    arrays = {name: getattr(workspace, name) for name in names}
+    return _pack_model(workspace.model, workspace.load) | arrays | {"refused": np.array(workspace.refused)}
+
+
+def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
+    model, load = _unpack_model(fields)
+    arrays = {name: fields[name] for name in ("q_motors", "q_springs", "tip_positions", "manipulability")}
+    return workspace_at(model, load, **arrays, refused=_counts(fields["refused"].reshape(1))[0])
+
+
+def _pack_map(result: WorkspaceMap) -> dict[str, Any]:
+    return _pack_model(result.model, Load.of(result.model, gravity=result.gravity)) | packed(result)
+
+
+def _unpack_map(fields: Mapping[str, Any]) -> WorkspaceMap:
+    model, load = _unpack_model(fields)
+    return unpacked(model, load.gravity, fields)
+
+
+KINDS: dict[str, tuple[type, Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Result]]] = {
+    "equilibrium": (Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
+    "ik_solution": (IkSolution, _pack_solution, _unpack_solution),
+    "imposed_displacement": (ImposedDisplacement, _pack_imposed, _unpack_imposed),
+    "load_estimate": (LoadEstimate, _pack_estimate, _unpack_estimate),
+    "trajectory": (Trajectory, _pack_trajectory, _unpack_trajectory),
+    "workspace": (Workspace, _pack_workspace, _unpack_workspace),
+    "workspace_map": (WorkspaceMap, _pack_map, _unpack_map),
+}
+"""By name of a kind: its class, and what makes arrays of a result and a result of arrays."""

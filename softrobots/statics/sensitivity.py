@@ -1,0 +1,121 @@
+"""First derivatives of a loaded equilibrium: how the tip follows the motors, and how it gives way to a load."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import NeutralEquilibrium
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium, check_same_model
+from softrobots.statics.kinematics import frame_jacobian
+
+
+def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
+    r"""Derivative of the loaded tip position with respect to the motors, at constant load.
+
+    .. math:: dx/dq_m = J_m + J_k K_t^{-1} \, d(J_k^T w - g_k)/dq_m
+
+    Args:
+        model: The robot.
+        equilibrium: An equilibrium of it.
+
+    Returns:
+        Shape (3, n_motors) [m/rad or m/m], world axes.
+
+    Raises:
+        ParameterError: If the equilibrium belongs to another model.
+        NeutralEquilibrium: If its tangent stiffness is singular.
+    """
+    check_same_model(model, equilibrium)
+    motors, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
+    return tip_motion(motors[:3], springs[:3], equilibrium.tangent_stiffness, equilibrium.coupling)[0]
+
+
+def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
+    """Motion of the tip per wrench added at the tip, motors held: `J_k K_t^-1 J_k^T`.
+
+    Motion is translation, then rotation vector; the wrench is force, then moment; world axes. Symmetric if the load has a
+    potential (Maxwell-Betti).
+
+    Args:
+        model: The robot.
+        equilibrium: An equilibrium of it.
+
+    Returns:
+        Shape (6, 6) [m/N, m/(N m); rad/N, rad/(N m)].
+
+    Raises:
+        ParameterError: If the equilibrium belongs to another model.
+        NeutralEquilibrium: If its tangent stiffness is singular.
+    """
+    check_same_model(model, equilibrium)
+    _, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
+    return np.asarray(springs @ _solve(equilibrium.tangent_stiffness, springs.T))
+
+
+def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Geometric Jacobian of the tip per actuator and per elastic coordinate, the other held, linear rows first.
+
+    Args:
+        model: The robot.
+        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+        q_springs: Elastic coordinates, shape (n_springs,) [rad or m].
+
+    Returns:
+        Shapes (6, n_motors) and (6, n_springs), world axes.
+    """
+    point = model.coordinates.at(q_motors, q_springs)
+    return point.columns(frame_jacobian(model, model.embed(point.joints), model.tip))
+
+
+def tip_motion(
+    motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """How tip and springs follow the motors at constant load, from matrices at an equilibrium.
+
+    Args:
+        motors: Rows of the tip Jacobian, columns per actuator, shape (m, n_motors).
+        springs: The same rows, columns per elastic coordinate, shape (m, n_springs).
+        tangent: Tangent stiffness, shape (n_springs, n_springs).
+        coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
+
+    Returns:
+        `dx/dq_m`, shape (m, n_motors), and `dy/dq_m`, shape (n_springs, n_motors).
+
+    Raises:
+        NeutralEquilibrium: If the tangent stiffness is singular.
+    """
+    follow = _solve(tangent, coupling)
+    return motors + springs @ follow, follow
+
+
+def motor_torque_slope(motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray) -> FloatArray:
+    r"""Derivative of the actuator loads with respect to a tip force, springs following.
+
+    .. math:: d\tau_m/df = J_m^T + d(J_m^T w - g_m)/dy \, K_t^{-1} J_k^T
+
+    The transpose of the elastostatic Jacobian: the load must have a potential.
+
+    Args:
+        motors: Linear rows of the tip Jacobian, columns per actuator, shape (3, n_motors).
+        springs: The same rows, columns per elastic coordinate, shape (3, n_springs).
+        tangent: Tangent stiffness, shape (n_springs, n_springs).
+        coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
+
+    Returns:
+        Shape (n_motors, 3) [m].
+
+    Raises:
+        NeutralEquilibrium: If the tangent stiffness is singular.
+    """
+    return np.asarray(motors.T + coupling.T @ _solve(tangent, springs.T))
+
+
+def _solve(tangent: FloatArray, right: FloatArray) -> FloatArray:
+    try:
+        with one_blas_thread(len(tangent)):
+            return np.asarray(np.linalg.solve(tangent, right))
+    except np.linalg.LinAlgError as error:
+        raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has no derivative") from error

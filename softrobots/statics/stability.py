@@ -1,0 +1,215 @@
+"""Buckling: the load at which an equilibrium path loses its stability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray, positive_number, unit_vector
+from softrobots.core.errors import NoCriticalLoad, ParameterError
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.elastostatics import ElasticState, newton, scaled, settled
+from softrobots.statics.kinematics import frame_jacobian
+from softrobots.statics.loads import Load
+
+_MOST_POINTS = 20_000  # of the path
+_NEWTON_STEPS = 12
+_TOLERANCE = 1e-12
+_SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
+_LARGEST_MOVE = 0.1  # [rad] of a spring between two points of the path
+_NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the one at zero force, may vanish in the next step
+_KNEE = 1e-6  # relative distance of the springs from the beginning of a plateau that counts as none
+_KNEE_STEP = 1e-4  # of the force, relative to the force reached: shorter steps may cross the beginning of a plateau
+_STIFF = 1e-9  # eigenvalues above this, relative to the springs' own stiffness, count for the prediction
+
+NEUTRAL = 1e-7
+"""Smallest eigenvalue, relative to the springs' own stiffness, that counts as none."""
+
+
+class CriticalPoint(NamedTuple):
+    """Where an equilibrium path stops being stable."""
+
+    force: float
+    """The force [N]."""
+    q_springs: FloatArray
+    """The springs at the last stable point of the path, shape (n_springs,) [rad or m]."""
+    crosses: bool
+    """Whether an eigenvalue of the tangent stiffness goes through zero there and the path goes on, unstable.
+
+    Else it turns back, or jumps below zero where a link comes onto its plateau.
+    """
+    origin: FloatArray
+    """The springs at the beginning of the path, without the force, shape (n_springs,) [rad or m]."""
+
+
+def critical_load(
+    model: SoftModel,
+    q_motors: Any,
+    direction: Any,
+    *,
+    frame: str | None = None,
+    gravity: Any = None,
+    max_force: float | None = None,
+) -> float:
+    """Smallest force along a direction at which the equilibrium stops being stable.
+
+    Follows the equilibrium from zero force, without leaving its path, until the smallest eigenvalue of the tangent
+    stiffness crosses zero (a pitchfork, as of an axially pushed straight arm) or the path turns back (a limit point). A push
+    that is oblique, however little, may bend the robot smoothly where the exact one buckles it, and then has no limit, unless a
+    link with a largest moment collapses: where it reaches its plateau, or later.
+
+    Args:
+        model: The robot.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        direction: Direction of the force, shape (3,), any length but zero, world axes.
+        frame: Frame that is pushed; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
+        max_force: Largest force to try [N]; by default 100 times the largest stiffness over the reach.
+
+    Returns:
+        The force [N].
+
+    Raises:
+        ParameterError: If an argument is out of range, the model has no springs, or it is unstable under gravity alone.
+        NameNotFound: If the frame does not exist.
+        NoCriticalLoad: If the path is stable up to `max_force` (the direction pulls or bends rather than pushes), or as far
+            as it could be followed.
+    """
+    return critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force).force
+
+
+def critical_point(
+    model: SoftModel,
+    q_motors: Any,
+    direction: Any,
+    *,
+    frame: str | None = None,
+    gravity: Any = None,
+    max_force: float | None = None,
+) -> CriticalPoint:
+    """Find where the equilibrium path under a growing force stops being stable: `critical_load` with all that is known of it.
+
+    Args:
+        model: The robot.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        direction: Direction of the force, shape (3,), any length but zero, world axes.
+        frame: Frame that is pushed; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
+        max_force: Largest force to try [N]; by default 100 times the largest stiffness over the reach.
+
+    Returns:
+        The point.
+
+    Raises:
+        ParameterError: If an argument is out of range, the model has no springs, or it is unstable under gravity alone.
+        NameNotFound: If the frame does not exist.
+        NoCriticalLoad: If the path is stable up to `max_force`, or as far as it could be followed.
+    """
+    check_model(model)
+    motors = model.checked_motors(q_motors)
+    unit = unit_vector("direction", direction)
+    if model.n_springs == 0:
+        raise ParameterError("model", model, "a robot with springs")
+    if max_force is None:
+        largest = 100.0 * model.stiffest / max(model.reach, 1e-9)
+    else:
+        largest = positive_number("max_force", max_force, "N")
+    constant = Load.of(model, frame=frame, gravity=gravity)
+    push = np.concatenate([unit, np.zeros(3)])
+    at = model.tip if frame is None else frame
+
+    def follow(magnitude: float, last: _Point) -> _Point | None:
+        """The point of the path at a force, from a point nearby; None if Newton leaves the path."""
+        guess = last.state.q_springs + (magnitude - last.force) * last.slope
+        state = _correct(model, motors, constant.plus(at, magnitude * push), guess, last.state.q_springs)
+        return None if state is None else _point(model, state, magnitude, push, at)
+
+    with one_blas_thread(model.n_springs):
+        first_state = settled(model, motors, constant, model.rest)
+        here = None if first_state is None else _point(model, first_state, 0.0, push, at)
+        if first_state is None or here is None or here.softest <= 0.0:
+            raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
+        first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
+        nearly_zero = _NEARLY_ZERO * here.softest
+        for _ in range(_MOST_POINTS):
+            if here.force >= largest:
+                break
+            there = follow(min(here.force + step, largest), here)
+            knee = step < _KNEE_STEP * max(here.force, first_step) and there is not None and _knee_between(model, here, there)
+            if there is None or (not knee and here.softest > nearly_zero and there.softest < 0.5 * here.softest):
+                step *= 0.5  # too far to tell this path from a neighbour
+                if step < _SHORTEST_STEP * max(here.force, first_step):
+                    if here.softest <= 10.0 * nearly_zero or _at_knee(model, here):
+                        # It turns back: a limit point.
+                        return CriticalPoint(here.force, here.state.q_springs, False, first_state.q_springs)
+                    break
+            elif there.softest <= 0.0:
+                force, last = _bisect(follow, here, there.force)
+                return CriticalPoint(force, last.state.q_springs, last.softest <= NEUTRAL, first_state.q_springs)
+            else:
+                here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
+    reached = f"{here.force:.6g} N along {unit.tolist()}"
+    told = f"the equilibrium stays stable up to {reached}"
+    if here.force < largest:
+        told += f"; its path could not be followed further (up to {largest:.6g} N was wanted)"
+    raise NoCriticalLoad(told, max_force=here.force)
+
+
+class _Point(NamedTuple):
+    """A point of the equilibrium path."""
+
+    force: float
+    state: ElasticState
+    softest: float
+    """Smallest eigenvalue of the tangent stiffness, relative to the springs' own stiffness."""
+    slope: FloatArray
+    """Derivative of the springs with respect to the force."""
+
+
+def _point(model: SoftModel, state: ElasticState, force: float, push: FloatArray, frame: str) -> _Point:
+    _, springs = state.point.columns(frame_jacobian(model, state.q, frame))
+    softness = 1.0 / np.sqrt(model.stiffness)
+    values, vectors = np.linalg.eigh(scaled(state.tangent, model.stiffness))
+    pull = vectors.T @ (softness * (push @ springs))
+    slope = softness * (vectors @ (pull / np.where(np.abs(values) > _STIFF, values, np.inf)))
+    return _Point(force, state, float(values[0]), slope)
+
+
+def _knee_between(model: SoftModel, here: _Point, there: _Point) -> bool:
+    """Whether a link goes onto its plateau between two points: there the tangent jumps."""
+    return model.springs.saturated(here.state.q_springs) != model.springs.saturated(there.state.q_springs)
+
+
+def _at_knee(model: SoftModel, here: _Point) -> bool:
+    """Whether a link is at the beginning of its plateau."""
+    bent = here.state.q_springs - model.rest
+    before, beyond = (model.springs.saturated(model.rest + share * bent) for share in (1.0 - _KNEE, 1.0 + _KNEE))
+    return before != beyond
+
+
+def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high: float) -> tuple[float, _Point]:
+    """Narrow the bracket of the zero of the smallest eigenvalue down to rounding; the force, and the point below it."""
+    while True:
+        middle = 0.5 * (here.force + high)
+        if not here.force < middle < high:
+            return middle, here
+        there = follow(middle, here)
+        if there is not None and there.softest > 0.0:
+            here = there
+        else:
+            high = middle
+
+
+def _correct(model: SoftModel, motors: FloatArray, load: Load, guess: FloatArray, last: FloatArray) -> ElasticState | None:
+    """Newton from a prediction; None if it does not converge, or not near the prediction and the last point."""
+    state, _ = newton(model, motors, load, guess, tolerance=_TOLERANCE, max_iterations=_NEWTON_STEPS, largest_step=0.5)
+    if state is None:
+        return None
+    moved, missed, predicted = (
+        float(np.abs(one - other).max(initial=0.0))
+        for one, other in ((state.q_springs, last), (state.q_springs, guess), (guess, last))
+    )
+    return state if moved <= _LARGEST_MOVE and missed <= max(0.5 * predicted, 0.1 * _LARGEST_MOVE) else None

@@ -1,0 +1,287 @@
+"""Following a path of targets with the loaded tip, waypoint by waypoint."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from softrobots import inflated_beam
+from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
+from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
+from softrobots.core.progress import with_progress
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, settle
+from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.inverse_kinematics import IkSolution, solve_ik, start_motors
+from softrobots.statics.kinematics import frame_jacobian, frame_placement
+from softrobots.statics.loads import Load
+from softrobots.statics.tip_goal import Goal, LoadedTip
+from softrobots.statics.tip_search import POSITION_TOLERANCE, LocalSolution, advance
+
+METHODS = ("newton", "fixed_point", "paper")
+"""How `follow_trajectory` follows: exact steps with the springs settled by Newton or by the paper's recursion, or the paper's
+closed-loop inverse kinematics."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Motor coordinates over a path, with the loaded robot at every waypoint; can be saved with `softrobots.save_result`."""
+
+    times: FloatArray
+    """Time of each waypoint, shape (n,) [s]; the number of the waypoint if no times were given."""
+    targets: FloatArray
+    """Target positions, shape (n, 3) [m]."""
+    equilibria: tuple[Equilibrium, ...]
+    """The loaded robot at each waypoint."""
+    method: str
+    """How the path was followed: a method of `follow_trajectory`, or a word of whoever made it otherwise."""
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self.equilibria[0].model
+
+    @cached_property
+    def q_motors(self) -> FloatArray:
+        """Motor coordinates, shape (n, n_motors) [rad or m]."""
+        return read_only(np.array([equilibrium.q_motors for equilibrium in self.equilibria]))
+
+    @cached_property
+    def q_springs(self) -> FloatArray:
+        """Spring coordinates, shape (n, n_springs) [rad or m]."""
+        return read_only(np.array([equilibrium.q_springs for equilibrium in self.equilibria]))
+
+    @cached_property
+    def tip_positions(self) -> FloatArray:
+        """Position of the loaded tip, shape (n, 3) [m]."""
+        return read_only(np.array([equilibrium.tip_position for equilibrium in self.equilibria]))
+
+    @cached_property
+    def tip_error(self) -> FloatArray:
+        """Distance of the loaded tip from its target, shape (n,) [m]."""
+        return read_only(np.linalg.norm(self.tip_positions - self.targets, axis=1))
+
+    @cached_property
+    def link_moments(self) -> FloatArray | None:
+        """Moment at each inflated link, shape (n, n_links) [N m]; None if the model names no inflated links."""
+        if not self.model.spring_groups:
+            return None
+        return read_only(np.array([equilibrium.link_moments for equilibrium in self.equilibria]))
+
+    @property
+    def required_pressure(self) -> float | None:
+        """Smallest gauge pressure at which no link wrinkles on the path [Pa], [Troise 2021] (3); None without links."""
+        if self.link_moments is None:
+            return None
+        largest = zip(self.link_moments.max(axis=0), self.model.spring_groups, strict=True)
+        return max(inflated_beam.required_pressure(moment, group.radius) for moment, group in largest)
+
+    @property
+    def wrinkling_margin(self) -> float | None:
+        """Share of the wrinkling moment that is left at the worst waypoint and link [-]; negative: a link wrinkles.
+
+        None without inflated links.
+
+        Raises:
+            ParameterError: If a link has no pressure, and so no wrinkling moment.
+        """
+        if self.link_moments is None:
+            return None
+        limits = np.array([group.wrinkling_moment for group in self.model.spring_groups])
+        if np.any(limits == 0.0):
+            raise ParameterError("pressure", 0.0, "positive in every link, for a wrinkling margin to exist")
+        return float(1.0 - (self.link_moments / limits).max())
+
+
+def follow_trajectory(
+    model: SoftModel,
+    targets: Any,
+    force: Any = None,
+    *,
+    wrench: Any = None,
+    frame: str | None = None,
+    gravity: Any = None,
+    q_motors0: Any = None,
+    elbow: str | None = None,
+    method: str = "newton",
+    tolerance: float = POSITION_TOLERANCE,
+    times: Any = None,
+    gain: float = 50.0,
+    allow_jumps: bool = False,
+    progress: bool | str = False,
+) -> Trajectory:
+    """Find motor coordinates that move the loaded tip through target positions.
+
+    "newton" and "fixed_point" reach every waypoint within `tolerance`, each search starting from the last waypoint and its
+    elastostatic Jacobian. "paper" is [Troise 2021] (8, 9) in position form, `dq_m/dt = [J^#]_m (v_d + K e)` with the springs
+    by the fixed point at every step: it follows with a lag that depends on the gain. (With the 6 x 7 Jacobian that the paper
+    prints it diverges at useful gains: three motors cannot hold an orientation.) It starts exactly on the first target.
+
+    Args:
+        model: The robot, with at least one motor.
+        targets: Target positions, shape (n, 3) [m], world axes.
+        force: Force at `frame`, shape (3,) [N], constant over the path, world axes.
+        wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
+        frame: Frame of `force` and `wrench`; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        q_motors0: Motor coordinates near the first waypoint, shape (n_motors,) [rad or m]. By default the solution nearest to
+            zero, or, where a motor limit then blocks the path, the next one from which the whole path can be followed.
+        elbow: "up" or "down" at the first waypoint; None: whatever changes `q_motors0` least.
+        method: "newton", "fixed_point" or "paper".
+        tolerance: Largest distance of the tip from a target [m]; not for "paper".
+        times: Increasing times of the waypoints, shape (n,) [s]; required by "paper".
+        gain: Gain `K` of "paper" [1/s]; intervals longer than half its inverse are integrated in several steps.
+        allow_jumps: Where a waypoint cannot be reached from the last one by a continuous motion (a motor limit, a turn of the
+            base under a tip that passes over it), go on from the nearest other solution instead of raising.
+        progress: Show a progress bar on stderr; a text is its label.
+
+    Returns:
+        The trajectory.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or out of range.
+        NameNotFound: If a frame does not exist.
+        TargetUnreachable: If a waypoint cannot be reached, or not without a jump; names it and how near the tip came.
+        EquilibriumNotFound: If the springs do not settle on the way.
+    """
+    check_model(model)
+    choice("method", method, METHODS)
+    points = finite_array("targets", targets, (None, 3), "m")
+    if len(points) == 0:
+        raise ParameterError("targets", targets, "at least one target position [m]")
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    positive_number("gain", gain, "1/s")
+    start_motors(model, q_motors0)
+    if method == "paper" and model.muscles and model.muscle_input == "forces":
+        raise ParameterError(
+            "method", method, "'newton' or 'fixed_point' where tensions are given: they move nothing by themselves"
+        )
+    if times is None:
+        if method == "paper":
+            raise ParameterError("times", times, "given for method='paper', which integrates over time")
+        moments: FloatArray = np.arange(len(points), dtype=np.float64)
+    else:
+        moments = increasing("times", finite_array("times", times, (len(points),), "s"), "s")
+    inner = "newton" if method == "newton" else "fixed_point"
+    options = {"wrench": dict(load.wrenches), "gravity": gravity, "method": inner, "tolerance": tolerance}
+    try:
+        begin = solve_ik(model, points[0], q_motors0=q_motors0, elbow=elbow, **options)
+    except TargetUnreachable as error:
+        raise _named(error, 1, len(points)) from error
+
+    def follow_from(first: Equilibrium) -> Trajectory:
+        steps = (
+            _paper_steps(model, points, moments, load, first, gain)
+            if method == "paper"
+            else _exact_steps(model, points, load, first, inner, tolerance, allow_jumps)
+        )
+        bar = with_progress(steps, progress, label=f"waypoints ({method})", unit="wp", total=len(points) - 1)
+        equilibria = (first, *bar)
+        return Trajectory(read_only(moments), read_only(points), equilibria, method)
+
+    try:
+        return follow_from(begin.equilibrium)
+    except TargetUnreachable as error:
+        if q_motors0 is not None or error.residual > tolerance:  # the start was chosen, or the waypoint is out of reach
+            raise
+        for motors in begin.alternatives:  # the same tip, another shoulder or elbow: perhaps no limit is in the way
+            with contextlib.suppress(TargetUnreachable):
+                return follow_from(solve_ik(model, points[0], q_motors0=motors, starts=1, **options).equilibrium)
+        raise
+
+
+def _named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachable:
+    """The error with the number of its waypoint, counted from 1."""
+    told = f"waypoint {number} of {total}: {error}"
+    return TargetUnreachable(told, best=error.best, residual=error.residual, iterations=error.iterations)
+
+
+def _exact_steps(
+    model: SoftModel, points: FloatArray, load: Load, first: Equilibrium, method: str, tolerance: float, allow_jumps: bool
+) -> Iterable[Equilibrium]:
+    state = elastic_state(model, first.q_motors, first.q_springs, load)
+    here = LocalSolution(first.q_motors, state, 0.0)
+    tip = LoadedTip(model, Goal(points[0]), load, method)
+    for number, (last, target) in enumerate(pairwise(points), start=2):
+        reached = advance(tip, last, target, here, tolerance)
+        if reached is None:
+            reached = _jump(model, target, load, here, method, tolerance, number, len(points))
+            if not allow_jumps:
+                apart = reached.q_motors - here.q_motors
+                solution = equilibrium_from_state(model, reached.q_motors, load, reached.state, method=method, iterations=0)
+                raise TargetUnreachable(
+                    f"waypoint {number} of {len(points)}: no continuous motion leads there from the last one; the nearest "
+                    f"solution is a jump of the motors by {apart.round(4).tolist()} rad (allow_jumps=True takes it)",
+                    best=IkSolution(target, None, solution, reached.error, 0.0, reached.iterations, ()),
+                    residual=reached.error,
+                    iterations=reached.iterations,
+                )
+        here = reached
+        yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
+
+
+def _jump(
+    model: SoftModel,
+    target: FloatArray,
+    load: Load,
+    here: LocalSolution[ElasticState],
+    method: str,
+    tolerance: float,
+    number: int,
+    total: int,
+) -> LocalSolution[ElasticState]:
+    """Search a waypoint from everywhere when the way from the last one is blocked."""
+    try:
+        found = solve_ik(
+            model,
+            target,
+            wrench=dict(load.wrenches),
+            gravity=load.gravity,
+            q_motors0=here.q_motors,
+            method=method,
+            tolerance=tolerance,
+        )
+    except TargetUnreachable as error:
+        raise _named(error, number, total) from error
+    solution = found.equilibrium
+    state = elastic_state(model, solution.q_motors, solution.q_springs, load)
+    return LocalSolution(solution.q_motors, state, found.error, iterations=found.iterations)
+
+
+def _paper_steps(
+    model: SoftModel, points: FloatArray, times: FloatArray, load: Load, first: Equilibrium, gain: float
+) -> Iterable[Equilibrium]:
+    """Closed-loop inverse kinematics, explicit Euler, [Troise 2021] (8, 9) with the three position rows of the Jacobian."""
+    motors, springs, q = np.array(first.q_motors), np.array(first.q_springs), first.q
+    for number in range(1, len(points)):
+        interval = times[number] - times[number - 1]
+        velocity = (points[number] - points[number - 1]) / interval
+        parts = max(1, int(np.ceil(2.0 * gain * interval - 1e-9)))  # explicit Euler is unstable at gain times step > 2
+        spent = 0
+        for part in range(parts):
+            wanted = points[number - 1] + (part / parts) * (points[number] - points[number - 1])
+            error = wanted - frame_placement(model, q, model.tip).translation
+            point = model.coordinates.at(motors, springs)
+            by_motors, by_springs = point.columns(frame_jacobian(model, q, model.tip)[:3])
+            inverse = np.linalg.pinv(np.concatenate([by_motors, by_springs], axis=1))
+            motors = motors + interval / parts * (inverse[: model.n_motors] @ (velocity + gain * error))
+            motors = np.clip(motors, *model.motor_limits.T)
+            state, used, _ = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
+            spent += used
+            if state.error > largest_residual(model, state.scale, TOLERANCE):
+                best = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
+                raise EquilibriumNotFound(
+                    f"waypoint {number + 1} of {len(points)}: the fixed point of method='paper' does not converge in {used} "
+                    f"steps (residual {best.residual:.3g} N m)",
+                    best=best,
+                    residual=best.residual,
+                    iterations=spent,
+                )
+            springs, q = np.array(state.q_springs), state.q
+        yield equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)

@@ -1,0 +1,218 @@
+"""What a robot can reach: random actuator coordinates within the limits, the tip there, and its manipulability."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checkpoint import Checkpoint
+from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
+from softrobots.core.errors import NeutralEquilibrium, ParameterError
+from softrobots.core.npz_file import LARGEST
+from softrobots.core.progress import with_progress
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.elastostatics import elastic_state, is_stable, largest_residual, settled
+from softrobots.statics.kinematics import frame_jacobian, frame_placement
+from softrobots.statics.loads import Load
+from softrobots.statics.sensitivity import tip_motion
+from softrobots.version import __version__
+
+_BLOCK = 250  # samples that are kept together
+_FIELDS = ("q_motors", "q_springs", "tip_positions", "manipulability")
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """Sampled reach of a robot under a load; can be saved with `softrobots.save_result`."""
+
+    model: SoftModel
+    """The robot."""
+    load: Load
+    """The load."""
+    q_motors: FloatArray
+    """Sampled actuator coordinates, shape (n, n_motors) [rad, m or N]."""
+    q_springs: FloatArray
+    """Elastic coordinates in equilibrium there, shape (n, n_springs) [rad or m]."""
+    tip_positions: FloatArray
+    """Position of the loaded tip, shape (n, 3) [m]."""
+    manipulability: FloatArray
+    r"""Manipulability of the loaded tip, shape (n,) [m^3/rad^3].
+
+    :math:`\sqrt{\det(J J^T)}` with the elastostatic Jacobian `J` of the position, each actuator measured by
+    `SoftModel.motor_scale` (for muscles: their distance from the backbone). 0: the tip cannot move in some direction.
+    """
+    refused: int
+    """Samples left out: lengths that no shape of the robot has, or no stable equilibrium."""
+
+
+def sample_workspace(
+    model: SoftModel,
+    samples: int = 2000,
+    *,
+    force: Any = None,
+    wrench: Any = None,
+    frame: str | None = None,
+    gravity: Any = None,
+    seed: int = 0,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: bool | str = False,
+) -> Workspace:
+    """Sample what the tip can reach.
+
+    Actuator coordinates are uniform within their limits (muscle lengths of a segment that must fit together are made to).
+    At each the robot is brought to equilibrium under the load.
+
+    Args:
+        model: The robot, with at least one actuator.
+        samples: Number of samples to draw.
+        force: Force at `frame`, shape (3,) [N], world axes.
+        wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
+        frame: Frame of `force` and `wrench`; the tip by default.
+        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        seed: Seed of the samples.
+        checkpoint: Folder that keeps the finished samples. After an interruption, even a killed process, the same call goes on
+            from there, to the same bytes. Delete the folder when the workspace is saved. None: nothing is kept.
+        progress: Show a progress bar on stderr; a text is its label.
+
+    Returns:
+        The samples that are stable equilibria.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape or is out of range, the robot has no actuators, no sample is left, or
+            the samples that are kept are those of another case.
+        NameNotFound: If a frame does not exist.
+        FileFormatError, OutputExists: If the folder of finished samples is no such folder.
+        OutputError: If samples cannot be kept; those before them stay.
+    """
+    check_model(model)
+    if model.n_motors == 0:
+        raise ParameterError("model", model, "a robot with at least one motor or muscle")
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    most = LARGEST // (8 * (model.n_motors + model.n_springs + 5))  # as can be saved
+    count = positive_integer("samples", samples, most)
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ParameterError("seed", seed, "a whole number, zero or above")
+    kept = None if checkpoint is None else Checkpoint(checkpoint, _identity(model, load, count, int(seed)))
+    answers = _answers(model, load, count, int(seed), kept, progress)
+    stable = np.concatenate([answer["stable"] for answer in answers])
+    if not stable.any():
+        raise ParameterError("samples", samples, "such that one is a stable equilibrium; none is")
+    motors, springs, tips, measures = (
+        read_only(np.concatenate([answer[name] for answer in answers])[stable]) for name in _FIELDS
+    )
+    return Workspace(model, load, motors, springs, tips, measures, count - int(stable.sum()))
+
+
+def _identity(model: SoftModel, load: Load, count: int, seed: int) -> dict[str, Any]:
+    """What the samples depend on."""
+    return {
+        "job": "sample_workspace",
+        "version": __version__,
+        "urdf": model.urdf,
+        "springs": model.spring_table,
+        "motors": model.motor_joints,
+        "muscles": model.muscle_input,
+        "tip": model.tip,
+        "wrenches": {frame: wrench.tolist() for frame, wrench in load.wrenches.items()},
+        "gravity": load.gravity,
+        "samples": count,
+        "seed": seed,
+    }
+
+
+def _answers(
+    model: SoftModel, load: Load, count: int, seed: int, kept: Checkpoint | None, progress: bool | str
+) -> list[dict[str, Any]]:
+    """The samples in blocks: those that are kept, and the others; rows that are not stable are zero."""
+    sizes = [min(_BLOCK, count - first) for first in range(0, count, _BLOCK)]
+    found = [None if kept is None else kept.block(number, _arrays(model, size)) for number, size in enumerate(sizes)]
+    answers = [
+        {name: np.zeros(shape, kind) for name, (kind, shape) in _arrays(model, size).items()} if held is None else held
+        for held, size in zip(found, sizes, strict=True)
+    ]
+
+    def drawn() -> Iterator[tuple[int, int, FloatArray | None]]:
+        """Block, row and motors of what is left; the samples that are kept are drawn, too, or the others would differ."""
+        random = np.random.default_rng(seed)
+        for number, size in enumerate(sizes):
+            motors = [model.actuators.draw(random) for _ in range(size)]
+            if found[number] is None:
+                yield from ((number, row, one) for row, one in enumerate(motors))
+
+    done = sum(size for held, size in zip(found, sizes, strict=True) if held is not None)
+    for number, row, motors in with_progress(drawn(), progress, label="samples", unit="sample", total=count, done=done):
+        sample = None if motors is None else _sample(model, load, motors)
+        if sample is not None:
+            answers[number]["stable"][row] = True
+            for name, value in zip(_FIELDS, sample, strict=True):
+                answers[number][name][row] = value
+        if kept is not None and row == sizes[number] - 1:
+            kept.keep(number, answers[number])
+    return answers
+
+
+def _arrays(model: SoftModel, count: int) -> dict[str, tuple[type, tuple[int, ...]]]:
+    """Type of numbers and shape of each array of a block."""
+    return {
+        "stable": (np.bool_, (count,)),
+        "q_motors": (np.float64, (count, model.n_motors)),
+        "q_springs": (np.float64, (count, model.n_springs)),
+        "tip_positions": (np.float64, (count, 3)),
+        "manipulability": (np.float64, (count,)),
+    }
+
+
+def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
+    """Motors, springs, tip and manipulability of a sample; None where there is no stable equilibrium."""
+    state = settled(model, motors, load, model.rest)
+    if state is None or not is_stable(model, state.tangent, symmetric=load.conservative):
+        return None
+    by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, model.tip)[:3])
+    try:
+        slope = tip_motion(by_motors, by_springs, state.tangent, state.load.coupling)[0] @ model.actuators.basis
+    except NeutralEquilibrium:
+        return None
+    tip = np.array(frame_placement(model, state.q, model.tip).translation)
+    values = np.linalg.svd(slope, compute_uv=False)
+    return motors, state.q_springs, tip, float(np.prod(values)) if len(values) == 3 else 0.0
+
+
+def workspace_at(
+    model: SoftModel, load: Load, q_motors: Any, q_springs: Any, tip_positions: Any, manipulability: Any, refused: int
+) -> Workspace:
+    """Make a workspace of arrays that were computed before; what a saved one is loaded with.
+
+    Args:
+        model: The robot.
+        load: The load.
+        q_motors: Actuator coordinates, shape (n, n_motors).
+        q_springs: Elastic coordinates, shape (n, n_springs).
+        tip_positions: Tip positions, shape (n, 3) [m].
+        manipulability: Manipulability, shape (n,).
+        refused: Samples left out.
+
+    Returns:
+        The workspace.
+
+    Raises:
+        ParameterError: If shapes do not fit, or a sample (a hundred are tried) is not what it claims.
+    """
+    motors = finite_array("q_motors", q_motors, (None, model.n_motors))
+    count = len(motors)
+    springs = finite_array("q_springs", q_springs, (count, model.n_springs))
+    tips = finite_array("tip_positions", tip_positions, (count, 3), "m")
+    measures = finite_array("manipulability", manipulability, (count,))
+    if count == 0 or int(refused) < 0 or measures.min() < 0.0:
+        raise ParameterError("manipulability", measures, "given for at least one sample, zero or above")
+    for row in np.unique(np.linspace(0, count - 1, min(count, 100)).astype(int)):
+        state = elastic_state(model, model.checked_motors(motors[row]), springs[row], load)
+        if state.error > largest_residual(model, state.scale, 1e-9):
+            raise ParameterError("q_springs", springs[row], f"in balance; its row {row} is not")
+        tip = frame_placement(model, state.q, model.tip).translation
+        if np.abs(tip - tips[row]).max() > 1e-9 * max(model.reach, 1.0):
+            raise ParameterError("tip_positions", tips[row], f"the tip of its row {row}, {tip.tolist()}")
+    return Workspace(model, load, read_only(motors), read_only(springs), read_only(tips), read_only(measures), int(refused))

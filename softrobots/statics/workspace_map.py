@@ -1,0 +1,179 @@
+"""Maps of what the loaded arm reaches, carries, and which pressure it needs, over a grid of targets and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softrobots.core.checks import FloatArray, finite_array, finite_number, increasing, positive_number, unit_vector
+from softrobots.core.errors import ParameterError
+from softrobots.inflated_beam import required_pressure
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastostatics import elastic_state, largest_residual
+from softrobots.statics.equilibrium import equilibrium_from_state
+from softrobots.statics.loads import Load
+from softrobots.statics.target_grid import TargetGrid
+
+CLOSE = 1e-3
+"""Missing pressure that counts as none [Pa]."""
+
+BoolArray = NDArray[np.bool_]
+
+_ARRAYS = ("direction", "loads", "reached", "required_pressure", "payload", "q_motors", "q_springs")
+_CHECKED = 100  # cases of a map from a file that are computed again
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceMap:
+    """What the arm reaches and carries; can be saved with `softrobots.save_result`.
+
+    The first three axes of every array are those of the grid, `grid.shape`.
+    """
+
+    model: SoftModel
+    """The arm."""
+    grid: TargetGrid
+    """Where the tip is to be."""
+    direction: FloatArray
+    """Unit vector of the load, world axes, shape (3,)."""
+    loads: FloatArray
+    """Sizes of the load, increasing, shape (n_loads,) [N]."""
+    gravity: tuple[float, float, float] | None
+    """Gravity that the arm itself feels, world axes [m/s^2]; None: weightless."""
+    tolerance: float
+    """Largest distance of the tip from a target that counts as reached [m]."""
+    reached: BoolArray
+    """Whether the loaded tip gets to the target, stable and within the limits of motors and springs, shape (..., n_loads)."""
+    required_pressure: FloatArray
+    """Smallest gauge pressure at which no link wrinkles, in the best posture found, shape (..., n_loads) [Pa].
+
+    [Troise 2021] (3). Infinite where the target is not reached.
+    """
+    payload: FloatArray
+    """Largest load up to which the target is reached and no link wrinkles at its own pressure, shape (...) [N].
+
+    In one posture, whole turns of a motor aside. At most the last of `loads`; 0 where not even the first one is carried.
+    """
+    q_motors: FloatArray
+    """Motor angles of the posture that needs the least pressure, shape (..., n_loads, 3) [rad]; 0 where not reached."""
+    q_springs: FloatArray
+    """Springs in equilibrium there, shape (..., n_loads, n_springs) [rad]; 0 where not reached."""
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name in _ARRAYS:
+            getattr(self, name).setflags(write=False)
+
+    @property
+    def reached_load(self) -> FloatArray:
+        """Largest of `loads` up to which the target is reached at every one, shape (...) [N]; -1 where at none."""
+        levels = np.cumprod(self.reached, axis=-1).sum(axis=-1)
+        return np.asarray(np.where(levels > 0, self.loads[levels - 1], -1.0))
+
+    @property
+    def wrinkled(self) -> BoolArray:
+        """Whether the target is reached with a link that needs more than its own pressure, shape (..., n_loads).
+
+        In the posture that is kept, which needs the least pressure. Where links differ in pressure, another posture may still
+        carry the load: `payload` counts that one.
+        """
+        own = np.array([group.pressure for group in self.model.spring_groups])
+        springs = self.q_springs.reshape(-1, self.model.n_springs)
+        lacking = (required_pressures(self.model, springs) > own + CLOSE).any(axis=1)
+        return np.asarray(self.reached & lacking.reshape(self.reached.shape))
+
+
+def required_pressures(model: SoftModel, q_springs: FloatArray) -> FloatArray:
+    """Gauge pressure at which a link just wrinkles, from the norm of its spring torques: [Troise 2021] (3).
+
+    Args:
+        model: The arm, with linear springs.
+        q_springs: Spring coordinates, shape (n, n_springs) [rad].
+
+    Returns:
+        Pressure of each link, shape (n, n_links) [Pa].
+    """
+    torques = model.stiffness * (q_springs - model.rest)
+    moments = [np.linalg.norm(torques[:, list(group.springs)], axis=1) for group in model.spring_groups]
+    return np.stack(moments, axis=1) * [required_pressure(1.0, group.radius) for group in model.spring_groups]
+
+
+def packed(result: WorkspaceMap) -> dict[str, Any]:
+    """The arrays of a map by name, without its robot; what `unpacked` takes."""
+    grid = {f"grid_{axis}": getattr(result.grid, axis) for axis in "xyz"}
+    return grid | {name: getattr(result, name) for name in _ARRAYS} | {"tolerance": np.array(result.tolerance)}
+
+
+def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, fields: Mapping[str, Any]) -> WorkspaceMap:
+    """Make a map of arrays that were computed before.
+
+    Args:
+        model: The arm.
+        gravity: Gravity, world axes [m/s^2]; None: weightless.
+        fields: Arrays by name, as `packed` gives them.
+
+    Returns:
+        The map.
+
+    Raises:
+        ParameterError: If shapes do not fit, or a case (a hundred are tried) is not what it claims.
+    """
+    grid = TargetGrid(*(fields[f"grid_{axis}"] for axis in "xyz"))
+    direction, loads = unit_vector("direction", fields["direction"]), finite_array("loads", fields["loads"], (None,), "N")
+    cases = (*grid.shape, len(increasing("loads", loads, "N")))
+    reached = np.asarray(fields["reached"])
+    if reached.shape != cases or reached.dtype != np.bool_:
+        raise ParameterError("reached", reached, f"truth values of shape {cases}")
+    required = np.array(fields["required_pressure"])
+    if required.dtype.kind not in "fiu" or required.shape != cases:
+        raise ParameterError("required_pressure", required, f"numbers of shape {cases} [Pa]")
+    if not np.array_equal(required < np.inf, reached) or (required < 0.0).any():
+        raise ParameterError("required_pressure", required, "zero or above, infinite where not reached [Pa]")
+    payload = finite_array("payload", fields["payload"], grid.shape, "N")
+    if payload.min() < 0.0 or payload.max() > loads[-1]:
+        raise ParameterError("payload", payload, f"between 0 and {loads[-1]} N")
+    if ((loads <= payload[..., None]) & ~reached)[payload > 0.0].any():
+        raise ParameterError("payload", payload, "0, or such that the target is reached at every load up to it")
+    made = WorkspaceMap(
+        model=model,
+        grid=grid,
+        direction=direction,
+        loads=loads,
+        gravity=gravity,
+        tolerance=positive_number("tolerance", finite_number("tolerance", fields["tolerance"]), "m"),
+        reached=reached,
+        required_pressure=required.astype(np.float64),
+        payload=payload,
+        q_motors=finite_array("q_motors", fields["q_motors"], (*cases, model.n_motors), "rad"),
+        q_springs=finite_array("q_springs", fields["q_springs"], (*cases, model.n_springs), "rad"),
+    )
+    places = np.argwhere(reached)
+    for number in np.unique(np.linspace(0, len(places) - 1, min(len(places), _CHECKED)).astype(int)):
+        _check_case(made, tuple(places[number].tolist()))
+    return made
+
+
+def _check_case(made: WorkspaceMap, place: tuple[int, ...]) -> None:
+    """Compute a reached case again, on Pinocchio.
+
+    Raises:
+        ParameterError: If it is not in balance, its tip is elsewhere, or it needs another pressure.
+    """
+    model, (x, y, z, level) = made.model, place
+    load = Load.of(model, made.direction * made.loads[level], gravity=made.gravity)
+    state = elastic_state(model, made.q_motors[place], made.q_springs[place], load)
+    if state.error > largest_residual(model, state.scale, 1e-9):
+        raise ParameterError("q_springs", made.q_springs[place], f"in balance; case {place} is not")
+    equilibrium = equilibrium_from_state(model, made.q_motors[place], load, state, method="newton", iterations=0)
+    off = np.linalg.norm(equilibrium.tip_position - (made.grid.x[x], made.grid.y[y], made.grid.z[z]))
+    if off > made.tolerance + 1e-12 * model.reach:
+        raise ParameterError(
+            "q_motors", made.q_motors[place], f"such that the tip is at the target; in case {place} it is {off:.3g} m away"
+        )
+    needed = max(map(required_pressure, equilibrium.link_moments.tolist(), (group.radius for group in model.spring_groups)))
+    if abs(needed - made.required_pressure[place]) > 1e-9 * needed + 1e-6:
+        raise ParameterError("required_pressure", made.required_pressure[place], f"{needed} Pa in case {place}")

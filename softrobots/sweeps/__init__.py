@@ -1,7 +1,0 @@
-"""Sweeps over millions of targets and loads with the compiled solvers, in this process or on a Dask cluster."""
-
-from softrobots.sweeps.mapping import map_workspace
-from softrobots.target_grid import TargetGrid
-from softrobots.workspace_map import WorkspaceMap
-
-__all__ = ["TargetGrid", "WorkspaceMap", "map_workspace"]

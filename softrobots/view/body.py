@@ -1,0 +1,204 @@
+"""The continuous body of a robot with sections: its backbone, its surface and its muscles, for pictures and measurements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.constant_curvature.screws import Screw
+from softrobots.core.checks import FloatArray, positive_integer
+from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.description.urdf_tags import LineTag, MuscleTag
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentBody:
+    """One segment of a body."""
+
+    number: int
+    """Number of the segment, from 1."""
+    poses: FloatArray
+    """Frames along the backbone, z along it, from the start to the end of the segment, shape (n, 4, 4) [m], world axes."""
+    radius: float
+    """Radius of the body [m]."""
+    muscles: dict[str, FloatArray]
+    """Points along each muscle, by name, shape (n, 3) [m]."""
+    lines: dict[str, FloatArray]
+    """Points along each line that is only drawn, by name, shape (n, 3) [m]."""
+
+    @property
+    def backbone(self) -> FloatArray:
+        """Points along the backbone, shape (n, 3) [m]."""
+        return np.asarray(self.poses[:, :3, 3])
+
+    def surface(self, sides: int = 24) -> tuple[FloatArray, FloatArray]:
+        """Triangles of the tube around the backbone, closed at both ends.
+
+        Args:
+            sides: Corners of its cross-section.
+
+        Returns:
+            Corners, shape (n sides + 2, 3) [m], and the corners of each triangle, shape (m, 3), integers, seen from outside
+            anticlockwise.
+        """
+        return tube(self.poses[:, :3, :3], self.backbone, self.radius, sides)
+
+    def thinned(self, spacing: float) -> SegmentBody:
+        """The same body without frames that follow another within less than a spacing [m]; the last one stays."""
+        steps = np.linalg.norm(np.diff(self.backbone, axis=0), axis=1)
+        kept, run = [0], 0.0
+        for number, step in enumerate(steps.tolist(), start=1):
+            run += step
+            if run >= spacing:
+                kept.append(number)
+                run = 0.0
+        if kept[-1] != len(steps):  # the last frame takes the place of the one before it, unless that is the first
+            kept[max(len(kept) - 1, 1) :] = [len(steps)]
+        chosen = {name: points[kept] for name, points in self.muscles.items()}
+        return SegmentBody(self.number, self.poses[kept], self.radius, chosen, {n: p[kept] for n, p in self.lines.items()})
+
+    def dome(self, sides: int = 24, rings: int = 6) -> tuple[FloatArray, FloatArray]:
+        """Triangles of half a ball on the end of the tube, the tip of a tube that everts there.
+
+        Args:
+            sides: Corners of its cross-section.
+            rings: Cross-sections.
+
+        Returns:
+            Corners, shape ((rings + 1) sides + 2, 3) [m], and the corners of each triangle, as in `surface`.
+        """
+        angle = 0.5 * np.pi * np.arange(rings + 1) / (rings + 0.5)  # not to the pole, where a ring would be a point
+        poses = np.tile(self.poses[-1], (rings + 1, 1, 1))
+        poses[:, :3, 3] += self.radius * np.sin(angle)[:, None] * poses[:, :3, 2]
+        return tube(poses[:, :3, :3], poses[:, :3, 3], self.radius * np.cos(angle), sides)
+
+    def muscle_surface(self, name: str, radius: float, sides: int = 8) -> tuple[FloatArray, FloatArray]:
+        """Triangles of a tube around a muscle or a line, as in `surface`.
+
+        Args:
+            name: The muscle, or the line.
+            radius: Radius of the tube [m].
+            sides: Corners of its cross-section.
+
+        Returns:
+            Corners and triangles.
+
+        Raises:
+            NameNotFound: If no muscle or line of the segment is called that.
+        """
+        there = self.muscles | self.lines
+        if name not in there:
+            raise NameNotFound("muscle", name, there)
+        return tube(self.poses[:, :3, :3], there[name], radius, sides)
+
+
+def tube(rotations: FloatArray, centres: FloatArray, radius: FloatArray | float, sides: int) -> tuple[FloatArray, FloatArray]:
+    """Triangles of a closed tube.
+
+    Args:
+        rotations: Axes of each cross-section, which lies in x and y, shape (n, 3, 3).
+        centres: Centre of each, shape (n, 3) [m].
+        radius: Radius of all, or of each, shape (n,) [m].
+        sides: Corners of a cross-section.
+
+    Returns:
+        Corners, shape (n sides + 2, 3) [m], and the corners of each triangle, shape (m, 3), integers, seen from outside
+        anticlockwise.
+    """
+    rings, angle = len(centres), 2.0 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    sizes = np.broadcast_to(radius, rings)
+    corners = np.einsum("n,nij,sj->nsi", sizes, rotations, ring) + centres[:, None, :]
+    start = sides * np.repeat(np.arange(rings - 1), sides)
+    here, there = np.tile(np.arange(sides), rings - 1), np.tile((np.arange(sides) + 1) % sides, rings - 1)
+    low = np.column_stack([start + here, start + there, start + sides + there])
+    high = np.column_stack([start + here, start + sides + there, start + sides + here])
+    around, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    first, last, top = rings * sides, rings * sides + 1, (rings - 1) * sides
+    caps = [np.column_stack([after, around, np.full(sides, first)])]
+    caps.append(np.column_stack([top + around, top + after, np.full(sides, last)]))
+    return np.concatenate([corners.reshape(-1, 3), centres[[0, -1]]]), np.concatenate([low, high, *caps])
+
+
+def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:
+    """Shape of the body of a loaded robot; see `body_at`.
+
+    Args:
+        equilibrium: The loaded robot.
+        points: Points a section, the start of the segment apart.
+
+    Returns:
+        The segments, base to tip; empty for a robot without sections.
+
+    Raises:
+        ParameterError: If it is no equilibrium, or `points` is not positive.
+    """
+    if not isinstance(equilibrium, Equilibrium):
+        raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
+    return body_at(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, points)
+
+
+def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, points: int = 12) -> tuple[SegmentBody, ...]:
+    """Shape of the body at given coordinates: screw motions from the start of each segment along its sections.
+
+    For sections of constant strain this is exact. A lumped chain is drawn as the smooth body that it stands for, which its
+    rigid links follow to the order of the discretisation.
+
+    Args:
+        model: The robot.
+        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+        q_springs: Elastic coordinates, shape (n_springs,) [rad or m].
+        points: Points a section, the start of the segment apart.
+
+    Returns:
+        The segments, base to tip; empty for a robot without sections.
+
+    Raises:
+        ParameterError: If `points` is not positive.
+    """
+    positive_integer("points", points, 10_000)
+    structure = model.structure
+    sections = structure.section_table
+    if not sections:
+        return ()
+    pin_model, data = model.workspace(None)
+    pin.forwardKinematics(pin_model, data, model.embed(model.coordinates.at(q_motors, q_springs).joints))
+    coordinates = structure.section_coordinates(q_motors, q_springs)
+    shares = np.arange(1, points + 1) / points
+    made = []
+    for number in dict.fromkeys(section.segment for section in sections):
+        rows = [row for row, section in enumerate(sections) if section.segment == number]
+        pose = _start(model, data, rows[0])
+        poses = [pose[None]]
+        for row in rows:
+            along = Screw(shares[:, None] * coordinates[row], shares * sections[row].length)
+            steps = np.tile(np.eye(4), (points, 1, 1))
+            steps[:, :3, :3], steps[:, :3, 3] = along.rotation, along.position
+            poses.append(pose @ steps)
+            pose = poses[-1][-1]
+        frames = np.concatenate(poses)
+        muscles = {tag.name: _along(frames, tag) for tag in structure.muscles if tag.segment == number}
+        lines = {tag.name: _along(frames, tag) for tag in structure.parts.lines if tag.segment == number}
+        made.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles, lines))
+    return tuple(made)
+
+
+def _along(frames: FloatArray, tag: MuscleTag | LineTag) -> FloatArray:
+    """Points beside a backbone, shape (n, 3)."""
+    aside = np.cos(tag.azimuth) * frames[:, :3, 0] + np.sin(tag.azimuth) * frames[:, :3, 1]
+    return np.asarray(frames[:, :3, 3] + tag.distance * aside)
+
+
+def _start(model: SoftModel, data: object, row: int) -> FloatArray:
+    """Frame at the start of a section, (4, 4), after forward kinematics."""
+    pin_model, section = model.pinocchio, model.structure.section_table[row]
+    joints = [pin_model.getJointId(name) for name in section.joint_names]
+    first = min(joints)
+    before = data.oMi[pin_model.parents[first]] * pin_model.jointPlacements[first]  # type: ignore[attr-defined]
+    rigid = Screw(section.to_joints, section.hinge)  # of a lumped section
+    back = pin.SE3(pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0), np.zeros(3))
+    return np.array((before * back * pin.SE3(rigid.rotation, rigid.position).inverse()).homogeneous)

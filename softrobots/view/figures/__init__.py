@@ -1,0 +1,1 @@
+"""Figures of robots and results. Needs matplotlib (extra `plot`)."""

@@ -1,0 +1,143 @@
+"""Figures of equilibria: a growing load up to buckling and beyond, and a probe that pushes. Needs matplotlib (extra `plot`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, positive_number, unit_vector
+from softrobots.core.errors import ParameterError
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.imposed_displacement import ImposedDisplacement
+from softrobots.statics.post_buckling import EquilibriumBranch
+from softrobots.view.figures.plots import line_style, new_figure
+
+
+def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, *, critical: float | None = None) -> Any:
+    """Way of the tip and least stiffness over the tip force along a direction, one line a branch of equilibria.
+
+    Args:
+        branches: Equilibria in the order of growing force, by what is told of them; the way is counted from the first.
+        direction: Direction of the force, shape (3,), any length but zero, world axes.
+        critical: Force at which the robot buckles [N], to be marked; see `softrobots.critical_load`.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If a branch is empty or holds something else, or an equilibrium has no springs.
+        MissingDependency: If matplotlib is not installed.
+    """
+    unit = unit_vector("direction", direction)
+    _check(branches, Equilibrium)
+    figure = new_figure((10.0, 4.4))
+    left, right = figure.subplots(1, 2)
+    for number, (label, branch) in enumerate(branches.items()):
+        forces = [_force(equilibrium) @ unit for equilibrium in branch]
+        ways = [1e3 * float(np.linalg.norm(one.tip_position - branch[0].tip_position)) for one in branch]
+        style = {"label": label, "markevery": max(len(branch) // 10, 1)} | line_style(number)
+        left.plot(forces, ways, **style)
+        right.plot(forces, [_least_stiffness(equilibrium) for equilibrium in branch], **style)
+    for axes in (left, right):
+        if critical is not None:
+            force = positive_number("critical", critical, "N")
+            axes.axvline(force, color="black", lw=1.0, label=f"buckling load, {force:.2f} N")
+        axes.set_xlabel("force at the tip [N]")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=9)
+    left.set(ylabel="way of the tip [mm]", title="Where the tip goes")
+    right.set(ylabel="smallest eigenvalue of the tangent stiffness [N m/rad]", title="What stiffness is left")
+    return figure
+
+
+def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
+    """Way of the tip across a push, and the softest eigenvalue, over the force; one line a branch, dashed where not stable.
+
+    Args:
+        found: Branches as `softrobots.post_buckling_branches` gives them; the way is counted from the first point of the first.
+        across: Direction of the way that is drawn, shape (3,), any length but zero, world axes.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If there is no branch, or something else.
+        MissingDependency: If matplotlib is not installed.
+    """
+    unit = unit_vector("across", across)
+    if not isinstance(found, Sequence) or not found or not all(isinstance(one, EquilibriumBranch) for one in found):
+        raise ParameterError("found", found, "at least one EquilibriumBranch")
+    origin = found[0].equilibria[0].tip_position
+    figure = new_figure((10.0, 4.8))
+    left, right = figure.subplots(1, 2)
+    for number, branch in enumerate(found):
+        ways = [1e3 * float(unit @ (one.tip_position - origin)) for one in branch.equilibria]
+        style = line_style(number) | {"ls": "-", "ms": 4, "markevery": max(len(ways) // 5, 1)}
+        dashed = ~branch.stable
+        dashed[:-1] |= dashed[1:]  # up to where the other line ends
+        for axes, values in ((left, ways), (right, branch.softest)):
+            axes.plot(branch.forces, np.where(branch.stable, values, np.nan), label=branch.label, **style)
+            axes.plot(branch.forces, np.where(dashed, values, np.nan), **(style | {"ls": "--", "marker": ""}))
+    for axes in (left, right):
+        axes.set_xlabel("force [N]")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=7)
+    left.set(ylabel="way of the tip across the push [mm]", title="Where the tip goes (dashed: not stable)")
+    right.set(ylabel="softest eigenvalue over the springs' stiffness [-]", title="How stable it is")
+    return figure
+
+
+def reaction(runs: Mapping[str, Sequence[ImposedDisplacement]]) -> Any:
+    """Force on a probe over the way that it pushes a robot, one line a run.
+
+    Markers are filled where the robot would be stable under the same force as a dead load, empty where only the probe holds it.
+
+    Args:
+        runs: Solutions in the order of growing displacement, by what is told of them.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If a run is empty or holds something else.
+        MissingDependency: If matplotlib is not installed.
+    """
+    _check(runs, ImposedDisplacement)
+    figure = new_figure((8.0, 4.6))
+    axes = figure.add_subplot()
+    for number, (label, run) in enumerate(runs.items()):
+        ways = 1e3 * np.array([held.displacement for held in run])
+        forces = np.array([held.reaction for held in run])
+        style = line_style(number)
+        colour, marker = style["color"], style["marker"]
+        axes.plot(ways, forces, color=colour, ls=style["ls"], label=label)
+        dead = np.array([held.equilibrium.stable for held in run])
+        axes.plot(ways[dead], forces[dead], ls="", marker=marker, ms=5, color=colour)
+        axes.plot(ways[~dead], forces[~dead], ls="", marker=marker, ms=5, color=colour, mfc="white")
+    for face, told in (("black", "stable under the force alone, too"), ("white", "held by the probe only")):
+        axes.plot([], [], ls="", marker="o", ms=5, color="black", mfc=face, label=told)
+    axes.set(xlabel="displacement of the probe [mm]", ylabel="force on the robot [N]", title="Imposed displacement")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=9)
+    return figure
+
+
+def _check(lines: Any, kind: type) -> None:
+    if not isinstance(lines, Mapping) or not lines:
+        raise ParameterError("lines", lines, f"a mapping from labels to sequences of {kind.__name__}")
+    for label, line in lines.items():
+        if not isinstance(line, Sequence) or not line or not all(isinstance(one, kind) for one in line):
+            raise ParameterError(f"lines[{label!r}]", line, f"at least one {kind.__name__}")
+
+
+def _force(equilibrium: Equilibrium) -> FloatArray:
+    return np.asarray(equilibrium.load.wrenches.get(equilibrium.model.tip, np.zeros(6))[:3])
+
+
+def _least_stiffness(equilibrium: Equilibrium) -> float:
+    values = np.linalg.eigvals(equilibrium.tangent_stiffness).real
+    if not len(values):
+        raise ParameterError("branches", equilibrium.model, "of a robot with springs")
+    return float(values.min())

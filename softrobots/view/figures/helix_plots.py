@@ -1,0 +1,193 @@
+"""Figures of helical actuation, after Figures 5, 7 and 9 of [Blumenschein 2018]. Needs matplotlib (extra `plot`).
+
+Every function returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Lines differ in style or marker too,
+so that they can be told apart in grey.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots import helix
+from softrobots.core.checks import FloatArray, finite_array, positive_number
+from softrobots.core.errors import ParameterError
+from softrobots.view.figures.helix_sheet import draw, sheet
+from softrobots.view.figures.plots import COLOURS, MARKERS, new_figure
+
+MOST_HELICES = 60
+"""Helices that `grid` draws at most."""
+
+MOST_DIAMETERS = 100.0
+"""Length over diameter of a tube that `grid` draws, at most."""
+
+_STYLES = ("-", "--", "-.")
+_THIN_STYLE = (0, (1.0, 1.6))
+
+
+def grid(contractions: Any, angles: Any, diameter: float, length: float, handedness: str = "right") -> Any:
+    """Helices of tubes of one length, contraction by angle, all to one scale: after [Blumenschein 2018] Figure 5.
+
+    Each is seen from 25 degrees above, axis up. A tube that runs into itself has another colour and a caption that says so.
+
+    Args:
+        contractions: Contractions `lambda`, one a column, each in (0, 1], shape (n,) [-].
+        angles: Angles `theta` of the actuator to the axis of the tube, one a row, each in [0, pi/2), shape (m,) [rad].
+        diameter: Diameter of the tubes, positive [m].
+        length: Length of the uninflated tubes, positive and at most `MOST_DIAMETERS` times the diameter [m].
+        handedness: "right" or "left".
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If an argument is out of range, there are more than `MOST_HELICES` helices, or one has more
+            windings than can be drawn (tubes of 100 diameters beyond 80 degrees).
+        StraightTube: At contraction 1 and angle 0, where no helix exists.
+        MissingDependency: If matplotlib is not installed.
+    """
+    shares, tilts = _row("contractions", contractions, "-"), _row("angles", angles, "rad")
+    size, span = positive_number("diameter", diameter, "m"), positive_number("length", length, "m")
+    if len(shares) * len(tilts) > MOST_HELICES:
+        raise ParameterError("contractions", len(shares) * len(tilts), f"at most {MOST_HELICES} helices with the angles")
+    if span > MOST_DIAMETERS * size:
+        raise ParameterError("length", length, f"at most {MOST_DIAMETERS:g} diameters, {MOST_DIAMETERS * size:g} m")
+    helix.forward(shares, tilts[:, None], size)  # refuses what has no shape before anything is drawn
+    drawn = [[draw(share, tilt, size, span, handedness) for share in shares] for tilt in tilts]
+    return sheet(drawn, shares, tilts, f"Tubes {100 * size:.3g} cm thick, {span:.3g} m long before they contract, to one scale")
+
+
+def radius_and_pitch(angles: Any, diameter: float) -> Any:
+    """Outer radius and pitch against contraction, with the limit of self-contact: after [Blumenschein 2018] Figure 7.
+
+    Args:
+        angles: Angles `theta` of the actuator to the axis of the tube, up to three, each above 0 and at most pi/4 (beyond that
+            folds come before turns that touch), shape (m,) [rad].
+        diameter: Diameter of the tube, positive [m].
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+        MissingDependency: If matplotlib is not installed.
+    """
+    tilts, size = _row("angles", angles, "rad"), positive_number("diameter", diameter, "m")
+    if len(tilts) > len(_STYLES) or np.any(tilts <= 0.0) or np.any(tilts > 0.25 * np.pi):
+        raise ParameterError("angles", angles, f"up to {len(_STYLES)} angles above 0 and at most pi/4 rad")
+    figure = new_figure((14.0, 5.2))
+    radius, pitch, close = figure.subplots(1, 3)
+    below = 100 * size / (2.0 * np.pi)
+    for axes in (pitch, close):
+        axes.axhline(below, color="0.35", lw=1.0)
+    for number, tilt in enumerate(tilts):
+        _against_contraction((radius, pitch, close), float(tilt), size, number)
+    limits = helix.contraction_limit(tilts)
+    for axes, name in ((radius, "outer radius $R_o$ [cm]"), (pitch, "normalised pitch $b$ [cm/rad]"), (close, "$b$ [cm/rad]")):
+        axes.set(xlabel=r"contraction $\lambda$ [-]", ylabel=name, xlim=(0.0, 1.0))
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3)
+    close.set(xlim=(max(0.0, limits.min() - 0.1), min(1.0, limits.max() + 0.1)), ylim=(0.0, 3.0 * below))
+    close.locator_params(axis="x", nbins=6)
+    for axes, name in ((radius, "Outer radius"), (pitch, "Pitch"), (close, "Pitch near self-contact")):
+        axes.set_title(name, fontsize=11)
+    _name_lines(figure, pitch)
+    figure.suptitle(f"Shape of a tube {100 * size:.3g} cm thick against the contraction of its actuator")
+    return figure
+
+
+def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) -> Any:
+    """Grasp force of our model against pressure and deflection, with its two bounds: after [Blumenschein 2018] Figure 9.
+
+    Args:
+        test: What is grasped, and by what helix.
+        pressure: Largest gauge pressure, positive [Pa].
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+        MissingDependency: If matplotlib is not installed.
+    """
+    if not isinstance(test, helix.GraspTest):
+        raise ParameterError("test", test, "a GraspTest")
+    most = positive_number("pressure", pressure, "Pa")
+    depths = _row("deflections", test.deflections, "m")
+    if len(depths) > len(COLOURS):
+        raise ParameterError("deflections", test.deflections, f"at most {len(COLOURS)} numbers")
+    test.force(most, depths)  # refuses what is out of range
+    deepest = min(0.5 * test.diameter, test.object_radius, max(1.5 * float(depths.max()), 0.1 * test.diameter))
+    pressures, range_of = np.linspace(0.0, most, 9), np.linspace(0.0, deepest, 300)
+    figure = new_figure((11.5, 5.4))
+    left, right = figure.subplots(1, 2, sharey=True)
+    for number, depth in enumerate(depths):
+        found, colour = test.force(pressures, depth), COLOURS[number]
+        style = {"color": colour, "marker": MARKERS[number], "ms": 7, "clip_on": False}
+        left.plot(pressures / 1e3, found.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
+        told = f"force, deflected by {1e3 * depth:.3g} mm"
+        left.plot(pressures / 1e3, found.force, lw=2.2, ls=_STYLES[number % 3], markevery=(number, 3), label=told, **style)
+        right.plot([1e3 * depth], [found.force[-1]], ls="none", zorder=4, **style)
+    bounds = test.force(most, range_of)
+    right.plot(1e3 * range_of, bounds.force, color="0.75", lw=6.0, label="force, the smaller bound", zorder=1)
+    right.plot(1e3 * range_of, bounds.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
+    right.plot(1e3 * range_of, bounds.contact, color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b): the wall flattens")
+    found = test.force(pressures, 0.0)
+    left.plot(pressures / 1e3, found.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
+    left.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), open marks: the wall flattens")
+    left.set(xlabel="gauge pressure [kPa]", ylabel="grasp force [N]", xlim=(0.0, most / 1e3))
+    right.set(xlabel=f"deflection of the inner radius at {most / 1e3:.3g} kPa [mm]", xlim=(0.0, 1e3 * deepest))
+    for axes in (left, right):
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=9, loc="upper left" if axes is left else "lower right")
+    told = f"object {200 * test.object_radius:.3g} cm thick, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
+    figure.suptitle(f"Grasp force: our model, not data of the paper ({told}, {100 * test.turn_height:.3g} cm rise per turn)")
+    return figure
+
+
+def _against_contraction(all_axes: tuple[Any, Any, Any], tilt: float, diameter: float, number: int) -> None:
+    """Lines of one angle: outer radius on the first axes, pitch on the others."""
+    limit, rule = float(helix.contraction_limit(tilt)), float(helix.simple_contraction_limit(tilt))
+    free, beyond = np.linspace(limit, 1.0, 600), np.linspace(1e-6, limit, 400)
+    colour = COLOURS[number]
+    for axes, name in zip(all_axes, ("outer_radius", "pitch", "pitch"), strict=True):
+
+        def at(contraction: Any, name: str = name) -> Any:
+            return 100 * np.atleast_1d(getattr(helix.forward(contraction, tilt, diameter), name))
+
+        label = rf"$\theta$ = {np.degrees(tilt):.4g}°: turns touch below $\lambda$ = {limit:.4f} (simple rule: {rule:.4f})"
+        axes.plot(free, at(free), color=colour, ls=_STYLES[number], lw=2.2, label=label)
+        axes.plot(beyond, at(beyond), color=colour, ls=_THIN_STYLE, lw=1.2)
+        ends = {"color": colour, "marker": "o", "ms": 7, "ls": "none", "clip_on": axes is all_axes[2]}
+        axes.plot([1.0, 0.0], [at(1.0)[0], at(1e-30)[0]], zorder=4, **ends)
+        marks = {"color": colour, "ls": "none", "zorder": 5}
+        axes.plot([limit], at(limit), marker="D", mfc="white", ms=7, **marks)
+        if axes is not all_axes[0]:
+            axes.plot([rule], at(rule), marker="x", ms=6, mew=1.5, **marks)
+
+
+def _name_lines(figure: Any, axes: Any) -> None:
+    """Legend of angles, and of what lines and marks of every angle mean."""
+    from matplotlib.lines import Line2D
+
+    angles, names = axes.get_legend_handles_labels()
+    told: dict[str, dict[str, Any]] = {
+        r"start, $\lambda$ = 1, and end, $\lambda$ = 0": {"marker": "o", "ms": 7, "ls": "none"},
+        "the tube would run into itself": {"ls": _THIN_STYLE, "lw": 1.2},
+        r"a turn rises by a diameter, $2\pi b = D$": {"lw": 1.0, "color": "0.35"},
+        "neighbouring turns just touch, exact": {"marker": "D", "mfc": "white", "ms": 7, "ls": "none"},
+        r"limit by the simple rule, $2\pi b \geq D$": {"marker": "x", "ms": 6, "mew": 1.5, "ls": "none"},
+    }
+    black: dict[str, Any] = {"color": "black"}
+    lines = [Line2D([], [], **(black | style)) for style in told.values()]
+    figure.legend(angles + lines, names + list(told), loc="outside lower center", ncols=3, fontsize=9)
+
+
+def _row(name: str, values: Any, unit: str) -> FloatArray:
+    """Numbers in a row, at least one."""
+    row = finite_array(name, values, (None,), unit)
+    if len(row) == 0:
+        raise ParameterError(name, values, "at least one number")
+    return row

@@ -1,0 +1,124 @@
+"""Pictures of workspace maps: reach, payload and required pressure beside each other. Needs matplotlib (extra `plot`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_number
+from softrobots.core.errors import ParameterError
+from softrobots.statics.workspace_map import WorkspaceMap
+from softrobots.view.figures.plots import new_figure, plain_words
+
+NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
+"""What becomes of a target under a load: never reached, lost under the load, reached with a wrinkled link, carried."""
+
+SHADES = ("#ffffff", "#7f7f7f", "#f3cc6b", "#17375e")
+"""Colour of each; apart in grey, too."""
+_LABELS = ("not reached", "reached with smaller loads only", "reached, a link wrinkles", "reached, no link wrinkles")
+
+
+def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
+    """Reach, payload and required pressure in the plane of the map, or in the middle slice of a box.
+
+    Args:
+        result: The map.
+        load: Load of the first and the last panel [N]; the nearest of the map is shown. None: half of the largest.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If it is no map, it has one radius or one height only, or the load is not finite.
+        MissingDependency: If matplotlib is not installed.
+    """
+    if not isinstance(result, WorkspaceMap):
+        raise ParameterError("result", result, "a WorkspaceMap")
+    if len(result.grid.x) < 2 or len(result.grid.z) < 2:
+        raise ParameterError("result", result.grid.shape, "a map with at least two coordinates x and z (this is its shape)")
+    wanted = result.loads[-1] / 2.0 if load is None else finite_number("load", load, "N")
+    level = int(np.abs(result.loads - wanted).argmin())
+    new_figure((1.0, 1.0))  # tells what is missing before matplotlib is imported here
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.patches import Patch
+
+    across, middle = result.grid.x, len(result.grid.y) // 2
+    wide = float(np.ptp(across)) > 0.75 * float(np.ptp(result.grid.z))
+    figure = new_figure((15.0, 5.2) if wide else (11.0, 6.0))
+    reach_axes, payload_axes, pressure_axes = all_axes = figure.subplots(1, 3, sharex=True, sharey=True)
+    force = f"{result.loads[level]:.4g} N"
+
+    outcomes = outcome(result, level)[:, middle]
+    shades = ListedColormap(SHADES)
+    _cells(reach_axes, result, outcomes, cmap=shades, norm=BoundaryNorm(np.arange(5) - 0.5, 4))
+    shown = [number for number in (CARRIED, WRINKLED, LOST, NOT_REACHED) if (outcomes == number).any()]
+    handles = [Patch(facecolor=SHADES[number], edgecolor="0.3", label=_LABELS[number]) for number in shown]
+    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles), title=f"reach with {force}", fontsize=9)
+    reach_axes.set_title(f"Reach with {force} on the tip")
+
+    payload = np.where(result.reached[:, middle, :, 0], result.payload[:, middle], np.nan)
+    drawn = _cells(payload_axes, result, payload, cmap="cividis", vmin=0.0, vmax=float(result.loads[-1]))
+    figure.colorbar(drawn, ax=payload_axes, label=f"largest load without wrinkling, up to {result.loads[-1]:g} N [N]")
+    _contours(payload_axes, result, payload, set())
+    payload_axes.set_title("Payload")
+
+    needed = np.where(result.reached[:, middle, :, level], result.required_pressure[:, middle, :, level], np.nan) / 1e3
+    drawn = _cells(pressure_axes, result, needed, cmap="cividis")
+    figure.colorbar(drawn, ax=pressure_axes, label="gauge pressure at which no link wrinkles [kPa]")
+    _contours(pressure_axes, result, needed, {group.pressure / 1e3 for group in result.model.spring_groups})
+    pressure_axes.set_title(f"Required pressure with {force}")
+
+    flat = len(result.grid.y) == 1 and result.grid.y[0] == 0.0
+    for axes in all_axes:
+        axes.plot(0.0, 0.0, marker="+", color="k", ms=10, ls="none")
+        axes.set(aspect="equal", xlabel="distance from the axis of motor 1 [m]" if flat and across[0] > 0.0 else "x [m]")
+    reach_axes.set_ylabel("height z [m]")
+    weight = "weightless arm" if result.gravity is None else f"arm under gravity {_told(result.gravity)} m/s²"
+    where = "" if flat else f", slice at y = {result.grid.y[middle]:.4g} m"
+    figure.suptitle(f"{plain_words(result.model.pinocchio.name)}: force along {_told(result.direction)}, {weight}{where}")
+    return figure
+
+
+def outcome(result: WorkspaceMap, level: int) -> Any:
+    """What becomes of each target at a load of the map: `NOT_REACHED`, `LOST`, `WRINKLED` or `CARRIED`, `grid.shape`."""
+    here, wrinkled = result.reached[..., level], result.wrinkled[..., level]
+    before = result.reached[..., :level].any(axis=-1)
+    return np.where(here, np.where(wrinkled, WRINKLED, CARRIED), np.where(before, LOST, NOT_REACHED))
+
+
+def _cells(axes: Any, result: WorkspaceMap, values: Any, **style: Any) -> Any:
+    axes.set_facecolor("white")
+    return axes.pcolormesh(result.grid.x, result.grid.z, values.T, shading="nearest", rasterized=True, **style)
+
+
+def _contours(axes: Any, result: WorkspaceMap, values: FloatArray, levels: set[float]) -> None:
+    """Lines of equal value with their numbers: some in white, or, thick and dashed, at given levels.
+
+    Their edges have the other shade, so that they stand out from light and from dark.
+    """
+    finite = values[np.isfinite(values)]
+    if not len(finite) or float(np.ptp(finite)) <= 0.0:
+        return
+    from matplotlib.patheffects import withStroke
+    from matplotlib.ticker import MaxNLocator
+
+    own = sorted(level for level in levels if finite.min() < level < finite.max())
+    plain = MaxNLocator(6).tick_values(finite.min(), finite.max())
+    plain = [value for value in plain if finite.min() < value < finite.max() and value not in own]
+    for chosen, style, edge, told in (
+        (plain, {"colors": "white", "linewidths": 0.9}, "black", "{:g}"),
+        (own, {"colors": "black", "linewidths": 1.8, "linestyles": "--"}, "white", "own: {:g}"),
+    ):
+        if chosen:
+            lines = axes.contour(result.grid.x, result.grid.z, values.T, levels=chosen, **style)
+            # One number a level, on its longest line: where the value falls off a cliff, many short ones lie together.
+            longest = [max(segments, key=len) for segments in lines.allsegs if segments]
+            places = [segment[len(segment) // 2] for segment in longest if len(segment) > 1]
+            for text in axes.clabel(lines, fmt=told.format, fontsize=9, manual=places):
+                text.set_path_effects([withStroke(linewidth=2.0, foreground=edge)])
+            lines.set_path_effects([withStroke(linewidth=1.6, foreground=edge)])
+
+
+def _told(vector: Any) -> str:
+    return f"({', '.join(f'{number:.4g}' for number in vector)})"

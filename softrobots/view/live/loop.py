@@ -1,0 +1,156 @@
+"""A live view: a robot in the browser that follows commands while it is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.errors import ParameterError, SoftRobotsError, ViewerError
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.inverse_kinematics import IkSolution
+from softrobots.view.live.commands import Wanted
+from softrobots.view.warm_start import next_equilibrium, next_solution
+
+
+class Page(Protocol):
+    """What shows the robot: a `softrobots.view.viewer.Viewer`, or something like it."""
+
+    @property
+    def serving(self) -> bool:
+        """Whether anybody can look at it."""
+
+    def show(self, equilibrium: Equilibrium) -> None:
+        """Show a loaded robot."""
+
+    def mark(self, target: Any) -> None:
+        """Mark a target, shape (3,) [m]; None: none."""
+
+
+class Commands(Protocol):
+    """Where commands come from; see `softrobots.view.live.input`."""
+
+    def read(self, live: LiveView) -> Wanted | None:
+        """Wait a fraction of a second for commands.
+
+        Args:
+            live: The view as it is.
+
+        Returns:
+            What is wanted now; None if nothing new came.
+
+        Raises:
+            SoftRobotsError: If a command is wrong. More can be read after it.
+        """
+
+
+class LiveView:
+    """A robot on a page, and what it was last asked for."""
+
+    def __init__(self, page: Page, shown: Equilibrium | IkSolution) -> None:
+        """Begin with a robot that is shown already.
+
+        Args:
+            page: What shows it.
+            shown: The loaded robot, or the solution whose target is to be held; loaded by a force on the tip and gravity only.
+
+        Raises:
+            ParameterError: If it is loaded otherwise.
+        """
+        equilibrium = shown.equilibrium if isinstance(shown, IkSolution) else shown
+        target = shown.target if isinstance(shown, IkSolution) else None
+        gravity = equilibrium.load.gravity
+        self.page = page
+        self.start = Wanted(
+            equilibrium.q_motors,
+            target,
+            tip_force(equilibrium),
+            None if gravity is None else read_only(finite_array("gravity", gravity, (3,), "m/s^2")),
+        )
+        """What it began with."""
+        self.wanted = self.start
+        """What is shown."""
+        self.equilibrium = self._first = equilibrium
+        """The loaded robot that is shown."""
+
+    def apply(self, wanted: Wanted) -> Equilibrium:
+        """Show the robot as it is wanted; if there is no such equilibrium, everything stays as it is.
+
+        Args:
+            wanted: What is wanted.
+
+        Returns:
+            The loaded robot.
+
+        Raises:
+            ParameterError: If numbers are wrong in kind or number, or a target is given to a robot without actuators.
+            TargetUnreachable: If the tip does not reach the target.
+            EquilibriumNotFound: If there is no equilibrium.
+            ViewerError: If the page is closed.
+        """
+        if wanted is self.start:
+            found = self._first  # not what the robot would come to from where it is now
+        elif wanted.target is None:
+            found = next_equilibrium(self.equilibrium, wanted.motors, wanted.force, gravity=wanted.gravity)
+        else:
+            found = next_solution(self.equilibrium, wanted.target, wanted.force, gravity=wanted.gravity).equilibrium
+        self.page.show(found)
+        self.page.mark(wanted.target)
+        self.wanted, self.equilibrium = wanted._replace(motors=found.q_motors), found
+        return found
+
+
+def follow(live: LiveView, commands: Commands, tell: Callable[[str], object], complain: Callable[[str], object]) -> None:
+    """Follow commands until they end, or the page does. A command that cannot be followed is told, and the next one is read.
+
+    Args:
+        live: The view.
+        commands: Where commands come from.
+        tell: Takes a line on each robot that is shown.
+        complain: Takes a line on each command that cannot be followed.
+
+    Raises:
+        ViewerError: If the page is closed on the way.
+    """
+    while live.page.serving:
+        try:
+            wanted = commands.read(live)
+            if wanted is None:
+                continue
+            if wanted.done:
+                return
+            tell(state_line(live.apply(wanted)))
+        except ViewerError:
+            raise
+        except SoftRobotsError as error:
+            complain(f"error: {error}")
+
+
+def state_line(equilibrium: Equilibrium) -> str:
+    """A loaded robot in a line: where its tip is, its actuators, whether it is stable and wrinkled, the residual."""
+    words = [f"tip {_spelled(equilibrium.tip_position)} m"]
+    if len(equilibrium.q_motors):
+        words.append(f"motors {_spelled(equilibrium.q_motors)}" + ("" if equilibrium.within_limits else " (beyond limits)"))
+    words.append("stable" if equilibrium.stable else "not stable")
+    if equilibrium.model.spring_groups:
+        words.append("wrinkled" if equilibrium.wrinkled else "not wrinkled")
+    return ", ".join((*words, f"residual {equilibrium.residual:.1e} N m"))
+
+
+def tip_force(equilibrium: Equilibrium) -> FloatArray:
+    """Force on the tip, shape (3,) [N], of a robot that nothing else but gravity loads.
+
+    Raises:
+        ParameterError: If there is another force, or a moment.
+    """
+    model, wrenches = equilibrium.model, equilibrium.load.wrenches
+    if any(wrench.any() for name, wrench in wrenches.items() if name != model.tip) or not equilibrium.conservative:
+        told = {name: wrench.tolist() for name, wrench in wrenches.items()}
+        raise ParameterError("load", told, "a force on the tip and gravity only, to be changed by commands")
+    return read_only(np.array(wrenches[model.tip][:3]) if model.tip in wrenches else np.zeros(3))
+
+
+def _spelled(values: FloatArray) -> str:
+    return " ".join(f"{value:.4f}" for value in (values.round(4) + 0.0).tolist())  # no negative zero

@@ -1,0 +1,108 @@
+"""Triangles and colours of the meshes of a robot, for pictures.
+
+Pinocchio reads meshes through Coal (3.0), which joins the parts of a file that hang on one node into one list of corners and
+lets every triangle count from the first part: a mesh of several materials comes out torn. So files are read once more by
+trimesh, which tells the colour of each part, too.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+
+_FARTHEST = 1e9  # [m]; sums and squares of corners must be numbers in single precision, too
+
+
+class Triangles(NamedTuple):
+    """A surface."""
+
+    corners: FloatArray
+    """Shape (n, 3) [m]."""
+    faces: Any
+    """Corners of each triangle, shape (m, 3), integers."""
+
+
+class ColouredPart(NamedTuple):
+    """A part of a mesh."""
+
+    surface: Triangles
+    """Its triangles."""
+    rgba: tuple[float, float, float, float] | None
+    """Red, green, blue, opacity in [0, 1]; None if the file gives no colour."""
+
+
+def coloured_parts(mesh: Any, file: Path, scale: FloatArray) -> tuple[ColouredPart, ...]:
+    """Parts of a mesh as its file colours them.
+
+    Args:
+        mesh: The mesh as Coal has read it, scaled.
+        file: Its file.
+        scale: Scale along x, y, z, shape (3,).
+
+    Returns:
+        The parts. Coal's triangles in one part, if trimesh is not there, cannot read the file, or puts its corners elsewhere
+        (up axis and unit of a file are read differently).
+    """
+    corners = np.array(mesh.vertices())
+    parts = _parts(file, scale)
+    if parts:
+        everything = np.concatenate([part.surface.corners for part in parts])
+        size = float(np.ptp(corners, axis=0).max())
+        if all(
+            np.allclose(end(everything, axis=0), end(corners, axis=0), rtol=0.0, atol=1e-4 * size) for end in (np.min, np.max)
+        ):
+            return parts
+    triangles = (mesh.tri_indices(number) for number in range(mesh.num_tris))
+    return (ColouredPart(Triangles(corners, np.array([[t[0], t[1], t[2]] for t in triangles])), None),)
+
+
+def readable(file: Path) -> bool:
+    """Whether Coal, and so Pinocchio, can read a mesh file, and its corners are numbers."""
+    try:
+        return has_finite_corners(coal.MeshLoader().load(str(file), np.ones(3)))
+    except (ValueError, RuntimeError):
+        return False
+
+
+def has_finite_corners(geometry: Any) -> bool:
+    """Whether no corner of a geometry that Coal has read is infinite, no number, or absurdly far away."""
+    if not isinstance(geometry, coal.BVHModelBase):
+        return True
+    return bool(np.all(np.abs(np.asarray(geometry.vertices())) <= _FARTHEST))  # NaN is not
+
+
+def _parts(file: Path, scale: FloatArray) -> tuple[ColouredPart, ...]:
+    try:
+        import trimesh
+
+        with warnings.catch_warnings(), np.errstate(all="ignore"):  # what it computes of colours that are no numbers
+            warnings.simplefilter("ignore", DeprecationWarning)  # pycollada sets shapes as NumPy 2.5 no longer wants
+            return _parts_of(trimesh, trimesh.Scene(trimesh.load(str(file))), scale)
+    except Exception:  # whatever the reader of that format comes upon
+        return ()
+
+
+def _parts_of(trimesh: Any, scene: Any, scale: FloatArray) -> tuple[ColouredPart, ...]:
+    made = []
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        part = scene.geometry[name]
+        if not isinstance(part, trimesh.Trimesh) or not len(part.faces):
+            continue
+        corners = (np.asarray(part.vertices) @ transform[:3, :3].T + transform[:3, 3]) * scale
+        made.append(ColouredPart(Triangles(corners, np.asarray(part.faces)), _colour(part.visual)))
+    return tuple(made)
+
+
+def _colour(visual: Any) -> tuple[float, float, float, float] | None:
+    material = getattr(visual, "material", None)
+    if material is None or not visual.defined:
+        return None
+    red, green, blue, opacity = (np.asarray(material.main_color, dtype=np.float64) / 255.0).tolist()
+    return red, green, blue, opacity

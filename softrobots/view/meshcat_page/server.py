@@ -1,0 +1,105 @@
+"""Starts and ends the meshcat server of a viewer, on loopback only, and connects to it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from softrobots.core.errors import ViewerError
+from softrobots.view.served_page import LOOPBACK
+
+_REPLY_TIME = 30_000  # [ms], longest wait for an answer of the server
+# As a file: as a module of the package it would import Pinocchio first, which takes as long as the server itself.
+_RUN = f"import runpy; runpy.run_path({str(Path(__file__).with_name('server_process.py'))!r}, run_name='__main__')"
+
+
+def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str, str]:
+    """Start a server process.
+
+    Args:
+        port: Port of the page; by default the first free one from 7000.
+
+    Returns:
+        The process, its ZeroMQ address and its web address.
+
+    Raises:
+        ViewerError: If it ends before it serves, e.g. because the port is taken.
+    """
+    wish = [] if port is None else [str(port)]
+    server = subprocess.Popen(
+        [sys.executable, "-u", "-c", _RUN, LOOPBACK, *wish],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    watchdog = threading.Timer(_REPLY_TIME / 1000.0, server.kill)  # a server that says nothing ends, and so does the wait
+    watchdog.start()
+    found: dict[str, str] = {}
+    while server.stdout is not None and len(found) < 2:
+        line = server.stdout.readline().decode("utf-8", "replace")
+        if not line:
+            watchdog.cancel()
+            told = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
+            end_server(server)
+            raise ViewerError(f"the meshcat server ended before it served: {told}")
+        name, _, value = line.strip().partition("=")
+        if name in ("zmq_url", "web_url"):
+            found[name] = value
+    watchdog.cancel()
+    return server, found["zmq_url"], found["web_url"]
+
+
+def end_server(server: subprocess.Popen[bytes]) -> None:
+    """End a server process and wait for its end."""
+    server.terminate()
+    try:
+        server.wait(5.0)
+    except subprocess.TimeoutExpired:
+        server.kill()
+        server.wait()
+    for stream in (server.stdin, server.stdout, server.stderr):
+        if stream is not None:
+            stream.close()
+
+
+def connect(zmq_url: str, web_url: str) -> Any:
+    """Connect to a server; returns a `meshcat.Visualizer` whose calls fail rather than wait for ever."""
+    import meshcat
+    import zmq
+    from meshcat.visualizer import ViewerWindow
+
+    class Window(ViewerWindow):  # type: ignore[misc]
+        """Meshcat's window without its second socket, which nobody closes, and without its message on stdout."""
+
+        def __init__(self) -> None:
+            self.server_proc = None
+            self.zmq_url, self.web_url = zmq_url, web_url
+            self.connect_zmq()
+            self.zmq_socket.rcvtimeo = _REPLY_TIME
+
+        def send(self, command: Any) -> None:
+            """Send a command, and wait for the answer."""
+            try:
+                super().send(command)
+            except zmq.ZMQError as error:  # ended or stopped while it was asked
+                raise ViewerError(f"the meshcat server does not answer: {error}") from error
+
+    return meshcat.Visualizer(window=Window())
+
+
+def tell_server(page: Any, what: str, text: str) -> None:
+    """Tell a server what meshcat itself has no words for.
+
+    Args:
+        page: The `meshcat.Visualizer`.
+        what: "page", the HTML that it serves, or "legend", the rows of the legend on it.
+        text: HTML.
+
+    Raises:
+        ViewerError: If the server does not answer.
+    """
+    page.window.send(SimpleNamespace(lower=lambda: {"type": what, "path": "", "text": text}))

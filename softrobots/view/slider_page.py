@@ -1,0 +1,239 @@
+"""A robot in the browser with sliders: motors or muscles, a force on the tip, gravity; every change is solved and drawn."""
+
+from __future__ import annotations
+
+import atexit
+import threading
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, positive_integer, positive_number
+from softrobots.core.errors import NeutralEquilibrium, NotConverged, ParameterError, ViewerError
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.loads import EARTH_GRAVITY
+from softrobots.statics.sensitivity import compliance
+from softrobots.view.meshcat_page.robot import RobotDrawing
+from softrobots.view.meshcat_page.stage import Stage
+from softrobots.view.scene import Scene
+from softrobots.view.served_page import LOOPBACK, ServedPage
+from softrobots.view.viser_page.server import end_server, start_server
+from softrobots.view.viser_page.slider_panel import SliderPanel, Wish, round_down
+from softrobots.view.viser_page.tree import ViserTree
+from softrobots.view.warm_start import next_equilibrium
+
+_BENDING = 0.25  # how far the largest force moves the tip of a relaxed robot, as far as it is linear, of the robot's size
+_ANY_FORCE = 10.0  # [N], the largest force on a robot that does not bend
+_TRAIL = 2000  # most points of the path of the tip
+
+
+class SliderPage(ServedPage):
+    """A page with sliders for one robot, served by viser on loopback only; a context manager that ends its server.
+
+    The equilibrium is solved anew at every change, from the one that is shown: a robot that has snapped through stays on its
+    branch until it is reset. While a solution is under way changes are not queued: the newest is taken up next. Where there is
+    no equilibrium, the page says so and keeps showing the last one.
+    """
+
+    def __init__(
+        self,
+        model: SoftModel,
+        *,
+        q_motors: Any = None,
+        force: Any = None,
+        gravity: Any = None,
+        port: int | None = None,
+        full_force: float | None = None,
+    ) -> None:
+        """Solve the start, then start a server in threads of this process and draw it.
+
+        Args:
+            model: The robot.
+            q_motors: Actuator coordinates at the start, shape (n_motors,) [rad, m or N]; relaxed by default.
+            force: Force on the tip at the start, shape (3,) [N], world axes; none by default.
+            gravity: Gravity, shape (3,) [m/s^2], world axes, which can be switched off; by default it is off, and the Earth's
+                when it is switched on.
+            port: Port of the page; the first free one from 8080 by default.
+            full_force: How far each slider of the force goes to both sides [N]; by default a round number that bends the robot
+                visibly, or the largest component of `force` if that is more.
+
+        Raises:
+            ParameterError: If an argument has the wrong shape, is not finite or out of range.
+            EquilibriumNotFound: If there is no equilibrium at the start.
+            MissingDependency: If viser is not installed.
+            ViewerError: If the port is not free, or a shape cannot be drawn.
+        """
+        self._model = check_model(model)
+        relaxed = model.relaxed_motors if q_motors is None else q_motors
+        push = finite_array("force", (0.0, 0.0, 0.0) if force is None else force, (3,), "N")
+        self._gravity = finite_array("gravity", EARTH_GRAVITY if gravity is None else gravity, (3,), "m/s^2")
+        self._full = _visible_force(model) if full_force is None else positive_number("full_force", full_force, "N")
+        if full_force is None:
+            self._full = max(self._full, float(np.abs(push).max()))
+        self._start = Wish(self._checked_motors(relaxed), self._checked_force(push), gravity is not None)
+        wished = None if port is None else positive_integer("port", port, 65535)
+        self._equilibrium = self._cold(self._start)
+        self._last: Wish | None = self._start
+        self._problem: Exception | None = None
+        self._trail: list[FloatArray] = []
+        scene = Scene(model)
+        self._lock, self._wake, self._closed = threading.Lock(), threading.Event(), threading.Event()
+        self._worker = threading.Thread(target=self._follow, name="softrobots sliders", daemon=True)
+        self._server = start_server(model.pinocchio.name, wished)
+        try:
+            self._port = int(self._server.get_port())
+            self._tree = ViserTree(self._server)
+            root = self._tree["softrobots"]
+            stage = Stage(self._tree, root, model)
+            self._root, self._robot = root, RobotDrawing(root, model, scene, stage.size, 0.5 * self._full)
+            stage.prepare(scene.ground())
+            stage.look_at(self._equilibrium.tip_position)
+            self._panel = SliderPanel(self._server.gui, model, self._start, self._full, changed=self._wake.set)
+            self._draw()
+            self._show_extras()
+            self._panel.tell(self._equilibrium, self._robot.legend())
+        except BaseException:
+            end_server(self._server)
+            raise
+        self._worker.start()
+        atexit.register(self.close)
+
+    @property
+    def url(self) -> str:
+        """Address of the page; reachable from this machine only."""
+        return f"http://{LOOPBACK}:{self._port}/"
+
+    @property
+    def serving(self) -> bool:
+        """Whether the server runs."""
+        return not self._closed.is_set()
+
+    @property
+    def equilibrium(self) -> Equilibrium:
+        """The equilibrium that is shown."""
+        return self._equilibrium
+
+    def set(self, *, q_motors: Any = None, force: Any = None, gravity: bool | None = None) -> Equilibrium:
+        """Move the sliders, solve and draw; what is left out stays.
+
+        Args:
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+            force: Force on the tip, shape (3,) [N], world axes.
+            gravity: Whether there is gravity.
+
+        Returns:
+            The equilibrium that is shown then.
+
+        Raises:
+            ParameterError: If an argument has the wrong shape, is not finite, or is beyond the ends of a slider.
+            EquilibriumNotFound: If there is none; the page says so too.
+            ViewerError: If the page is closed.
+        """
+        motors = None if q_motors is None else self._checked_motors(q_motors)
+        push = None if force is None else self._checked_force(finite_array("force", force, (3,), "N"))
+        if gravity is not None and not isinstance(gravity, bool):
+            raise ParameterError("gravity", gravity, "True or False; the page was given the vector when it was made")
+        with self._lock:
+            if self._closed.is_set():
+                raise ViewerError("the page is closed; open a new one")
+            now = self._panel.wish
+            wish = Wish(
+                now.q_motors if motors is None else motors,
+                now.force if push is None else push,
+                now.gravity if gravity is None else gravity,
+            )
+            self._panel.put(wish)
+            self._solve(wish)
+            if self._problem is not None:
+                raise self._problem
+            return self._equilibrium
+
+    def close(self) -> None:
+        """End the server and its threads; the page stays as it is in browsers that show it."""
+        with self._lock:
+            if self._closed.is_set():
+                return
+            self._closed.set()
+        self._wake.set()
+        atexit.unregister(self.close)
+        self._worker.join()
+        end_server(self._server)
+
+    def _follow(self) -> None:
+        """Take up what the sliders ask for until the page is closed; of changes that come meanwhile the newest."""
+        while self._wake.wait() and not self._closed.is_set():
+            self._wake.clear()
+            with self._lock:
+                if self._panel.taken_reset():
+                    self._panel.put(self._start)
+                    self._equilibrium, self._trail, self._last = self._cold(self._start), [], None
+                wish = self._panel.wish
+                if self._last is not None and not self._model.actuators.independent:
+                    wish = wish._replace(q_motors=_fitting(self._model, self._last.q_motors, wish.q_motors))
+                    self._panel.put(wish)
+                self._solve(wish)
+
+    def _solve(self, wish: Wish) -> None:
+        """Solve and draw what is asked for, unless it is what was asked for last; where that fails, the page says why."""
+        try:
+            if wish != self._last:
+                self._last, self._problem = wish, None
+                gravity = self._gravity if wish.gravity else None
+                self._equilibrium = next_equilibrium(self._equilibrium, wish.q_motors, wish.force, gravity=gravity)
+                self._draw()
+            self._show_extras()
+        except Exception as error:  # whatever it is: the next change has another chance
+            self._problem = error
+        self._panel.tell(self._equilibrium, self._robot.legend(), "" if self._problem is None else str(self._problem))
+
+    def _cold(self, wish: Wish) -> Equilibrium:
+        """Solve from relaxed springs."""
+        gravity = self._gravity if wish.gravity else None
+        return solve_equilibrium(self._model, wish.q_motors, wish.force, gravity=gravity)
+
+    def _draw(self) -> None:
+        """Draw the equilibrium."""
+        self._trail = [*self._trail[1 - _TRAIL :], self._equilibrium.tip_position]
+        self._robot.show(self._equilibrium)
+
+    def _show_extras(self) -> None:
+        """Draw what can be switched on and off."""
+        self._root["rigid"].set_property("visible", self._panel.rigid)
+        if self._panel.path:
+            self._robot.trace(np.array(self._trail))
+        self._root["path"].set_property("visible", self._panel.path)
+        self._tree.commit()
+
+    def _checked_motors(self, value: Any) -> tuple[float, ...]:
+        motors = self._model.checked_motors(value)
+        low, high = self._model.motor_limits.T
+        if not np.all((motors >= low) & (motors <= high)):
+            raise ParameterError("q_motors", value, f"within the limits of the motors, {self._model.motor_limits.tolist()}")
+        return tuple(motors.tolist())
+
+    def _checked_force(self, force: FloatArray) -> tuple[float, ...]:
+        if np.any(np.abs(force) > self._full):
+            raise ParameterError("force", force, f"within the ends of its sliders, +-{self._full:g} N (full_force)")
+        return tuple(force.tolist())
+
+
+def _fitting(model: SoftModel, last: tuple[float, ...], wished: tuple[float, ...]) -> tuple[float, ...]:
+    """Muscle lengths that some shape of the robot has: those that changed stay as wished, the others follow, within limits."""
+    here, basis = np.array(last), model.actuators.basis
+    change = np.array(wished) - here
+    moved = change != 0.0
+    step = basis @ np.linalg.lstsq(basis[moved], change[moved], rcond=None)[0]
+    return tuple(model.actuators.go(here, step).tolist())
+
+
+def _visible_force(model: SoftModel) -> float:
+    """A round force that moves the tip of the relaxed robot by a part of its size, where it gives way most easily [N]."""
+    try:
+        softest = float(np.linalg.eigvalsh(compliance(model, solve_equilibrium(model, model.relaxed_motors))[:3, :3])[-1])
+    except (NeutralEquilibrium, NotConverged):
+        return _ANY_FORCE
+    force = _BENDING * model.reach / max(softest, 1e-300)
+    if not 1e-6 < force < 1e6:
+        return _ANY_FORCE
+    return round_down(force)

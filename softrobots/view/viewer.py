@@ -1,0 +1,289 @@
+"""The robot in the browser: meshcat on loopback, and self-contained HTML files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from softrobots.core.checks import FloatArray, finite_array, positive_integer, positive_number
+from softrobots.core.errors import ParameterError, ViewerError
+from softrobots.core.files import new_file, write_text
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.robots import HelixTube
+from softrobots.statics.equilibrium import Equilibrium, check_same_model
+from softrobots.statics.inverse_kinematics import IkSolution
+from softrobots.statics.trajectory import Trajectory
+from softrobots.view.meshcat_page.inline_page import InlinePage
+from softrobots.view.meshcat_page.page_text import legend_rows, live_page, page_text
+from softrobots.view.meshcat_page.robot import RobotDrawing
+from softrobots.view.meshcat_page.server import connect, end_server, start_server, tell_server
+from softrobots.view.meshcat_page.stage import Stage
+from softrobots.view.scene import Scene
+from softrobots.view.served_page import ServedPage
+
+
+class Viewer(ServedPage):
+    """A meshcat page that shows one robot; a context manager that ends its server.
+
+    The deformed robot is opaque; the rigid one, with the same motors and relaxed springs, is translucent. Inflated links are
+    coloured by the share of the wrinkling moment that is left. Segments with sections are drawn as smooth translucent tubes,
+    with their muscles (blue pulls, orange pushes) and the equivalent chain inside. As the last expression of a cell of a
+    notebook it is shown there, as it is at that moment.
+    """
+
+    def __init__(self, model: SoftModel, *, port: int | None = None) -> None:
+        """Start a server on loopback and draw the robot at rest.
+
+        Args:
+            model: The robot.
+            port: Port of the page; by default the first free one from 7000.
+
+        Raises:
+            ParameterError: If it is no model or no port.
+            ViewerError: If the server does not start, e.g. on a port that is taken, or a shape cannot be drawn.
+        """
+        self._model = check_model(model)
+        scene = Scene(model)
+        self._server, zmq_url, self._url = start_server(None if port is None else positive_integer("port", port, 65535))
+        try:
+            self._page = connect(zmq_url, self._url)
+            root = self._page["softrobots"]
+            self._stage = Stage(self._page, root, model)
+            self._robot = RobotDrawing(root, model, scene, self._stage.size)
+            self._stage.prepare(scene.ground())
+            tell_server(self._page, "page", live_page(model.pinocchio.name))
+            self._legend = ""
+            self._show_legend()
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def url(self) -> str:
+        """Address of the page; reachable from this machine only."""
+        return self._url
+
+    @property
+    def serving(self) -> bool:
+        """Whether the server runs."""
+        return self._server.poll() is None
+
+    def show(self, equilibrium: Equilibrium) -> None:
+        """Show a loaded robot: deformed and rigid, its forces as arrows, its links coloured.
+
+        Args:
+            equilibrium: An equilibrium of the viewer's robot.
+
+        Raises:
+            ParameterError: If it belongs to another robot.
+            ViewerError: If the viewer is closed.
+        """
+        self._check(equilibrium)
+        self._robot.show(equilibrium)
+        self._show_legend()
+
+    def show_configuration(self, q: FloatArray) -> None:
+        """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling, the chain alone.
+
+        Raises:
+            ParameterError: If the shape differs or a number is not finite.
+        """
+        q = finite_array("q", q, (self._model.pinocchio.nq,))
+        self._check_open()
+        self._robot.show_configuration(q)
+        self._show_legend()
+
+    def trace(self, points: Any) -> None:
+        """Draw a path as dots.
+
+        Args:
+            points: Positions, shape (n, 3) [m].
+
+        Raises:
+            ParameterError: If the shape differs or a number is not finite.
+            ViewerError: If the viewer is closed.
+        """
+        self._check_open()
+        self._robot.trace(finite_array("points", points, (None, 3), "m"))
+        self._show_legend()
+
+    def mark(self, target: Any) -> None:
+        """Draw a cross at a target, in place of the last one.
+
+        Args:
+            target: Where, shape (3,) [m]; None: no cross.
+
+        Raises:
+            ParameterError: If the shape differs or a number is not finite.
+            ViewerError: If the viewer is closed.
+        """
+        self._check_open()
+        self._robot.mark(None if target is None else finite_array("target", target, (3,), "m"))
+        self._show_legend()
+
+    def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1000) -> None:
+        """Play a trajectory as a meshcat animation, path and forces included; it starts by itself and can be scrubbed.
+
+        Args:
+            trajectory: A trajectory of the viewer's robot.
+            duration: Time of the animation [s]; the time of the trajectory by default.
+            repetitions: How often it plays. (At the end of the last one meshcat goes back to the start, and then mixes the two
+                when the slider is moved; hence not once by default.)
+
+        Raises:
+            ParameterError: If it belongs to another robot, or the duration is not positive.
+        """
+        if not isinstance(trajectory, Trajectory):
+            raise ParameterError("trajectory", trajectory, "a Trajectory")
+        self._check(trajectory.equilibria[0])
+        span = float(trajectory.times[-1] - trajectory.times[0])
+        seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
+        positive_integer("repetitions", repetitions)
+        self._stage.look_at(trajectory.tip_positions.mean(axis=0))
+        self._page.set_animation(self._robot.animation(trajectory, seconds), play=True, repetitions=repetitions)
+        self._show_legend()
+
+    def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
+        """Play the growth of a helical tube: it everts at its tip, and the helix forms behind the tip.
+
+        Wall that has come out stays where it is; the rest waits inside (dark) and comes forward at twice the speed of the tip.
+
+        Args:
+            tube: The tube that the viewer's model was made of, with chain="sections".
+            duration: Time of the animation [s].
+            front: Length of tube behind the tip over which the helix forms [m]; three diameters by default, 0: at the tip.
+            hold: Share of the time at the end during which the whole tube is shown, in [0, 1).
+
+        Raises:
+            ParameterError: If the tube is not that of the viewer's model, or an argument is out of range.
+            ViewerError: If the viewer is closed.
+        """
+        self._check_open()
+        if not isinstance(tube, HelixTube) or tube.urdf() != self._model.urdf:
+            raise ParameterError("tube", tube, "the HelixTube that the viewer's model was loaded from")
+        animation, along = self._robot.growth(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
+        self._stage.look_at(along.max(axis=0) + along.min(axis=0))
+        self._page.set_animation(animation, play=True, repetitions=1000)
+        self._show_legend()
+
+    def look_at(self, tip: FloatArray) -> None:
+        """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
+
+        The base is the world's origin, unless the chain starts farther from it than it is long.
+
+        Args:
+            tip: Where the tip is, or is on average, shape (3,) [m].
+        """
+        self._stage.look_at(tip)
+
+    def look_from(self, eye: Any, centre: Any) -> None:
+        """Put the camera somewhere.
+
+        Args:
+            eye: Where the camera is, shape (3,) [m], world axes.
+            centre: What it looks at, shape (3,) [m], world axes; not where it is.
+
+        Raises:
+            ParameterError: If a shape differs, a number is not finite, or both are the same point.
+        """
+        self._stage.look_from(eye, centre)
+
+    def html(self, title: str = "softrobots") -> str:
+        """Return the page as one self-contained HTML text that works offline, with its animation.
+
+        Args:
+            title: Title of the page.
+
+        Raises:
+            ViewerError: If the viewer is closed.
+        """
+        self._check_open()
+        return page_text(self._page.static_html(), title, self._robot.legend())
+
+    def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
+        """Write `html` to a file.
+
+        Args:
+            path: The file.
+            title: Title of the page.
+            overwrite: Replace an existing file.
+
+        Returns:
+            The path.
+
+        Raises:
+            OutputExists: If the file exists and `overwrite` is false.
+        """
+        new_file(path, overwrite=overwrite)  # tells at once
+        return write_text(path, self.html(title), overwrite=overwrite)
+
+    def inline(self, height: int = 480, *, title: str = "softrobots") -> InlinePage:
+        """The page as it is now, for a cell of a notebook; stays there when the viewer is closed.
+
+        Args:
+            height: Height in the notebook [px].
+            title: Title of the page.
+
+        Raises:
+            ParameterError: If the height is no positive integer, at most 10000.
+            ViewerError: If the viewer is closed.
+        """
+        return InlinePage(self.html(title), positive_integer("height", height, 10_000))
+
+    def _repr_html_(self) -> str:
+        """What Jupyter shows of a viewer: `inline`."""
+        return self.inline()._repr_html_()
+
+    def close(self) -> None:
+        """End the server; the page stays as it is in browsers that show it."""
+        page = getattr(self, "_page", None)
+        if page is not None:
+            page.window.zmq_socket.close(linger=0)
+        end_server(self._server)
+
+    def _show_legend(self) -> None:
+        """Bring the legend of the served page up to what is drawn."""
+        rows = legend_rows(self._robot.legend())
+        if rows != self._legend:
+            tell_server(self._page, "legend", rows)
+            self._legend = rows
+
+    def _check(self, equilibrium: Any) -> None:
+        check_same_model(self._model, equilibrium)
+        self._check_open()
+
+    def _check_open(self) -> None:
+        if not self.serving:
+            raise ViewerError("the viewer is closed, or its server has ended; open a new one")
+
+
+def view(model: SoftModel, result: Equilibrium | IkSolution | Trajectory | None = None, *, port: int | None = None) -> Viewer:
+    """Open a viewer and show a result in it.
+
+    Args:
+        model: The robot.
+        result: An equilibrium to show, a solution of the inverse kinematics to show with its target, or a trajectory to play;
+            the robot at rest by default.
+        port: Port of the page; by default the first free one from 7000.
+
+    Returns:
+        The viewer; print its `url` and `tunnel`, and `close` it at the end (or use it in a `with` statement).
+
+    Raises:
+        ParameterError: If the result is something else or belongs to another robot, or it is no port.
+        ViewerError: If the server does not start.
+    """
+    viewer = Viewer(model, port=port)
+    try:
+        if isinstance(result, Trajectory):
+            viewer.animate(result)
+        elif result is not None:
+            shown = result.equilibrium if isinstance(result, IkSolution) else result
+            viewer.show(shown)
+            viewer.look_at(shown.tip_position)
+            if isinstance(result, IkSolution):
+                viewer.mark(result.target)
+    except BaseException:
+        viewer.close()
+        raise
+    return viewer

@@ -1,0 +1,184 @@
+"""The panel beside a robot in the browser: sliders of its motors and of the force on its tip, and what the statics says."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.view.meshcat_page.page_text import Colour, legend_rows
+
+_STEPS = 400  # least number of steps of a slider
+_LISTED = 6  # inflated links of which each is told
+_SLIDE = 1.0  # [m], how far from the middle a slide without limits goes
+
+_STYLE = (
+    "<style>#softrobots-panel{font:13px/1.5 sans-serif;padding:0 1em .5em} #softrobots-note{font-weight:bold;color:#8b0000}"
+    "#softrobots-legend span{display:inline-block;width:1.1em;height:.8em;margin-right:.5em;border:1px solid #888}"
+    "#softrobots-state td{padding-right:.8em;vertical-align:top}</style>"
+)
+
+
+class Wish(NamedTuple):
+    """What the sliders ask for."""
+
+    q_motors: tuple[float, ...]
+    """Actuator coordinates [rad, m or N]."""
+    force: tuple[float, ...]
+    """Force on the tip [N], world axes."""
+    gravity: bool
+    """Whether there is gravity."""
+
+
+class SliderPanel:
+    """The panel on a page of viser."""
+
+    def __init__(self, gui: Any, model: SoftModel, start: Wish, full_force: float, *, changed: Callable[[], None]) -> None:
+        """Add the panel.
+
+        Args:
+            gui: The `viser.GuiApi`.
+            model: The robot.
+            start: Where the sliders stand.
+            full_force: How far each slider of the force goes to both sides [N].
+            changed: Called whenever somebody changes something, in the thread of the server: must not wait.
+        """
+        self._gui, self._changed = gui, changed
+        self._reset = False
+        rows = zip(model.motor_joints, model.actuators.units, model.motor_limits.tolist(), start.q_motors, strict=True)
+        with gui.add_folder("muscles" if model.n_motors == len(model.muscles) > 0 else "motors", visible=model.n_motors > 0):
+            self._motors = [self._slider(name, unit, *_ends(limits, unit), value) for name, unit, limits, value in rows]
+        with gui.add_folder("load"):
+            force = zip("xyz", start.force, strict=True)
+            self._force = [self._slider(f"force {axis}", "N", -full_force, full_force, value) for axis, value in force]
+            self._gravity = self._checkbox("gravity", start.gravity)
+        with gui.add_folder("picture"):
+            self._rigid = self._checkbox("show rigid arm", True)
+            self._path = self._checkbox("path of the tip", False)
+        button = gui.add_button("reset", hint="back to the start, with relaxed springs")
+
+        button.on_click(self._pressed)
+        self._text = gui.add_html(_STYLE)
+
+    @property
+    def wish(self) -> Wish:
+        """What the sliders ask for now."""
+        motors, force = (tuple(slider.value for slider in sliders) for sliders in (self._motors, self._force))
+        return Wish(motors, force, self._gravity.value)
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the rigid robot is to be seen."""
+        return bool(self._rigid.value)
+
+    @property
+    def path(self) -> bool:
+        """Whether the path of the tip is to be seen."""
+        return bool(self._path.value)
+
+    def taken_reset(self) -> bool:
+        """Whether the button was pressed since the last call."""
+        pressed, self._reset = self._reset, False
+        return pressed
+
+    def put(self, wish: Wish) -> None:
+        """Move the sliders."""
+        values = (*wish.q_motors, *wish.force)
+        for slider, value in zip((*self._motors, *self._force), values, strict=True):
+            slider.value = value
+        self._gravity.value = wish.gravity
+
+    def tell(self, equilibrium: Equilibrium, legend: Sequence[tuple[Colour, str]], problem: str = "") -> None:
+        """Write what an equilibrium is and what the colours mean.
+
+        Args:
+            equilibrium: The equilibrium that is shown.
+            legend: Colour and meaning of each thing.
+            problem: Why it is not the one that the sliders ask for.
+        """
+        rows = "".join(f"<tr><td>{name}</td><td>{html.escape(text)}</td></tr>" for name, text in _facts(equilibrium))
+        note = f'<div id="softrobots-note">NO EQUILIBRIUM; the picture shows the last one. {html.escape(problem)}</div>'
+        self._text.content = (
+            f'{_STYLE}<div id="softrobots-panel">{note if problem else ""}<table id="softrobots-state">{rows}</table>'
+            f'<div id="softrobots-legend">{legend_rows(legend)}</div></div>'
+        )
+
+    def _slider(self, name: str, unit: str, low: float, high: float, value: float) -> Any:
+        first, last, step = slider_grid(low, high)
+        made = self._gui.add_slider(f"{name} [{unit}]", first, last, step, first)  # a round number: viser shows as many digits
+        made.value = value
+        made.on_update(self._moved)
+        return made
+
+    def _checkbox(self, label: str, ticked: bool) -> Any:
+        made = self._gui.add_checkbox(label, ticked)
+        made.on_update(self._moved)
+        return made
+
+    # Coroutines run in the thread of the server; functions would each take another thread of a pool.
+    async def _moved(self, _: Any) -> None:
+        self._changed()
+
+    async def _pressed(self, _: Any) -> None:
+        self._reset = True
+        self._changed()
+
+
+def round_down(number: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above a positive number (to rounding)."""
+    power = math.floor(math.log10(number * (1.0 + 1e-9)))
+    return max(float(f"{digit}e{power}") for digit in (1, 2, 5) if digit * 10.0**power <= number * (1.0 + 1e-9))
+
+
+def slider_grid(low: float, high: float) -> tuple[float, float, float]:
+    """First value, last value and step of a slider: round numbers within two limits.
+
+    Args:
+        low: Lower limit.
+        high: Upper limit, not below.
+
+    Returns:
+        Multiples of a step of 1, 2 or 5 times a power of ten, at least 400 of them between the limits; the limits themselves
+        where nothing is between them.
+    """
+    if high <= low:
+        return low, low, 1.0
+    step = round_down((high - low) / _STEPS)
+    digits = max(0, -math.floor(math.log10(step)))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return round(first * step, digits), round(last * step, digits), step
+
+
+def _ends(limits: Sequence[float], unit: str) -> tuple[float, float]:
+    """Limits of a slider: those of the motor, or, where it has none, a distance from the other or from zero."""
+    (low, high), around = limits, math.pi if unit == "rad" else _SLIDE
+    if math.isinf(low) and math.isinf(high):
+        return -around, around
+    return high - 2.0 * around if math.isinf(low) else low, low + 2.0 * around if math.isinf(high) else high
+
+
+def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:
+    """Name and text of what the statics says."""
+    x, y, z = equilibrium.tip_position.tolist()
+    facts = [("tip [m]", f"{x:.4f}  {y:.4f}  {z:.4f}")]
+    truths = (
+        ("stable", equilibrium.stable),
+        ("conservative", equilibrium.conservative),
+        ("within limits", equilibrium.within_limits),
+    )
+    facts += [(name, "yes" if true else "no") for name, true in truths]
+    groups = equilibrium.model.spring_groups
+    left = [1.0 - moment / group.wrinkling_moment for moment, group in zip(equilibrium.link_moments, groups, strict=True)]
+    told = [
+        f"{'link' if group.segment is None else 'section'} {number}: "
+        + ("wrinkled" if share <= 0.0 or flat else f"{100.0 * share:.0f} %")
+        for number, (group, share, flat) in enumerate(zip(groups, left, equilibrium.saturated, strict=True), start=1)
+    ]
+    if len(told) > _LISTED:
+        told = [f"least of {len(told)}, {told[int(np.argmin(left))]}"]
+    return facts + ([("left to wrinkling", "; ".join(told))] if told else [])
