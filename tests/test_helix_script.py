@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 import softrobots as sr
+from softrobots.view.meshcat_page import animation_frames
 from tests.test_scripts import run_script
 
 
 @pytest.fixture(autouse=True)
 def light_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """A growth of few pictures."""
-    monkeypatch.setattr("softrobots.view.meshcat_page.animation_frames._MOST_BODIES", 6)
+    monkeypatch.setattr(animation_frames, "_MOST_BODIES", 6)
 
 
 def test_an_actuator_becomes_design_template_robots_and_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

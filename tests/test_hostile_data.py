@@ -29,6 +29,7 @@ from softrobots.helix import ActuatorTable, HelixDesign
 from softrobots.robots.parameter_file import LARGEST_FILE, read_parameters
 from softrobots.statics import results_io
 from softrobots.statics.result_fields import KINDS
+from softrobots.view.live import input as live_input
 from softrobots.view.live.input import Keys, Lines, WatchedFile
 from softrobots.view.live.keys import KeyMoves
 from softrobots.view.live.loop import LiveView, follow
@@ -596,7 +597,7 @@ def test_any_lines_of_a_pipe_are_followed_or_told(arm: sr.SoftModel, sent: bytes
 
 def test_a_watched_file_may_lie_about_its_size(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Files of the kernel have no size until they are read, and some have no end."""
-    monkeypatch.setattr("softrobots.view.live.input._LARGEST", 1000)
+    monkeypatch.setattr(live_input, "_LARGEST", 1000)
     live = LiveView(Shown(), sr.solve_equilibrium(arm, (0.3, 0.6, -0.8)))
     endless = Path("/proc/kallsyms")
     if not endless.is_file():

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
+from softrobots.view import warm_start
 from softrobots.view.live import input as live_input
 from softrobots.view.live.commands import Wanted, changed, read_commands
 from softrobots.view.live.input import Lines, Terminal, WatchedFile, commands_from
@@ -153,7 +154,7 @@ def test_without_a_way_from_the_last_springs_the_relaxed_ones_are_tried(
             raise sr.EquilibriumNotFound("none", best=None, residual=1.0, iterations=1)
         return sr.solve_equilibrium(*arguments, **options)
 
-    monkeypatch.setattr("softrobots.view.warm_start.solve_equilibrium", fails_warm)
+    monkeypatch.setattr(warm_start, "solve_equilibrium", fails_warm)
     assert np.array_equal(next_equilibrium(last, (0.2, 0.5, -0.5), (0, 3, 0)).q_springs, cold.q_springs)
 
 

@@ -15,6 +15,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.robots import HelixTube
+from softrobots.view import browser as view_browser
 from softrobots.view.browser import show_share, take_animation
 from softrobots.view.meshcat_page.page_commands import RESOLUTION, packed, read_page, tidied, unpacked
 from softrobots.view.meshcat_page.page_text import page_text, scene_of
@@ -264,7 +265,7 @@ def test_what_is_no_page_is_refused(call: Callable[[], object], message: str) ->
 def test_a_moving_picture_moves_and_repeats(browser: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from PIL import Image
 
-    monkeypatch.setattr("softrobots.view.browser.open_browser", lambda: nullcontext(browser))
+    monkeypatch.setattr(view_browser, "open_browser", lambda: nullcontext(browser))
     page = FOLDER / "inflatable_arm.html"
     file = take_animation(page, tmp_path / "a.gif", width=320, height=240, seconds=0.9, frames=3)
     with Image.open(file) as made:

@@ -21,7 +21,9 @@ import pytest
 
 import softrobots as sr
 from softrobots.cli.main import main
+from softrobots.view import slider_page
 from softrobots.view.browser import show_share
+from softrobots.view.meshcat_page import animation_frames
 from tests.test_viewer import coloured, listening, pixels
 
 COMMAND = [sys.executable, "-m", "softrobots", "view"]
@@ -275,7 +277,7 @@ def test_a_tube_grows_and_a_picture_is_taken_where_it_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     taken = []
-    monkeypatch.setattr("softrobots.view.meshcat_page.animation_frames._MOST_BODIES", 6)  # of 60: a lighter page
+    monkeypatch.setattr(animation_frames, "_MOST_BODIES", 6)  # of 60: a lighter page
     monkeypatch.setattr("softrobots.cli.view.find_chromium", lambda: "chromium")
     monkeypatch.setattr(
         "softrobots.cli.view.take_picture",
@@ -309,7 +311,7 @@ def test_sliders_begin_with_the_loaded_robot(monkeypatch: pytest.MonkeyPatch, ca
         def wait(self) -> None:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("softrobots.view.slider_page.SliderPage", Page)
+    monkeypatch.setattr(slider_page, "SliderPage", Page)
     words = "view inflatable_arm --sliders --motors 0 0.5 -0.5 --force 0 0 -3 --gravity --port 8123"
     assert main(words.split()) == 0
     options = {"q_motors": [0.0, 0.5, -0.5], "force": [0.0, 0.0, -3.0], "gravity": [0.0, 0.0, -9.81], "port": 8123}
@@ -320,7 +322,7 @@ def test_sliders_begin_with_the_loaded_robot(monkeypatch: pytest.MonkeyPatch, ca
 def test_the_browser_of_the_machine_is_opened_on_demand(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url))  # as where there is none
-    monkeypatch.setattr("softrobots.view.viewer.Viewer.wait", lambda self: None)
+    monkeypatch.setattr(sr.Viewer, "wait", lambda self: None)
     assert main(["view", "inflatable_arm", "--open"]) == 0
     out, err = capsys.readouterr()
     assert f"serving {opened[0]} " in out
