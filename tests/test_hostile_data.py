@@ -579,7 +579,7 @@ def test_steps_of_keys_stay_numbers(arm: sr.SoftModel) -> None:
         assert not np.array_equal(pushed.force, start.force)
 
 
-@law("live.loop.LiveView")
+@law("view.live.loop.LiveView")
 @settings(max_examples=25)
 @given(sent=st.binary(max_size=200) | st.text('targetmotorsforcegravityon {}[]:,"0123456789.e-\n', max_size=80).map(str.encode))
 def test_any_lines_of_a_pipe_are_followed_or_told(arm: sr.SoftModel, sent: bytes) -> None:

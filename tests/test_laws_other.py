@@ -225,7 +225,7 @@ def test_a_table_comes_back_from_its_text(rows: list[tuple[float, str]]) -> None
     assert [(float(one), two) for one, two in lines] == rows
 
 
-@law("sweeps.TargetGrid")
+@law("compiled.sweeps.TargetGrid")
 @settings(max_examples=20)
 @given(st.floats(1e-3, 1e3), st.integers(1, 12))
 def test_cells_of_a_grid_fill_it_once(reach: float, cells: int) -> None:

@@ -148,7 +148,7 @@ def _arm(axis: str, xyz: list[float], rpy: list[float]) -> str:
     return f'<robot name="theirs"><link name="base">{INERTIAL}</link>{joint("turn", "base", "end", axis, **places)}</robot>'
 
 
-@law("mount", "composition.fix_joints")
+@law("mount", "description.composition.fix_joints")
 @settings(max_examples=6)
 @given(triples_, triples_, triples_, triples_, st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 def test_a_mounted_robot_stands_where_it_was_put(
@@ -212,7 +212,12 @@ def test_a_table_of_a_trajectory_is_its_way(side: float, height: float, steps: i
 # --- The command line
 
 
-@law("command_line.add_load", "command_line.add_gravity", "command_line.gravity_of", "command_line.add_resume")
+@law(
+    "cli.options.command_line.add_load",
+    "cli.options.command_line.add_gravity",
+    "cli.options.command_line.gravity_of",
+    "cli.options.command_line.add_resume",
+)
 @settings(max_examples=30)
 @given(
     st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=3),
@@ -245,7 +250,12 @@ class _Page:
         """At once."""
 
 
-@law("command_line.exit_status", "command_line.refuse_too_large", "command_line.address_lines", "command_line.serve")
+@law(
+    "cli.options.command_line.exit_status",
+    "cli.options.command_line.refuse_too_large",
+    "cli.options.command_line.address_lines",
+    "cli.options.command_line.serve",
+)
 @settings(max_examples=30)
 @given(st.text(st.characters(categories=["L", "N", "P"]), min_size=1), st.integers(1, 10_000), st.integers(1, 65_535))
 def test_the_exit_status_tells_what_kind_of_end_it_was(text: str, joints: int, port: int) -> None:

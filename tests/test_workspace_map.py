@@ -66,7 +66,7 @@ def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: sr.sweeps.Wo
     assert tried > 20
 
 
-@law("sweeps.map_workspace", "sweeps.WorkspaceMap")
+@law("compiled.sweeps.map_workspace", "compiled.sweeps.WorkspaceMap")
 @settings(max_examples=10)
 @given(st.floats(0.1, 1.3), st.floats(-1.2, 1.2), st.floats(0.0, 60.0))
 def test_what_a_map_says_of_a_target_holds(arm: sr.SoftModel, x: float, z: float, load: float) -> None:

@@ -26,9 +26,11 @@ class ApiPage(NamedTuple):
     """Full names: of things, or of modules of which everything public is shown."""
 
 
-PACKAGES = tuple(f"softrobots.{name}" for name in ("inflated_beam", "constant_curvature", "helix", "export", "sweeps"))
+PACKAGES = tuple(f"softrobots.{name}" for name in ("inflated_beam", "constant_curvature", "helix", "export", "compiled.sweeps"))
 """Names that are packages: what they export, by module."""
 
+
+FIGURES = Path(softrobots.__file__).parent / "view" / "figures"
 
 BEHIND_GUIDES = "---\nsearch:\n  boost: 0.5\n---\n\n"
 """Makes a search find guides first."""
@@ -46,7 +48,7 @@ PAGES = {
             *_top("InflatableArm", "PccArm", "HelixTube", "ROBOTS", "robots.Robot"),
             *_top("load_model", "SoftModel", "SpringGroup", "grown_coordinates"),
             *(f"softrobots.robots.parameter_file.{name}" for name in ("read_robot", "read_parameters", "write_parameters")),
-            *_top("mount", "composition.fix_joints", "third_party.robot_file", "__version__"),
+            *_top("mount", "description.composition.fix_joints", "description.third_party.robot_file", "__version__"),
         ),
     ),
     "statics": ApiPage(
@@ -78,35 +80,38 @@ PAGES = {
         "Compiled solvers, and sweeps over millions of cases. `softrobots.compile` is `compile_model` here; a star import "
         "leaves it out, since it would hide the builtin.",
         (
-            *_top("kernels.compiled_model.compile_model", "kernels.compiled_model.CompiledModel", "kernels.statuses.Status"),
+            *(f"softrobots.compiled.run.compiled_model.{name}" for name in ("compile_model", "CompiledModel")),
+            "softrobots.compiled.statuses.Status",
             *(f"softrobots.compiled.run.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
             *(f"softrobots.compiled.run.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),
-            *_top("sweeps"),
+            *_top("compiled.sweeps"),
         ),
     ),
     "viewer": ApiPage(
         "Viewer",
         "The robot in a browser: as a page on loopback, as a file of its own, with sliders, or following commands.",
         (
-            *_top("view", "Viewer", "meshcat_view.inline_page.InlinePage", "slider_page.SliderPage"),
-            *_top("live.loop.LiveView", "live.commands.Wanted", "live.commands.GRAMMAR", "live.keys.KEYS"),
+            *_top("view", "Viewer", "view.meshcat_page.inline_page.InlinePage", "view.slider_page.SliderPage"),
+            *_top("view.live.loop.LiveView", "view.live.commands.Wanted", "view.live.commands.GRAMMAR", "view.live.keys.KEYS"),
         ),
     ),
     "plots": ApiPage(
         "Plots",
         "Pictures with matplotlib (extra `plot`). Each function returns a figure; `savefig` writes it.",
-        tuple(f"softrobots.{path.stem}" for path in sorted(Path(softrobots.__file__).parent.glob("*plots.py"))),
+        tuple(f"softrobots.view.figures.{path.stem}" for path in sorted(FIGURES.glob("*plots.py"))),
     ),
     "results": ApiPage(
         "Files and results", "Results as files, without pickle.", _top("save_result", "load_result", "save_csv")
     ),
     "errors": ApiPage(
-        "Errors", "Everything that is raised on purpose. `except softrobots.SoftRobotsError` catches it all.", _top("errors")
+        "Errors",
+        "Everything that is raised on purpose. `except softrobots.SoftRobotsError` catches it all.",
+        _top("core.errors"),
     ),
     "command_line": ApiPage(
         "Command line",
         "The command `softrobots` from Python, and what the scripts share.",
-        (*_top("cli.main", "cli.parser"), "softrobots.cli.options.command_line"),
+        (*_top("cli.main.main", "cli.main.parser"), "softrobots.cli.options.command_line"),
     ),
 }
 """The pages, by the name of their file."""
