@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import re
@@ -19,12 +18,8 @@ import softrobots as sr
 from softrobots import constant_curvature, helix
 from softrobots.cli import bench
 from softrobots.cli.main import main
+from softrobots.compiled.run.machines import available_backend
 from softrobots.view.figures import pcc_plots
-from studies.benchmark import compiled_solvers
-from studies.benchmark.jobs import JOBS, PLAIN
-from studies.benchmark.race import Settings, quick_settings, short_settings
-from studies.benchmark.results import Results, as_json, read_results
-from tests.conftest import CHECKOUT
 
 LENGTHS = ("0.50", "0.53", "0.55", "0.54", "0.51", "0.52")
 """Muscle lengths of the reference in theory.md, section 2.3; distance 0.04 m is the default."""
@@ -258,7 +253,7 @@ def test_pcc_refuses(words: list[str], message: str, told, tmp_path: Path, monke
         (["helix", "design", "--antenna", "1", "1", "1", "--grasp", "1", "1", "1"], "not allowed with"),
         (["helix", "forward", "--handedness", "both"], "invalid choice: 'both'"),
         (["bench", "--only", "nothing"], "invalid choice: 'nothing'"),
-        (["bench", "--full", "--quick"], "not allowed with"),
+        (["bench", "--rounds", "many"], "invalid int value: 'many'"),
     ],
 )
 def test_words_that_argparse_refuses(words: list[str], message: str, capsys: pytest.CaptureFixture) -> None:
@@ -527,99 +522,56 @@ def test_defaults_are_those_of_the_robots(answer) -> None:
 # --- softrobots bench
 
 
-@pytest.fixture
-def without_numba(monkeypatch: pytest.MonkeyPatch):
-    """As on a machine without the extra `fast`, whatever is installed here: nothing is compiled."""
-    original = compiled_solvers.compile_model
-
-    def compile_model(model: sr.SoftModel, *, backend: str, locked_strains: tuple) -> object:
-        if backend == "numba":
-            raise sr.MissingDependency("numba", "fast")
-        return original(model, backend=backend, locked_strains=locked_strains)
-
-    monkeypatch.setattr(compiled_solvers, "compile_model", compile_model)
-    compiled_solvers.compiled.cache_clear()
-    yield
-    compiled_solvers.compiled.cache_clear()
-
-
-def test_bench_measures_what_is_installed_and_names_what_is_not(without_numba, told, tmp_path: Path) -> None:
+def test_bench_times_every_job_and_writes_what_it_prints(told, tmp_path: Path) -> None:
     file = tmp_path / "bench.json"
-    words = ["bench", "--quick", "--rounds", "1", "-o", str(file)]
+    words = ["bench", "--quick", "--rounds", "2", "-o", str(file)]
     status, out, err = told(*words)
     assert status == 0
-    assert "1/1" in err  # a progress bar
-    assert "skipped:\n" in out
-    assert "numba is not installed" in out
+    assert "5/5" in err  # a progress bar
     assert out.endswith(f"{file}: written\n")
-    results = read_results(file)
-    assert results.settings["jobs"] == [PLAIN]
-    assert results.machine["numpy"] == np.__version__
-    measured = [row for row in results.rows if not row.skipped]
-    assert {row.baseline for row in measured if row.job == "equilibrium, batch"} == {
-        "Python + Pinocchio, fixed point",
-        "NumPy, written plainly",
-    }
-    assert {row.ours for row in measured} == {"compiled, python, batch", "compiled, python, one call", "solve_equilibrium"}
-    for row in measured:
-        assert row.target is None  # small sizes on somebody's machine
-        quotient = row.baseline_seconds / row.our_seconds  # of one round
-        assert row.value == pytest.approx(1.0 / quotient if row.unit == "times as costly" else quotient, rel=1e-12)
-        assert row.ours in out
+    results = json.loads(file.read_text(encoding="utf-8"))
+    assert results["machine"]["softrobots"] == sr.__version__
+    assert results["machine"]["backend"] == available_backend()
+    assert [row["job"] for row in results["rows"]] == list(bench.JOBS)
+    for row in results["rows"]:
+        assert row["compiled_seconds"] > 0.0
+        assert row["pinocchio_seconds"] > 0.0
+        assert row["low"] <= row["ratio"] <= row["high"]
+        costs = (f"{1e6 * row[name]:.3g}" for name in ("compiled_seconds", "pinocchio_seconds"))
+        assert re.search(rf"^{row['job']} +{' +'.join(map(re.escape, costs))} ", out, re.M)
     assert told(*words) == (2, "", f"error: {file} exists; choose another name or allow overwriting\n")
-    status, out, _ = told(*words, "--overwrite", "--json")
+    status, out, _ = told(*words, "--overwrite", "--json", "--only", "batch", "gravity")
     assert status == 0
     assert json.loads(out) == json.loads(file.read_text(encoding="utf-8"))
+    assert [row["job"] for row in json.loads(out)["rows"]] == ["gravity", "batch"]
+
+
+def test_bench_solves_the_same_cases_twice() -> None:
+    """Every job, compiled and on Pinocchio: springs, loads and motors agree."""
+    model = sr.load_model(sr.InflatableArm())
+    jobs = bench.prepare_jobs(model, sr.compile(model), 4)
+    assert tuple(jobs) == bench.JOBS
+    for name, job in jobs.items():
+        compiled, pinocchio = job.compiled(), job.pinocchio()
+        attribute = {"estimation": "force", "trajectory": "q_motors"}.get(name, "q_springs")
+        pair = [
+            getattr(rows, attribute) if hasattr(rows, attribute) else [getattr(row, attribute) for row in rows]
+            for rows in (compiled, pinocchio)
+        ]
+        assert len(pair[0]) == job.cases == 4
+        assert np.allclose(*pair, rtol=0.0, atol=1e-6), name
+
+
+def test_bench_takes_each_ratio_within_its_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine that slows down from round to round does not change the ratio."""
+    seconds = {"compiled": iter([1.0, 1e-3, 2e-3, 9e-3]), "pinocchio": iter([1.0, 4e-3, 8e-3, 36e-3])}  # the first: how often
+    monkeypatch.setattr(bench, "_cpu_seconds", lambda solve, repeats: next(seconds[solve()]))
+    row = bench.measure("batch", bench.Job(10, lambda: "compiled", lambda: "pinocchio"), 3)
+    assert row == bench.Row("batch", 2e-4, 8e-4, pytest.approx(4.0), pytest.approx(4.0), pytest.approx(4.0))
 
 
 @pytest.mark.parametrize(
-    ("words", "settings", "jobs"),
-    [
-        ([], short_settings(5, progress=True), [PLAIN]),
-        (["--only", "rod", "fresh", "--rounds", "2"], short_settings(2, progress=True), ["rod", "fresh"]),
-        (["--full", "--cpp"], Settings(progress=True, cpp=True), list(JOBS)),
-        (["--full", "--rounds", "3", "--only", "gravity"], Settings(3, progress=True), ["gravity"]),
-        (["--quick"], quick_settings(5, progress=True, cpp=False), [PLAIN]),
-    ],
-)
-def test_bench_runs_the_jobs_in_the_sizes_asked_for(
-    words: list[str], settings: Settings, jobs: list[str], told, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    recorded = read_results(CHECKOUT / "docs" / "benchmark.json")
-    asked = []
-
-    def measure(settings: Settings, jobs: list[str]) -> Results:
-        asked.append((settings, jobs))
-        return recorded
-
-    monkeypatch.setattr(bench, "measure", measure)
-    status, out, err = told("bench", *words)
-    assert (status, err) == (0, "")
-    assert asked == [(settings, jobs)]
-    # what is told of recorded results is what they say
-    line = next(line for line in out.splitlines() if "NumPy, written plainly" in line)
-    row = next(row for row in recorded.rows if row.baseline == "NumPy, written plainly")
-    assert line.split()[-7:-3] == [f"{row.value:.3g}", "times", "cheaper", "at"]
-    assert line.endswith("met")
-    assert f"Medians of {recorded.settings['rounds']} rounds" in out
-    assert json.loads(as_json(recorded)) == json.loads(told("bench", *words, "--json")[1])
-
-
-def test_bench_short_sizes_are_smaller_in_everything_that_costs() -> None:
-    short, full = (dataclasses.asdict(made) for made in (short_settings(5, progress=False), Settings()))
-    for name in ("rounds", "batch", "singles", "waypoints", "sections", "memory", "starts"):
-        assert 0 < short[name] < full[name]
-    for name in ("sizes", "batches"):
-        assert max(short[name]) < max(full[name])
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--rounds", "0"], "--rounds must be at least 1"),
-        (["--cpp"], "--cpp must be given with --full"),
-        (["-o", "."], "is a folder"),
-    ],
+    ("words", "message"), [(["--rounds", "0"], "--rounds must be at least 1"), (["-o", "."], "is a folder")]
 )
 def test_bench_refuses(words: list[str], message: str, told, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "measure", None)  # nothing is measured before
@@ -628,9 +580,9 @@ def test_bench_refuses(words: list[str], message: str, told, monkeypatch: pytest
     assert message in err
 
 
-def test_bench_says_where_the_other_bench_is(capsys: pytest.CaptureFixture) -> None:
+def test_bench_help_names_the_jobs_and_the_other_benchmark(capsys: pytest.CaptureFixture) -> None:
     with pytest.raises(SystemExit):
         main(["bench", "--help"])
-    told = " ".join(capsys.readouterr().out.split())
-    assert "scripts/ur5_bench.py" in told
-    assert all(job in told for job in JOBS)
+    help_text = " ".join(capsys.readouterr().out.split())
+    assert "scripts/benchmark.py" in help_text
+    assert all(job in help_text for job in bench.JOBS)

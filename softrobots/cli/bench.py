@@ -1,4 +1,4 @@
-"""`softrobots bench`: what the solvers cost on this machine, compiled against Pinocchio from Python."""
+"""`softrobots bench`: time the compiled solvers against those on Pinocchio, on this machine."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from softrobots.cli.reports.answers import add_json, aligned, tell
-from softrobots.compiled.run.compiled_model import compile_model
+from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
+from softrobots.compiled.run.compiled_model import CompiledModel, compile_model
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file, write_text
 from softrobots.core.progress import with_progress
@@ -30,9 +30,11 @@ from softrobots.statics.trajectory import follow_trajectory
 from softrobots.version import __version__
 
 JOBS = ("equilibrium", "gravity", "estimation", "trajectory", "batch")
+"""What is timed: equilibria one by one, weightless or under gravity, load estimates, a path, a batch of equilibria."""
+
 _CASES, _QUICK_CASES = 100, 5
-_FORCE = 18.027756377319946  # [N], the size of the paper's load (0, 10, -15) N
-_SHORTEST = 0.02  # [s], least time of a timed run
+_FORCE = math.hypot(10.0, 15.0)  # [N], magnitude of the paper's load (0, 10, -15) N
+_LEAST_TIME = 0.02  # [s], a run is repeated until it takes this long
 _EXAMPLES = f"""examples:
   softrobots bench                                   every job, a quarter of a minute
   softrobots bench --only estimation trajectory      some jobs
@@ -41,27 +43,38 @@ _EXAMPLES = f"""examples:
 Jobs for --only: {", ".join(JOBS)}.
 
 Each row times the inflatable arm with the public functions on Pinocchio and with `softrobots.compile`, in turn and on one
-thread, with random motor angles and forces of {_FORCE:.1f} N. Costs are CPU seconds of a case, medians over the rounds; the
-ratio is taken within each round. The first run compiles for some seconds; the code is kept (`softrobots doctor` tells where).
+thread, with random motor angles and forces of {_FORCE:.1f} N. Costs are CPU time per case, medians over the rounds; the
+ratio is taken within each round. The first run compiles for some seconds; the code is cached (`softrobots doctor` shows where).
 Other baselines (MuJoCo, SciPy, Pink, C++), long chains, start-up and memory are in scripts/benchmark.py of the repository.
 """
 
 
+class Job(NamedTuple):
+    """The same cases for both solvers."""
+
+    cases: int
+    """Number of cases in one run."""
+    compiled: Callable[[], object]
+    """Solves all cases with the compiled solver."""
+    pinocchio: Callable[[], object]
+    """Solves all cases with the public functions on Pinocchio."""
+
+
 class Row(NamedTuple):
-    """One job, measured."""
+    """The measurement of one job."""
 
     job: str
     """Its name, one of `JOBS`."""
     compiled_seconds: float
-    """CPU time of a case by the compiled solver, median over the rounds [s]."""
+    """CPU time per case of the compiled solver, median over the rounds [s]."""
     pinocchio_seconds: float
     """The same on Pinocchio from Python [s]."""
     ratio: float
-    """How many times the compiled solver is faster: median over the rounds of the ratio within a round."""
+    """Speed-up of the compiled solver: median over the rounds of the ratio within a round."""
     low: float
     """The smallest ratio of a round."""
     high: float
-    """The largest."""
+    """The largest ratio of a round."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -74,7 +87,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--only", nargs="+", choices=JOBS, default=JOBS, metavar="JOB", help="run these jobs (all)")
     parser.add_argument("--quick", action="store_true", help=f"{_QUICK_CASES} cases instead of {_CASES}: a trial run")
-    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="rounds of each job [-] (5)")
+    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="rounds of each job [-] (%(default)s)")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="also write the results to a new file (none)")
     parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
@@ -82,32 +95,37 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Measure and tell."""
+    """Measure the jobs and print the table."""
     if arguments.rounds < 1:
         raise ParameterError("--rounds", arguments.rounds, "at least 1")
     if arguments.output is not None:
         new_file(arguments.output, overwrite=arguments.overwrite)  # refused before the work
     model = load_model(InflatableArm())
     compiled = compile_model(model)
-    solvers = _solvers(model, compiled, _QUICK_CASES if arguments.quick else _CASES)
-    chosen = [job for job in JOBS if job in arguments.only]
-    rows = [_measure(job, *solvers[job], arguments.rounds) for job in with_progress(chosen, True, label="jobs", unit="job")]
+    jobs = prepare_jobs(model, compiled, _QUICK_CASES if arguments.quick else _CASES)
+    chosen = [name for name in JOBS if name in arguments.only]
+    rows = [measure(name, jobs[name], arguments.rounds) for name in with_progress(chosen, True, label="jobs", unit="job")]
     machine = {"softrobots": __version__, "python": platform.python_version(), "platform": platform.platform()}
     answer = {"machine": machine | {"backend": compiled.backend}, "rows": [row._asdict() for row in rows]}
-    lines = [f"{', '.join(f'{name} {text}' for name, text in machine.items())}; compiled by {compiled.backend}", ""]
-    table: list[tuple[str, ...]] = [("job", "compiled [us a case]", "on Pinocchio [us a case]", "times faster (rounds)")]
+    table = [("job", "compiled [us/case]", "on Pinocchio [us/case]", "speed-up (range over the rounds)")]
     for row in rows:
-        costs = (f"{1e6 * seconds:.3g}" for seconds in (row.compiled_seconds, row.pinocchio_seconds))
+        costs = (f"{1e6 * row.compiled_seconds:.3g}", f"{1e6 * row.pinocchio_seconds:.3g}")
         table.append((row.job, *costs, f"{row.ratio:.3g} ({row.low:.3g} to {row.high:.3g})"))
-    lines += aligned(table)
+    files = []
     if arguments.output is not None:
-        text = json.dumps(answer, indent=1) + "\n"
-        lines += ["", f"{write_text(arguments.output, text, overwrite=arguments.overwrite)}: written"]
-    tell(arguments, answer, lines)
+        files.append(write_text(arguments.output, json.dumps(answer, indent=1) + "\n", overwrite=arguments.overwrite))
+    head = f"{', '.join(f'{name} {value}' for name, value in machine.items())}; compiled by {compiled.backend}"
+    tell(arguments, answer, [head, "", *aligned(table), *written_lines(files)])
 
 
-def _solvers(model: SoftModel, compiled: Any, count: int) -> Mapping[str, tuple[int, Callable[[], Any], Callable[[], Any]]]:
-    """By job: how many cases a run has, the compiled run, and the run on Pinocchio."""
+def prepare_jobs(model: SoftModel, compiled: CompiledModel, count: int) -> Mapping[str, Job]:
+    """Return every job by name.
+
+    Args:
+        model: The inflatable arm.
+        compiled: The same arm, compiled.
+        count: Number of cases in a run, or of waypoints.
+    """
     random = np.random.default_rng(0)
     motors = random.uniform(-np.pi, np.pi, (count, model.n_motors))
     forces = random.normal(size=(count, 3))
@@ -117,45 +135,49 @@ def _solvers(model: SoftModel, compiled: Any, count: int) -> Mapping[str, tuple[
     targets = np.linspace((0.9, 0.3, 0.2), (0.9, -0.2, 0.1), count)
     start = solve_ik(model, targets[0], force, elbow="up").q_motors
 
-    def each(solve: Callable[..., Any], rows: Any, **options: Any) -> Callable[[], Any]:
-        return lambda: [solve(*case, **options) for case in zip(motors, rows, strict=True)]
+    def each(solve: Callable[..., object], inputs: Any, **options: Any) -> Callable[[], object]:
+        """Solve one case after the other."""
+        return lambda: [solve(*case, **options) for case in zip(motors, inputs, strict=True)]
 
-    def on_pinocchio(solve: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda *case, **options: solve(model, *case, **options)
+    def reference(solve: Callable[..., object], inputs: Any, **options: Any) -> Callable[[], object]:
+        """The same with a function on Pinocchio, which takes the model first."""
+        return each(lambda *case, **options: solve(model, *case, **options), inputs, **options)
 
-    equilibrium, estimate = on_pinocchio(solve_equilibrium), on_pinocchio(estimate_load)
     return {
-        "equilibrium": (count, each(compiled.equilibrium, forces), each(equilibrium, forces)),
-        "gravity": (
+        "equilibrium": Job(count, each(compiled.equilibrium, forces), reference(solve_equilibrium, forces)),
+        "gravity": Job(
             count,
             each(compiled.equilibrium, forces, gravity=EARTH_GRAVITY),
-            each(equilibrium, forces, gravity=EARTH_GRAVITY),
+            reference(solve_equilibrium, forces, gravity=EARTH_GRAVITY),
         ),
-        "estimation": (count, each(compiled.estimate_load, torques), each(estimate, torques)),
-        "trajectory": (
+        "estimation": Job(count, each(compiled.estimate_load, torques), reference(estimate_load, torques)),
+        "trajectory": Job(
             count,
             lambda: compiled.follow(targets, force, q_motors0=start),
             lambda: follow_trajectory(model, targets, force, q_motors0=start),
         ),
-        "batch": (count, lambda: compiled.equilibria(motors, forces, threads=1), each(equilibrium, forces)),
+        "batch": Job(count, lambda: compiled.equilibria(motors, forces, threads=1), reference(solve_equilibrium, forces)),
     }
 
 
-def _measure(job: str, cases: int, compiled: Callable[[], Any], pinocchio: Callable[[], Any], rounds: int) -> Row:
-    """Time two runs in turn, round after round, on one thread; each is run once before to warm up."""
+def measure(name: str, job: Job, rounds: int) -> Row:
+    """Time both solvers in turn, round after round, on one thread; each runs once before, to compile and to warm up."""
+    solvers = (job.compiled, job.pinocchio)
     seconds = np.zeros((rounds, 2))
     with threadpool_limits(limits=1, user_api="blas"):
-        repeats = [math.ceil(_SHORTEST / max(_cpu_seconds(call, 1), 1e-7)) for call in (compiled, pinocchio) if call()]
+        for solve in solvers:
+            solve()
+        repeats = [math.ceil(_LEAST_TIME / max(_cpu_seconds(solve, 1), 1e-7)) for solve in solvers]
         for row in seconds:
-            row[:] = [_cpu_seconds(*pair) for pair in zip((compiled, pinocchio), repeats, strict=True)]
+            row[:] = [_cpu_seconds(*pair) for pair in zip(solvers, repeats, strict=True)]
     ratios = seconds[:, 1] / seconds[:, 0]
-    ours, theirs = (float(value) / cases for value in np.median(seconds, axis=0))
-    return Row(job, ours, theirs, *(float(pick(ratios)) for pick in (np.median, np.min, np.max)))
+    costs = np.median(seconds, axis=0) / job.cases
+    return Row(name, *costs.tolist(), *(float(statistic(ratios)) for statistic in (np.median, np.min, np.max)))
 
 
-def _cpu_seconds(call: Callable[[], Any], repeats: int) -> float:
-    """CPU time of one call, over some repeats [s]."""
-    began = time.process_time()
+def _cpu_seconds(solve: Callable[[], object], repeats: int) -> float:
+    """CPU time of one run, averaged over repeats [s]."""
+    start = time.process_time()
     for _ in range(repeats):
-        call()
-    return max(time.process_time() - began, 1e-9) / repeats
+        solve()
+    return max(time.process_time() - start, 1e-9) / repeats
