@@ -439,12 +439,12 @@ def tests_oracles() -> Any:
     """The rods of the tests."""
     sys.path.insert(0, str(ROOT))
     try:
-        import tests.helix_rods
-        import tests.muscle_rods
-        import tests.rods
+        import tests.support.helix_rods
+        import tests.support.muscle_rods
+        import tests.support.rods
     except ImportError as error:
         raise sr.MissingDependency("scipy", "dev") from error
-    return tests
+    return tests.support
 
 
 def run(arguments: argparse.Namespace) -> None:

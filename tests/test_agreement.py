@@ -237,7 +237,7 @@ def test_bad_options_are_refused_before_the_work(arguments: list[str], told: str
 
 
 def test_without_scipy_it_says_what_is_missing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    monkeypatch.setitem(sys.modules, "tests.muscle_rods", None)
+    monkeypatch.setitem(sys.modules, "tests.support.muscle_rods", None)
     assert script().main(["--robot", "pcc_arm", "--no-mujoco"]) == 2
     assert "scipy" in capsys.readouterr().err
 

@@ -19,7 +19,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.cli.options.command_line import blocks_beside
-from softrobots.compiled.sweeps import TargetGrid, map_workspace, mapping
+from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace, mapping
 from softrobots.core.checkpoint import CASE, Checkpoint, discard
 from softrobots.statics import workspace
 from tests.conftest import CHECKOUT
@@ -38,7 +38,7 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workspace, "_BLOCK", 5)
 
 
-def mapped(arm: sr.SoftModel, folder: Path | None, **options: Any) -> sr.sweeps.WorkspaceMap:
+def mapped(arm: sr.SoftModel, folder: Path | None, **options: Any) -> WorkspaceMap:
     return map_workspace(arm, **({"grid": GRID, "loads": LOADS, "backend": "python", "checkpoint": folder} | options))
 
 

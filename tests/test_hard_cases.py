@@ -257,7 +257,7 @@ def test_compiled_code_that_hangs_ends_the_soak_with_a_broken_law(monkeypatch: p
 def test_every_loop_of_the_compiled_solvers_ends() -> None:
     """A loop without a count goes on with a share that it halves or doubles, up to a limit that the share itself has."""
     loops = []
-    for file in (CHECKOUT / "softrobots" / "kernels").glob("*drivers.py"):
+    for file in (CHECKOUT / "softrobots" / "compiled").rglob("*drivers.py"):
         tree = ast.parse(file.read_text(encoding="utf-8"))
         for loop in (node for node in ast.walk(tree) if isinstance(node, ast.While)):
             told = ast.unparse(loop.test)

@@ -709,34 +709,34 @@ def test_the_scan_sees_what_it_looks_for(tmp_path: Path) -> None:
 DOORS = {"opened", "read_bytes", "read_text", "read_json", "read_xml", "read_arrays", "read_table"}
 """Names of functions that bring in what a file says."""
 DOORWAYS = {
-    "bounded_reading": "the door itself",
-    "csv_table": "the door itself",
-    "json_text": "the door itself",
-    "npz_file": "the door itself",
-    "xml_input": "the door itself",
-    "sources": ("URDF", "MJCF", "SDF"),
-    "readers.mjcf_limits": ("MJCF",),
-    "description": ("xacro",),
-    "interop.kinematics": ("URDF",),
-    "collada_check": ("DAE",),
-    "time_law": ("waypoints CSV",),
+    "core.bounded_reading": "the door itself",
+    "core.csv_table": "the door itself",
+    "core.json_text": "the door itself",
+    "core.npz_file": "the door itself",
+    "core.xml_input": "the door itself",
+    "description.sources": ("URDF", "MJCF", "SDF"),
+    "description.readers.mjcf_limits": ("MJCF",),
+    "description.expansion": ("xacro",),
+    "cli.tools.kinematics": ("URDF",),
+    "description.collada_check": ("DAE",),
+    "statics.time_law": ("waypoints CSV",),
     "helix.actuator_table": ("actuator CSV",),
     "helix.helix_design": ("design JSON",),
-    "results_io": ("results NPZ",),
-    "checkpoint": ("checkpoint JSON", "checkpoint NPZ"),
-    "benchmark.results": ("benchmark JSON",),
+    "statics.results_io": ("results NPZ",),
+    "core.checkpoint": ("checkpoint JSON", "checkpoint NPZ"),
+    "studies.benchmark.results": ("benchmark JSON",),
     "robots.parameter_file": ("parameters YAML", "parameters JSON"),
-    "live.input": ("watched file",),
+    "view.live.input": ("watched file",),
     "export.meshes": ("STL",),
-    "argument_notes": "our own xacro files",
-    "generated": "compares a file with what is generated, byte for byte",
-    "recorded_run": "a page of the checkout",
-    "mutants": "what the tool has just written",
-    "kernels.machines": "compares a file with what is generated, byte for byte",
+    "description.argument_notes": "our own xacro files",
+    "robots.generated": "compares a file with what is generated, byte for byte",
+    "studies.recorded_run": "a page of the checkout",
+    "studies.mutants": "what the tool has just written",
+    "compiled.run.machines": "compares a file with what is generated, byte for byte",
     "export.python_text": "a template of ours",
-    "benchmark.machine": "a file of the kernel",
-    "benchmark.processes": "a file of the kernel",
-    "meshcat_view.server_process": "a page of ours",
+    "studies.benchmark.machine": "a file of the kernel",
+    "studies.benchmark.processes": "a file of the kernel",
+    "view.meshcat_page.server_process": "a page of ours",
 }
 """Modules that read files, and the readers of the campaign that go through them, or why there is none."""
 
@@ -756,8 +756,9 @@ def readers_in(text: str) -> bool:
 
 def test_every_module_that_reads_files_is_tried() -> None:
     script = load_script("fuzz_readers")
-    package = CHECKOUT / "softrobots"
+    package, scripts = CHECKOUT / "softrobots", CHECKOUT / "scripts"
     files = {file: ".".join(file.relative_to(package).with_suffix("").parts) for file in package.rglob("*.py")}
+    files |= {file: ".".join(file.relative_to(scripts).with_suffix("").parts) for file in (scripts / "studies").rglob("*.py")}
     found = {name for file, name in files.items() if readers_in(file.read_text(encoding="utf-8"))}
     assert found == set(DOORWAYS)
     tried = {reader for told in DOORWAYS.values() if isinstance(told, tuple) for reader in told}

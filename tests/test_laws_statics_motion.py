@@ -12,6 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.support.law_robots import PUSHES, Case, cases, model, triples
 from tests.support.laws import law
 
@@ -170,7 +171,7 @@ WEIGHT = {"arm": (1.0, 2.0, -9.0), "helix": sr.EARTH_GRAVITY}
 
 
 @cache
-def solver(kind: str) -> sr.kernels.compiled_model.CompiledModel:
+def solver(kind: str) -> CompiledModel:
     return sr.compile(model(kind), backend="python")
 
 

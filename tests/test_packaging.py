@@ -10,7 +10,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -33,9 +32,21 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
     assert not loaded & (heavy | {"urllib.request"})  # brings http, ssl and email along, an eighth of the whole
 
 
-def test_every_public_name_exists() -> None:
-    assert sorted(sr.__all__) == sorted(set(sr.__all__))
-    for name in sr.__all__:
+PUBLIC = """
+EARTH_GRAVITY ROBOTS ClusterError DescriptionError Equilibrium EquilibriumBranch EquilibriumNotFound FileFormatError HelixTube
+IkSolution ImposedDisplacement InflatableArm LoadEstimate LoadNotFound MissingDependency NameNotFound NeutralEquilibrium
+NoCriticalLoad NotConverged OutputError OutputExists ParameterError Path3D PccArm SelfIntersection SoftModel SoftRobotsError
+SpringGroup StraightTube TargetUnreachable Trajectory Viewer ViewerError Workspace __version__ compliance constant_curvature
+critical_load distributed_force elastostatic_jacobian estimate_load export follow_trajectory grown_coordinates helix
+inflated_beam load_model load_result mount post_buckling_branches quintic read_waypoints sample_workspace save_csv save_result
+solve_equilibrium solve_ik solve_imposed_displacement straight_line view waypoints
+"""
+"""What users import from `softrobots`: a name is added here on purpose, and none disappears unnoticed."""
+
+
+def test_the_public_names_are_these_and_exist() -> None:
+    assert sr.__all__ == PUBLIC.split()
+    for name in (*sr.__all__, "compile"):
         assert getattr(sr, name) is not None
 
 
@@ -68,128 +79,199 @@ def test_every_error_crosses_to_another_process(arm: sr.SoftModel) -> None:
         assert twin.__dict__.keys() == error.__dict__.keys()
 
 
+# --- The rooms
+
+ROOMS = {
+    "core": "",
+    "inflated_beam": "core",
+    "constant_curvature": "core",
+    "helix": "core constant_curvature",
+    "description": "core",
+    "robots": "core inflated_beam constant_curvature helix description",
+    "model": "core inflated_beam constant_curvature description",
+    "statics": "core inflated_beam model",
+    "compiled": "core constant_curvature description model statics",
+    "export": "core inflated_beam constant_curvature description robots model",
+    "view": "core inflated_beam constant_curvature helix description robots model statics",
+    "cli": "core inflated_beam constant_curvature helix description robots model statics compiled export view",
+}
+"""Every folder of the package, and the rooms that it may import."""
+SOLVERS = "trajectory load_estimation imposed_displacement stability workspace post_buckling sensitivity"
+LOADING = "softrobots.model.loader softrobots.description.tag_reader softrobots.description.sources"
+SEPARATE = {
+    " ".join(f"softrobots.statics.{name}" for name in SOLVERS.split()): LOADING,
+    "softrobots.compiled.run": LOADING,
+    "softrobots.view.figures": "softrobots.view.meshcat_page softrobots.view.viser_page softrobots.view.live"
+    " softrobots.view.viewer",
+    "softrobots.view.live": "softrobots.view.meshcat_page softrobots.view.viser_page softrobots.view.viewer",
+    "softrobots.view.meshcat_page": "softrobots.view.viser_page softrobots.view.live softrobots.view.viewer",
+    "softrobots.view.viewer": "softrobots.view.viser_page softrobots.view.slider_page softrobots.view.live",
+    "softrobots.view.slider_page": "softrobots.view.viewer softrobots.view.live",
+    "studies.papers.reproduction": "softrobots.view studies.papers.pictures",
+}
+"""Modules or folders, and what they import neither directly nor through others."""
+EQUATIONS = ("studies.papers.dh_tables", "studies.papers.helix_equations", "studies.papers.pcc_equations")
+"""Equations as the papers print them, with which the package is compared."""
+LONG = {
+    "softrobots.compiled.program.long_program",
+    "softrobots.compiled.run.compiled_model",
+    "softrobots.helix.shapes",
+    "softrobots.model.soft_model",
+    "softrobots.statics.elastostatics",
+    "softrobots.statics.load_estimation",
+}
+"""Modules above 300 lines, which are to be split."""
+XACRO = "softrobots.description.expansion"
+BUILDER = "softrobots.model.loader"
+COMPARING = {"softrobots.description.collision_shapes", "softrobots.cli.tools.kinematics", "softrobots.cli.tools.checks"}
+"""Modules that read a file with Pinocchio as other tools do, to compare it or look at its shapes."""
+WITH_PINOCCHIO = {
+    f"softrobots.description.{name}" for name in ("rigid_tree", "rigid_tree_urdf", "composition", "collision_shapes")
+}
+"""Below `model` only these, which read and write foreign files, import Pinocchio."""
+
+
+@functools.cache
+def modules() -> dict[str, Path]:
+    """Every module of the package and of the studies."""
+    files = {file: file.relative_to(CHECKOUT) for file in PACKAGE.rglob("*.py")}
+    files |= {file: file.relative_to(CHECKOUT / "scripts") for file in (CHECKOUT / "scripts" / "studies").rglob("*.py")}
+    return {".".join(path.with_suffix("").parts).removesuffix(".__init__"): file for file, path in files.items()}
+
+
+def in_package() -> dict[str, Path]:
+    return {name: file for name, file in modules().items() if room_of(name)}
+
+
+def room_of(name: str) -> str:
+    """The room of a module; empty for a study and for the modules beside the rooms."""
+    first, _, rest = name.partition(".")
+    return rest.partition(".")[0] if first == "softrobots" and rest not in {"version", "__main__"} else ""
+
+
 @functools.cache
 def nodes_of(file: Path) -> tuple[ast.AST, ...]:
     """Every node of a module."""
     return tuple(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
 
 
-def imports_of(file: Path) -> set[str]:
-    found = set()
-    for node in nodes_of(file):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("softrobots"):
-            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return found
-
-
 @functools.cache
-def import_graph() -> dict[str, set[str]]:
-    """Which modules each module of the package imports, also inside functions."""
-    files = {
-        ".".join(f.relative_to(CHECKOUT).with_suffix("").parts).removesuffix(".__init__"): f for f in PACKAGE.rglob("*.py")
-    }
-    return {
-        name: (imports_of(file) & files.keys()) - {name, "softrobots"} for name, file in files.items() if name != "softrobots"
-    }
+def import_graph() -> dict[str, set[tuple[str, str]]]:
+    """The modules that each module imports, also inside functions, with the name taken from each; not the face."""
+    graph: dict[str, set[tuple[str, str]]] = {}
+    for name, file in modules().items():
+        taken = graph[name] = set()
+        for node in nodes_of(file):
+            if isinstance(node, ast.ImportFrom) and node.module is not None:
+                full = {(f"{node.module}.{alias.name}", alias.name) for alias in node.names}
+                taken |= {(whole if whole in modules() else node.module, part) for whole, part in full}
+        graph[name] = {(source, part) for source, part in taken if source in modules() and source not in {name, "softrobots"}}
+    return graph
 
 
-def test_imports_point_one_way() -> None:
-    """No cycle among the modules, not even through an import inside a function."""
-    graph = import_graph()
-    while graph:
-        leaves = {name for name, needs in graph.items() if not needs & graph.keys()}
-        assert leaves, f"a cycle among {sorted(graph)}"
-        graph = {name: needs for name, needs in graph.items() if name not in leaves}
+def sources_of(name: str) -> set[str]:
+    return {source for source, _ in import_graph()[name]}
 
 
-def test_the_statics_knows_nothing_of_descriptions_arms_and_other_tools() -> None:
-    reached = reached_from(["trajectory", "load_estimation", "imposed_displacement", "stability", "workspace"])
-    assert "elastostatics" in reached
-    roots = {name.split(".")[0] for name in reached}
-    assert not roots & {"robots", "helix", "constant_curvature", "export", "readers", "interop", "commands", "composition"}
-    assert not roots & {"description", "tag_reader", "rigid_tree", "rigid_tree_urdf", "sources", "loader", "scene", "viewer"}
-    assert not roots & {"papers", "live", "meshcat_view", "viser_view", "slider_page", "browser", "plots", "gallery"}
+def within(name: str, folder: str) -> bool:
+    return name == folder or name.startswith(f"{folder}.")
 
 
-def reached_from(names: Iterable[str]) -> set[str]:
-    """Modules that some modules, or all modules of a folder, import, directly or through others; with themselves."""
-    graph = import_graph()
-    starts = tuple(f"softrobots.{name}" for name in names)
-    reached = {name for name in graph if name in starts or name.startswith(tuple(f"{start}." for start in starts))}
-    assert all(any(name == start or name.startswith(f"{start}.") for name in reached) for start in starts)
-    while new := {needed for name in reached for needed in graph[name]} - reached:
+def reached_from(*folders: str) -> set[str]:
+    """Modules that the modules of some folders import, directly or through others; with themselves."""
+    reached = {name for name in modules() if any(within(name, folder) for folder in folders)}
+    while new := {source for name in reached for source in sources_of(name)} - reached:
         reached |= new
-    return {name.removeprefix("softrobots.") for name in reached}
+    return reached
 
 
-@pytest.mark.parametrize(
-    ("names", "unknown"),
-    [
-        # Equations as the papers print them are what ours are compared with: they share nothing but the checks of input.
-        (["papers.dh_tables", "papers.helix_equations", "papers.pcc_equations"], None),
-        (["live"], ["viewer", "meshcat_view", "viser_view", "slider_page", "commands", "browser"]),
-        (["meshcat_view"], ["viewer", "viser_view", "slider_page", "live", "commands", "papers", "browser"]),
-        (["viewer"], ["viser_view", "slider_page", "live", "commands", "papers", "browser"]),
-        (["viser_view", "slider_page"], ["viewer", "live", "commands", "papers", "browser"]),
-        (["papers.reproduction"], ["plots", "commands", "viewer", "helix_sheet"]),
-        (["plots", "browser", "marked_text"], ["commands", "papers", "live", "viewer", "meshcat_view", "viser_view"]),
-    ],
-)
-def test_what_people_meet_is_made_of_parts_that_do_not_know_each_other(names: list[str], unknown: list[str] | None) -> None:
-    reached = reached_from(names)
-    if unknown is None:
-        assert reached == {*names, "checks", "errors"}
-    else:
-        assert all(reached_from([name]) for name in unknown)  # none of them is a name of old
-        assert not {name for name in reached if name in unknown or name.split(".")[0] in unknown}
+def test_rooms_import_only_the_rooms_below_them() -> None:
+    """One table; a private name stays in its room; nothing but the rooms, the face and the version in `softrobots/`."""
+    found = {path.name for path in PACKAGE.iterdir()} - {"__pycache__"}
+    assert found == {"__init__.py", "__main__.py", "version.py", "py.typed", *ROOMS}
+    above: set[str] = set()
+    for room in reversed(ROOMS):
+        assert not above & set(ROOMS[room].split()), f"{room} imports a room that comes after it in the table"
+        above.add(room)
+        assert above - set(ROOMS) == set()
+    for name in in_package():
+        room = room_of(name)
+        for source, part in import_graph()[name]:
+            other = room_of(source)
+            assert other in {"", room, *ROOMS[room].split()}, f"{name} imports {source}: not in the table"
+            assert other == room or not part.startswith("_") or part == "__version__", f"{name} imports {part} of {source}"
+            assert not source.startswith("studies"), f"{name} imports {source}, which is not in the wheel"
 
 
-def test_nothing_but_the_command_line_imports_the_commands_and_only_papers_the_papers() -> None:
-    for name, needs in import_graph().items():
-        home = name.removeprefix("softrobots.")
-        if not home.startswith(("commands", "cli", "__main__")):
-            assert not {needed for needed in needs if needed.startswith(("softrobots.cli", "softrobots.cli.main"))}, name
-        if not home.startswith("papers"):
-            shared = {"studies.papers", "studies.papers.arm_path"}  # a path that scripts and benchmarks follow, too
-            assert not {needed for needed in needs - shared if needed.startswith("studies.papers")}, name
+def test_no_room_and_no_module_is_too_large() -> None:
+    """At most 25 modules a folder; at most 300 lines a module; every folder says in one line what is in it."""
+    long = set()
+    for name, file in in_package().items():
+        assert len(list(file.parent.glob("*.py"))) <= 25, file.parent
+        if len(file.read_text(encoding="utf-8").splitlines()) > 300:
+            long.add(name)
+        if file.name == "__init__.py":
+            text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8")))
+            assert text, f"{name} has no docstring"
+    assert long <= LONG
+
+
+def test_imports_have_no_circle() -> None:
+    """Not even through an import inside a function."""
+    graph = {name: sources_of(name) for name in modules()}
+    while graph:
+        leaves = {name for name, sources in graph.items() if not sources & graph.keys()}
+        assert leaves, f"a circle among {sorted(graph)}"
+        graph = {name: sources for name, sources in graph.items() if name not in leaves}
+
+
+def test_parts_do_not_know_each_other() -> None:
+    for part, others in SEPARATE.items():
+        reached = reached_from(*part.split())
+        for other in others.split():
+            assert any(within(name, other) for name in modules()), f"{other} does not exist"
+            assert not [name for name in reached if within(name, other)], f"{part} imports {other}"
+    assert reached_from(*EQUATIONS) == {*EQUATIONS, "softrobots.core.checks", "softrobots.core.errors"}
+
+
+def test_only_papers_import_papers() -> None:
+    shared = {"studies.papers", "studies.papers.arm_path"}  # the path is followed by the benchmark, too
+    for name in modules():
+        if not within(name, "studies.papers"):
+            assert not {source for source in sources_of(name) - shared if within(source, "studies.papers")}, name
 
 
 def test_closed_forms_and_descriptions_know_nothing_of_pinocchio() -> None:
-    names = [
-        "errors",
-        "checks",
-        "paths",
-        "description",
-        "urdf_tags",
-        "tag_reader",
-        "mesh_files",
-        "renaming",
-        "argument_notes",
-        "springs",
-        "time_law",
-        "stumpff",
-        "screws",
-        "strain_chain",
-        "serial_chain",
-        "growth",
-        "files",
-        "checkpoint",
-    ]
-    files = [
-        PACKAGE / f"{name}.py" for name in (*names, "coordinates", "joint_loads", "muscles", "muscle_lengths", "actuators")
-    ]
-    for folder in ("inflated_beam", "constant_curvature", "helix", "robots"):
-        files += (PACKAGE / folder).glob("*.py")
-    assert len(files) > 20
-    for file in files:
-        assert "pinocchio" not in file.read_text(encoding="utf-8").replace("Pinocchio", ""), file
+    below = list(ROOMS)[: list(ROOMS).index("model")]
+    users = {
+        name
+        for name, file in in_package().items()
+        if room_of(name) in below
+        and any(
+            (isinstance(node, ast.Import) and any(alias.name.partition(".")[0] == "pinocchio" for alias in node.names))
+            or (isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "pinocchio")
+            for node in nodes_of(file)
+        )
+    }
+    assert users <= WITH_PINOCCHIO
+    for room in ("inflated_beam", "constant_curvature", "helix"):
+        assert not reached_from(f"softrobots.{room}") & WITH_PINOCCHIO, room
 
 
 def test_only_one_module_imports_xacro_and_one_builds_models() -> None:
-    users = [f.name for f in PACKAGE.rglob("*.py") if re.search(r"^\s*import xacro$", f.read_text(encoding="utf-8"), re.M)]
-    core = [f for f in PACKAGE.rglob("*.py") if f.parent.name != "interop"]  # there Pinocchio is compared with other tools
-    builders = [f.name for f in core if "buildModelFrom" in f.read_text(encoding="utf-8")]
-    assert (users, builders) == (["description.py"], ["loader.py"])
+    texts = {name: file.read_text(encoding="utf-8") for name, file in in_package().items()}
+    assert {name for name, text in texts.items() if re.search(r"^\s*import xacro$", text, re.M)} == {XACRO}
+    assert {name for name, text in texts.items() if "buildModelFrom" in text} == {BUILDER} | COMPARING
+
+
+# --- What is in the distribution
+
+
+def test_the_wheel_holds_the_package_and_no_studies() -> None:
+    text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
+    wheel = text[text.index("[tool.hatch.build.targets.wheel]") :].partition("\n\n")[0]
+    assert re.findall(r"^only-include = (.*)$", wheel, re.M) == ['["softrobots", "xacro", "urdf"]']
+    assert not [name for name in in_package() if "studies" in name]
 
 
 def test_xacro_and_urdf_hold_no_python() -> None:
@@ -266,7 +348,7 @@ def test_dev_installs_the_tools_of_the_gate() -> None:
 
 def test_the_version_stands_in_one_place() -> None:
     """The package says it; the citation and the newest entry of the changelog are that version."""
-    assert 'path = "softrobots/__init__.py"' in (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
+    assert 'path = "softrobots/version.py"' in (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
     citation = (CHECKOUT / "CITATION.cff").read_text(encoding="utf-8")
     assert re.findall(r"^version: (.*)$", citation, flags=re.MULTILINE) == [sr.__version__]
     changelog = (CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.compiled.sweeps import TargetGrid, map_workspace, mapping, scheduling
+from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, load_case, map_workspace, mapping, scheduling
 from softrobots.compiled.sweeps.scheduling import run_blocks
 from softrobots.view.figures import map_plots
 from tests.support.laws import law
@@ -27,12 +27,12 @@ DOWN = np.array([0.0, 0.0, -1.0])
 LOADS = (0.0, 8.0, 16.0, 24.0, 32.0, 40.0)
 
 
-def few(model: sr.SoftModel, x: Any, z: Any, loads: Any = LOADS, **options: Any) -> sr.sweeps.WorkspaceMap:
+def few(model: sr.SoftModel, x: Any, z: Any, loads: Any = LOADS, **options: Any) -> WorkspaceMap:
     return map_workspace(model, TargetGrid(x, (0.0,), z), loads, backend="python", **options)
 
 
 @pytest.fixture(scope="module")
-def weighed(arm: sr.SoftModel) -> sr.sweeps.WorkspaceMap:
+def weighed(arm: sr.SoftModel) -> WorkspaceMap:
     """A coarse map of the arm under its own weight."""
     return few(arm, (0.15, 0.5, 0.85, 1.1, 1.18), (-1.0, -0.4, 0.1, 0.7), gravity=sr.EARTH_GRAVITY)
 
@@ -48,7 +48,7 @@ def two_elbows(model: sr.SoftModel, target: Any, force: Any, gravity: Any) -> li
     return [needed(sr.solve_ik(model, target, force, gravity=gravity, elbow=side).equilibrium) for side in ("up", "down")]
 
 
-def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: sr.sweeps.WorkspaceMap) -> None:
+def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: WorkspaceMap) -> None:
     grid, tried = weighed.grid, 0
     for place in np.argwhere(weighed.reached):
         x, y, z, level = place
@@ -71,7 +71,7 @@ def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: sr.sweeps.Wo
 @given(st.floats(0.1, 1.3), st.floats(-1.2, 1.2), st.floats(0.0, 60.0))
 def test_what_a_map_says_of_a_target_holds(arm: sr.SoftModel, x: float, z: float, load: float) -> None:
     """Reached: an equilibrium on Pinocchio has the tip there. Not reached: Pinocchio's solver does not get there."""
-    found: sr.sweeps.WorkspaceMap = map_workspace(arm, TargetGrid((x,), (0.0,), (z,)), (0.0, load + 1.0), backend="python")
+    found: WorkspaceMap = map_workspace(arm, TargetGrid((x,), (0.0,), (z,)), (0.0, load + 1.0), backend="python")
     for level, weight in enumerate(found.loads):
         place = (0, 0, 0, level)
         if found.reached[place]:
@@ -86,7 +86,7 @@ def test_what_a_map_says_of_a_target_holds(arm: sr.SoftModel, x: float, z: float
     assert found.reached[0, 0, 0, 0] or not unloaded
 
 
-def test_the_posture_is_the_better_elbow(arm: sr.SoftModel, weighed: sr.sweeps.WorkspaceMap) -> None:
+def test_the_posture_is_the_better_elbow(arm: sr.SoftModel, weighed: WorkspaceMap) -> None:
     for x, z, level in ((1, 1, 2), (0, 2, 3), (2, 3, 1)):
         target = (weighed.grid.x[x], 0.0, weighed.grid.z[z])
         both = two_elbows(arm, target, weighed.loads[level] * DOWN, sr.EARTH_GRAVITY)
@@ -94,7 +94,7 @@ def test_the_posture_is_the_better_elbow(arm: sr.SoftModel, weighed: sr.sweeps.W
         assert abs(both[0] - both[1]) > 1.0  # [Pa]: the elbows do differ
 
 
-def test_at_the_payload_the_required_pressure_is_that_of_the_arm(arm: sr.SoftModel, weighed: sr.sweeps.WorkspaceMap) -> None:
+def test_at_the_payload_the_required_pressure_is_that_of_the_arm(arm: sr.SoftModel, weighed: WorkspaceMap) -> None:
     assert weighed.payload[0].max() == 40.0  # near the axis all loads are carried
     for x, z in ((2, 1), (3, 2)):
         payload = float(weighed.payload[x, 0, z])
@@ -177,7 +177,7 @@ def test_loads_in_any_direction_bend_sideways(arm: sr.SoftModel) -> None:
     assert made.required_pressure[place] == pytest.approx(needed(there), rel=1e-7)
 
 
-def test_a_map_is_saved_and_loaded_whole(weighed: sr.sweeps.WorkspaceMap, tmp_path: Path) -> None:
+def test_a_map_is_saved_and_loaded_whole(weighed: WorkspaceMap, tmp_path: Path) -> None:
     files = [sr.save_result(weighed, tmp_path / name) for name in ("one.npz", "two.npz")]
     assert files[0].read_bytes() == files[1].read_bytes()
     again = sr.load_result(files[0])
@@ -205,7 +205,7 @@ def test_a_map_is_saved_and_loaded_whole(weighed: sr.sweeps.WorkspaceMap, tmp_pa
     ],
 )
 def test_a_changed_file_is_refused(
-    name: str, change: Callable[[Any], Any], message: str, weighed: sr.sweeps.WorkspaceMap, tmp_path: Path
+    name: str, change: Callable[[Any], Any], message: str, weighed: WorkspaceMap, tmp_path: Path
 ) -> None:
     file = sr.save_result(weighed, tmp_path / "map.npz")
     with np.load(file) as fields:
@@ -273,7 +273,7 @@ def test_grids_cover_their_plane_and_box() -> None:
             make(-1.0, 3)
 
 
-def fingerprint(made: sr.sweeps.WorkspaceMap) -> list[bytes]:
+def fingerprint(made: WorkspaceMap) -> list[bytes]:
     names = ("loads", "direction", "reached", "required_pressure", "payload", "q_motors", "q_springs")
     return [getattr(made, name).tobytes() for name in names]
 
@@ -355,7 +355,7 @@ def test_an_error_in_a_block_comes_out(threads: int) -> None:
 
 
 def test_another_version_of_softrobots_is_refused(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sr, "__version__", "0.0.0")
+    monkeypatch.setattr(load_case, "__version__", "0.0.0")
     case = mapping.SweepCase.of(
         arm, direction=DOWN, loads=np.array(LOADS), gravity=None, tolerance=1e-9, backend="python", version="9.9.9"
     )
@@ -363,7 +363,7 @@ def test_another_version_of_softrobots_is_refused(arm: sr.SoftModel, monkeypatch
         mapping.solve_block(case, GRID.targets[:1])
 
 
-def test_the_picture_shows_the_map(weighed: sr.sweeps.WorkspaceMap, tool: Callable[[str], ModuleType]) -> None:
+def test_the_picture_shows_the_map(weighed: WorkspaceMap, tool: Callable[[str], ModuleType]) -> None:
     tool("matplotlib")
     figure = map_plots.workspace_maps(weighed, load=17.0)
     reach, payload, pressure, *bars = figure.axes
