@@ -26,9 +26,8 @@ from studies.marked_text import marked
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
-"""Between these lines of README.md and docs/compiled.md stand the tables."""
-PAGES = {"README.md": True, "docs/compiled.md": False}
-"""Pages with a table, and whether only what has a target is in it."""
+"""The lines of the page between which the table stands."""
+PAGE = "docs/compiled.md"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -43,16 +42,15 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--from", type=Path, dest="saved", metavar="FILE", help=told)
     made.add_argument("--json", type=Path, metavar="FILE", help="also write the results to a new file")
     made.add_argument("--plots", type=Path, metavar="FOLDER", help="draw the curves into a folder (jobs sizes and batches)")
-    told = "write docs/benchmark.json, docs/images/benchmark_*.png and the tables in README.md and docs/compiled.md"
+    told = "write docs/benchmark.json, docs/images/benchmark_*.png and the table in docs/compiled.md"
     made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
     return made
 
 
-def document(results: Results, *, targets_only: bool) -> str:
-    """What a page shows of the results: machine, table and notes."""
-    rows = [row for row in results.rows if row.target is not None or not targets_only]
-    notes = [] if targets_only else ["\n".join(f"- {note}" for note in results.notes)]
-    return "\n\n".join(part for part in [machine_text(results), table(rows), *notes] if part)
+def document(results: Results) -> str:
+    """What the page shows of the results: machine, table and notes."""
+    notes = "\n".join(f"- {note}" for note in results.notes)
+    return "\n\n".join(part for part in (machine_text(results), table(results.rows), notes) if part)
 
 
 def write_pictures(results: Results, folder: Path, *, overwrite: bool) -> list[Path]:
@@ -62,23 +60,26 @@ def write_pictures(results: Results, folder: Path, *, overwrite: bool) -> list[P
     return [plots.write_png(picture(results, name), folder / f"benchmark_{name}.png", overwrite=overwrite) for name in names]
 
 
-def read_page(checkout: Path, name: str) -> str:
-    """The text of a page."""
+def page_with(checkout: Path, text: str) -> str:
+    """The page of a checkout with a text between its two marks.
+
+    Raises:
+        FileFormatError: If the page cannot be read, or does not have each mark once, in order.
+    """
     try:
-        return (checkout / name).read_text(encoding="utf-8")
+        page = (checkout / PAGE).read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
-        raise sr.FileFormatError(f"cannot read {checkout / name}: {error}") from error
+        raise sr.FileFormatError(f"cannot read {checkout / PAGE}: {error}") from error
+    return marked(page, PAGE, BEGIN, END, text)
 
 
 def write_docs(results: Results, checkout: Path) -> list[Path]:
-    """Write results, pictures and tables into a checkout; return the files."""
+    """Write results, pictures and table into a checkout; return the files."""
     require_whole(results, list(JOBS))
-    texts = {}
-    for name, targets_only in PAGES.items():
-        texts[name] = marked(read_page(checkout, name), name, BEGIN, END, document(results, targets_only=targets_only))
+    page = page_with(checkout, document(results))
     files = write_pictures(results, checkout / "docs" / "images", overwrite=True)
     files.append(write_text(checkout / "docs" / "benchmark.json", as_json(results), overwrite=True))
-    return files + [write_text(checkout / name, text, overwrite=True) for name, text in texts.items()]
+    return [*files, write_text(checkout / PAGE, page, overwrite=True)]
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -92,13 +93,12 @@ def run(arguments: argparse.Namespace) -> None:
         plots.require_matplotlib()  # tells at once what is missing
     if arguments.json is not None:
         new_file(arguments.json, overwrite=False)
-    if arguments.docs is not None and arguments.saved is None:  # tells at once what keeps the pages from being written
+    if arguments.docs is not None and arguments.saved is None:  # tells at once what keeps the page from being written
         if arguments.quick or not arguments.cpp or set(arguments.only) != set(JOBS):
             raise sr.ParameterError("--docs", str(arguments.docs), "given with --cpp, for all jobs, without --quick")
-        for name in PAGES:
-            marked(read_page(arguments.docs, name), name, BEGIN, END, "")
+        page_with(arguments.docs, "")
     results = measure(settings, arguments.only) if arguments.saved is None else read_results(arguments.saved)
-    print(f"\n{document(results, targets_only=False)}")
+    print(f"\n{document(results)}")
     written = []
     if arguments.json is not None:
         written.append(write_text(arguments.json, as_json(results), overwrite=False))

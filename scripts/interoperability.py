@@ -41,7 +41,8 @@ ROBOTS = {"inflatable_arm": "inflatable arm", "pcc_arm_lumped": "arm of muscles"
 """Robots of the equilibria, and what the tables call them."""
 CHECKOUT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- interoperability:begin -->", "<!-- interoperability:end -->"
-"""Between these lines of README.md stand the tables."""
+"""The lines of the page between which the tables stand."""
+PAGE = "docs/other_tools.md"
 POSES = 5
 SMALLEST = 1e-18
 """Where the picture puts a difference of zero."""
@@ -76,7 +77,7 @@ def parser() -> argparse.ArgumentParser:
         "--from", type=Path, dest="saved", metavar="FILE", help="make tables and pictures of saved results instead"
     )
     made.add_argument("--output", type=Path, metavar="FILE", help="also write the results to a new JSON file")
-    told = "write docs/interoperability.json, docs/images/interoperability.png and the tables in README.md of this checkout"
+    told = "write docs/interoperability.json, docs/images/interoperability.png and the tables in docs/other_tools.md"
     made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
     return made
 
@@ -182,7 +183,7 @@ def kinematics_table(results: Results) -> str:
 
 
 def document(results: Results) -> str:
-    """Everything that README.md shows of the results."""
+    """Everything that the page shows of the results."""
     cases = len({(row["robot"], row["pose"], row["gravity"]) for row in results["equilibrium"]})
     parts = []
     if results["equilibrium"]:
@@ -201,17 +202,17 @@ def document(results: Results) -> str:
     return "\n\n".join(parts)
 
 
-def readme_with(text: str, results: Results) -> str:
-    """The text of a README with the tables of the results between its two marks.
+def page_with(text: str, results: Results) -> str:
+    """The text of the page with the tables of the results between its two marks.
 
     Args:
-        text: The README.
+        text: The page.
         results: The results.
 
     Raises:
         FileFormatError: If it does not have each mark once, in order.
     """
-    return marked(text, "the README", BEGIN, END, document(results))
+    return marked(text, PAGE, BEGIN, END, document(results))
 
 
 def figure(results: Results) -> Any:
@@ -292,13 +293,13 @@ def write_docs(results: Results, checkout: Path) -> list[Path]:
     if asked != (set(SIMULATORS), set(TOOLS)) or len(cases) != 2 * POSES * len(ROBOTS) or not simulated:
         raise sr.ParameterError("--docs", str(checkout), "given for results of all tools, robots and poses, simulated")
     try:
-        readme = (checkout / "README.md").read_text(encoding="utf-8")
+        page = (checkout / PAGE).read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
-        raise sr.FileFormatError(f"cannot read the README of {checkout}: {error}") from error
-    updated, drawing = readme_with(readme, results), figure(results)
+        raise sr.FileFormatError(f"cannot read {checkout / PAGE}: {error}") from error
+    updated, drawing = page_with(page, results), figure(results)
     files = [write_text(checkout / "docs" / "interoperability.json", as_json(results), overwrite=True)]
     files.append(plots.write_png(drawing, checkout / "docs" / "images" / "interoperability.png", overwrite=True))
-    files.append(write_text(checkout / "README.md", updated, overwrite=True))
+    files.append(write_text(checkout / PAGE, updated, overwrite=True))
     return files
 
 

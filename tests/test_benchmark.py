@@ -483,20 +483,20 @@ def test_docs_are_made_of_a_recorded_run(tmp_path: Path, capsys: pytest.CaptureF
     script, saved = load_script("benchmark"), tmp_path / "saved.json"
     saved.write_text(as_json(made_up()), encoding="utf-8")
     (tmp_path / "docs").mkdir()
-    for name in script.PAGES:
-        (tmp_path / name).write_text(f"Before.\n\n{script.BEGIN}\nold\n{script.END}\n\nAfter.\n", encoding="utf-8")
+    page = tmp_path / script.PAGE
+    page.write_text(f"Before.\n\n{script.BEGIN}\nold\n{script.END}\n\nAfter.\n", encoding="utf-8")
     assert script.main(["--from", str(saved), "--docs", str(tmp_path)]) == 0
-    short, whole = ((tmp_path / name).read_text(encoding="utf-8") for name in script.PAGES)
-    assert short.startswith("Before.\n\n")
-    assert short.endswith("\n\nAfter.\n")
-    assert ("| something |" in whole, "| something |" in short) == (True, False)
-    assert "old" not in short + whole
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("Before.\n\n")
+    assert text.endswith("\n\nAfter.\n")
+    assert "| something |" in text
+    assert "old" not in text
     assert (tmp_path / "docs" / "benchmark.json").read_text(encoding="utf-8") == as_json(made_up())
     for name in PICTURES:
         assert (tmp_path / "docs" / "images" / f"benchmark_{name}.png").read_bytes()[:4] == b"\x89PNG"
-    (tmp_path / "README.md").write_text("no marks\n", encoding="utf-8")
+    page.write_text("no marks\n", encoding="utf-8")
     assert script.main(["--from", str(saved), "--docs", str(tmp_path)]) == 2
-    assert "README.md must have the lines <!-- benchmark:begin -->" in capsys.readouterr().err
+    assert "docs/compiled.md must have the lines <!-- benchmark:begin -->" in capsys.readouterr().err
 
 
 def test_the_tables_of_the_pages_are_those_of_the_recorded_run() -> None:
@@ -504,9 +504,7 @@ def test_the_tables_of_the_pages_are_those_of_the_recorded_run() -> None:
         missing("docs/benchmark.json has not been recorded: scripts/benchmark.py --cpp --docs")
     script, results = load_script("benchmark"), read_results(RECORDED)
     require_whole(results, list(JOBS))
-    for name, targets_only in script.PAGES.items():
-        text = (CHECKOUT / name).read_text(encoding="utf-8")
-        assert script.marked(text, name, script.BEGIN, script.END, script.document(results, targets_only=targets_only)) == text
+    assert script.page_with(CHECKOUT, script.document(results)) == (CHECKOUT / script.PAGE).read_text(encoding="utf-8")
     for name in PICTURES:
         assert (CHECKOUT / "docs" / "images" / f"benchmark_{name}.png").stat().st_size > 10_000
 

@@ -1,4 +1,4 @@
-"""Simulators that get an exported file, and nothing else, find Pinocchio's equilibrium; the README shows the recorded run."""
+"""Simulators that get an exported file, and nothing else, find Pinocchio's equilibrium, live and in the recorded run."""
 
 from __future__ import annotations
 
@@ -288,11 +288,11 @@ def test_springs_read_refuses_other_tools_and_formats() -> None:
 RECORDED = CHECKOUT / "docs" / "interoperability.json"
 
 
-def test_the_table_of_the_readme_is_that_of_the_recorded_run() -> None:
+def test_the_tables_of_the_page_are_those_of_the_recorded_run() -> None:
     script = load_script("interoperability")
     results = script.read_results(RECORDED)
-    readme = (CHECKOUT / "README.md").read_text(encoding="utf-8")
-    assert script.readme_with(readme, results) == readme
+    page = (CHECKOUT / script.PAGE).read_text(encoding="utf-8")
+    assert script.page_with(page, results) == page
     assert script.agreed(results)
     assert {row["tool"] for row in results["equilibrium"]} == {"MuJoCo", "Drake", "PyBullet"}
     for robot in ROBOTS:
@@ -328,16 +328,16 @@ def test_docs_are_made_of_the_recorded_run(tmp_path: Path, capsys: pytest.Captur
     script = load_script("interoperability")
     (tmp_path / "docs" / "images").mkdir(parents=True)
     before, after = "# softrobots\n\n", "\n\nThe end.\n"
-    (tmp_path / "README.md").write_text(f"{before}{script.BEGIN}\nold\n{script.END}\n{after}", encoding="utf-8")
+    (tmp_path / script.PAGE).write_text(f"{before}{script.BEGIN}\nold\n{script.END}\n{after}", encoding="utf-8")
     assert run_script(["--from", str(RECORDED), "--docs", str(tmp_path)]) == 0
-    made = (tmp_path / "README.md").read_text(encoding="utf-8")
+    made = (tmp_path / script.PAGE).read_text(encoding="utf-8")
     assert made.startswith(before)
     assert made.endswith(after)
     assert "| helical tube |" in made
     assert "old" not in made
     assert (tmp_path / "docs/interoperability.json").read_text() == RECORDED.read_text()
     assert (tmp_path / "docs/images/interoperability.png").read_bytes()[:4] == b"\x89PNG"
-    (tmp_path / "README.md").write_text("no marks\n", encoding="utf-8")
+    (tmp_path / script.PAGE).write_text("no marks\n", encoding="utf-8")
     assert run_script(["--from", str(RECORDED), "--docs", str(tmp_path)]) == 2
     assert "interoperability:begin" in capsys.readouterr().err
 
