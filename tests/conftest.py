@@ -18,6 +18,7 @@ import pytest
 from hypothesis import settings
 
 import softrobots as sr
+from softrobots.description.third_party import UR5, robot_file
 
 # The same examples in every run: a failure is a failure of the code, not of the day.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -177,6 +178,15 @@ def odd_arm() -> sr.SoftModel:
             pressure=(60e3, 50e3, 40e3),
         )
     )
+
+
+@pytest.fixture(scope="session")
+def ur5() -> Path:
+    try:
+        return robot_file(UR5)
+    except sr.MissingDependency as error:
+        missing(str(error))
+        raise
 
 
 @pytest.fixture

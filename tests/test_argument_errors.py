@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from tests.test_hostile_numbers import CALLS
+from tests.support.closed_form_calls import CALLS
 
 UNITS = {
     "m": "length radius wall_thickness position distance hinge_offset probe_distance offset displacement outer_radius "

@@ -23,11 +23,8 @@ import softrobots as sr
 from softrobots.compiled.c.c_source import to_c
 from softrobots.compiled.drivers import intrinsics, trigonometry
 from tests.conftest import missing
+from tests.support.c_libraries import build_library
 
-FLAGS = [
-    *("-std=c99", "-O2", "-ffreestanding", "-nostdlib", "-shared", "-fPIC", "-ffp-contract=off"),
-    *("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wmissing-prototypes", "-Werror"),
-]
 TRIGONOMETRY = "\n\n".join(map(inspect.getsource, trigonometry.FUNCTIONS))
 EVERYTHING = f'''"""All that the language has.
 
@@ -195,17 +192,6 @@ def over(w: Array, count: int, which: int) -> None:
 EXPORTED = ["whole", "locals_and_loops", "operators", "chosen", "over", "is_large", "N"]
 
 
-def compiled(folder: Path, text: str, name: str) -> Path:
-    """A shared library of a C file, without the C library."""
-    if not shutil.which("gcc"):
-        missing("gcc is not installed (Debian: apt-get install gcc)")
-    source, library = folder / f"{name}.c", folder / f"{name}.so"
-    source.write_text(text, encoding="ascii")
-    done = subprocess.run(["gcc", *FLAGS, str(source), "-o", str(library)], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, ""), f"{done.stderr}\n{text}"
-    return library
-
-
 def in_python(text: str) -> dict[str, Any]:
     names: dict[str, Any] = dict(vars(intrinsics))
     exec(text, names)
@@ -219,7 +205,7 @@ def bits(numbers: Any) -> list[bytes]:
 
 @pytest.fixture(scope="module")
 def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(tmp_path_factory.mktemp("c"), to_c(EVERYTHING, prefix="arm_", exported=EXPORTED), "everything")
+    return build_library(tmp_path_factory.mktemp("c"), to_c(EVERYTHING, prefix="arm_", exported=EXPORTED), "everything")
 
 
 @pytest.fixture(scope="module")
@@ -417,7 +403,7 @@ def test_any_expression_gives_the_same_bits(tmp_path: Path, texts: list[str], ro
     lines = [f"    w[{3 + place}] = {text}" for place, text in enumerate(texts)]
     text = "def all_of_them(w: Array, x: float, y: float, n: int, m: int) -> None:\n" + "\n".join(lines) + "\n"
     name = f"any{len(list(tmp_path.iterdir()))}"  # a library is loaded once under its name
-    function = ctypes.CDLL(str(compiled(tmp_path, to_c(text, prefix="p_", exported=["all_of_them"]), name))).p_all_of_them
+    function = ctypes.CDLL(str(build_library(tmp_path, to_c(text, prefix="p_", exported=["all_of_them"]), name))).p_all_of_them
     number = ctypes.c_double
     function.argtypes = [ctypes.POINTER(number), number, number, ctypes.c_int, ctypes.c_int]
     function.restype = None

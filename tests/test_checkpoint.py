@@ -23,8 +23,8 @@ from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace, 
 from softrobots.core.checkpoint import CASE, Checkpoint, discard
 from softrobots.statics import workspace
 from tests.conftest import CHECKOUT
-from tests.test_scripts import run_script
-from tests.test_workspace_map import fingerprint
+from tests.support.load_cases import fingerprint
+from tests.support.scripts import run_script
 
 GRID = TargetGrid.plane(1.2, 3)  # 18 targets
 LOADS = (0.0, 20.0)

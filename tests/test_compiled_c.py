@@ -16,8 +16,8 @@ import softrobots as sr
 from softrobots.compiled import Status
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
-from tests.test_c_source import compiled as library_of
-from tests.test_compiled_model import cases, directions
+from tests.support.c_libraries import build_library
+from tests.support.load_cases import cases, directions
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 SAME = 1e-12  # sine and cosine differ from libm's by an ulp; of angles of a radian and lengths of a metre
@@ -29,7 +29,7 @@ class Controller:
 
     def __init__(self, solver: CompiledModel, folder: Path, *, gravity: bool, name: str) -> None:
         text = solver.c_source(gravity=gravity, prefix=name)
-        self.path = library_of(folder, text, name)
+        self.path = build_library(folder, text, name)
         self.place = {key: int(value) for key, value in re.findall(rf"^enum {{ {name}_(\w+) = (\d+) }};$", text, re.MULTILINE)}
         self._library, self._name = ctypes.CDLL(str(self.path)), name
         self.w = (ctypes.c_double * self.place["WORKSPACE_SIZE"])()

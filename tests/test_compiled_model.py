@@ -19,6 +19,7 @@ from softrobots.compiled.run import compiled_model
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
 from tests.support.foreign import BRANCHED
+from tests.support.load_cases import cases, directions
 from tests.support.oracles import REFERENCE_EQUILIBRIA, arm_balance, arm_energy
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
@@ -55,16 +56,6 @@ def three_links() -> CompiledModel:
 def one_link() -> CompiledModel:
     """Two motors, two springs."""
     return sr.compile(sr.load_model(sr.InflatableArm(link_lengths=(0.6,))), backend="python")
-
-
-def directions(rng: np.random.Generator, count: int) -> np.ndarray:
-    vectors = rng.normal(size=(count, 3))
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
-
-
-def cases(rng: np.random.Generator, count: int, low: float, high: float, motors: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """Motors anywhere, forces of any direction."""
-    return rng.uniform(-np.pi, np.pi, (count, motors)), directions(rng, count) * rng.uniform(low, high, (count, 1))
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:

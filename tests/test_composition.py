@@ -16,7 +16,6 @@ import pytest
 import softrobots as sr
 from softrobots.description.composition import fix_joints
 from softrobots.description.tag_reader import read_tags
-from softrobots.description.third_party import UR5, robot_file
 from softrobots.statics.kinematics import frame_placement
 from tests.conftest import missing
 from tests.support.foreign import INERTIAL, joint
@@ -38,15 +37,6 @@ def stand(xyz: str = "0.1 0.2 0.3", rpy: str = "0.4 -0.5 0.6", more: str = "") -
         f'<robot name="stand"><link name="floor"/><joint name="leg" type="fixed"><origin xyz="{xyz}" rpy="{rpy}"/>'
         f'<parent link="floor"/><child link="top"/></joint><link name="top">{INERTIAL}</link>{more}</robot>'
     )
-
-
-@pytest.fixture(scope="session")
-def ur5() -> Path:
-    try:
-        return robot_file(UR5)
-    except sr.MissingDependency as error:
-        missing(str(error))
-        raise
 
 
 def placements(urdf: str, values: dict[str, float]) -> dict[str, pin.SE3]:

@@ -27,7 +27,7 @@ from softrobots.view.local_requests import is_local
 from softrobots.view.meshcat_page.page_text import legend_rows
 from softrobots.view.viewer import Viewer, view
 from tests.conftest import CHECKOUT, load_script
-from tests.test_viewer import listening
+from tests.support.pictures import listening
 
 SCRIPT = "</script><script>window.pwned = 1</script><img src=x onerror='window.pwned = 1'>"
 NAMES = (

@@ -25,7 +25,7 @@ from softrobots.core.checkpoint import Checkpoint
 from softrobots.core.files import free_folder, make_folder, new_file, write_atomically, write_bytes, write_text
 from softrobots.view.figures import plots
 from tests.conftest import CHECKOUT, missing
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 
 @contextlib.contextmanager

@@ -18,7 +18,7 @@ from softrobots.core.errors import ParameterError, StraightTube
 from softrobots.view.figures import helix_plots
 from softrobots.view.figures.helix_sheet import draw
 from tests.conftest import missing
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 PICTURES = {"helix_grid.png", "helix_shapes.png", "helix_grasp.png"}
 TABLES = {"shapes.csv", "contraction_limits.csv", "grasp_forces.csv"}

@@ -16,8 +16,7 @@ from scipy.linalg import expm
 from softrobots import helix
 from softrobots.core.errors import ParameterError
 from softrobots.helix import HANDEDNESS, PATHS, HelixShape
-from tests.support.laws import law
-from tests.test_helix_shapes import (
+from tests.support.helix_forms import (
     ANGLES,
     CONTRACTIONS,
     DEG,
@@ -30,6 +29,7 @@ from tests.test_helix_shapes import (
     exact_forward,
     length_by_chords,
 )
+from tests.support.laws import law
 
 # Paper's reference; inner path beyond the axis, and on it; straight; planar; the actuator across more than along; tight; wide.
 ACTUATORS = [

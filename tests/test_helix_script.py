@@ -11,7 +11,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.view.meshcat_page import animation_frames
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 
 @pytest.fixture(autouse=True)

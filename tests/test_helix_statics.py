@@ -26,7 +26,7 @@ from tests.support.helix_rods import (
     solve_helix_rod,
     tip_compliance,
 )
-from tests.test_interop import assert_mujoco_balances
+from tests.support.mujoco_balance import assert_mujoco_balances
 
 FIELDS: dict[str, Any] = {"length": 0.5, "bending_stiffness": 0.02, "torsional_stiffness": 0.012, "axial_stiffness": 100.0}
 """0.9 turns of the paper's helix, soft: a force of 1 N moves the tip by some 0.3 m."""

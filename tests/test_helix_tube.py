@@ -34,7 +34,7 @@ from softrobots.statics.kinematics import frame_placement
 from softrobots.view.body import body_at
 from tests.support.helix_rods import actuator_frames, gauss
 from tests.support.laws import law
-from tests.test_pcc_description import changed, check_portable, edited, gazebo_numbers, link_masses, link_poses, within_joint
+from tests.support.urdf_reading import changed, check_portable, edited, gazebo_numbers, link_masses, link_poses, within_joint
 
 DEG = math.pi / 180.0
 XACRO = xacro_folder() / HelixTube.XACRO

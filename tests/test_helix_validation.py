@@ -14,7 +14,7 @@ import pytest
 import softrobots as sr
 from tests.conftest import load_script
 from tests.support.helix_rods import actuator_frames
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 
 def script() -> ModuleType:

@@ -30,8 +30,8 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastostatics import elastic_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
+from tests.support.serial_chains import ROBOTS, drawn
 from tests.support.traced import functions, values
-from tests.test_serial_chain import ROBOTS, drawn
 
 
 def floats(array: Any) -> np.ndarray:

@@ -25,7 +25,7 @@ from softrobots.compiled.program.generated_module import Program, make_program
 from softrobots.compiled.run import machines
 from softrobots.compiled.run.machines import NumbaRun, PythonRun, available_backend, cache_folder, make_run
 from softrobots.model.soft_model import SoftModel
-from tests.test_serial_chain import ROBOTS
+from tests.support.serial_chains import ROBOTS
 
 GRAVITY = np.array([0.5, -1.0, -9.6])
 

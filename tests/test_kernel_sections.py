@@ -22,9 +22,9 @@ from softrobots.compiled.trace.stumpff_series import LARGEST, stumpff
 from softrobots.model.serial_chain import ChainSection
 from softrobots.model.soft_model import SoftModel
 from tests.support.oracles import central_difference
+from tests.support.screw_motions import H, exact_screw, exact_stumpff, screw_matrix
+from tests.support.serial_chains import section_frames
 from tests.support.traced import functions, values
-from tests.test_serial_chain import section_frames
-from tests.test_strain_chain import H, exact_screw, exact_stumpff, screw_matrix
 
 angles_ = st.floats(-1.5, 1.5)
 sections_ = st.tuples(angles_, angles_, angles_, st.floats(-0.04, 0.1))

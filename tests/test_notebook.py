@@ -16,7 +16,7 @@ import pytest
 import softrobots as sr
 from softrobots.view.browser import find_chromium, open_browser, show_share
 from tests.conftest import CHECKOUT, missing
-from tests.test_viewer import coloured, pixels
+from tests.support.pictures import coloured, pixels
 
 NOTEBOOK = CHECKOUT / "docs" / "tutorial.ipynb"
 VIEWS = ("view", "animation")

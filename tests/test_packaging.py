@@ -264,6 +264,12 @@ def test_only_one_module_imports_xacro_and_one_builds_models() -> None:
     assert {name for name, text in texts.items() if "buildModelFrom" in text} == {BUILDER} | COMPARING
 
 
+def test_test_modules_do_not_import_each_other() -> None:
+    """What several of them use lies in `tests/support/`."""
+    for file in (CHECKOUT / "tests").rglob("*.py"):
+        assert not re.search(r"^\s*(from|import) tests\.test_", file.read_text(encoding="utf-8"), re.M), file
+
+
 # --- What is in the distribution
 
 

@@ -23,7 +23,7 @@ from softrobots.view.scene import Scene
 from softrobots.view.viewer import view
 from studies.gallery import EXHIBITS
 from tests.conftest import CHECKOUT
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 FOLDER = CHECKOUT / "docs" / "pages"
 LIMITS = {"helix_growth": 3e6, "pcc_arm": 2e6, "inflatable_arm": 0.5e6, "ur5_bench": 2e6}

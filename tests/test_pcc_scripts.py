@@ -16,7 +16,7 @@ from softrobots.view.body import body
 from softrobots.view.figures import body_plots
 from tests.conftest import CHECKOUT
 from tests.support.oracles import central_difference
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 

@@ -10,7 +10,7 @@ import pytest
 import softrobots as sr
 from softrobots.view.body import body
 from softrobots.view.viewer import Viewer, view
-from tests.test_viewer import pictures_of
+from tests.support.pictures import pictures_of
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
 

@@ -42,7 +42,7 @@ def test_every_package_of_the_design_is_named(package: str) -> None:
 
 
 def test_the_numbers_of_the_default_trajectory_are_current(tmp_path) -> None:
-    from tests.test_scripts import run_script
+    from tests.support.scripts import run_script
 
     run_script("ik_trajectory", ["--output", str(tmp_path / "a"), "--no-plots"])
     summary = json.loads((tmp_path / "a" / "summary.json").read_text())

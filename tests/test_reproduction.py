@@ -43,7 +43,7 @@ from studies.papers.rows import (
 )
 from tests.conftest import CHECKOUT, load_script
 from tests.support.oracles import PRINTED_WRINKLING_MOMENTS, central_difference, flexible_jacobian, flexible_table, rigid_table
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 Found = dict[str, tuple[Row, ...]]
 

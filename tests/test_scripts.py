@@ -11,12 +11,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.statics.trajectory import METHODS
-from tests.conftest import load_script
-
-
-def run_script(name: str, arguments: list[str]) -> int:
-    """Import a script as a module and call its main."""
-    return load_script(name).main(arguments)
+from tests.support.scripts import run_script
 
 
 @pytest.mark.parametrize("method", METHODS)

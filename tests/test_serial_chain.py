@@ -11,7 +11,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 import softrobots as sr
 from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain
@@ -20,78 +19,9 @@ from softrobots.model.structure import Parts
 from softrobots.statics.kinematics import frame_placement
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.laws import law
-from tests.test_composition import ur5  # noqa: F401 - a fixture
-from tests.test_strain_chain import rotation, screw_matrix
-
-HEAVY = INERTIAL.replace("<inertial>", '<inertial><origin xyz="0.02 -0.03 0.05" rpy="0.3 0 0"/>')  # off its link's origin
-
-# An odd axis, a slide on a slanted one, a continuous joint about -y, and fixed links with mass in between.
-ODD = (
-    f'<robot name="odd"><link name="base">{INERTIAL}</link>'
-    + joint("plinth", "base", "column", "0 0 1", "fixed", "0.1 0 0.2", "0 0 1")
-    + joint("turn", "column", "arm", "1 2 3")
-    + joint("plate", "arm", "side", "0 0 1", "fixed", "0 0.1 0", "1 0 0")
-    + joint("slide", "side", "sledge", "0 -0.6 0.8", "prismatic", "0.2 0.1 0")
-    + joint("box", "sledge", "case", "0 0 1", "fixed", "0 0 0.1", "0 1 0")
-    + joint("wheel", "case", "fork", "0 -1 0", "continuous", "0.1 0 0.1", f"{math.pi / 2} 0 {-math.pi / 2}")
-    + joint("nose", "fork", "end", "-3 0 1", "revolute", "0.2 0 0")
-    + joint("cap", "end", "tool", "0 0 1", "fixed", "0.05 0.02 -0.1", "0.2 0.4 0.6")
-    + "</robot>"
-).replace(INERTIAL, HEAVY)
-
-
-def odd() -> SoftModel:
-    return sr.load_model(ODD, springs={"slide": (900.0, 0.02), "nose": (30.0, -0.1)})
-
-
-def pcc(**options: object) -> SoftModel:
-    muscles = {"muscles": options.pop("muscles")} if "muscles" in options else {}
-    return sr.load_model(sr.PccArm(segment_lengths=(0.5, 0.4), bending_stiffness=(1.9, 1.2), **options), **muscles)
-
-
-def uneven() -> SoftModel:
-    """Hinges of one segment that differ in stiffness."""
-    alike = pcc(chain="lumped", hinges=3)
-    table = {name: ((1.0 + place / 5) * k, rest) for place, (name, (k, rest)) in enumerate(alike.spring_table.items())}
-    return sr.load_model(alike.urdf, springs=table)
-
-
-ROBOTS: dict[str, Callable[[], SoftModel]] = {
-    "arm": lambda: sr.load_model(sr.InflatableArm()),
-    "pcc": lambda: pcc(elastic_sections=2),
-    "pcc_forces": lambda: pcc(elastic_sections=2, muscles="forces"),
-    "pcc_lumped": lambda: pcc(chain="lumped", hinges=2),
-    "helix": lambda: sr.load_model(sr.HelixTube(elastic_sections=6)),
-    "helix_lumped": lambda: sr.load_model(sr.HelixTube(chain="lumped", hinges=6)),
-    "odd": odd,
-    "stacked": lambda: sr.load_model(sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(elastic_sections=2))),
-    "uneven": uneven,
-}
-
+from tests.support.serial_chains import HEAVY, ROBOTS, drawn, moved_by, odd, pcc, placed, section_frames
 
 # --- Oracle: the chain as its docstrings say, written out; nothing here calls the package or Pinocchio
-
-
-def placed(turn: np.ndarray, position: np.ndarray) -> np.ndarray:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = turn, position
-    return made
-
-
-def moved_by(slides: bool, amount: float) -> np.ndarray:
-    return placed(np.eye(3), np.array([0.0, 0.0, amount])) if slides else rotation(2, amount)
-
-
-def section_frames(z: np.ndarray, length: float) -> list[np.ndarray]:
-    """Frames behind the six joints of a section, in its start; the last is SciPy's exponential of the strain."""
-    end = screw_matrix(z, length)
-    x, y, along = end[:3, 3]
-    first = rotation(0, math.atan2(-y, along))
-    second = first @ rotation(1, math.atan2(x, math.hypot(y, along)))
-    third = second @ moved_by(True, math.hypot(x, y, along))
-    about_x, about_y, _ = Rotation.from_matrix(second[:3, :3].T @ end[:3, :3]).as_euler("XYZ")
-    fourth = third @ rotation(0, about_x)
-    return [first, second, third, fourth, fourth @ rotation(1, about_y), end]
 
 
 def walk(chain: SerialChain, motors: np.ndarray, strains: np.ndarray) -> tuple[np.ndarray, list[tuple[np.ndarray, ChainBody]]]:
@@ -115,15 +45,6 @@ def potential(bodies: list[tuple[np.ndarray, ChainBody]], gravity: np.ndarray) -
 
 
 # --- Robots of every kind
-
-
-def drawn(model: SoftModel, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Random actuators within their limits, and elastic coordinates up to half a radian or 3 cm from rest."""
-    motors = None
-    while motors is None:
-        motors = model.actuators.draw(rng)
-    size = np.where(model.structure.law.turning, 0.5, 0.03)
-    return motors, model.rest + size * rng.uniform(-1.0, 1.0, model.n_springs)
 
 
 def check_against_pinocchio(model: SoftModel, rng: np.random.Generator, times: int = 5) -> None:
@@ -153,7 +74,7 @@ def test_tip_and_energy_of_three_links_that_differ(odd_arm: SoftModel, rng: np.r
 
 
 @pytest.mark.parametrize("robot", [sr.InflatableArm(), sr.PccArm(elastic_sections=1), sr.HelixTube(elastic_sections=6)])
-def test_tip_and_energy_on_a_ur5(robot: sr.Robot, ur5: Path, rng: np.random.Generator) -> None:  # noqa: F811 - the fixture
+def test_tip_and_energy_on_a_ur5(robot: sr.Robot, ur5: Path, rng: np.random.Generator) -> None:
     model = sr.load_model(sr.mount(ur5, "tool0", robot, xyz=(0.02, -0.03, 0.05), rpy=(0.3, -1.1, 0.7)))
     assert [getattr(e, "motor", None) for e in model.chain().elements[:6]] == list(range(6))
     check_against_pinocchio(model, rng)

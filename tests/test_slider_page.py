@@ -23,7 +23,7 @@ from softrobots.view.scene import WRINKLING_COLOURS, Scene, wrinkling_level
 from softrobots.view.slider_page import SliderPage
 from softrobots.view.viser_page.shapes import drawn_of
 from softrobots.view.viser_page.slider_panel import round_down, slider_grid
-from tests.test_viewer import listening, pixels
+from tests.support.pictures import listening, pixels
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
 

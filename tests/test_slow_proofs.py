@@ -19,7 +19,7 @@ from studies.clean_checkout import copy_checkout
 from studies.mutants import read_explanations
 from studies.recorded_run import command_of
 from tests.conftest import CHECKOUT, load_script
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 
 def test_the_page_names_tests_that_exist() -> None:

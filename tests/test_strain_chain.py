@@ -20,8 +20,8 @@ from softrobots.constant_curvature.screws import Screw, skew
 from softrobots.constant_curvature.strain_chain import JOINTS, SectionChain, in_range, joint_map, joint_positions
 from softrobots.constant_curvature.stumpff import stumpff
 from tests.support.oracles import central_difference
+from tests.support.screw_motions import H, exact_screw, exact_stumpff, rotation, screw_matrix
 
-H = 0.131  # rest length of a section of the default arm [m]
 SIZES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, math.pi - 0.1)  # of the rotation over a section [rad]
 UNIT = np.array([0.55, -0.72, 0.42]) / np.linalg.norm([0.55, -0.72, 0.42])  # bending in a slanted plane, with twist
 STRETCH = 0.02  # [m], and as much is tested as compression
@@ -31,24 +31,6 @@ sections_ = st.tuples(angles_, angles_, angles_, st.floats(-0.04, 0.1)).map(np.a
 
 
 # --- Oracles: nothing here calls the package
-
-
-def exact_stumpff(k: int, x: float) -> Any:
-    """The series of the definition at 100 digits: with 200 terms exact to 1e-50 up to an angle of 60."""
-    with mp.workdps(100):
-        square = mp.mpf(x)
-        return mp.fsum((-square) ** j / mp.factorial(2 * j + k) for j in range(200))
-
-
-def screw_matrix(z: np.ndarray, h: float) -> np.ndarray:
-    """Motion of a section of constant strain, by scipy."""
-    x, y, twist, stretch = z
-    return expm(np.array([[0, -twist, y, 0], [twist, 0, -x, 0], [-y, x, 0, h + stretch], [0, 0, 0, 0]]))
-
-
-def exact_screw(x: Any, y: Any, twist: Any, stretch: Any) -> Any:
-    """The same by mpmath, at rest length H."""
-    return mp.expm(mp.matrix([[0, -twist, y, 0], [twist, 0, -x, 0], [-y, x, 0, mp.mpf(H) + stretch], [0, 0, 0, 0]]))
 
 
 def exact_joints(*arguments: Any) -> list[Any]:
@@ -90,14 +72,6 @@ def exact_derivatives(z: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
                 values = [float((pp - pm - mp_ + mm) / (4 * step**2)) for pp, pm, mp_, mm in corners]
                 second[:, a - 1, b - 1] = second[:, b - 1, a - 1] = values
         return first, second
-
-
-def rotation(axis: int, angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    made = np.eye(4)
-    made[i, i], made[j, j], made[i, j], made[j, i] = c, c, -s, s
-    return made
 
 
 def chain_matrix(joints: Sequence[float]) -> np.ndarray:

@@ -20,7 +20,7 @@ from softrobots.statics.kinematics import frame_placement
 from studies.ur5.bench import PROBE, TOUCH, UR5_JOINTS, UR5Bench
 from studies.ur5.bench_run import BenchRun, push_link
 from tests.conftest import missing
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 ROW = TABLE_3[4]  # 50 kPa
 

@@ -13,7 +13,7 @@ import pytest
 import softrobots as sr
 from softrobots.description.third_party import UR5, robot_file
 from tests.conftest import missing
-from tests.test_scripts import run_script
+from tests.support.scripts import run_script
 
 NAME = "ur5_with_soft_arm"
 

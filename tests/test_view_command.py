@@ -24,7 +24,7 @@ from softrobots.cli.main import main
 from softrobots.view import slider_page
 from softrobots.view.browser import show_share
 from softrobots.view.meshcat_page import animation_frames
-from tests.test_viewer import coloured, listening, pixels
+from tests.support.pictures import coloured, listening, pixels
 
 COMMAND = [sys.executable, "-m", "softrobots", "view"]
 # A terminal of its own, so that Ctrl-C reaches it.

@@ -21,7 +21,8 @@ from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, load_case, map_
 from softrobots.compiled.sweeps.scheduling import run_blocks
 from softrobots.view.figures import map_plots
 from tests.support.laws import law
-from tests.test_scripts import run_script
+from tests.support.load_cases import fingerprint
+from tests.support.scripts import run_script
 
 DOWN = np.array([0.0, 0.0, -1.0])
 LOADS = (0.0, 8.0, 16.0, 24.0, 32.0, 40.0)
@@ -271,11 +272,6 @@ def test_grids_cover_their_plane_and_box() -> None:
             make(1.2, 0)
         with pytest.raises(sr.ParameterError, match="reach"):
             make(-1.0, 3)
-
-
-def fingerprint(made: WorkspaceMap) -> list[bytes]:
-    names = ("loads", "direction", "reached", "required_pressure", "payload", "q_motors", "q_springs")
-    return [getattr(made, name).tobytes() for name in names]
 
 
 GRID = TargetGrid.plane(1.2, 6)  # 72 targets

@@ -93,7 +93,7 @@ def urdf_corpus() -> list[bytes]:
 @cache
 def mjcf_corpus() -> list[bytes]:
     """Exports, and what other people write: degrees, classes, frames, several joints a body."""
-    from tests.test_readers import ARM
+    from tests.support.foreign import ARM
 
     return [ARM.encode(), MJCF.encode(), to_mjcf(sr.load_model(sr.InflatableArm())).encode()]
 
