@@ -12,9 +12,9 @@ from scipy.linalg import expm
 
 import softrobots as sr
 from softrobots.robots.growth import SHORTEST, grown_coordinates
+from softrobots.view.animation_frames import growth_frames
 from softrobots.view.body import body_at
-from softrobots.view.meshcat_page.animation_frames import growth_frames
-from softrobots.view.scene import Scene
+from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.viewer import view
 
 
@@ -151,7 +151,7 @@ def test_the_viewer_colours_a_section_whatever_its_group_names(chain: str, names
     text = sr.HelixTube(chain=chain, elastic_sections=6, hinges=6).urdf()
     for section in (f"section_1_{number}" for number in range(1, 7)):
         text = text.replace(f'springs="{section}_bend_x {section}_bend_y"', f'springs="{names.format(section)}"')
-    shapes = Scene(sr.load_model(text)).shapes
+    shapes = RobotShapes(sr.load_model(text)).shapes
     assert {shape.inflated_link for shape in shapes if shape.name.startswith("section_1_")} >= set(range(6))
 
 

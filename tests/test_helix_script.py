@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.view.meshcat_page import animation_frames
+from softrobots.view import animation_frames
 from tests.support.scripts import run_script
 
 

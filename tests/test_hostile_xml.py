@@ -34,7 +34,7 @@ from softrobots.description.sources import read_source
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.description.urdf_structure import MOST_LINKS
-from softrobots.view.scene import Scene
+from softrobots.view.robot_shapes import RobotShapes
 from tests.conftest import CHECKOUT, missing
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS
 from tests.support.hostile import HOSTILE_NUMBERS, Damage, damaged_bytes, damaged_xml
@@ -293,7 +293,7 @@ def test_a_mesh_of_another_kind_is_left_out_and_the_kinds_are_told(tmp_path: Pat
     file = tmp_path / "part.ply"
     file.write_text("ply\n")
     with pytest.warns(MissingMeshWarning, match=r"part\.ply \(\.obj, \.stl, \.dae files are read\)"):
-        assert Scene(sr.load_model(drawn(str(file)), springs={})).shapes == ()
+        assert RobotShapes(sr.load_model(drawn(str(file)), springs={})).shapes == ()
 
 
 @pytest.mark.parametrize(

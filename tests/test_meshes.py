@@ -13,7 +13,7 @@ from softrobots.description.composition import fix_joints
 from softrobots.description.mesh_files import MissingMeshWarning, find_mesh, with_absolute_paths
 from softrobots.description.third_party import UR5, package_folders, robot_file
 from softrobots.view.mesh_triangles import Triangles
-from softrobots.view.scene import Scene, Shape
+from softrobots.view.robot_shapes import RobotShapes, Shape
 from softrobots.view.viewer import Viewer
 from tests.conftest import missing
 from tests.support.foreign import INERTIAL, joint
@@ -57,7 +57,7 @@ def no_ros(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(name, raising=False)
 
 
-def meshes(scene: Scene) -> list[Shape]:
+def meshes(scene: RobotShapes) -> list[Shape]:
     return [shape for shape in scene.shapes if isinstance(shape.geometry, Triangles)]
 
 
@@ -66,7 +66,7 @@ def test_a_relative_mesh_is_found_and_drawn_in_its_two_colours(tmp_path: Path) -
     write_cube(tmp_path / "a & b")
     file = tmp_path / "robot.urdf"
     file.write_text(with_mesh("a &amp; b/cube.obj", "2 1 1"))
-    scene = Scene(load(file))
+    scene = RobotShapes(load(file))
     parts = {shape.colour: area(shape) for shape in meshes(scene)}
     assert parts == pytest.approx({(1.0, 0.0, 0.0, 1.0): 2 + 2 + 2, (0.0, 0.0, 1.0, 1.0): 1 + 2 + 1}, rel=1e-6)  # float32
     assert len(scene.shapes) == 3
@@ -81,7 +81,7 @@ def test_a_colour_in_the_description_goes_first(tmp_path: Path) -> None:
     (tmp_path / "robot.urdf").write_text(
         with_mesh("cube.obj", material='<material name="g"><color rgba="0 1 0 0.5"/></material>')
     )
-    assert {shape.colour for shape in meshes(Scene(load(tmp_path / "robot.urdf")))} == {(0.0, 1.0, 0.0, 0.5)}
+    assert {shape.colour for shape in meshes(RobotShapes(load(tmp_path / "robot.urdf")))} == {(0.0, 1.0, 0.0, 0.5)}
 
 
 def test_a_mounted_robot_keeps_the_meshes_of_both_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,8 +92,8 @@ def test_a_mounted_robot_keeps_the_meshes_of_both_files(tmp_path: Path, monkeypa
     text = sr.mount(Path("robot.urdf"), "arm", tmp_path / "two" / "robot.urdf")
     monkeypatch.chdir("/")
     model = sr.load_model(text, springs={"soft_elbow": 1.0})
-    assert len(meshes(Scene(model))) == 4
-    assert [shape.elastic for shape in Scene(model).shapes] == [False] * 6  # both stand before the spring
+    assert len(meshes(RobotShapes(model))) == 4
+    assert [shape.elastic for shape in RobotShapes(model).shapes] == [False] * 6  # both stand before the spring
 
 
 @pytest.mark.parametrize("name", ["package://bench/cube.obj", "file://{folder}/bench/cube.obj", "{folder}/bench/cube.obj"])
@@ -104,11 +104,11 @@ def test_packages_and_whole_paths_are_found(name: str, tmp_path: Path, monkeypat
     assert with_absolute_paths(text, Path("/other")) == text
     if name.startswith("package"):
         with pytest.warns(MissingMeshWarning, match="ROS_PACKAGE_PATH"):
-            Scene(load(text))
+            RobotShapes(load(text))
     for variable, value in (("ROS_PACKAGE_PATH", f"/nowhere:{share}"), ("AMENT_PREFIX_PATH", f"{tmp_path}:/nowhere")):
         with monkeypatch.context() as patch:
             patch.setenv(variable, value)
-            assert len(meshes(Scene(load(text)))) == 2
+            assert len(meshes(RobotShapes(load(text)))) == 2
 
 
 @pytest.mark.parametrize("name", ["no/such.stl", "package://nowhere/such.dae", "http://example.org/such.stl", "broken.stl"])
@@ -117,7 +117,7 @@ def test_a_missing_or_broken_mesh_is_left_out_with_a_warning(name: str, tmp_path
     file = tmp_path / "robot.urdf"
     file.write_text(with_mesh(name))
     with pytest.warns(MissingMeshWarning, match="drawn without 1 mesh files") as caught:
-        scene = Scene(load(file))
+        scene = RobotShapes(load(file))
     assert [type(shape.geometry).__name__ for shape in scene.shapes] == ["Box"]
     (told,) = (warning.message for warning in caught)
     assert [Path(mesh).name for mesh in told.meshes] == [Path(name).name]
@@ -127,7 +127,7 @@ def test_without_trimesh_the_mesh_is_still_there(tmp_path: Path, monkeypatch: py
     write_cube(tmp_path)
     (tmp_path / "robot.urdf").write_text(with_mesh("cube.obj"))
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    (shape,) = meshes(Scene(load(tmp_path / "robot.urdf")))
+    (shape,) = meshes(RobotShapes(load(tmp_path / "robot.urdf")))
     assert len(shape.geometry.faces) == 12
     assert shape.colour == (0.9, 0.9, 0.9, 1.0)  # Pinocchio's own
 
@@ -150,7 +150,7 @@ def carried() -> sr.SoftModel:
 
 def test_a_ur5_is_drawn_whole_without_warnings(carried: sr.SoftModel) -> None:
     """The surface of its meshes is that of the files, and the rigid robot is drawn beside it only where springs move it."""
-    scene = Scene(carried)
+    scene = RobotShapes(carried)
     with Viewer(carried) as viewer:
         page = viewer.html()
     drawn = meshes(scene)
@@ -167,14 +167,14 @@ def test_a_ur5_is_drawn_whole_without_warnings(carried: sr.SoftModel) -> None:
 
 
 def test_held_motors_do_not_mix_up_the_colours_of_the_links(carried: sr.SoftModel) -> None:
-    links = {shape.name: shape.inflated_link for shape in Scene(carried).shapes if shape.inflated_link is not None}
+    links = {shape.name: shape.inflated_link for shape in RobotShapes(carried).shapes if shape.inflated_link is not None}
     assert links == {"soft_link_1_root_1": 0, "soft_link_1_0": 0, "soft_link_2_root_1": 1, "soft_link_2_0": 1}
 
 
 def test_what_is_mounted_on_an_inflated_link_is_not_coloured_as_one() -> None:
     hand = '<robot name="hand"><link name="palm"><visual><geometry><box size=".1 .1 .1"/></geometry></visual></link></robot>'
     model = sr.load_model(sr.mount(sr.InflatableArm(), "tip", hand, prefix=""))
-    links = {shape.name: shape.inflated_link for shape in Scene(model).shapes}
+    links = {shape.name: shape.inflated_link for shape in RobotShapes(model).shapes}
     assert links["palm_0"] is None
     assert links["link_2_0"] == 1
 

@@ -19,7 +19,7 @@ from softrobots.view import browser as view_browser
 from softrobots.view.browser import show_share, take_animation
 from softrobots.view.meshcat_page.page_commands import RESOLUTION, packed, read_page, tidied, unpacked
 from softrobots.view.meshcat_page.page_text import page_text, scene_of
-from softrobots.view.scene import Scene
+from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.viewer import view
 from studies.gallery import EXHIBITS
 from tests.conftest import CHECKOUT
@@ -162,7 +162,7 @@ def drawn_shapes(name: str) -> set[str]:
 def test_the_pages_show_the_robots_of_today() -> None:
     """What is drawn there are the shapes that the descriptions have now."""
     for name, robot in (("inflatable_arm", sr.InflatableArm()), ("pcc_arm", sr.PccArm())):
-        assert drawn_shapes(name) == {shape.name for shape in Scene(sr.load_model(robot)).shapes}
+        assert drawn_shapes(name) == {shape.name for shape in RobotShapes(sr.load_model(robot)).shapes}
     assert {"forearm_link_0", "wrist_3_link_0"} <= drawn_shapes("ur5_bench")
     tube = HelixTube(length=2.0, elastic_sections=32, upright="axis")
     sections = {re.match("section_[0-9]+_[0-9]+", shape)[0] for shape in drawn_shapes("helix_growth") if "section" in shape}

@@ -22,7 +22,7 @@ from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.export import to_mjcf, to_sdf
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.meshcat_page.stage import Stage
-from softrobots.view.scene import Scene
+from softrobots.view.robot_shapes import RobotShapes
 from studies.interop.newton import balance_point
 from tests.conftest import missing
 from tests.support.foreign import ARM
@@ -452,7 +452,7 @@ def test_a_file_finds_what_it_includes(tool: Tool, tmp_path: Path) -> None:
     placed = (corners * shape.size) @ shape.placement.rotation.T + shape.placement.position
     distances = np.linalg.norm(placed[:, None] - expected[None], axis=2)
     assert distances.min(axis=0).max() < 1e-6  # MuJoCo keeps vertices in single precision
-    assert len(Scene(model).shapes) == 1
+    assert len(RobotShapes(model).shapes) == 1
     broken = tmp_path / "broken.xml"
     broken.write_text('<mujoco><worldbody><include file="nowhere.xml"/></worldbody></mujoco>')
     with pytest.raises(sr.DescriptionError, match=r"MuJoCo [\d.]+ refuses .*broken.xml: "):
@@ -462,9 +462,9 @@ def test_a_file_finds_what_it_includes(tool: Tool, tmp_path: Path) -> None:
 def test_shapes_are_those_of_mujoco(tool: Tool) -> None:
     tool("mujoco")
     model = sr.load_model(ARM)
-    kinds = [type(shape.geometry).__name__ for shape in Scene(model).shapes]
+    kinds = [type(shape.geometry).__name__ for shape in RobotShapes(model).shapes]
     assert kinds == ["Box", "Cylinder", "Cylinder", "Sphere", "Sphere"]  # no plane, no ellipsoid
-    assert Scene(model).shapes[0].colour == (1.0, 0.0, 0.0, 1.0)
+    assert RobotShapes(model).shapes[0].colour == (1.0, 0.0, 0.0, 1.0)
 
 
 # --- SDF
@@ -595,16 +595,16 @@ def test_sdf_is_in_the_balance_that_drake_computes(tool: Tool, rng: np.random.Ge
 
 def test_shapes_are_those_of_drake(tool: Tool, tmp_path: Path) -> None:
     tool("pydrake")
-    colours = {type(shape.geometry).__name__: shape.colour for shape in Scene(sr.load_model(SDF_ARM)).shapes}
+    colours = {type(shape.geometry).__name__: shape.colour for shape in RobotShapes(sr.load_model(SDF_ARM)).shapes}
     assert colours.keys() == {"Box", "Cylinder"}
     assert colours["Cylinder"] == (1.0, 0.0, 0.0, 1.0)
     mesh = '<visual name="v"><geometry><mesh><uri>wedge.obj</uri><scale>2 3 4</scale></mesh></geometry></visual>'
     text = chain().replace('<link name="b">', f'<link name="b">{mesh}')
     file = tmp_path / "arm.sdf"
     file.write_text(text)
-    assert Scene(sr.load_model(file)).shapes == ()  # the mesh is missing: the chain remains
+    assert RobotShapes(sr.load_model(file)).shapes == ()  # the mesh is missing: the chain remains
     (tmp_path / "wedge.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
-    assert len(Scene(sr.load_model(file)).shapes) == 1
+    assert len(RobotShapes(sr.load_model(file)).shapes) == 1
 
 
 def test_a_robot_without_shapes_and_far_from_the_origin_can_be_viewed(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:

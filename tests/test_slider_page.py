@@ -19,7 +19,8 @@ import pytest
 import softrobots as sr
 from softrobots.view import slider_page
 from softrobots.view.body import body
-from softrobots.view.scene import WRINKLING_COLOURS, Scene, wrinkling_level
+from softrobots.view.robot_shapes import RobotShapes
+from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 from softrobots.view.slider_page import SliderPage
 from softrobots.view.viser_page.shapes import drawn_of
 from softrobots.view.viser_page.slider_panel import round_down, slider_grid
@@ -204,7 +205,7 @@ def test_everything_is_drawn_where_pinocchio_has_it() -> None:
     assert model.actuators.units == ("m", "rad", "rad", "rad")
     with SliderPage(model, q_motors=(0.2, 0.3, -0.6, 0.8)) as page:
         shown = page.set(force=(5, 5, -10))
-        scene = Scene(model)
+        scene = RobotShapes(model)
         for group, q in (("deformed", shown.q), ("rigid", model.configuration(shown.q_motors))):
             boxes = drawn_boxes(page, group)
             assert len(boxes) >= 4

@@ -21,9 +21,8 @@ import pytest
 
 import softrobots as sr
 from softrobots.cli.main import main
-from softrobots.view import slider_page
+from softrobots.view import animation_frames, slider_page
 from softrobots.view.browser import show_share
-from softrobots.view.meshcat_page import animation_frames
 from tests.support.pictures import coloured, listening, pixels
 
 COMMAND = [sys.executable, "-m", "softrobots", "view"]

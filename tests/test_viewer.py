@@ -18,7 +18,8 @@ import softrobots as sr
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.browser import find_chromium, show_share, take_picture
 from softrobots.view.meshcat_page.page_text import scene_of
-from softrobots.view.scene import WRINKLING_COLOURS, Scene, wrinkling_level
+from softrobots.view.robot_shapes import RobotShapes
+from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 from softrobots.view.viewer import Viewer, view
 from tests.support.pictures import coloured, listening, pictures_of, pixels
 
@@ -188,7 +189,7 @@ class forwarded:
 
 def test_cylinders_start_and_end_at_the_joints(arm: sr.SoftModel) -> None:
     """The far end of the last cylinder is the tip; the first shape of link 1 starts at its motor."""
-    scene = Scene(arm)
+    scene = RobotShapes(arm)
     q = arm.configuration((0.3, 0.6, -0.8), (0.05, -0.1, 0.03, -0.04))
     poses = dict(zip((shape.name for shape in scene.shapes), scene.transforms(q), strict=True))
     last = poses["link_2_0"]

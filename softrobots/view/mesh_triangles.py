@@ -1,8 +1,8 @@
 """Triangles and colours of the meshes of a robot, for pictures.
 
-Pinocchio reads meshes through Coal (3.0), which joins the parts of a file that hang on one node into one list of corners and
-lets every triangle count from the first part: a mesh of several materials comes out torn. So files are read once more by
-trimesh, which tells the colour of each part, too.
+Pinocchio reads meshes through Coal (3.0), which joins the parts of a node into one list of corners but numbers the corners of
+every triangle from the first part, so that a mesh of several materials is torn. Files are therefore read again by trimesh,
+which also gives the colour of each part.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 
-_FARTHEST = 1e9  # [m]; sums and squares of corners must be numbers in single precision, too
+_FARTHEST = 1e9  # [m]; sums and squares of corners must be finite in single precision
 
 
 class Triangles(NamedTuple):
@@ -46,8 +46,8 @@ def coloured_parts(mesh: Any, file: Path, scale: FloatArray) -> tuple[ColouredPa
         scale: Scale along x, y, z, shape (3,).
 
     Returns:
-        The parts. Coal's triangles in one part, if trimesh is not there, cannot read the file, or puts its corners elsewhere
-        (up axis and unit of a file are read differently).
+        The parts; Coal's triangles as one part if trimesh is not installed, cannot read the file, or places its corners
+        elsewhere (the two read the up axis and the unit of a file differently).
     """
     corners = np.array(mesh.vertices())
     parts = _parts(file, scale)
@@ -71,7 +71,7 @@ def readable(file: Path) -> bool:
 
 
 def has_finite_corners(geometry: Any) -> bool:
-    """Whether no corner of a geometry that Coal has read is infinite, no number, or absurdly far away."""
+    """Whether all corners of a geometry that Coal has read are finite and within 1e9 m of its origin."""
     if not isinstance(geometry, coal.BVHModelBase):
         return True
     return bool(np.all(np.abs(np.asarray(geometry.vertices())) <= _FARTHEST))  # NaN is not
@@ -81,23 +81,23 @@ def _parts(file: Path, scale: FloatArray) -> tuple[ColouredPart, ...]:
     try:
         import trimesh
 
-        with warnings.catch_warnings(), np.errstate(all="ignore"):  # what it computes of colours that are no numbers
+        with warnings.catch_warnings(), np.errstate(all="ignore"):  # colours that are NaN
             warnings.simplefilter("ignore", DeprecationWarning)  # pycollada sets shapes as NumPy 2.5 no longer wants
             return _parts_of(trimesh, trimesh.Scene(trimesh.load(str(file))), scale)
-    except Exception:  # whatever the reader of that format comes upon
+    except Exception:  # each format has a reader of its own
         return ()
 
 
 def _parts_of(trimesh: Any, scene: Any, scale: FloatArray) -> tuple[ColouredPart, ...]:
-    made = []
+    parts = []
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         part = scene.geometry[name]
         if not isinstance(part, trimesh.Trimesh) or not len(part.faces):
             continue
         corners = (np.asarray(part.vertices) @ transform[:3, :3].T + transform[:3, 3]) * scale
-        made.append(ColouredPart(Triangles(corners, np.asarray(part.faces)), _colour(part.visual)))
-    return tuple(made)
+        parts.append(ColouredPart(Triangles(corners, np.asarray(part.faces)), _colour(part.visual)))
+    return tuple(parts)
 
 
 def _colour(visual: Any) -> tuple[float, float, float, float] | None:

@@ -1,23 +1,23 @@
-"""What a robot looks like: shapes on joints, poses of all shapes at a configuration, colours by wrinkling."""
+"""The scene: everything that a viewer draws of one state of a robot, as plain data without the model."""
 
 from __future__ import annotations
 
-import math
-import warnings
-from pathlib import Path
-from typing import Any, NamedTuple
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
-import coal
 import numpy as np
-import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import ViewerError
-from softrobots.description.mesh_files import MissingMeshWarning, only_found
-from softrobots.description.third_party import package_folders
 from softrobots.model.soft_model import SoftModel
+from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium
-from softrobots.view.mesh_triangles import ColouredPart, coloured_parts, has_finite_corners, readable
+from softrobots.statics.kinematics import backbone, frame_placement
+from softrobots.statics.trajectory import Trajectory
+from softrobots.view.animation_frames import Frame, even_frames, growth_frames, waypoint_frames
+from softrobots.view.body import SegmentBody, body_at
+from softrobots.view.robot_shapes import RobotShapes
 
 WRINKLING_COLOURS = (
     (0.8, (1.00, 0.96, 0.66)),
@@ -27,138 +27,139 @@ WRINKLING_COLOURS = (
     (0.0, (0.72, 0.00, 0.15)),
     (-np.inf, (0.33, 0.00, 0.45)),
 )
-"""Colours of an inflated link by the share of its wrinkling moment that is left, at least; the last one is wrinkled.
-Ordered in lightness too, so that they can be told apart in grey and by colour-blind people."""
+"""Colours of an inflated link by the least remaining share of its wrinkling moment; the last one is wrinkled. Ordered in
+lightness too, for grey prints and colour-blind readers."""
+
+_NO_FORCE = 1e-12  # [N], forces below have no arrow
 
 
-class Shape(NamedTuple):
-    """One visual shape of a robot; a mesh of several colours is several shapes."""
+class Arrow(NamedTuple):
+    """A force on the robot."""
 
-    name: str
-    """Unique name."""
-    geometry: Any
-    """A `coal` shape, or the `softrobots.view.mesh_triangles.Triangles` of a mesh."""
-    colour: tuple[float, float, float, float]
-    """Red, green, blue, opacity."""
-    inflated_link: int | None
-    """Number of the inflated link that it is part of, for colouring by wrinkling."""
-    elastic: bool
-    """Whether springs or sections move it, so that the loaded robot has it elsewhere than the rigid one."""
-    place: int
-    """Number of the visual shape in the description."""
+    pose: FloatArray
+    """Pose at its point of application, y along the force, shape (4, 4) [m]."""
+    force: float
+    """Magnitude [N]."""
 
 
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """The visual shapes of a model, and where they are at a configuration."""
+    """One state of a robot, in world axes."""
+
+    deformed: Sequence[FloatArray]
+    """Pose of each shape of the robot, shape (4, 4) [m], in the order of `RobotShapes.shapes`."""
+    rigid: Sequence[FloatArray]
+    """The same with relaxed springs, for the translucent robot."""
+    reference: str
+    """What the translucent robot is, for the legend."""
+    wrinkling: Sequence[int] | None = None
+    """Place in `WRINKLING_COLOURS` of each inflated link; None without load."""
+    segments: Sequence[SegmentBody] = ()
+    """The continuous body of sections: tubes with their muscles."""
+    pushing: frozenset[str] = frozenset()
+    """Names of the muscles that push."""
+    arrows: Mapping[str, Arrow] = field(default_factory=dict)
+    """Forces by the frame that they act on."""
+    grown: float | None = None
+    """Share of a growing tube that has everted; None if the robot does not grow."""
+
+
+class Extent(NamedTuple):
+    """The size of a robot at rest, for camera, floor and arrows."""
+
+    base: FloatArray
+    """The world's origin, or the start of a chain that begins farther from it than it is long, shape (3,) [m]."""
+    tip: FloatArray
+    """Position of the tip, shape (3,) [m]."""
+    size: float
+    """Largest distance of the chain from its start [m]; the reach of a robot that is straight at rest."""
+    ground: float
+    """Height of the floor: of the lowest point that is fixed to the world, or a little below the origin [m]."""
+
+
+class SceneBuilder:
+    """Builds the scenes of one robot; the only part of a viewer that knows the model."""
 
     def __init__(self, model: SoftModel) -> None:
-        """Read the visual shapes out of the model's URDF.
-
-        Meshes `package://..` are looked up in the folders of ROS_PACKAGE_PATH, AMENT_PREFIX_PATH and of example-robot-data. The
-        robot is drawn without those whose files are missing or cannot be read, with a `MissingMeshWarning`.
+        """Read the shapes of the robot.
 
         Raises:
-            ViewerError: If the shapes cannot be read for another reason.
+            ViewerError: If the shapes cannot be read.
         """
         self._model = model
-        pin_model, _ = model.workspace(None)
-        folders = package_folders()
-        drawn, missing = only_found(model.urdf, folders)
-        try:
-            try:
-                self._geometry = pin.buildGeomFromUrdfString(pin_model, drawn, pin.GeometryType.VISUAL)
-                whole = all(has_finite_corners(shape.geometry) for shape in self._geometry.geometryObjects)
-            except (ValueError, RuntimeError):
-                whole = False
-            if not whole:
-                drawn, missing = only_found(model.urdf, folders, readable)  # takes longer: reads every file
-                self._geometry = pin.buildGeomFromUrdfString(pin_model, drawn, pin.GeometryType.VISUAL)
-        except (ValueError, RuntimeError) as error:
-            raise ViewerError(f"the visual shapes of {pin_model.name} cannot be read: {error}") from error
-        if missing:
-            warnings.warn(MissingMeshWarning(pin_model.name, missing), stacklevel=2)
-        self._data = self._geometry.createData()
-        links, elastic = self._inflated_links(), self._elastic_joints()
-        names: dict[str, int] = {}
-        shapes = []
-        for place, shape in enumerate(self._geometry.geometryObjects):
-            for geometry, colour in _parts(shape):
-                names[shape.name] = names.get(shape.name, 0) + 1
-                unique = shape.name if names[shape.name] == 1 else f"{shape.name}_{names[shape.name]}"
-                shapes.append(Shape(unique, geometry, colour, links[place], shape.parentJoint in elastic, place))
-        self.shapes = tuple(shapes)
-        """Every shape."""
+        self.robot = RobotShapes(model)
+        """The visual shapes."""
+        q = model.configuration(model.relaxed_motors)
+        points = backbone(model, q)
+        size = max(float(np.linalg.norm(points - points[0], axis=1).max()), 0.05 * model.reach)
+        base = points[0] if float(np.linalg.norm(points[0])) > size else np.zeros(3)
+        ground = self.robot.ground()
+        tip = np.array(frame_placement(model, q, model.tip).translation)
+        self.extent = Extent(base, tip, size, -0.15 * size if ground is None else ground)
+        """Size and place of the robot at rest."""
 
-    def transforms(self, q: FloatArray) -> list[FloatArray]:
-        """Poses of the shapes in the world at a configuration, each shape (4, 4) [m], in the order of `shapes`."""
-        pin_model, data = self._model.workspace(None)
-        pin.updateGeometryPlacements(pin_model, data, self._geometry, self._data, q)
-        poses = [np.array(pose.homogeneous) for pose in self._data.oMg]
-        return [poses[shape.place] for shape in self.shapes]
+    def relaxed(self) -> Scene:
+        """Return the robot at rest, without load."""
+        return self._scene(Frame(0, self._model.relaxed_motors, self._model.rest, None))
 
-    def ground(self) -> float | None:
-        """Height of the lowest point of what is fixed to the world [m]; None if no shape is."""
-        heights = []
-        for shape in self._geometry.geometryObjects:
-            if shape.parentJoint == 0:
-                shape.geometry.computeLocalAABB()
-                box = shape.geometry.aabb_local
-                middle, half = 0.5 * (np.array(box.max_) + np.array(box.min_)), 0.5 * (np.array(box.max_) - np.array(box.min_))
-                turned = np.abs(np.array(shape.placement.rotation)[2]) @ half
-                heights.append(float(shape.placement.act(middle)[2] - turned))
-        return min(heights, default=None)
+    def loaded(self, equilibrium: Equilibrium) -> Scene:
+        """Return a loaded robot, its forces and the colours of its inflated links."""
+        return self._scene(Frame(0, equilibrium.q_motors, equilibrium.q_springs, equilibrium))
 
-    def _elastic_joints(self) -> set[int]:
-        """Numbers of the joints that have a spring, are part of a section, or come after such a joint."""
-        pin_model, structure = self._model.pinocchio, self._model.structure
-        names = [*structure.spring_joints, *(name for tag in structure.parts.sections for name in tag.joints)]
-        elastic = {pin_model.getJointId(name) for name in names}
-        for joint in range(1, pin_model.njoints):  # parents have lower numbers
-            if pin_model.parents[joint] in elastic:
-                elastic.add(joint)
-        return elastic
+    def chain(self, q: FloatArray) -> Scene:
+        """Return the chain alone at a configuration of Pinocchio, shape (nq,), without load."""
+        poses = self.robot.transforms(q)
+        return Scene(poses, poses, self._reference())
 
-    def _inflated_links(self) -> list[int | None]:
-        """Inflated link of every shape: the link on its last spring, and the tube of its radius just before its first.
+    def trajectory(self, trajectory: Trajectory, seconds: float) -> dict[int, Scene]:
+        """Return the scenes of an animation by number of frame: waypoints, or, of a body that bends, evenly spaced shapes.
 
-        What is mounted on that link is no part of it.
+        Args:
+            trajectory: A trajectory of the robot.
+            seconds: Duration of the animation [s].
         """
-        pin_model, objects = self._model.pinocchio, self._geometry.geometryObjects
-        links: list[int | None] = [None] * len(objects)
-        sections = self._model.structure.section_of
-        frames = pin_model.frames
-        moved = [frames[frames[shape.parentFrame].parentFrame].type == pin.FrameType.JOINT for shape in objects]
-        ends = {pin_model.getJointId(self._model.spring_joints[group.springs[-1]]) for group in self._model.spring_groups}
-        for number, group in enumerate(self._model.spring_groups):
-            names = [self._model.spring_joints[place] for place in group.springs]
-            if all(name in sections for name in names):  # the pieces of its sections
-                joints = {pin_model.getJointId(joint) for name in names for joint in sections[name].joint_names}
-                for place, shape in enumerate(objects):
-                    if shape.parentJoint in joints and moved[place]:
-                        links[place] = number
-                continue
-            first, last = (pin_model.getJointId(names[place]) for place in (0, -1))
-            for place, shape in enumerate(objects):
-                tube = isinstance(shape.geometry, coal.Cylinder) and math.isclose(shape.geometry.radius, group.radius)
-                of_another = moved[place] and shape.parentJoint in ends
-                before = tube and shape.parentJoint == pin_model.parents[first] and not of_another
-                if (shape.parentJoint == last and moved[place]) or before:
-                    links[place] = number
-        return links
+        frames = even_frames if self._model.structure.section_table else waypoint_frames
+        return {frame.number: self._scene(frame, 4) for frame in frames(trajectory, seconds)}
 
+    def growth(self, tube: HelixTube, seconds: float, front: float, hold: float) -> dict[int, Scene]:
+        """Return the scenes of a growing tube by number of frame; see `growth_frames`.
 
-def _parts(shape: Any) -> list[tuple[Any, tuple[float, float, float, float]]]:
-    """Geometry and colour of each part of a visual shape; a colour in the description goes before those of a mesh file."""
-    red, green, blue, opacity = np.array(shape.meshColor).tolist()
-    said = (red, green, blue, opacity)
-    if not isinstance(shape.geometry, coal.BVHModelBase):
-        return [(shape.geometry, said)]
-    parts: tuple[ColouredPart, ...] = coloured_parts(shape.geometry, Path(shape.meshPath), np.array(shape.meshScale).ravel())
-    return [(part.surface, said if shape.overrideMaterial or part.rgba is None else part.rgba) for part in parts]
+        Raises:
+            ParameterError: If an argument is out of range.
+        """
+        return {frame.number: self._scene(frame, 3) for frame in growth_frames(tube, seconds, front, hold)}
+
+    def _scene(self, frame: Frame, points: int = 12) -> Scene:
+        """The scene of a frame, with a number of points of the body for each section."""
+        model, equilibrium = self._model, frame.equilibrium
+        q = model.embed(model.coordinates.at(frame.q_motors, frame.q_springs).joints)
+        rigid = model.embed(model.coordinates.at(frame.q_motors, model.rest).joints)
+        scene = Scene(
+            self.robot.transforms(q),
+            self.robot.transforms(rigid),
+            self._reference() if frame.grown is None else "the whole tube",
+            segments=body_at(model, frame.q_motors, frame.q_springs, points),
+            grown=frame.grown,
+        )
+        if equilibrium is None:
+            return scene
+        muscles = zip(model.muscles, equilibrium.muscle_forces, strict=True)
+        return dataclasses.replace(
+            scene,
+            wrinkling=[wrinkling_level(equilibrium, link) for link in range(len(model.spring_groups))],
+            pushing=frozenset(muscle.name for muscle, tension in muscles if tension < 0.0),
+            arrows=_arrows(equilibrium, q),
+        )
+
+    def _reference(self) -> str:
+        model = self._model
+        if not model.muscles:
+            return "rigid arm, same motor angles" if model.n_motors else "without load"
+        return "without load, same muscle lengths" if model.muscle_input == "lengths" else "straight, at rest"
 
 
 def wrinkling_level(equilibrium: Equilibrium, link: int) -> int:
-    """Place in `WRINKLING_COLOURS` of an inflated link at an equilibrium.
+    """Return the place in `WRINKLING_COLOURS` of an inflated link at an equilibrium.
 
     Args:
         equilibrium: The loaded robot.
@@ -172,3 +173,21 @@ def wrinkling_level(equilibrium: Equilibrium, link: int) -> int:
     if moment >= limit or equilibrium.saturated[link]:
         return len(WRINKLING_COLOURS) - 1
     return next(level for level, (least, _) in enumerate(WRINKLING_COLOURS) if 1.0 - moment / limit >= least)
+
+
+def _arrows(equilibrium: Equilibrium, q: FloatArray) -> dict[str, Arrow]:
+    """Forces of a load by frame, at a configuration, shape (nq,)."""
+    arrows = {}
+    for frame, wrench in equilibrium.load.wrenches.items():
+        force = wrench[:3]
+        size = float(np.linalg.norm(force))
+        if size <= _NO_FORCE:
+            continue
+        along = force / size
+        across = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+        across /= np.linalg.norm(across)
+        pose = np.eye(4)
+        pose[:3, :3] = np.column_stack([across, along, np.cross(across, along)])
+        pose[:3, 3] = frame_placement(equilibrium.model, q, frame).translation
+        arrows[frame] = Arrow(pose, size)
+    return arrows

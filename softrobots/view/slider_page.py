@@ -16,7 +16,7 @@ from softrobots.statics.loads import EARTH_GRAVITY
 from softrobots.statics.sensitivity import compliance
 from softrobots.view.meshcat_page.robot import RobotDrawing
 from softrobots.view.meshcat_page.stage import Stage
-from softrobots.view.scene import Scene
+from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import LOOPBACK, ServedPage
 from softrobots.view.viser_page.server import end_server, start_server
 from softrobots.view.viser_page.slider_panel import SliderPanel, Wish, round_down
@@ -65,19 +65,19 @@ class SliderPage(ServedPage):
             ViewerError: If the port is not free, or a shape cannot be drawn.
         """
         self._model = check_model(model)
-        relaxed = model.relaxed_motors if q_motors is None else q_motors
+        motors = model.relaxed_motors if q_motors is None else q_motors
         push = finite_array("force", (0.0, 0.0, 0.0) if force is None else force, (3,), "N")
         self._gravity = finite_array("gravity", EARTH_GRAVITY if gravity is None else gravity, (3,), "m/s^2")
         self._full = _visible_force(model) if full_force is None else positive_number("full_force", full_force, "N")
         if full_force is None:
             self._full = max(self._full, float(np.abs(push).max()))
-        self._start = Wish(self._checked_motors(relaxed), self._checked_force(push), gravity is not None)
+        self._start = Wish(self._checked_motors(motors), self._checked_force(push), gravity is not None)
         wished = None if port is None else positive_integer("port", port, 65535)
         self._equilibrium = self._cold(self._start)
         self._last: Wish | None = self._start
         self._problem: Exception | None = None
         self._trail: list[FloatArray] = []
-        scene = Scene(model)
+        self._scenes = SceneBuilder(model)
         self._lock, self._wake, self._closed = threading.Lock(), threading.Event(), threading.Event()
         self._worker = threading.Thread(target=self._follow, name="softrobots sliders", daemon=True)
         self._server = start_server(model.pinocchio.name, wished)
@@ -85,10 +85,9 @@ class SliderPage(ServedPage):
             self._port = int(self._server.get_port())
             self._tree = ViserTree(self._server)
             root = self._tree["softrobots"]
-            stage = Stage(self._tree, root, model)
-            self._root, self._robot = root, RobotDrawing(root, model, scene, stage.size, 0.5 * self._full)
-            stage.prepare(scene.ground())
-            stage.look_at(self._equilibrium.tip_position)
+            extent, relaxed = self._scenes.extent, self._scenes.relaxed()
+            self._root, self._robot = root, RobotDrawing(root, self._scenes.robot, relaxed, extent.size, 0.5 * self._full)
+            Stage(self._tree, root, extent).look_at(self._equilibrium.tip_position)
             self._panel = SliderPanel(self._server.gui, model, self._start, self._full, changed=self._wake.set)
             self._draw()
             self._show_extras()
@@ -195,7 +194,7 @@ class SliderPage(ServedPage):
     def _draw(self) -> None:
         """Draw the equilibrium."""
         self._trail = [*self._trail[1 - _TRAIL :], self._equilibrium.tip_position]
-        self._robot.show(self._equilibrium)
+        self._robot.show(self._scenes.loaded(self._equilibrium))
 
     def _show_extras(self) -> None:
         """Draw what can be switched on and off."""

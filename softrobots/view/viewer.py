@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, positive_number
 from softrobots.core.errors import ParameterError, ViewerError
@@ -18,7 +21,7 @@ from softrobots.view.meshcat_page.page_text import legend_rows, live_page, page_
 from softrobots.view.meshcat_page.robot import RobotDrawing
 from softrobots.view.meshcat_page.server import connect, end_server, start_server, tell_server
 from softrobots.view.meshcat_page.stage import Stage
-from softrobots.view.scene import Scene
+from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import ServedPage
 
 
@@ -43,14 +46,13 @@ class Viewer(ServedPage):
             ViewerError: If the server does not start, e.g. on a port that is taken, or a shape cannot be drawn.
         """
         self._model = check_model(model)
-        scene = Scene(model)
+        self._scenes = SceneBuilder(model)
         self._server, zmq_url, self._url = start_server(None if port is None else positive_integer("port", port, 65535))
         try:
             self._page = connect(zmq_url, self._url)
             root = self._page["softrobots"]
-            self._stage = Stage(self._page, root, model)
-            self._robot = RobotDrawing(root, model, scene, self._stage.size)
-            self._stage.prepare(scene.ground())
+            self._robot = RobotDrawing(root, self._scenes.robot, self._scenes.relaxed(), self._scenes.extent.size)
+            self._stage = Stage(self._page, root, self._scenes.extent)
             tell_server(self._page, "page", live_page(model.pinocchio.name))
             self._legend = ""
             self._show_legend()
@@ -79,7 +81,7 @@ class Viewer(ServedPage):
             ViewerError: If the viewer is closed.
         """
         self._check(equilibrium)
-        self._robot.show(equilibrium)
+        self._robot.show(self._scenes.loaded(equilibrium))
         self._show_legend()
 
     def show_configuration(self, q: FloatArray) -> None:
@@ -90,7 +92,7 @@ class Viewer(ServedPage):
         """
         q = finite_array("q", q, (self._model.pinocchio.nq,))
         self._check_open()
-        self._robot.show_configuration(q)
+        self._robot.show(self._scenes.chain(q))
         self._show_legend()
 
     def trace(self, points: Any) -> None:
@@ -140,7 +142,10 @@ class Viewer(ServedPage):
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
         positive_integer("repetitions", repetitions)
         self._stage.look_at(trajectory.tip_positions.mean(axis=0))
-        self._page.set_animation(self._robot.animation(trajectory, seconds), play=True, repetitions=repetitions)
+        self._robot.show(self._scenes.loaded(trajectory.equilibria[0]))
+        self._robot.trace(trajectory.tip_positions)
+        animation = self._robot.animate(self._scenes.trajectory(trajectory, seconds))
+        self._page.set_animation(animation, play=True, repetitions=repetitions)
         self._show_legend()
 
     def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
@@ -161,9 +166,12 @@ class Viewer(ServedPage):
         self._check_open()
         if not isinstance(tube, HelixTube) or tube.urdf() != self._model.urdf:
             raise ParameterError("tube", tube, "the HelixTube that the viewer's model was loaded from")
-        animation, along = self._robot.growth(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
-        self._stage.look_at(along.max(axis=0) + along.min(axis=0))
-        self._page.set_animation(animation, play=True, repetitions=1000)
+        scenes = self._scenes.growth(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
+        whole = self._scenes.relaxed()
+        self._robot.show(dataclasses.replace(scenes[0], deformed=whole.deformed, segments=()))
+        self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=1000)
+        backbone = np.concatenate([segment.backbone for segment in whole.segments])
+        self._stage.look_at(backbone.max(axis=0) + backbone.min(axis=0))
         self._show_legend()
 
     def look_at(self, tip: FloatArray) -> None:

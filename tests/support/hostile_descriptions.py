@@ -14,7 +14,7 @@ from softrobots.description.expansion import expand
 from softrobots.description.mesh_files import MissingMeshWarning
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.export import to_mjcf, to_sdf
-from softrobots.view.scene import Scene
+from softrobots.view.robot_shapes import RobotShapes
 from tests.support.foreign import BRANCHED, INERTIAL, LIMIT
 
 SDF = """<sdf version="1.9" xmlns:drake="http://drake.mit.edu"><model name="m">
@@ -155,7 +155,7 @@ def read_mesh(file: Path) -> None:
     """Draw the mesh, or leave it out with a warning."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        scene = Scene(sr.load_model(drawn(str(file)), springs={}))
+        scene = RobotShapes(sr.load_model(drawn(str(file)), springs={}))
         scene.transforms(np.zeros(0))
     if any(not issubclass(warning.category, MissingMeshWarning) for warning in caught):
         raise RuntimeError(f"a warning of another kind: {[str(warning.message) for warning in caught]}")

@@ -1,17 +1,18 @@
-"""The continuous body of a robot in the browser view: smooth tubes with their muscles, in meshcat's terms."""
+"""The continuous body of a robot on a meshcat page: smooth tubes with their muscles."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from softrobots.view.body import SegmentBody, tube
 from softrobots.view.meshcat_page.shapes import material
+from softrobots.view.scene import Scene
 
 TUBE_COLOUR = (0.85, 0.74, 0.50, 0.32)
-"""Red, green, blue, opacity of the tube; the chain inside shows through."""
+"""Red, green, blue, opacity of the tube, through which the chain is seen."""
 PULL_COLOUR = (0.00, 0.45, 0.70)
 """Blue of muscles that pull."""
 PUSH_COLOUR = (0.90, 0.45, 0.00)
@@ -21,78 +22,65 @@ TAIL_COLOUR = (0.25, 0.25, 0.28, 0.8)
 """Dark grey of the wall inside a growing tube."""
 
 _TAIL = 0.28  # radius of that wall, of the radius of the body
-_MARKS = 24  # on the whole of it
+_MARKS = 24  # marks on the whole wall
 _MUSCLE_RADIUS = 0.09  # of the radius of the body
 
 
 class BodyDrawing:
-    """The tubes and muscles under one node of a meshcat page."""
+    """The tubes and muscles under one node of a page."""
 
     def __init__(self, root: Any) -> None:
         """Draw under `root`."""
         self._root = root
         self.entries: dict[str, tuple[float, ...]] = {}
-        """What is drawn, for the legend: colour by meaning."""
+        """Colour of what is drawn by meaning, for the legend."""
 
-    def draw(self, segments: Sequence[SegmentBody], tensions: dict[str, float]) -> None:
-        """Replace what is drawn.
+    def draw(self, scene: Scene) -> None:
+        """Replace the body; a scene without segments has none."""
+        self._clear()
+        self._draw(self._root["now"], scene.segments, scene.pushing)
 
-        Args:
-            segments: The body.
-            tensions: Tension by muscle name [N]; muscles without are drawn as if they pulled.
-        """
-        self.clear()
-        self._draw(self._root["now"], segments, tensions)
+    def animate(self, animation: Any, scenes: Mapping[int, Scene]) -> None:
+        """Draw the body of every scene and let an animation show one after the other: meshcat can switch visibility, not bend.
 
-    def clear(self) -> None:
-        """Remove the body."""
-        self._root.delete()
-        self.entries = {}
-
-    def animate(
-        self,
-        animation: Any,
-        frames: Mapping[int, tuple[Sequence[SegmentBody], dict[str, float]]],
-        *,
-        everting: Mapping[int, float] | None = None,
-    ) -> None:
-        """Draw one body a frame and let an animation show them in turn: meshcat can switch visibility, but bend nothing.
+        The tip of a growing tube is drawn round, and the wall that has not everted yet as a dark string inside.
 
         Args:
             animation: A meshcat animation.
-            frames: Body and tensions by number of frame.
-            everting: For a tube that grows at its tip, the share that has come out by number of frame: the tip is drawn round,
-                and the wall that has not come out as a dark string inside.
+            scenes: Scenes by number of frame.
         """
-        self.clear()
-        numbers = sorted(frames)
+        self._clear()
+        numbers = sorted(scenes)
         for place, number in enumerate(numbers):
             node = self._root[f"frame_{place}"]
-            if place > 0:  # before its shapes arrive, or they flash. A saved page starts to play before it sets properties: the
-                node.set_property("visible", False)  # first body, which is visible anyway, must not be told so again then
-            segments, tensions = frames[number]
-            if everting is None:
-                self._draw(node, segments, tensions, 16)
+            if place > 0:  # hidden before its shapes arrive, or they flash. A saved page starts to play before it sets
+                node.set_property("visible", False)  # properties: the first body must not be made visible after that
+            scene = scenes[number]
+            if scene.grown is None:
+                self._draw(node, scene.segments, scene.pushing, 16)
             else:
-                short = [segment.thinned(0.1 * segment.radius) for segment in segments]
-                self._draw(node, short, tensions, 14)
-                self._draw_eversion(node, short[-1], everting[number])
-            # All tracks last as long as the animation: meshcat starts a shorter one anew when it is sought beyond its end.
-            # They change half a frame early: the chain inside, which moves in between, is never far from them.
+                short = [segment.thinned(0.1 * segment.radius) for segment in scene.segments]
+                self._draw(node, short, scene.pushing, 14)
+                self._draw_eversion(node, short[-1], scene.grown)
+            # All tracks last as long as the animation: meshcat restarts a shorter one when the time is set beyond its end.
+            # Bodies change half a frame early: the chain inside, which moves in between, is never far from them.
             last = place == len(numbers) - 1
             begin, end = number - 0.5 * (place > 0), numbers[-1] + 1 if last else numbers[place + 1] - 0.5
             for when in sorted({numbers[0], begin, min(end, numbers[-1]), numbers[-1]}):
                 animation.at_frame(node, when).set_property("visible", "boolean", begin <= when < end)
 
-    def _draw(self, node: Any, segments: Sequence[SegmentBody], tensions: dict[str, float], sides: int = 24) -> None:
+    def _clear(self) -> None:
+        self._root.delete()
+        self.entries = {}
+
+    def _draw(self, node: Any, segments: Sequence[SegmentBody], pushing: Collection[str], sides: int = 24) -> None:
         for segment in segments:
             self.entries["body"] = TUBE_COLOUR
             at = node[f"segment_{segment.number}"]
             at["tube"].set_object(_mesh(*segment.surface(sides)), material(TUBE_COLOUR))
             for name in segment.muscles:
-                pushes = tensions.get(name, 0.0) < 0.0
-                colour = PUSH_COLOUR if pushes else PULL_COLOUR
-                self.entries["muscle that pushes" if pushes else "muscle that pulls"] = colour
+                colour = PUSH_COLOUR if name in pushing else PULL_COLOUR
+                self.entries["muscle that pushes" if name in pushing else "muscle that pulls"] = colour
                 self._draw_line(at["lines"][name], segment, name, colour)
             for name in segment.lines:
                 self.entries[name] = PULL_COLOUR
@@ -102,7 +90,7 @@ class BodyDrawing:
         node.set_object(_mesh(*segment.muscle_surface(name, _MUSCLE_RADIUS * segment.radius, 6)), material((*colour, 1.0)))
 
     def _draw_eversion(self, node: Any, segment: SegmentBody, share: float) -> None:
-        """The round tip, and the wall that comes forward inside at twice the speed of the tip, with marks on it."""
+        """The round tip, and the wall inside, which moves at twice the speed of the tip, with marks on it."""
         node["dome"].set_object(_mesh(*segment.dome()), material(TUBE_COLOUR))
         if share >= 1.0:
             return

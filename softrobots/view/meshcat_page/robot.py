@@ -1,23 +1,20 @@
-"""A robot in the browser view: its chain, its body, its load and the path of its tip, still or in motion."""
+"""A robot on a meshcat page: its chain, body, forces, path and target, still or animated. It is drawn from scenes alone."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.model.soft_model import SoftModel
-from softrobots.robots import HelixTube
-from softrobots.statics.equilibrium import Equilibrium
-from softrobots.statics.trajectory import Trajectory
-from softrobots.view.body import body, body_at
-from softrobots.view.meshcat_page.animation_frames import FRAME_RATE, Frame, even_frames, growth_frames, waypoint_frames
+from softrobots.view.animation_frames import FRAME_RATE
 from softrobots.view.meshcat_page.arrows import ArrowDrawing
 from softrobots.view.meshcat_page.body import BodyDrawing
 from softrobots.view.meshcat_page.chain import ChainDrawing
 from softrobots.view.meshcat_page.shapes import FORCE_COLOUR, PATH_COLOUR, RIGID_COLOUR, wrinkling_rows
-from softrobots.view.scene import Scene, wrinkling_level
+from softrobots.view.robot_shapes import RobotShapes
+from softrobots.view.scene import Scene
 
 LegendEntry = tuple[tuple[float, ...] | int, str]
 """Colour and meaning of something that is drawn."""
@@ -26,45 +23,31 @@ _CROSS = (0.16, 0.006)  # length and width of the mark of a target, of the size 
 
 
 class RobotDrawing:
-    """One robot under one node of a meshcat page. Arguments are not checked here, see `softrobots.view.viewer.Viewer`."""
+    """One robot under one node of a meshcat page, or of a `ViserTree`, which takes the same calls."""
 
-    def __init__(self, root: Any, model: SoftModel, scene: Scene, size: float, unit_force: float | None = None) -> None:
-        """Draw the robot at rest.
+    def __init__(self, root: Any, robot: RobotShapes, scene: Scene, size: float, unit_force: float | None = None) -> None:
+        """Draw the robot.
 
         Args:
             root: The node.
-            model: The robot.
-            scene: Its shapes.
+            robot: Its shapes.
+            scene: Its first state.
             size: Scale of arrows and marks [m].
             unit_force: Force whose arrow is `ARROW_LENGTH` long [N]; the largest of each load by default.
         """
-        self._root, self._model, self._size = root, model, size
+        self._root, self._shapes, self._size = root, robot.shapes, size
         self._arrows = ArrowDrawing(root["load"], size, unit_force)
-        self._chain = ChainDrawing(root, model, scene)
+        self._chain = ChainDrawing(root, robot.shapes)
         self._body = BodyDrawing(root["body"])
-        self._segments = bool(model.structure.section_table)
-        self._ghost = _ghost(model)
-        self._loaded = self._traced = self._marked = False
-        self.show_configuration(model.configuration(model.relaxed_motors))
-        self._body.draw(body_at(model, model.relaxed_motors, model.rest), {})
+        self._traced = self._marked = False
+        self.show(scene)
 
-    def show(self, equilibrium: Equilibrium) -> None:
-        """Show the loaded robot."""
-        self._chain.show_sections(True)
-        self._chain.place(equilibrium.q, self._model.configuration(equilibrium.q_motors))
-        self._chain.colour(_levels(equilibrium) or [])
-        self._body.draw(body(equilibrium), _tensions(equilibrium))
-        self._arrows.draw(equilibrium)
-        self._ghost, self._loaded = _ghost(self._model), True
-
-    def show_configuration(self, q: FloatArray) -> None:
-        """Show the chain alone at a configuration of Pinocchio, shape (nq,), without load."""
-        self._chain.show_sections(True)
-        self._chain.place(q, q)
-        self._chain.colour([0] * len(self._model.spring_groups))
-        self._body.clear()
-        self._arrows.clear()
-        self._ghost, self._loaded = _ghost(self._model), False
+    def show(self, scene: Scene) -> None:
+        """Show another state of the robot."""
+        self._scene = scene
+        self._chain.draw(scene)
+        self._body.draw(scene)
+        self._arrows.draw(scene.arrows)
 
     def trace(self, positions: FloatArray) -> None:
         """Draw a path, shape (n, 3) [m], as dots."""
@@ -97,89 +80,32 @@ class RobotDrawing:
         node.set_transform(pose)
         self._marked = True
 
-    def animation(self, trajectory: Trajectory, seconds: float) -> Any:
-        """Meshcat's animation of a trajectory; its first waypoint is shown, its path drawn."""
+    def animate(self, scenes: Mapping[int, Scene]) -> Any:
+        """Return a meshcat animation of scenes by number of frame, in growing order."""
         import meshcat.animation
 
-        self.show(trajectory.equilibria[0])
-        self.trace(trajectory.tip_positions)
-        made = meshcat.animation.Animation(default_framerate=FRAME_RATE)
-        frames = even_frames(trajectory, seconds) if self._segments else waypoint_frames(trajectory, seconds)
-        for frame, following in zip(frames, (*frames[1:], frames[-1]), strict=True):
-            self._add_frame(made, frame)
-            if self._segments and following.number > frame.number + 1:  # bodies move in steps, and so must the chain inside
-                self._add_frame(made, frame._replace(number=following.number - 1))
-        if self._segments:
-            bodies = {
-                frame.number: (body_at(self._model, frame.q_motors, frame.q_springs, 4), _tensions(frame.equilibrium))
-                for frame in frames
-            }
-            self._body.animate(made, bodies)
-        return made
-
-    def growth(self, tube: HelixTube, seconds: float, front: float, hold: float) -> tuple[Any, FloatArray]:
-        """Meshcat's animation of a tube that grows.
-
-        Args:
-            tube: The tube, the one that is drawn.
-            seconds: Time of the animation [s].
-            front: Length behind the tip over which the helix forms [m].
-            hold: Share of the time at the end during which the whole tube is shown.
-
-        Returns:
-            The animation, and points along the whole tube, shape (n, 3) [m].
-
-        Raises:
-            ParameterError: If an argument is out of range.
-        """
-        import meshcat.animation
-
-        frames = growth_frames(tube, seconds, front, hold)
-        self.show_configuration(self._model.configuration((), self._model.rest))
-        self._ghost = "the whole tube"
-        self._chain.show_sections(False)  # the links of sections that have not come out would stick out of the tip
-        made = meshcat.animation.Animation(default_framerate=FRAME_RATE)
-        for frame in frames:
-            self._add_frame(made, frame)
-        bodies = {f.number: (body_at(self._model, f.q_motors, f.q_springs, 3), _tensions(None)) for f in frames}
-        self._body.animate(made, bodies, everting={frame.number: frame.grown for frame in frames})
-        whole = body_at(self._model, frames[-1].q_motors, self._model.rest)
-        return made, np.concatenate([segment.backbone for segment in whole])
+        animation = meshcat.animation.Animation(default_framerate=FRAME_RATE)
+        numbers = list(scenes)
+        for (number, scene), following in zip(scenes.items(), (*numbers[1:], numbers[-1]), strict=True):
+            self._add_frame(animation, number, scene)
+            # A body changes in steps, and so must the chain inside; that of a growing tube is hidden.
+            if scene.segments and scene.grown is None and following > number + 1:
+                self._add_frame(animation, following - 1, scene)
+        if any(scene.segments for scene in scenes.values()):
+            self._body.animate(animation, scenes)
+        return animation
 
     def legend(self) -> list[LegendEntry]:
-        """Colour and meaning of what is drawn."""
-        entries: list[LegendEntry] = [(RIGID_COLOUR, self._ghost)] * self._chain.has_rigid
-        if self._segments and not self._model.spring_groups:
-            entries += [(colour, "equivalent rigid chain") for colour in self._chain.section_colours[:1]]
-        entries += [(colour, text) for text, colour in self._body.entries.items()]
+        """Return colour and meaning of what is drawn."""
+        scene, shapes = self._scene, self._shapes
+        entries: list[LegendEntry] = [(RIGID_COLOUR, scene.reference)] * any(shape.elastic for shape in shapes)
+        if all(shape.inflated_link is None for shape in shapes):
+            entries += [(shape.colour, "equivalent rigid chain") for shape in shapes if shape.of_section][:1]
+        entries += [(colour, meaning) for meaning, colour in self._body.entries.items()]
         entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(PATH_COLOUR, "target (cross)")] * self._marked
         entries += [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
-        return entries + (list(wrinkling_rows()) if self._model.spring_groups and self._loaded else [])
+        return entries + (wrinkling_rows() if scene.wrinkling else [])
 
-    def _add_frame(self, animation: Any, frame: Frame) -> None:
-        deformed = self._model.embed(self._model.coordinates.at(frame.q_motors, frame.q_springs).joints)
-        rigid = self._model.embed(self._model.coordinates.at(frame.q_motors, self._model.rest).joints)
-        self._chain.add_frame(animation, frame.number, deformed, rigid, _levels(frame.equilibrium))
-        if frame.equilibrium is not None:
-            self._arrows.add_frame(animation, frame.number, frame.equilibrium, deformed)
-
-
-def _ghost(model: SoftModel) -> str:
-    """What the translucent robot is."""
-    if not model.muscles:
-        return "rigid arm, same motor angles" if model.n_motors else "without load"
-    return "without load, same muscle lengths" if model.muscle_input == "lengths" else "straight, at rest"
-
-
-def _tensions(equilibrium: Equilibrium | None) -> dict[str, float]:
-    if equilibrium is None:
-        return {}
-    names = (muscle.name for muscle in equilibrium.model.muscles)
-    return dict(zip(names, equilibrium.muscle_forces.tolist(), strict=True))
-
-
-def _levels(equilibrium: Equilibrium | None) -> list[int] | None:
-    """Level of wrinkling of each inflated link; None without load."""
-    if equilibrium is None:
-        return None
-    return [wrinkling_level(equilibrium, link) for link in range(len(equilibrium.model.spring_groups))]
+    def _add_frame(self, animation: Any, number: int, scene: Scene) -> None:
+        self._chain.add_frame(animation, number, scene)
+        self._arrows.add_frame(animation, number, scene.arrows)

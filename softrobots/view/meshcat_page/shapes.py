@@ -1,4 +1,4 @@
-"""Shapes and colours of the browser view, in meshcat's terms."""
+"""Geometries and materials of meshcat, and the colours of a page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ FORCE_COLOUR = 0x009E73
 
 
 def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:
-    """Meshcat's form of a shape of a scene, and the turn from its axes to coal's (meshcat's cylinders stand along y)."""
+    """Return meshcat's geometry of a shape, and the rotation from its axes to coal's (meshcat's cylinders stand along y).
+
+    Raises:
+        ViewerError: If the shape is no box, cylinder, sphere or mesh.
+    """
     import coal
     import meshcat.geometry as geometry
 
@@ -37,7 +41,7 @@ def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:
 
 
 def material(rgba: tuple[float, ...]) -> Any:
-    """Meshcat's material of a colour: red, green, blue, opacity."""
+    """Return meshcat's material of a colour: red, green, blue, opacity."""
     import meshcat.geometry as geometry
 
     red, green, blue = (round(255 * value) for value in rgba[:3])
@@ -48,15 +52,15 @@ def material(rgba: tuple[float, ...]) -> Any:
 
 
 def floor_lines(reach: float, height: float) -> FloatArray:
-    """Ends of floor lines along x at a height [m], a sixth of the reach apart, shape (2 n, 3) [m]."""
+    """Return the ends of floor lines along x at a height [m], a sixth of the reach apart, shape (2 n, 3) [m]."""
     offsets = np.linspace(-1.0, 1.0, 13) * reach
     ends = [(x, y, height) for y in offsets for x in (-reach, reach)]
     return np.array(ends)
 
 
-def wrinkling_rows() -> list[tuple[tuple[float, ...], str]]:
-    """Colour and meaning of each level of wrinkling, for the legend of a page."""
-    rows: list[tuple[tuple[float, ...], str]] = []
+def wrinkling_rows() -> list[tuple[tuple[float, ...] | int, str]]:
+    """Return colour and meaning of each level of wrinkling, for the legend of a page."""
+    rows: list[tuple[tuple[float, ...] | int, str]] = []
     above = 1.0
     for least, rgb in WRINKLING_COLOURS:
         text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"

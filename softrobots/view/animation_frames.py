@@ -1,4 +1,4 @@
-"""What the frames of an animation show: waypoints of a trajectory, evenly spaced poses, a growing tube."""
+"""Frames of an animation: waypoints of a trajectory, evenly spaced interpolated states, a growing tube."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from softrobots.statics.trajectory import Trajectory
 FRAME_RATE = 30
 """Frames a second."""
 
-_MOST_BODIES = 90  # shapes of a continuous body that an animation goes through
-_MOST_FRAMES = 2**31 - 1  # of any animation; numbers of frames are integers of a browser
+_MOST_BODIES = 90  # shapes of a continuous body in one animation
+_MOST_FRAMES = 2**31 - 1  # a browser's largest frame number
 
 
 class Frame(NamedTuple):
-    """What a frame of an animation shows."""
+    """The state of a robot in one frame."""
 
     number: int
     """Number of the frame, from 0."""
@@ -31,12 +31,12 @@ class Frame(NamedTuple):
     """Elastic coordinates."""
     equilibrium: Equilibrium | None
     """The nearest waypoint; None without load."""
-    grown: float = 1.0
-    """Share of the tube that has come out."""
+    grown: float | None = None
+    """Share of a growing tube that has everted; None if the robot does not grow."""
 
 
 def waypoint_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
-    """The waypoints, each at the frame nearest to its time."""
+    """Return the waypoints, each at the frame nearest to its time."""
     span = float(trajectory.times[-1] - trajectory.times[0])
     share = (trajectory.times - trajectory.times[0]) / (span or 1.0)
     numbers = np.rint(share * seconds * FRAME_RATE).astype(int).tolist()
@@ -45,10 +45,10 @@ def waypoint_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
 
 
 def even_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
-    """Frames evenly over the time, between waypoints by linear interpolation: a bent body is drawn anew for each."""
+    """Return evenly spaced frames, interpolated linearly between waypoints; few, since a bent body is drawn anew for each."""
     numbers, total = _spread(seconds)
     times = trajectory.times[0] + (trajectory.times[-1] - trajectory.times[0]) * numbers / total
-    made = []
+    frames = []
     for number, moment in zip(numbers.tolist(), times, strict=True):
         after = int(np.clip(np.searchsorted(trajectory.times, moment), 1, max(len(trajectory.times) - 1, 1)))
         before, after = after - 1, min(after, len(trajectory.times) - 1)
@@ -57,19 +57,19 @@ def even_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
         motors, springs = (
             (1.0 - share) * rows[before] + share * rows[after] for rows in (trajectory.q_motors, trajectory.q_springs)
         )
-        made.append(Frame(number, motors, springs, trajectory.equilibria[after if share > 0.5 else before]))
-    return made
+        frames.append(Frame(number, motors, springs, trajectory.equilibria[after if share > 0.5 else before]))
+    return frames
 
 
 def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) -> list[Frame]:
-    """A tube that grows at constant speed, then the whole tube; see `softrobots.robots.growth.grown_coordinates`.
+    """Return frames of a tube that grows at constant speed and is then held; see `robots.growth.grown_coordinates`.
 
     Args:
         tube: The tube.
-        seconds: Time of the animation [s].
-        front: Length behind the tip over which the helix forms [m]; while the whole tube is shown it forms to the end, as
-            fast as the tube grew, or faster to be done in the last frame.
-        hold: Share of the time, at the end, for the whole tube, in [0, 1).
+        seconds: Duration of the animation [s].
+        front: Length behind the tip over which the helix forms [m]. While the tube is held the rest of the helix forms, at the
+            speed of growth, or faster so that it ends in the last frame.
+        hold: Share of the duration, at the end, for which the whole tube is held, in [0, 1).
 
     Returns:
         The frames.
@@ -82,7 +82,7 @@ def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) ->
     front = non_negative_number("front", front, "m")
     numbers, total = _spread(positive_number("duration", seconds, "s"))
     shares = np.clip(numbers / total / (1.0 - hold), 0.0, 1.0)
-    # When the tube is whole, the last stretch is formed too, over as much time as the tip took along it, or as there is.
+    # While the tube is held, its last stretch forms in the time that the tip took for it, or in the time that is left.
     speed = max(tube.length / (1.0 - hold), front / hold if hold > 0.0 else 0.0)
     formed = np.clip((numbers / total - (1.0 - hold)) * speed, 0.0, front)
     formed[-1] = front if hold > 0.0 else 0.0
@@ -94,6 +94,6 @@ def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) ->
 
 
 def _spread(seconds: float) -> tuple[FloatArray, int]:
-    """Numbers of frames evenly over a time, and that of the last one."""
+    """Evenly spaced frame numbers over a duration [s], and the last number."""
     total = max(round(min(seconds * FRAME_RATE, _MOST_FRAMES)), 1)
     return np.unique(np.rint(np.linspace(0, total, min(_MOST_BODIES, total + 1))).astype(int)), total
