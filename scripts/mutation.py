@@ -69,9 +69,7 @@ PARTS = {
     "constant_curvature": Part(
         tuple(f"constant_curvature/{name}.py" for name in ("arcs", "jacobians", "muscles", "poses")), CURVATURE
     ),
-    "helix": Part(
-        tuple(f"helix/{name}.py" for name in ("shapes", "paths", "contact", "tube", "grasping", "fabrication")), HELIX
-    ),
+    "helix": Part(tuple(f"helix/{name}.py" for name in ("shapes", "paths", "contact", "tube", "grasping", "pattern")), HELIX),
 }
 LEFT_OUT = {
     "10000": "ten thousand random cases; what they notice, others do",

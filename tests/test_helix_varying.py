@@ -407,7 +407,7 @@ def test_bad_input_is_refused(change: dict[str, Any], field: str) -> None:
 
 
 def test_a_function_that_is_nowhere_smooth_ends_with_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("softrobots.helix.varying._EVALUATIONS", 2000)
+    monkeypatch.setattr("softrobots.helix.varying_actuator._EVALUATIONS", 2000)
     noise = itertools.cycle(np.random.default_rng(0).uniform(0.4, 0.9, 997).tolist())
     with pytest.raises(
         ParameterError, match=r"smooth between them \(stuck at the position [\d.e-]+ m: more than \d+ evaluations"

@@ -16,7 +16,7 @@ from softrobots.cli.reports.facts import Fact, answer_of, lines_of
 from softrobots.cli.reports.tube_facts import tube_facts
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
-from softrobots.helix.template_files import write_template
+from softrobots.helix.template import write_template
 from softrobots.robots import HelixTube
 
 _EXAMPLES = """examples:

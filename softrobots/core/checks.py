@@ -5,6 +5,7 @@ Each returns the checked value in its final type, or raises before any work is d
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -54,7 +55,7 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
         # A comparison refuses NaN too, and on a short list it is several times faster than NumPy's reductions.
         refused = not all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
     if refused:
-        raise ParameterError(name, value, f"{_array_text(shape, unit)}, at most {LARGEST:g} in size")
+        raise ParameterError(name, value, _array_text(shape, unit) + _too_large(bool(np.all(np.isfinite(array)))))
     return array
 
 
@@ -66,7 +67,7 @@ def positive_array(name: str, value: Any, unit: str) -> FloatArray:
     """
     array = finite_array(name, value, None, unit)
     if np.any(array < 1.0 / LARGEST):
-        raise ParameterError(name, value, f"positive [{unit}], at least {1.0 / LARGEST:g}")
+        raise ParameterError(name, value, f"positive [{unit}]" + _too_small(bool(np.any(array <= 0.0))))
     return array
 
 
@@ -100,7 +101,7 @@ def finite_number(name: str, value: Any, unit: str = "") -> float:
     Raises:
         ParameterError: If it is not one.
     """
-    requirement = "a finite number" + (f" [{unit}]" if unit else "")
+    requirement = "a finite number" + _unit_text(unit)
     if isinstance(value, _NOT_NUMBERS):
         raise ParameterError(name, value, requirement)
     try:
@@ -108,7 +109,7 @@ def finite_number(name: str, value: Any, unit: str = "") -> float:
     except Exception as error:  # an object of the caller may raise anything
         raise ParameterError(name, value, requirement) from error
     if not abs(number) <= LARGEST:  # NaN too
-        raise ParameterError(name, value, f"{requirement}, at most {LARGEST:g} in size")
+        raise ParameterError(name, value, requirement + _too_large(math.isfinite(number)))
     return number
 
 
@@ -120,7 +121,7 @@ def positive_number(name: str, value: Any, unit: str = "") -> float:
     """
     number = finite_number(name, value, unit)
     if number < 1.0 / LARGEST:
-        raise ParameterError(name, value, "positive" + (f" [{unit}]" if unit else "") + f", at least {1.0 / LARGEST:g}")
+        raise ParameterError(name, value, "positive" + _unit_text(unit) + _too_small(number <= 0.0))
     return number
 
 
@@ -132,7 +133,7 @@ def non_negative_number(name: str, value: Any, unit: str = "") -> float:
     """
     number = finite_number(name, value, unit)
     if number < 0.0:
-        raise ParameterError(name, value, "zero or positive" + (f" [{unit}]" if unit else ""))
+        raise ParameterError(name, value, "zero or positive" + _unit_text(unit))
     return number
 
 
@@ -214,7 +215,21 @@ def _fits(shape: tuple[int, ...], required: tuple[int | None, ...]) -> bool:
 
 
 def _array_text(shape: tuple[int | None, ...] | None, unit: str) -> str:
-    return f"an array of {_shape_text(shape)}finite numbers" + (f" [{unit}]" if unit else "")
+    return f"an array of {_shape_text(shape)}finite numbers" + _unit_text(unit)
+
+
+def _unit_text(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _too_large(finite: bool) -> str:
+    """Addition to a requirement of finite numbers for those that are finite and yet refused."""
+    return f", at most {LARGEST:g} in size" if finite else ""
+
+
+def _too_small(zero_or_negative: bool) -> str:
+    """Addition to a requirement of positive numbers for those that are positive and yet refused."""
+    return "" if zero_or_negative else f", at least {1.0 / LARGEST:g}"
 
 
 def _shape_text(shape: tuple[int | None, ...] | None) -> str:

@@ -1,6 +1,6 @@
 """Helical actuation of an inflated tube in closed form; [Blumenschein 2018]. NumPy alone; `bent_tube` needs SciPy too."""
 
-from softrobots.helix.actuator_table import INTERPOLATIONS, ActuatorTable
+from softrobots.helix.actuators import INTERPOLATIONS, ActuatorTable, contraction_from_stoppers, gap_for
 from softrobots.helix.atlas import ShapeRow, ShapeTable, paper_grid, shape_table
 from softrobots.helix.contact import (
     ON_CONTACT,
@@ -11,10 +11,9 @@ from softrobots.helix.contact import (
     self_contact,
     simple_contraction_limit,
 )
-from softrobots.helix.design import ON_UNREALISABLE, design_antenna, design_grasp
-from softrobots.helix.fabrication import METHODS, REMAINDERS, contraction_from_stoppers, gap_for, pinch_pattern
+from softrobots.helix.design import DesignWarning, Deviation, HelixDesign, Wish
 from softrobots.helix.grasping import PAPER_CYLINDER, GraspForce, GraspTest, grasp_force
-from softrobots.helix.helix_design import DesignWarning, Deviation, HelixDesign, Wish
+from softrobots.helix.inverse_design import ON_UNREALISABLE, design_antenna, design_grasp
 from softrobots.helix.paths import (
     actuator_curvature_torsion,
     binormals,
@@ -26,12 +25,12 @@ from softrobots.helix.paths import (
     transform_base_to_axis,
     turn_angle,
 )
-from softrobots.helix.pattern import Pattern, SheetPoints
+from softrobots.helix.pattern import METHODS, REMAINDERS, Pattern, SheetPoints, pinch_pattern
 from softrobots.helix.pattern_error import DiscreteCentreLine, ShapeError, discrete_centre_line, shape_error
 from softrobots.helix.shapes import HANDEDNESS, PATHS, Actuator, HelixShape, forward, inverse, measure
-from softrobots.helix.template_files import write_template, write_template_pages, write_template_table
+from softrobots.helix.template import write_template, write_template_pages, write_template_table
 from softrobots.helix.tube import actuator_tension, centre_length, height, length_for_turns, material_twist, turns, volume
-from softrobots.helix.varying import BentTube, bent_tube
+from softrobots.helix.varying_actuator import BentTube, bent_tube
 
 __all__ = [
     "HANDEDNESS",

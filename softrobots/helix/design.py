@@ -1,146 +1,295 @@
-"""Designing a helix: from an object to grasp or an antenna to hold, to the actuator and the length of the tube.
-
-A grasp wants the inner path on the object, an antenna the centre line on a cylinder; both want a rise per turn. Diameter of
-the tube and turns are given. [Blumenschein 2018] (6, 7, 11) then tell contraction and angle of the actuator. Where such a tube
-would run into itself, or nobody can make the actuator, the wish is refused, followed all the same, or moved to the nearest
-helix that can be made (`softrobots.helix.nearest`): the caller chooses.
-"""
+"""A helix design: actuator and tube, the resulting helix, the requirement that it was made for, and its JSON file."""
 
 from __future__ import annotations
 
-import warnings
+import json
+import math
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import choice, non_negative_number, positive_number
-from softrobots.core.errors import ParameterError, SelfIntersection
-from softrobots.helix.helix_design import LIMIT_ROUNDING, DesignWarning, HelixDesign, Wish, checked_limits
-from softrobots.helix.nearest import Limits, WantedHelix, nearest_realisable, within
-from softrobots.helix.shapes import HelixShape, inverse
+from softrobots.core.checks import FloatArray, choice, finite_number, listed, non_negative_number, positive_number
+from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.files import as_path, write_text
+from softrobots.core.json_text import read_json
+from softrobots.helix.contact import BoolArray, SelfContact, self_contact
+from softrobots.helix.shapes import HANDEDNESS, HelixShape, forward
+from softrobots.helix.tube import centre_length, length_for_turns
 
-ON_UNREALISABLE = ("error", "nearest", "warn")
-"""What a design function does about a wish that cannot be made."""
+Limits = tuple[float, float]
+"""Smallest and largest value."""
 
-_EXTREME = 1e6  # beyond this many diameters, or below that part of one, rounding takes the helix
+LIMIT_ROUNDING = 1e-9
+"""How far contraction [-] and angle [rad] may pass a limit by rounding."""
+
+_FORMAT = 1
+_SAVED = ("contraction", "angle", "diameter", "turns", "handedness", "contraction_limits", "angle_limits")
+_LARGEST_FILE = 1_000_000  # bytes
+_AGREEMENT = 1e-9  # relative: a saved length or radius against the one computed again
 
 
-def design_grasp(
-    object_radius: float,
-    turn_height: float,
-    *,
-    diameter: float,
-    turns: float,
-    squeeze: float = 0.0,
-    handedness: str = "right",
-    on_unrealisable: str = "error",
-    contraction_limits: Limits | None = None,
-    angle_limits: Limits | None = None,
-) -> HelixDesign:
-    """Actuator and tube that wrap around an object: the inner path lies on it.
+class Wish(NamedTuple):
+    """The requirement of a design: radius of a path and rise of a turn."""
 
-    Args:
-        object_radius: Radius of the object, positive [m].
-        turn_height: Rise of a turn along the object, positive [m].
-        diameter: Diameter of the tube, positive [m].
-        turns: Turns around the object, positive [-].
-        squeeze: How much smaller the natural inner radius is made than the object, from 0 to below its radius [m]. A squeezed
-            object is held (`grasp_force`), one that is just wrapped is not.
-        handedness: "right" or "left".
-        on_unrealisable: What to do if the tube would run into itself or a limit is passed: one of `ON_UNREALISABLE`. "error" to
-            raise, "nearest" to take the nearest helix that can be made (see `softrobots.helix.nearest`), "warn" to return the
-            wish with its `faults` and `contact`, and issue a `DesignWarning`.
-        contraction_limits: Smallest and largest contraction that can be made, within (0, 1]; None for no limit [-].
-        angle_limits: Smallest and largest angle that can be made, within [0, pi/2); None for no limit [rad].
+    purpose: str
+    """"grasp" or "antenna"."""
+    path: str
+    """Path with the required radius: "inner" for a grasp, "centre" for an antenna."""
+    radius: float
+    """Radius of that path [m]."""
+    turn_height: float
+    """Rise of a turn [m]."""
+    squeeze: float = 0.0
+    """Radius of the object minus `radius` [m]."""
 
-    Returns:
-        The design.
+
+class Deviation(NamedTuple):
+    """Difference of a design from its requirement."""
+
+    radius: float
+    """Radius of the path minus the required one [m]."""
+    turn_height: float
+    """Rise of a turn minus the required one [m]."""
+    distance: float
+    """Both together, `m` of `softrobots.helix.inverse_design`: the relative change while it is small [-]."""
+
+
+class DesignWarning(UserWarning):
+    """A design that cannot be built, returned because of `on_unrealisable="warn"`.
+
+    Attributes:
+        design: The `HelixDesign`; see its `faults` and `contact`.
+    """
+
+    def __init__(self, message: str, *, design: HelixDesign) -> None:
+        """Create the warning with the design that it is about."""
+        super().__init__(message)
+        self.design = design
+
+
+@dataclass(frozen=True, eq=False)
+class HelixDesign:
+    """An actuator, a tube, the resulting helix, and its deviation from the requirement.
 
     Raises:
-        ParameterError: If an argument is out of range; if a limit is passed and `on_unrealisable` is "error"; or if nothing
-            within the limits can be made.
-        SelfIntersection: If the tube would run into itself and `on_unrealisable` is "error".
-        StraightTube: If the helix is straight within rounding.
+        ParameterError: If a number is out of range, the handedness is unknown, or a requirement is given although the helix has
+            no positive radius or rise.
+        StraightTube: If the actuator leaves the tube straight.
     """
-    thickness = positive_number("object_radius", object_radius, "m")
-    pressed = non_negative_number("squeeze", squeeze, "m")
-    if pressed >= thickness:
-        raise ParameterError("squeeze", squeeze, f"less than the radius of the object, {thickness} m")
-    wish = Wish("grasp", "inner", thickness - pressed, positive_number("turn_height", turn_height, "m"), pressed)
-    return _design(wish, diameter, turns, handedness, on_unrealisable, contraction_limits, angle_limits)
+
+    contraction: float
+    """Contracted over original length of the actuator `lambda`, in (0, 1] [-]."""
+    angle: float
+    """Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad]."""
+    diameter: float
+    """Diameter `D` of the tube [m]."""
+    turns: float
+    """Turns of the helix [-]."""
+    handedness: str = "right"
+    """"right" or "left"."""
+    wish: Wish | None = None
+    """The requirement; None if the actuator was given instead."""
+    contraction_limits: Limits | None = None
+    """Smallest and largest contraction that the actuator can have, or None [-]."""
+    angle_limits: Limits | None = None
+    """Smallest and largest angle that the actuator can have, or None [rad]."""
+    shape: HelixShape = field(init=False)
+    """The helix."""
+    tube_length: float = field(init=False)
+    """Length `Lt` of the uninflated tube [m]."""
+    contact: SelfContact = field(init=False)
+    """Clearance of the tube from itself."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers and compute the derived ones."""
+        numbers = {
+            "contraction": positive_number("contraction", self.contraction, "-"),
+            "angle": non_negative_number("angle", self.angle, "rad"),
+            "diameter": positive_number("diameter", self.diameter, "m"),
+            "turns": positive_number("turns", self.turns, "-"),
+        }
+        for name, number in numbers.items():
+            object.__setattr__(self, name, number)
+        choice("handedness", self.handedness, HANDEDNESS)
+        object.__setattr__(self, "wish", _checked_wish(self.wish))
+        object.__setattr__(self, "contraction_limits", checked_limits("contraction_limits", self.contraction_limits, "-"))
+        object.__setattr__(self, "angle_limits", checked_limits("angle_limits", self.angle_limits, "rad"))
+        shape = forward(self.contraction, self.angle, self.diameter)
+        if self.wish is not None and not (shape.radius(self.wish.path) > 0.0 and shape.pitch > 0.0):
+            raise ParameterError("wish", self.wish, f"None for a helix without radius or rise to compare it with: {shape}")
+        object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "tube_length", float(length_for_turns(shape, self.angle, self.turns)))
+        object.__setattr__(self, "contact", self_contact(shape, self.turns))
+
+    @property
+    def height(self) -> float:
+        """Rise of the whole helix along its axis [m]."""
+        return self.turns * float(self.shape.turn_height)
+
+    @property
+    def centre_length(self) -> float:
+        """Length of the centre line of the actuated tube [m]."""
+        return float(centre_length(self.contraction, self.angle, self.tube_length))
+
+    @property
+    def deviation(self) -> Deviation | None:
+        """Difference from the requirement; None without a requirement."""
+        if self.wish is None:
+            return None
+        radius, rise = float(self.shape.radius(self.wish.path)), float(self.shape.turn_height)
+        relative = float(distance(radius / self.wish.radius, rise / self.wish.turn_height))
+        return Deviation(radius - self.wish.radius, rise - self.wish.turn_height, relative)
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Reasons why the design cannot be built, one sentence each; empty if it can."""
+        sentences = [str(self.contact)] if bool(self.contact.touches) else []
+        for name, unit, limits in (("contraction", "", self.contraction_limits), ("angle", " rad", self.angle_limits)):
+            value = getattr(self, name)
+            if limits is not None and not within(np.asarray(value), limits, LIMIT_ROUNDING):
+                sentences.append(f"the {name} is {value:.4g}{unit}, which must be in [{limits[0]:.4g}, {limits[1]:.4g}]{unit}")
+        return tuple(sentences)
+
+    @property
+    def realisable(self) -> bool:
+        """Whether the tube is free of contact and the actuator within its limits."""
+        return not self.faults
+
+    def summary(self) -> str:
+        """Return a description, one fact a line; lengths in millimetres, angles in degrees."""
+        shape, degrees = self.shape, math.degrees(self.angle)
+        lines = [
+            f"Actuator: contraction {self.contraction:.4f}, angle {degrees:.3f} degrees, {self.handedness}-handed",
+            f"Tube: diameter {in_mm(self.diameter)}, length {in_mm(self.tube_length)} uninflated",
+            f"Helix: {self.turns:.3f} turns, rise {in_mm(shape.turn_height)} a turn, {in_mm(self.height)} in all",
+            f"Radii: outer {in_mm(shape.outer_radius)}, centre {in_mm(shape.centre_radius)}, inner {in_mm(shape.inner_radius)}",
+            f"Centre line: {in_mm(self.centre_length)} long",
+            f"Contact: {self.contact}",
+        ]
+        if self.wish is not None and self.deviation is not None:
+            wish, deviation = self.wish, self.deviation
+            squeeze = f", {in_mm(wish.squeeze)} less than the object" if wish.squeeze else ""
+            lines += [
+                f"Required ({wish.purpose}): {wish.path} radius {in_mm(wish.radius)}{squeeze}, "
+                f"rise {in_mm(wish.turn_height)} a turn",
+                f"Deviation: radius {deviation.radius * 1e3:+.3f} mm, rise {deviation.turn_height * 1e3:+.3f} mm a turn, "
+                f"distance {deviation.distance:.4g}",
+            ]
+        lines += [f"CANNOT BE MADE: {fault}" for fault in self.faults]
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        """Return `summary()`."""
+        return self.summary()
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Save the design as JSON: numbers in SI units and radians, full precision.
+
+        Args:
+            path: File to write.
+            overwrite: Replace an existing file.
+
+        Returns:
+            The path of the file.
+
+        Raises:
+            ParameterError: If `path` is not a path.
+            OutputExists: If the file exists and `overwrite` is false.
+            OutputError: If the file cannot be written.
+        """
+        document = {
+            "softrobots_helix_design": _FORMAT,
+            **{name: getattr(self, name) for name in _SAVED},
+            "wish": None if self.wish is None else self.wish._asdict(),
+            "computed": _computed(self),
+        }
+        return write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n", overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> HelixDesign:
+        """Load a design saved by `save`; derived numbers are computed again and compared with those in the file.
+
+        Args:
+            path: The JSON file.
+
+        Returns:
+            The design.
+
+        Raises:
+            ParameterError: If `path` is not a path.
+            FileFormatError: If the file cannot be read, was not written by `save`, or its derived numbers do not match.
+        """
+        file = as_path("path", path)
+        document = read_json(file, _LARGEST_FILE)
+        try:
+            if document["softrobots_helix_design"] != _FORMAT:
+                raise ValueError(f"it is in format {document['softrobots_helix_design']!r}; format {_FORMAT} is required")
+            wish = document["wish"] and Wish(**document["wish"])
+            design = cls(**{name: document[name] for name in _SAVED}, wish=wish)
+            for name, number in _computed(design).items():
+                claimed, rounding = document["computed"][name], _AGREEMENT * design.diameter
+                if not math.isclose(number, claimed, rel_tol=_AGREEMENT, abs_tol=rounding):
+                    raise ValueError(f"its {name} is {claimed}, but {number} follows from its other numbers")
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
+            reason = f"it has no {error}" if isinstance(error, KeyError) else error
+            raise FileFormatError(f"cannot read a helix design from {file}: {reason}") from error
+        return design
 
 
-def design_antenna(
-    radius: float,
-    turn_height: float,
-    *,
-    diameter: float,
-    turns: float,
-    handedness: str = "right",
-    on_unrealisable: str = "error",
-    contraction_limits: Limits | None = None,
-    angle_limits: Limits | None = None,
-) -> HelixDesign:
-    """Actuator and tube of a helical antenna: the centre line of the tube has the wanted radius.
+def _computed(design: HelixDesign) -> dict[str, float]:
+    """Derived numbers that are written to the file of a design."""
+    return {
+        "tube_length": design.tube_length,
+        "outer_radius": float(design.shape.outer_radius),
+        "inner_radius": float(design.shape.inner_radius),
+        "pitch": float(design.shape.pitch),
+    }
 
-    Args:
-        radius: Radius of the centre line, positive [m].
-        turn_height: Rise of a turn, positive [m].
-        diameter: Diameter of the tube, positive [m].
-        turns: Turns, positive [-].
-        handedness: "right" or "left".
-        on_unrealisable: As in `design_grasp`.
-        contraction_limits: As in `design_grasp` [-].
-        angle_limits: As in `design_grasp` [rad].
 
-    Returns:
-        The design.
+def distance(radius_ratio: Any, height_ratio: Any) -> FloatArray:
+    """Distance of two helices from the ratios of their radii and turn heights, positive: `hypot` of the logarithms."""
+    return np.asarray(np.hypot(np.log(radius_ratio), np.log(height_ratio)))
+
+
+def within(value: FloatArray, limits: Limits | None, rounding: float) -> BoolArray:
+    """Whether values lie within limits, up to rounding; always if the limits are None."""
+    if limits is None:
+        return np.ones(np.shape(value), dtype=np.bool_)
+    return np.asarray((value >= limits[0] - rounding) & (value <= limits[1] + rounding))
+
+
+def checked_limits(name: str, limits: Any, unit: str) -> Limits | None:
+    """Return `contraction_limits` or `angle_limits` as a pair of numbers, or None if that is given.
 
     Raises:
-        ParameterError: As in `design_grasp`.
-        SelfIntersection: As in `design_grasp`.
-        StraightTube: As in `design_grasp`.
+        ParameterError: If they are not a pair, not in order or out of range.
     """
-    size = positive_number("radius", radius, "m")
-    wish = Wish("antenna", "centre", size, positive_number("turn_height", turn_height, "m"))
-    return _design(wish, diameter, turns, handedness, on_unrealisable, contraction_limits, angle_limits)
+    if limits is None:
+        return None
+    contraction = name == "contraction_limits"
+    requirement = "a pair (low, high) " + ("in (0, 1]" if contraction else "in [0, pi/2) rad") + ", low not above high"
+    low, high = (finite_number(name, value, unit) for value in listed(name, limits, 2, requirement))
+    fits = 0.0 < low <= high <= 1.0 if contraction else 0.0 <= low <= high < 0.5 * math.pi
+    if not fits:
+        raise ParameterError(name, limits, requirement)
+    return low, high
 
 
-def _design(
-    wish: Wish,
-    diameter: float,
-    turns: float,
-    handedness: str,
-    on_unrealisable: str,
-    contraction_limits: Limits | None,
-    angle_limits: Limits | None,
-) -> HelixDesign:
-    """The design of a wish, or of what is nearest to it."""
-    choice("on_unrealisable", on_unrealisable, ON_UNREALISABLE)
-    shares = checked_limits("contraction_limits", contraction_limits, "-")
-    angles = checked_limits("angle_limits", angle_limits, "rad")
-    tube, count = positive_number("diameter", diameter, "m"), positive_number("turns", turns, "-")
-    for name, length in (("radius", wish.radius), ("turn_height", wish.turn_height)):
-        if not tube / _EXTREME <= length <= tube * _EXTREME:
-            raise ParameterError(name, length, f"within a factor of {_EXTREME:g} of the diameter {tube} m")
-    wanted = WantedHelix(wish.path, wish.radius, wish.turn_height, tube, count)
+def _checked_wish(wish: Any) -> Wish | None:
+    """A requirement with checked numbers, or None if that is given."""
+    if wish is None:
+        return None
+    if not isinstance(wish, Wish):
+        raise ParameterError("wish", wish, "a Wish, or None")
+    purpose = choice("wish.purpose", wish.purpose, ("grasp", "antenna"))
+    path = choice("wish.path", wish.path, ("inner" if purpose == "grasp" else "centre",))
+    radius, rise = positive_number("wish.radius", wish.radius, "m"), positive_number("wish.turn_height", wish.turn_height, "m")
+    return Wish(purpose, path, radius, rise, non_negative_number("wish.squeeze", wish.squeeze, "m"))
 
-    def of(shape: HelixShape, *, clipped: bool) -> HelixDesign:
-        contraction, angle, _ = (float(value) for value in inverse(shape))
-        if clipped:
-            contraction = float(np.clip(contraction, *(shares or (contraction, contraction))))
-            angle = float(np.clip(angle, *(angles or (angle, angle))))
-        return HelixDesign(contraction, angle, tube, count, handedness, wish, shares, angles)
 
-    design = of(wanted.shape, clipped=False)
-    if design.realisable:
-        return design
-    if on_unrealisable == "nearest":
-        return of(nearest_realisable(wanted, shares, angles), clipped=True)
-    if on_unrealisable == "warn":
-        warnings.warn(DesignWarning("; ".join(design.faults), design=design), stacklevel=3)
-        return design
-    advice = "on_unrealisable='nearest' gives the nearest helix that can be made"
-    if bool(design.contact.touches):
-        raise SelfIntersection(f"{'; '.join(design.faults)}; {advice}", contact=design.contact)
-    name = "angle_limits" if within(np.asarray(design.contraction), shares, LIMIT_ROUNDING) else "contraction_limits"
-    raise ParameterError(name, getattr(design, name), f"wide enough for the wish ({'; '.join(design.faults)}); {advice}")
+def in_mm(length: Any) -> str:
+    """Return a length [m] as text in millimetres."""
+    return f"{float(length) * 1e3:.2f} mm"

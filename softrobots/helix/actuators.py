@@ -1,4 +1,4 @@
-"""A measured table of pressure against contraction, as model of a pneumatic muscle along the tube.
+"""Contraction of the actuator: of a pneumatic muscle by its pressure, from a measured table, and of a string with stoppers.
 
 The inverse pneumatic muscle of [Blumenschein 2018] lengthens with pressure, so its contraction `lambda` (contracted over
 original length) rises towards 1; a contracting muscle has a falling table. The paper says that such a mapping must be measured
@@ -16,7 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import LARGEST, FloatArray, choice, finite_array, read_only
+from softrobots.core.checks import (
+    LARGEST,
+    FloatArray,
+    choice,
+    common_shape,
+    finite_array,
+    non_negative_array,
+    positive_array,
+    read_only,
+)
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, MissingDependency, ParameterError
 from softrobots.core.files import as_path, csv_text, write_text
@@ -31,7 +40,7 @@ _HALVINGS = 60  # of an interval of the table: past the last digit
 
 @dataclass(frozen=True, eq=False)
 class ActuatorTable:
-    """Contraction of an actuator measured at some pressures; between them it is interpolated, beyond them nothing is said.
+    """Contraction of an actuator measured at some pressures: interpolated between them, an error outside their range.
 
     Raises:
         ParameterError: If there are fewer than two rows, a number is not finite, the pressures do not increase, a contraction
@@ -62,7 +71,7 @@ class ActuatorTable:
         object.__setattr__(self, "pressure", read_only(pressures))
         object.__setattr__(self, "contraction", read_only(shares))
         if choice("interpolation", self.interpolation, INTERPOLATIONS) == "pchip":
-            _ = self._cubic  # tells at once if SciPy is missing
+            _ = self._cubic  # raises at once if SciPy is missing
 
     @classmethod
     def read_csv(cls, path: str | os.PathLike[str], interpolation: str = "linear") -> ActuatorTable:
@@ -78,10 +87,10 @@ class ActuatorTable:
             The table.
 
         Raises:
-            ParameterError: If the path is none or there is no such interpolation.
+            ParameterError: If `path` is not a path or the interpolation is unknown.
             FileFormatError: If the file cannot be read, lacks a column or has it twice, has fewer than two rows, or (naming the
-                line) has a cell that is no finite number, more or fewer cells than the first line, a pressure not above the one
-                before, or a contraction outside (0, 1] or that turns back.
+                line) has a cell that is not a finite number, more or fewer cells than the first line, a pressure not above the
+                previous one, or a contraction outside (0, 1] or not monotone.
             MissingDependency: For "pchip", if SciPy is not installed.
         """
         file, kind = as_path("path", path), choice("interpolation", interpolation, INTERPOLATIONS)
@@ -93,7 +102,7 @@ class ActuatorTable:
             raise FileFormatError(f"{file} has {len(rows)} rows of numbers; at least two are required")
         try:
             return cls(table.numbers[:, 0], table.numbers[:, 1], kind)
-        except ParameterError as error:  # numbers too large or too small, rows too near
+        except ParameterError as error:  # numbers too large or too small, rows too close together
             raise FileFormatError(f"{file}: {error}") from error
 
     def write_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
@@ -107,7 +116,7 @@ class ActuatorTable:
             The path of the file.
 
         Raises:
-            ParameterError: If the path is none.
+            ParameterError: If `path` is not a path.
             OutputExists: If the file exists and `overwrite` is false.
             OutputError: If the file cannot be written.
         """
@@ -125,7 +134,7 @@ class ActuatorTable:
         return float(self.contraction.min()), float(self.contraction.max())
 
     def contraction_at(self, pressure: Any) -> FloatArray:
-        """Contraction at a pressure, interpolated between the rows.
+        """Return the contraction at a pressure, interpolated between the rows.
 
         Args:
             pressure: Gauge pressure within `pressure_limits`, shape (...) [Pa].
@@ -141,10 +150,10 @@ class ActuatorTable:
             shares = self._cubic(pressures)
         else:
             shares = np.interp(pressures, self.pressure, self.contraction)
-        return np.asarray(np.clip(shares, *self.contraction_limits))  # rounding must not lead out of the table
+        return np.asarray(np.clip(shares, *self.contraction_limits))  # rounding must not leave the table
 
     def pressure_for(self, contraction: Any) -> FloatArray:
-        """Pressure that makes a contraction: the inverse of `contraction_at`.
+        """Return the pressure for a contraction: the inverse of `contraction_at`.
 
         Args:
             contraction: Contraction within `contraction_limits`, shape (...) [-].
@@ -170,13 +179,13 @@ class ActuatorTable:
         return np.asarray(high)
 
     def slope_at(self, pressure: Any) -> FloatArray:
-        """Derivative of the contraction by the pressure.
+        """Return the derivative of the contraction with respect to the pressure.
 
         Args:
             pressure: Gauge pressure within `pressure_limits`, shape (...) [Pa].
 
         Returns:
-            Slope, shape (...) [1/Pa]. A linear table has two at a row in its middle: the one above the row is given.
+            Slope, shape (...) [1/Pa]. At an inner row of a linear table it is the slope above the row.
 
         Raises:
             ParameterError: If a pressure is not finite or beyond the limits.
@@ -188,7 +197,7 @@ class ActuatorTable:
         return np.asarray((np.diff(self.contraction) / np.diff(self.pressure))[place - 1])
 
     def shape_at(self, pressure: Any, angle: Any, diameter: Any) -> HelixShape:
-        """Helix that a tube with this actuator makes at a pressure of the actuator: `forward` after `contraction_at`.
+        """Return the helix of a tube with this actuator at a pressure of the actuator: `forward` of `contraction_at`.
 
         Args:
             pressure: Gauge pressure of the actuator within `pressure_limits` [Pa].
@@ -206,12 +215,50 @@ class ActuatorTable:
 
     @cached_property
     def _cubic(self) -> Any:
-        """SciPy's monotone cubic through the rows."""
+        """SciPy's monotone cubic interpolation of the rows."""
         try:
             from scipy.interpolate import PchipInterpolator
         except ImportError as error:
             raise MissingDependency("scipy", "helix") from error
         return PchipInterpolator(self.pressure, self.contraction)
+
+
+def contraction_from_stoppers(stopper: Any, gap: Any) -> FloatArray:
+    r"""Return the contraction of a pull string whose gaps have closed: [Blumenschein 2018] section III-A.2.
+
+    .. math:: \lambda = \frac{\text{stopper}}{\text{stopper} + \text{gap}}
+
+    Args:
+        stopper: Length of a stopper, positive [m].
+        gap: Length of a gap on the uninflated tube, zero or positive [m].
+
+    Returns:
+        Contraction, the common shape [-].
+
+    Raises:
+        ParameterError: If a length is out of range or the shapes do not broadcast.
+    """
+    stoppers, gaps = positive_array("stopper", stopper, "m"), non_negative_array("gap", gap, "m")
+    common_shape("gap", stoppers.shape, gaps.shape)
+    return np.asarray(stoppers / (stoppers + gaps))
+
+
+def gap_for(contraction: Any, stopper: Any) -> FloatArray:
+    """Return the gap between stoppers for a contraction: the inverse of `contraction_from_stoppers`.
+
+    Args:
+        contraction: Contracted over original length, in (0, 1] [-].
+        stopper: Length of a stopper, positive [m].
+
+    Returns:
+        Gap, the common shape [m].
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    shares, stoppers = checked_contraction(contraction), positive_array("stopper", stopper, "m")
+    common_shape("stopper", shares.shape, stoppers.shape)
+    return np.asarray(stoppers * (1.0 - shares) / shares)
 
 
 def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> FloatArray:
@@ -222,7 +269,11 @@ def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> Fl
 
 
 def _check_row(where: str, rows: Sequence[Sequence[float]], place: int) -> None:
-    """Check a row by itself and against those before it."""
+    """Check that a row is in range and continues the rows before it.
+
+    Raises:
+        FileFormatError: If it does not.
+    """
     pressure, share = rows[place]
     if not 0.0 < share <= 1.0:
         raise FileFormatError(f"{where}: contraction = {share!r}; a number in (0, 1] is required")

@@ -1,0 +1,255 @@
+"""Drawing of the unrolled tube to scale, as SVG elements in millimetres.
+
+The tube is shown from outside, its axis to the right: the sheet with the folds of the flat tube, the actuator line, and the
+pinches, tapes, stoppers and gaps. Inside the group `sheet` coordinates are those of `SheetPoints`. Marks that cross the seam
+are drawn on both sides of it (class `copy`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.helix.pattern import Pattern
+from softrobots.helix.shapes import turning_sign
+
+TEXT = 3.2
+"""Size of ordinary text [mm]."""
+
+_SMALL = 2.6  # size of labels [mm]
+_FILLS = {
+    "tape": {"fill": "#ffd84d", "fill-opacity": "0.45"},
+    "stopper": {"fill": "#9cc4e4"},
+    "gap": {"stroke-dasharray": "1 0.7"},
+}
+_ON_SHEET = {"clip-path": "url(#sheet-clip)"}
+
+Point = tuple[float, float]
+"""Position on the drawing, y downwards [mm]."""
+
+
+class Window(NamedTuple):
+    """The part of the sheet that a page shows."""
+
+    start: float
+    """Along the tube [mm]."""
+    end: float
+    """Along the tube [mm]."""
+    page: int = 1
+    """Number of this page."""
+    pages: int = 1
+    """Number of pages."""
+    joins: tuple[float, ...] = ()
+    """Lines at which the page is joined to its neighbours, along the tube [mm]."""
+
+
+def draw_sheet(sheet: ET.Element, plan: Pattern, window: Window) -> None:
+    """Draw the part of the sheet in a window: outline, folds, actuator line, and the marks along it."""
+    around, length = 1e3 * plan.sheet_width, 1e3 * plan.tube_length
+    line = _Line(math.cos(plan.angle), turning_sign(plan.handedness) * math.sin(plan.angle))
+    half_mark = min(0.1 * around, 12.0, 0.2 * around * line.along)  # less where wraps are near to each other
+    folds = group(sheet, id="folds", **{"stroke": "#808080", "stroke-width": "0.35", "stroke-dasharray": "5 2"})
+    for y in (0.0, 0.5 * around, around):
+        segment(folds, (window.start, y), (window.end, y), **{"class": "fold"})
+    _draw_marks(sheet, plan, window, line, half_mark)
+    red = group(sheet, id="actuator-line", **{"stroke": "#d00000", "stroke-width": "0.4"}, **_ON_SHEET)
+    for start, end, wrap in _wrapped(plan, around):
+        segment(red, start, end, **{"class": "actuator-line", "data-wrap": str(wrap)})
+    box = group(sheet, **{"stroke-width": "0.3"}, **(_ON_SHEET if window.pages > 1 else {}))
+    rectangle(box, (0.0, 0.0), length, around, id="sheet-outline")
+    _draw_numbers(sheet, plan, window, line, half_mark)
+    _draw_edges(sheet, plan, window)
+
+
+def marks(plan: Pattern) -> list[tuple[int, str, float, float]]:
+    """Return number, kind, start and end [m] of all pinches, tapes, gaps and stoppers along the line, ordered by start."""
+    kind = "gap" if plan.method == "stoppers" else "pinch"
+    rows = [(n, kind, float(a), float(b)) for n, (a, b) in enumerate(zip(plan.starts.arc, plan.ends.arc, strict=True), 1)]
+    if plan.tape_length is not None:
+        side = 0.5 * plan.tape_length
+        rows += [(n, "tape", a - side, b + side) for n, _, a, b in rows]
+    if plan.method == "stoppers":
+        rows += [(n, "stopper", float(a), float(b)) for n, (a, b) in enumerate(plan.stoppers, 1)]
+    return sorted(rows, key=lambda row: row[2])
+
+
+class _Line(NamedTuple):
+    """Straight actuator line in the plane of the sheet, not wrapped."""
+
+    along: float
+    """Cosine of its angle."""
+    across: float
+    """Sine of its angle, with the sign of the turning."""
+
+    def place(self, arc: float, aside: float, base: float) -> Point:
+        """Position at `arc` along the line from (0, `base`), and `aside` from it, downwards [mm]."""
+        return arc * self.along - aside * self.across, base + arc * self.across + aside * self.along
+
+    def box(self, start: float, end: float, aside: float, base: float) -> list[Point]:
+        """Corners of a rectangle along the line that reaches `aside` to either side of it."""
+        return [self.place(*place, base) for place in ((start, -aside), (end, -aside), (end, aside), (start, aside))]
+
+
+def _wrapped(plan: Pattern, around: float) -> list[tuple[Point, Point, int]]:
+    """Straight pieces of the actuator line on the sheet: both ends [mm] and the wrap."""
+    sign, length = turning_sign(plan.handedness), 1e3 * plan.tube_length
+    slope, first = sign * math.tan(plan.angle), 0.5e3 * plan.diameter * plan.start_azimuth
+    last = first + slope * length
+    low, high = min(first, last), max(first, last)
+    crossings = [k * around for k in range(math.floor(low / around) + 1, math.ceil(high / around))]
+    levels = [first, *(crossings if sign > 0.0 else reversed(crossings)), last]
+    pieces = []
+    for start, end in itertools.pairwise(levels):
+        wrap = math.floor(0.5 * (start + end) / around)
+        x0, x1 = (0.0, length) if first == last else ((start - first) / slope, (end - first) / slope)
+        pieces.append(((x0, start - wrap * around), (x1, end - wrap * around), wrap))
+    return pieces
+
+
+def _draw_marks(sheet: ET.Element, plan: Pattern, window: Window, line: _Line, half_mark: float) -> None:
+    """Draw the pinches, pieces of tape, stoppers and gaps."""
+    box = group(sheet, id="marks", **{"stroke-width": "0.25", "stroke-linejoin": "round"}, **_ON_SHEET)
+    around, bar = 1e3 * plan.sheet_width, 0.25 * half_mark
+    aside = {"pinch": half_mark, "tape": 0.5e3 * (plan.tape_width or 0.0), "stopper": bar, "gap": bar}
+    for number, kind, start, end, base in _shown(plan, window, line):
+        middle, reach = base + 0.5 * (start + end) * line.across, aside[kind] + 0.5 * (end - start) + 1.0
+        attributes = {"data-number": str(number), "data-start": mm(start), "data-end": mm(end)}
+        for shift in (0.0, around, -around):
+            if shift and not -reach < middle + shift < around + reach:
+                continue
+            name = {"class": f"{kind} copy"} if shift else {"class": kind, "id": f"{kind}-{number}"}
+            mark = group(box, **name, **attributes)
+            if kind == "pinch":
+                _draw_pinch(mark, line, start, end, half_mark, base + shift)
+            else:
+                polygon(mark, line.box(start, end, aside[kind], base + shift), **_FILLS[kind])
+
+
+def _draw_pinch(mark: ET.Element, line: _Line, start: float, end: float, half_mark: float, base: float) -> None:
+    """Draw two marks square to the line, the wall between them that is folded away, and arrows that bring them together."""
+    length = end - start
+    mark.set("stroke-width", mm(min(0.25, 0.2 * length)))
+    polygon(mark, line.box(start, end, half_mark, base), stroke="none", fill="black", **{"fill-opacity": "0.07"})
+    for name, arc in (("start", start), ("end", end)):
+        segment(mark, line.place(arc, -half_mark, base), line.place(arc, half_mark, base), **{"class": f"mark {name}"})
+    head, aside = min(0.25 * length, 1.4), 0.75 * half_mark
+    for arc, tip in ((start, start + 0.45 * length), (end, end - 0.45 * length)):
+        back = tip - math.copysign(head, tip - arc)
+        places = ((arc, aside), (tip, aside), (back, aside - 0.5 * head), (tip, aside), (back, aside + 0.5 * head))
+        polyline(mark, [line.place(*place, base) for place in places], **{"class": "arrow"})
+
+
+def _draw_numbers(sheet: ET.Element, plan: Pattern, window: Window, line: _Line, half_mark: float) -> None:
+    """Draw the numbers of pinches and gaps above the line, or below if there is no room; only each n-th of a dense pattern."""
+    around, apart = 1e3 * plan.sheet_width, 1e3 * plan.spacing * line.along
+    every = next((n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500) if n * apart >= 7.0), 1000)
+    halo = {"class": "number", "stroke": "white", "stroke-width": "0.8", "paint-order": "stroke"}
+    for number, kind, start, end, base in _shown(plan, window, line):
+        if kind not in ("pinch", "gap") or not (number == 1 or number % every == 0):
+            continue
+        aside = (half_mark if kind == "pinch" else 0.25 * half_mark) + 2.4
+        for side in (-aside, aside):
+            x, y = line.place(0.5 * (start + end), side, base)
+            if window.start + 2.5 <= x <= window.end - 2.5 and 2.0 <= y <= around - 2.0:
+                text(sheet, str(number), (x, y + 0.9), size=_SMALL, anchor="middle", attributes=halo)
+                break
+
+
+def _shown(plan: Pattern, window: Window, line: _Line) -> Iterator[tuple[int, str, float, float, float]]:
+    """Number, kind, start and end of the marks on a page, and where the line through their middle meets x = 0 [mm]."""
+    rows = marks(plan)
+    middles = np.array([0.5 * (start + end) for _, _, start, end in rows])
+    bases = 1e3 * (plan.locate(middles).y - middles * line.across)
+    for (number, kind, start, end), middle, base in zip(rows, middles, bases, strict=True):
+        reach = 500.0 * (end - start) + 15.0
+        if window.start - reach <= 1e3 * middle * line.along <= window.end + reach:
+            yield number, kind, 1e3 * start, 1e3 * end, float(base)
+
+
+def _draw_edges(sheet: ET.Element, plan: Pattern, window: Window) -> None:
+    """Draw the names of folds and ends, joins of pages, and a scale along the tube."""
+    around, length = 1e3 * plan.sheet_width, 1e3 * plan.tube_length
+    for name, y in (("fold A", 0.0), ("fold B", 0.5 * around), ("fold A", around)):
+        text(sheet, name, (window.start - 1.5, y + 1.0), size=_SMALL, anchor="end")
+    if window.page == 1:
+        text(sheet, "BASE", (0.0, -1.8), bold=True)
+    if window.page == window.pages:
+        text(sheet, "TIP", (length, -1.8), anchor="end", bold=True)
+    for x in window.joins:
+        green = group(sheet, **{"class": "join", "stroke": "#008040", "stroke-width": "0.3", "data-x": mm(x)})
+        segment(green, (x, -4.0), (x, around + 1.5))
+        for share in (0.25, 0.75):
+            segment(green, (x - 4.0, share * around), (x + 4.0, share * around))
+        text(green, "join", (x, -5.0), size=_SMALL, anchor="middle")
+    scale = group(sheet, id="scale", **{"stroke-width": "0.2"})
+    for tick in range(math.ceil(window.start / 10.0 - 1e-9), math.floor(window.end / 10.0 + 1e-9) + 1):
+        x, long = 10.0 * tick, tick % 5 == 0
+        segment(scale, (x, around + 2.0), (x, around + (4.5 if long else 3.2)))
+        if tick == 0:
+            text(scale, "0 mm from the base", (x, around + 7.6), size=_SMALL)
+        elif long:
+            text(scale, f"{x:.0f}", (x, around + 7.6), size=_SMALL, anchor="middle")
+
+
+def group(parent: ET.Element, **attributes: str) -> ET.Element:
+    """Add an empty group."""
+    return ET.SubElement(parent, "g", attributes)
+
+
+def segment(parent: ET.Element, start: Point, end: Point, **attributes: str) -> None:
+    """Add a straight line."""
+    ends = {"x1": mm(start[0]), "y1": mm(start[1]), "x2": mm(end[0]), "y2": mm(end[1])}
+    ET.SubElement(parent, "line", {**attributes, **ends})
+
+
+def polyline(parent: ET.Element, points: Sequence[Point], **attributes: str) -> None:
+    """Add a line through points."""
+    ET.SubElement(parent, "polyline", {**attributes, "points": _coordinates(points)})
+
+
+def polygon(parent: ET.Element, corners: Sequence[Point], **attributes: str) -> None:
+    """Add a closed polygon."""
+    ET.SubElement(parent, "polygon", {**attributes, "points": _coordinates(corners)})
+
+
+def rectangle(parent: ET.Element, corner: Point, width: float, height: float, **attributes: str) -> None:
+    """Add a rectangle from its upper left corner."""
+    place = {"x": mm(corner[0]), "y": mm(corner[1]), "width": mm(width), "height": mm(height)}
+    ET.SubElement(parent, "rect", {**attributes, **place})
+
+
+def text(
+    parent: ET.Element,
+    words: str,
+    place: Point,
+    *,
+    size: float = TEXT,
+    anchor: str = "start",
+    bold: bool = False,
+    attributes: Mapping[str, str] | None = None,
+) -> None:
+    """Add a line of text, its baseline at `place`."""
+    settings = {
+        "x": mm(place[0]),
+        "y": mm(place[1]),
+        "font-size": mm(size),
+        "text-anchor": anchor,
+        "fill": "black",
+        "stroke": "none",
+    }
+    settings |= {**({"font-weight": "bold"} if bold else {}), **(attributes or {})}
+    ET.SubElement(parent, "text", settings).text = words
+
+
+def mm(value: float) -> str:
+    """A number in millimetres, to the nanometre, without needless zeros."""
+    return f"{value + 0.0:.6f}".rstrip("0").rstrip(".")
+
+
+def _coordinates(points: Sequence[Point]) -> str:
+    return " ".join(f"{mm(x)},{mm(y)}" for x, y in points)
