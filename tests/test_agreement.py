@@ -64,7 +64,7 @@ def assert_orders(name: str, form: str, rows: list[dict[str, Any]], near: float)
 
 
 def test_the_arm_with_muscles_is_arcs_without_load() -> None:
-    """The closed form of theory 2.1: to the tolerance of the solve."""
+    """The closed form, docs/theory.md 2.1: to the tolerance of the solve."""
     lengths = np.array([[0.50, 0.53, 0.55], [0.54, 0.51, 0.52]])
     stiffness = {"bending_stiffness": 1.9, "torsional_stiffness": 1.3, "axial_stiffness": 2400.0}
     segments = [

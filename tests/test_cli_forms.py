@@ -22,7 +22,7 @@ from softrobots.compiled.run.machines import available_backend
 from softrobots.view.figures import pcc_plots
 
 LENGTHS = ("0.50", "0.53", "0.55", "0.54", "0.51", "0.52")
-"""Muscle lengths of the reference in theory.md, section 2.3; distance 0.04 m is the default."""
+"""Muscle lengths of docs/theory.md 2.3; distance 0.04 m is the default."""
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -59,7 +59,7 @@ def numeric(value: object) -> bool:
 )
 def test_pcc_forward_gives_the_reference(frame: str, tip: tuple, answer) -> None:
     found = answer("pcc", "forward", *LENGTHS, "--frame", frame)
-    assert found["arc_bending"][0] == pytest.approx(0.726483157, abs=5e-10)  # printed digits of theory.md
+    assert found["arc_bending"][0] == pytest.approx(0.726483157, abs=5e-10)  # docs/theory.md 2.3
     assert found["arc_azimuth"][0] == pytest.approx(-0.408637855, abs=5e-10)
     assert np.allclose(found["tip_position"], tip, rtol=0.0, atol=5.1e-9)
     assert np.array(found["muscle_lengths"]).ravel().tolist() == [float(word) for word in LENGTHS]
@@ -338,7 +338,7 @@ def test_plots_replace_a_file_if_told_and_say_what_is_missing(answer, told, tmp_
 
 
 def test_helix_forward_gives_the_reference(answer) -> None:
-    """theory.md, section 3: 5 degrees, 0.66, 33.1 mm, which are the defaults."""
+    """docs/theory.md 3: 5 degrees, 0.66, 33.1 mm, which are the defaults."""
     found = answer("helix", "forward")
     assert found["angle"] == pytest.approx(math.radians(5.0), rel=1e-15)
     assert found["outer_radius"] == pytest.approx(0.0854078008, abs=5e-11)

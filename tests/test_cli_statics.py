@@ -139,7 +139,7 @@ def test_solve_passes_its_other_options_on(answer, arm: sr.SoftModel) -> None:
 def test_solve_tells_of_muscles(answer, told: Told) -> None:
     """The tip of the PCC paper's reference lengths, and a tension that is given instead."""
     found = answer("solve", "pcc_arm", "--motors", *PCC_LENGTHS)
-    assert np.allclose(found["tip_position"], (0.44957382, -0.31544214, 0.84384418), rtol=0.0, atol=5.1e-9)  # of the theory
+    assert np.allclose(found["tip_position"], (0.44957382, -0.31544214, 0.84384418), rtol=0.0, atol=5.1e-9)  # theory.md 2.3
     assert np.allclose(found["muscle_lengths"], [float(word) for word in PCC_LENGTHS], rtol=0.0, atol=1e-14)
     assert (found["units"]["q_motors"], found["units"]["motor_torques"]) == ("m", "N")
     rows = zip(found["spring_joints"], found["units"]["q_springs"].split(", "), strict=True)

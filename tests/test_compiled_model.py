@@ -24,7 +24,7 @@ from tests.support.oracles import REFERENCE_EQUILIBRIA, arm_balance, arm_energy
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 STIFFNESS = sr.inflated_beam.MEAN_STIFFNESS
-CRITICAL = 114.0657 * STIFFNESS / 172.71  # theory 1.4, [N]
+CRITICAL = 114.0657 * STIFFNESS / 172.71  # docs/theory.md 1.4 [N]
 REACH = 1.2  # [m]
 
 
@@ -210,7 +210,7 @@ def test_stiffness_and_load_scale_together(plain: CompiledModel, rng: np.random.
 
 
 def test_buckling(solver: CompiledModel) -> None:
-    """theory: below 114.0657 N along the axis the straight arm is stable; above it is a saddle, which is left."""
+    """Below 114.0657 N along the axis the straight arm is stable; above it is a saddle, which is left."""
     pushes = CRITICAL * np.array([0.5, 0.999, 1.001, 1.1, 1.75])
     found = solver.equilibria(np.zeros(3), np.outer(pushes, (-1.0, 0.0, 0.0)))
     assert found.counts() == {Status.CERTIFIED: 5}

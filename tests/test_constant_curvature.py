@@ -30,7 +30,7 @@ FRAMES_AND_BENDINGS = [
     (frame, bending) for frame in FRAMES for bending in BENDINGS if (frame, bending) != ("bending_plane", 0.0)
 ]
 D = 0.04
-UPPER, LOWER = (0.50, 0.53, 0.55), (0.54, 0.51, 0.52)  # theory 2.3
+UPPER, LOWER = (0.50, 0.53, 0.55), (0.54, 0.51, 0.52)  # docs/theory.md 2.3
 UNEVEN = (0.3, 1.9, -1.1)
 FIVE = (0.1, 1.2, 2.9, -2.2, -0.7)
 ROUNDING = 4e-16  # a few units in the last place of a number of size 1
@@ -131,7 +131,7 @@ def _digits():
 
 
 # --- Exact and smooth through straight
-# The issue asks for 1e-12 relative. Entries are compared one by one, so that the tilt of a nearly straight arc counts in full.
+# Required: 1e-12 relative. Entries are compared one by one, so that the tilt of a nearly straight arc counts in full.
 
 
 @pytest.mark.parametrize("bending", BENDINGS)
@@ -190,7 +190,7 @@ def test_root_of_the_papers_formula_loses_what_differences_keep() -> None:
         return l1 * l1 + l2 * l2 + l3 * l3 - l1 * l2 - l1 * l3 - l2 * l3
 
     exact = float(2 * mp.sqrt(square(*map(mp.mpf, lengths))) / (3 * mp.mpf(D)))
-    assert float(cc.arc_from_muscles(lengths, D).bending) == pytest.approx(exact, rel=1e-12)  # the issue's bound
+    assert float(cc.arc_from_muscles(lengths, D).bending) == pytest.approx(exact, rel=1e-12)  # as everywhere here
     assert abs(2.0 * math.sqrt(abs(square(*lengths))) / (3.0 * D) / exact - 1.0) > 1e-3
 
 
@@ -402,7 +402,7 @@ def test_backbone_is_a_circle(length: float, theta: float, alpha: float) -> None
 
 
 def test_an_offset_turns_the_frame_not_the_azimuth() -> None:
-    """`Rz(offset) T(alpha) = T(alpha + offset)` in the bending-plane frame only: theory 2.2."""
+    """`Rz(offset) T(alpha) = T(alpha + offset)` in the bending-plane frame only: docs/theory.md 2.2."""
     arc, turned = Arc(0.5, 0.8, 0.7), Arc(0.5, 0.8, 1.3)
     for frame in FRAMES:
         difference = cc.chain_transform([arc], (0.6,), frame) - cc.transform(turned, frame)

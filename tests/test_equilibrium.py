@@ -158,7 +158,7 @@ def test_every_random_case_ends_certified_stable(arm: sr.SoftModel, size: float,
 
 @pytest.mark.parametrize(("size", "share"), [(50, 1.0), (150, 0.69), (200, 0.34)])
 def test_the_papers_fixed_point_converges_as_often_as_measured(arm: sr.SoftModel, size: float, share: float) -> None:
-    """theory 1.4: 100, 69, 34 %; of 250 cases the standard deviation is 3 %, three of them are allowed."""
+    """docs/theory.md 1.4: 100, 70, 34 %; of 250 cases the standard deviation is 3 %, three of them are allowed."""
     rng, found = np.random.default_rng(7), 0
     for _ in range(250):
         motors, force = random_case(rng, size)

@@ -37,7 +37,7 @@ def frames_of(model: sr.SoftModel, coordinates: np.ndarray) -> np.ndarray:
 
 
 def helix_frame(tube: sr.HelixTube, length: float) -> np.ndarray:
-    """Frame at a length along the centre line: the exponential of its curvature and torsion, after theory (12, 13)."""
+    """Frame at a length along the centre line: the exponential of its curvature and torsion, docs/theory.md (12, 13)."""
     zeta = tube.contraction * np.exp(2j * tube.angle)
     centre = tube.diameter * (1 + zeta) / (2 * (1 - zeta))  # Rc + i b
     curvature, torsion = centre.real / abs(centre) ** 2, centre.imag / abs(centre) ** 2

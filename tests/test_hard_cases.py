@@ -318,7 +318,7 @@ def test_processes_count_the_same() -> None:
     assert alone.residual == together.residual
 
 
-# --- Each sentence of the issue
+# --- Extreme loads, stiffnesses and poses
 
 
 def compiled(kind: str) -> CompiledModel:

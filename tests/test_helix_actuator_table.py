@@ -92,7 +92,7 @@ def test_any_table_is_monotone_and_inverted(steps: list[tuple[float, float]], fa
 def test_the_helix_at_a_pressure() -> None:
     table = ActuatorTable([0.0, 50e3], [0.61, 0.71])
     shape = table.shape_at([25e3, 50e3], np.radians(5.0), 0.0331)
-    # theory.md: the reference helix at contraction 0.66
+    # docs/theory.md 3: the reference helix at contraction 0.66
     assert shape.outer_radius[0] == pytest.approx(0.0854078008, abs=1e-10)
     assert shape.inner_radius[0] == pytest.approx(0.0523078008, abs=1e-10)
     assert shape.pitch[0] == pytest.approx(0.0279647090, abs=1e-10)

@@ -1,4 +1,4 @@
-"""The atlas of helices: files, numbers in them against theory, refusals, and what its pictures show."""
+"""The atlas of helices: files, numbers in them against closed forms, refusals, and what its pictures show."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_pictures_and_tables_are_written(folder: Path) -> None:
 
 
 def test_shapes_are_those_of_the_papers_formulas(folder: Path) -> None:
-    """(12) written out; the grid first, then one helix in two sizes, whose numbers theory prints."""
+    """(12) written out; the grid first, then one helix in two sizes, whose numbers docs/theory.md prints."""
     rows = rows_of(folder / "shapes.csv")
     assert len(rows) == 17
     for row in rows:
@@ -64,7 +64,7 @@ def test_shapes_are_those_of_the_papers_formulas(folder: Path) -> None:
         # Two digits cancel in `below` at contraction 0.9.
         assert float(row["outer_radius [m]"]) == pytest.approx(size * (1 - share * math.cos(2 * angle)) / below, rel=1e-13)
         assert float(row["pitch [m/rad]"]) == pytest.approx(size * share * math.sin(2 * angle) / below, rel=1e-13)
-        assert (row["realisable"], row["realisable_by_simple_rule"]) == ("true", "true")  # theory: limits are below 0.5
+        assert (row["realisable"], row["realisable_by_simple_rule"]) == ("true", "true")  # limits are below 0.5
     grid = {(round(math.degrees(float(row["angle [rad]"])), 9), float(row["contraction [-]"])) for row in rows[:15]}
     assert grid == {(angle, share) for angle in (2.5, 5.0, 10.0) for share in (0.5, 0.6, 0.7, 0.8, 0.9)}
     printed = {"outer_radius [m]": 0.0854078008, "inner_radius [m]": 0.0523078008, "pitch [m/rad]": 0.0279647090}
@@ -246,7 +246,7 @@ def test_the_drawn_helix_winds_the_right_way(handedness: str, sign: float) -> No
 
 
 def test_self_contact_is_marked() -> None:
-    """At 5 degrees turns touch below 0.3739 (theory)."""
+    """At 5 degrees turns touch below 0.3739 (docs/theory.md 3)."""
     figure = helix_plots.grid([0.38, 0.36], [math.radians(5.0)], D, 1.0)
     captions = [text.get_text() for text in figure.axes[0].texts if "turns" in text.get_text()]
     assert ["in contact" in caption for caption in captions] == [False, True]
@@ -260,7 +260,7 @@ def test_self_contact_is_marked() -> None:
 def test_captions_tell_the_shape() -> None:
     figure = helix_plots.grid([0.66], [math.radians(5.0)], D, 1.0)
     caption = next(text.get_text() for text in figure.axes[0].texts if "turns" in text.get_text())
-    assert caption.startswith("$R_o$ = 8.54 cm\n$b$ = 2.8 cm/rad\n")  # theory: 0.0854078008, 0.0279647090 m
+    assert caption.startswith("$R_o$ = 8.54 cm\n$b$ = 2.8 cm/rad\n")  # docs/theory.md 3: 0.0854078008, 0.0279647090 m
     turns = 1.0 / (math.cos(math.radians(5.0)) * 2 * math.pi * math.hypot(0.0854078008, 0.0279647090))
     assert caption.endswith(f"{turns:.2f} turns")
 
@@ -268,7 +268,7 @@ def test_captions_tell_the_shape() -> None:
 def test_radius_and_pitch_run_from_start_to_end_and_change_style_at_contact() -> None:
     figure = helix_plots.radius_and_pitch(ANGLES, D)
     radius, pitch, close = figure.axes
-    limits = [0.4882, 0.3739, 0.2689]  # theory
+    limits = [0.4882, 0.3739, 0.2689]  # docs/theory.md 3
     for axes in (radius, pitch, close):
         solid = [line for line in axes.lines if line.get_linewidth() == 2.2]
         dotted = [line for line in axes.lines if line.get_linewidth() == 1.2]
@@ -302,7 +302,7 @@ def test_grasp_says_that_it_is_a_model() -> None:
     assert "our model, not data of the paper" in figure.get_suptitle()
     forces = [line for line in left.lines if str(line.get_label()).startswith("force")]
     assert [line.get_label() for line in forces] == [f"force, deflected by {mm} mm" for mm in (0, 2, 4)]
-    assert [line.get_ydata()[-1] for line in forces] == pytest.approx([0.0, 11.17, 11.17], abs=5e-3)  # theory, printed digits
+    assert [line.get_ydata()[-1] for line in forces] == pytest.approx([0.0, 11.17, 11.17], abs=5e-3)  # docs/theory.md 3
     assert len({line.get_marker() for line in forces}) == 3
     bounds = {line.get_label(): line.get_ydata() for line in right.lines}
     assert np.array_equal(

@@ -27,7 +27,7 @@ DIAMETER = 0.0331
 
 
 def centre_line(contraction: float, angle: float) -> tuple[float, float]:
-    """Radius and pitch of the centre line of a tube of diameter 1 (theory 3, complex form)."""
+    """Radius and pitch of the centre line of a tube of diameter 1 (docs/theory.md 3.1, complex form)."""
     turned = cmath.rect(contraction, 2.0 * angle)
     found = 0.5 * (1.0 + turned) / (1.0 - turned)
     return found.real, found.imag
@@ -533,7 +533,7 @@ def test_the_grid_tells_where_there_are_neighbouring_turns() -> None:
 
 def test_the_larger_tube_is_the_reference_two_and_a_half_times() -> None:
     one, large = helix.paper_grid().rows[-2:]
-    reference = (0.0854078008, 0.0523078008, 0.0279647090)  # theory 3
+    reference = (0.0854078008, 0.0523078008, 0.0279647090)  # docs/theory.md 3
     assert (one.outer_radius, one.inner_radius, one.pitch) == pytest.approx(reference, abs=5e-11)
     scaled = tuple(2.5 * size for size in reference)
     assert (large.outer_radius, large.inner_radius, large.pitch) == pytest.approx(scaled, abs=15e-11)

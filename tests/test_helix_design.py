@@ -103,7 +103,7 @@ def test_designing_the_antenna_of_an_actuator_gives_that_actuator(
 
 
 def test_the_papers_reference_comes_back_from_its_antenna():
-    # theory 3: theta = 5 degrees, lambda = 0.66 give Ro, Ri and b to ten digits
+    # docs/theory.md 3: theta = 5 degrees, lambda = 0.66 give Ro, Ri and b to ten digits
     centre = 0.5 * (0.0854078008 + 0.0523078008)
     design = helix.design_antenna(centre, TURN * 0.0279647090, diameter=D, turns=2.0)
     assert (design.contraction, math.degrees(design.angle)) == (pytest.approx(0.66, rel=1e-8), pytest.approx(5.0, rel=1e-8))

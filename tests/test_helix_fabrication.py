@@ -534,7 +534,7 @@ def test_between_the_pinches_the_centre_line_swings_by_the_spacing_unless_the_ac
 
 
 def test_the_reference_tube_pinched_every_two_centimetres_is_right_to_a_millimetre():
-    # theory 3: Ro, Ri and b of the reference, from which the smooth centre line here is computed
+    # docs/theory.md 3: Ro, Ri and b of the reference, from which the smooth centre line here is computed
     centre, pitch = 0.5 * (0.0854078008 + 0.0523078008), 0.0279647090
     error = helix.shape_error(pinch_pattern((*REFERENCE[:3], 1.0), 0.02, remainder="respace"))
     assert error.centre_radius - error.centre_radius_error == pytest.approx(centre, rel=1e-8)

@@ -172,7 +172,7 @@ def test_equal_steps_are_one_constant_screw(actuator: tuple[float, ...], path: s
 
 @every_hand
 def test_the_chain_from_its_base_lies_on_the_centre_line(handedness: str) -> None:
-    """Many sections in a row, several turns, from `transform_base_to_axis`: theory's promise in closed form."""
+    """Many sections in a row, several turns, from `transform_base_to_axis`: the sections stand on the closed form."""
     shape = helix.forward(0.66, 5 * DEG, D)
     kappa, tau = map(float, helix.actuator_curvature_torsion(0.66, 5 * DEG, D, "centre", handedness))
     step, pose = screw(kappa, tau, 0.05), helix.transform_base_to_axis(shape, handedness)
@@ -245,7 +245,7 @@ def test_tangents_of_inner_and_outer_path_are_two_theta_apart(contraction: float
 
 
 def test_centre_tangent_halves_that_angle_only_nearly() -> None:
-    """An erratum of the paper: 3.97 and 6.03 degrees, not 5 and 5 (theory, two decimals)."""
+    """An erratum of the paper: 3.97 and 6.03 degrees, not 5 and 5 (docs/theory.md 3, two decimals)."""
     shape = helix.forward(0.66, 5 * DEG, D)
     inner, centre, outer = (helix.tangents(shape, 1.0, path) for path in PATHS)
     assert math.degrees(math.acos(outer @ centre)) == pytest.approx(3.97, abs=0.005)
@@ -375,7 +375,7 @@ def test_reference_length_of_theory() -> None:
 
 @pytest.mark.parametrize("contraction", CONTRACTIONS)
 def test_centre_length_is_exact(contraction: float) -> None:
-    """By the circle radii of centre and outer path; theory's `|1 + z|/(2 cos theta)`."""
+    """By the circle radii of centre and outer path; `|1 + z|/(2 cos theta)`."""
     ratios = helix.centre_length(contraction, ANGLES, 2.0) / 2.0
     for angle, ratio in zip(ANGLES, ratios, strict=True):
         exact = abs(1 + mp.mpf(contraction) * mp.expj(2 * mp.mpf(angle))) / (2 * mp.cos(mp.mpf(angle)))

@@ -29,7 +29,7 @@ def test_an_actuator_becomes_design_template_robots_and_scenes(tmp_path: Path, c
     assert names == expected | {"shape.png", "summary.json", "template.csv", "template.svg", "template_pages"}
     printed = capsys.readouterr().out
     summary = json.loads((folder / "summary.json").read_text())
-    # theory.md's reference: 5 degrees, 0.66, 33.1 mm
+    # docs/theory.md 3: 5 degrees, 0.66, 33.1 mm
     assert summary["outer_radius_m"] == pytest.approx(0.0854078008, abs=1e-10)
     assert summary["inner_radius_m"] == pytest.approx(0.0523078008, abs=1e-10)
     assert summary["turn_height_m"] == pytest.approx(2 * np.pi * 0.0279647090, abs=1e-9)

@@ -168,7 +168,7 @@ def test_the_straight_tube_stands_on_the_origin_whatever_is_upright() -> None:
 
 
 def test_at_contraction_1_the_tube_is_straight_and_its_frames_follow_the_actuator_around_it() -> None:
-    """The actuator runs around a cylinder of circumference pi D: an angle of 2 Lt tan(theta) / D; theory 3."""
+    """The actuator runs around a cylinder of circumference pi D: an angle of 2 Lt tan(theta) / D."""
     robot = HelixTube(contraction=1.0, angle=0.3, length=0.5, elastic_sections=5)
     tip = link_poses(ElementTree.fromstring(robot.urdf()), {})["tip"]
     turn = 2 * 0.5 * math.tan(0.3) / 0.0331
@@ -186,7 +186,7 @@ def test_at_angle_0_the_tube_is_an_arc_in_its_plane() -> None:
 
 
 def test_the_reference_case_of_the_theory() -> None:
-    """Theory 3, ten digits: Ro, Ri and b of theta = 5 degrees, lambda = 0.66; the tip against them, axis upright."""
+    """docs/theory.md 3, ten digits: Ro, Ri and b of theta = 5 degrees, lambda = 0.66; the tip against them, axis upright."""
     outer, inner, pitch = 0.0854078008, 0.0523078008, 0.0279647090
     robot = HelixTube(upright="axis", elastic_sections=6)
     turn = 1.5 / (math.cos(5 * DEG) * math.hypot(outer, pitch))
@@ -507,7 +507,7 @@ def test_only_the_sections_of_the_chain_limit_the_growth() -> None:
 
 
 def test_a_tube_that_would_grow_into_itself_is_refused() -> None:
-    """theta = 5 degrees, lambda = 0.3 is below the limit of 0.3739 (theory 3); a piece of half a turn touches nothing."""
+    """theta = 5 degrees, lambda = 0.3 is below the limit of 0.3739 (self-contact); a piece of half a turn touches nothing."""
     piece = HelixTube(contraction=0.3, length=0.15)
     assert piece.turns < 1
     with pytest.raises(sr.SelfIntersection):
@@ -702,7 +702,7 @@ def test_what_the_tube_says_of_itself() -> None:
 @pytest.mark.parametrize(
     ("fields", "why"),
     [
-        ({"contraction": 0.37}, "neighbouring turns"),  # the limit at 5 degrees is 0.3739, theory 3
+        ({"contraction": 0.37}, "neighbouring turns"),  # the limit at 5 degrees is 0.3739, docs/theory.md 3
         ({"angle": 0.0, "contraction": 0.8, "length": 1.5}, "neighbouring turns"),
         ({"angle": 60 * DEG, "contraction": 0.4, "length": 0.1}, "bends with a radius"),  # lambda + cos 2 theta < 0
     ],
@@ -815,7 +815,7 @@ def test_tubes_that_differ_are_other_models(change: dict) -> None:
 
 @pytest.mark.parametrize(("helix", "form", "turned"), CASES)
 def test_points_of_the_body_lie_on_the_helix_and_the_actuator_on_the_inner_path(helix: str, form: str, turned: bool) -> None:
-    """The body starts at the base whatever the hinges; the inner path is p(s) = (Ri cos s, +- Ri sin s, b s), theory 3."""
+    """The body starts at the base whatever the hinges; the inner path is p(s) = (Ri cos s, +- Ri sin s, b s)."""
     robot, model = tube(helix, form, turned), model_of(helix, form, turned)
     count, points = robot.n_sections, 3
     (segment,) = body_at(model, np.zeros(0), model.rest, points)

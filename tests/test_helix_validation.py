@@ -78,7 +78,7 @@ def test_it_sees_a_frame_that_is_off(moved: tuple, turned: float, monkeypatch: p
 
 
 def test_its_closed_form_is_the_helix_and_its_grid_is_the_papers() -> None:
-    """Theory 3 in 50 digits; angles 2.5, 5 and 10 degrees, contractions 0.5 to 0.9, the paper's diameter and 2.5 times it."""
+    """docs/theory.md 3.1 in 50 digits; 2.5, 5, 10 degrees, contractions 0.5 to 0.9, the paper's diameter, 2.5 times it."""
     cases = list(script().grid())
     assert len(cases) == 2 * 120
     assert {round(np.degrees(case.tube.angle), 9) for case in cases} == {2.5, 5.0, 10.0}

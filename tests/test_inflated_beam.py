@@ -21,7 +21,7 @@ def test_wrinkling_moment_reproduces_table_3(pressure: float, printed: float) ->
 
 
 def test_required_pressure_of_the_papers_example() -> None:
-    # theory 1.4: (3) gives 42.7 kPa exactly for 17.51 N m, and 50 kPa is the first tabulated pressure above it.
+    # (3) gives 42.7 kPa exactly for 17.51 N m, and 50 kPa is the first tabulated pressure above it.
     assert inflated_beam.required_pressure(17.51, 0.055) == pytest.approx(42.65e3, abs=10.0)
     assert inflated_beam.required_tabulated_pressure(17.51, 0.055) == 50e3
     assert inflated_beam.required_tabulated_pressure(30.0, 0.055) is None
@@ -31,7 +31,7 @@ def test_required_pressure_of_the_papers_example() -> None:
 def test_young_modulus_reproduces_the_papers_range(pressure: float, modulus: float) -> None:
     mean = np.mean([row.stiffness for row in inflated_beam.TABLE_3])  # unrounded
     found = inflated_beam.young_modulus_from_stiffness(mean, pressure=pressure, **TUBE)
-    assert found == pytest.approx(modulus, abs=0.005e6)  # theory prints two decimals of MPa
+    assert found == pytest.approx(modulus, abs=0.005e6)  # two decimals of MPa
 
 
 @law("inflated_beam.stiffness_from_young_modulus", "inflated_beam.young_modulus_from_stiffness")

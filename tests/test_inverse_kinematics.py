@@ -13,7 +13,7 @@ from softrobots.statics.kinematics import frame_placement
 from tests.support.oracles import flexible_table, rigid_table
 
 FORCE = (0.0, 10.0, -15.0)
-TOLERANCE = 1e-9  # the bound [m]
+TOLERANCE = 1e-9  # what `solve_ik` promises [m]
 
 
 @pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])

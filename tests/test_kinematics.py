@@ -14,7 +14,7 @@ from tests.support.oracles import flexible_jacobian, flexible_table, rigid_table
 
 # The last DH frame has its z axis along -y of the arm; the tip frame of the URDF has z up.
 TIP_TO_DH = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-ROUNDING = 1e-12  # the bound; seven rotations and 1.2 m give about 1e-15
+ROUNDING = 1e-12  # required; seven rotations and 1.2 m give about 1e-15
 
 
 def angles_of(motors: np.ndarray, springs: np.ndarray) -> np.ndarray:

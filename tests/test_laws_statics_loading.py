@@ -114,7 +114,7 @@ def test_compliance_is_reciprocal_but_for_what_a_moment_makes_of_it(
     """Maxwell-Betti, and its failure: a moment `mu` fixed in the world leaves `C - C^T = C_m [mu] C_m^T`.
 
     `C_m` are the columns of the moments: the slope of `z_i . mu` along spring j is `mu . (z_j x z_i)` if j comes first, else 0
-    (theory 1.4), so `K - K^T` is `mu . (z_i x z_j)`. The code knows what has a potential: moments of zero have.
+    (docs/theory.md 1.4), so `K - K^T` is `mu . (z_i x z_j)`. The code knows what has a potential: moments of zero have.
     """
     robot, force = model(kind), case.force(kind)
     mu = 0.3 * PUSHES[kind] * robot.reach * moment * axis
@@ -207,7 +207,7 @@ def in_a_plane(lengths: tuple[float, float], hinge: float, stiffness: np.ndarray
 )
 @settings(max_examples=10)
 def test_two_links_buckle_where_their_eigenvalue_says(lengths: tuple, hinge: float, powers: tuple, size: float) -> None:
-    """Springs of 1e-3 to 1e6 N m/rad: the smallest F with `det(K - F G) = 0`, `G = [[a, c], [c, c]]`, as theory 1.4 has it."""
+    """Springs of 1e-3 to 1e6 N m/rad: the smallest F with `det(K - F G) = 0`, `G = [[a, c], [c, c]]`: docs/theory.md 1.4."""
     far, near = lengths[0] * (1.0 - hinge) + lengths[1], lengths[1] * (1.0 - hinge)
     stiffness = 10.0 ** np.array(powers)
     robot = in_a_plane(lengths, hinge, stiffness)

@@ -17,7 +17,7 @@ def true_case(
 
 
 def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel) -> None:
-    """The issue's law: 1e-6 relative in at least 99 % of 10 000 cases at 18 N; each miss is a pose near a singular one."""
+    """1e-6 relative in at least 99 % of 10 000 cases at 18 N; each miss is a pose near a singular one."""
     rng, found = np.random.default_rng(0), 0
     for _ in range(10_000):
         motors, force, truth = true_case(arm, rng, 18.0)
@@ -41,7 +41,7 @@ def test_the_papers_alternation_recovers_fewer(arm: sr.SoftModel) -> None:
             assert np.isfinite(error.best.force).all()
             continue
         found += np.linalg.norm(estimate.force - force) <= 1e-6 * 18.0
-    assert 0.90 <= found / 400 < 0.99  # theory 1.4: it fails in 2 to 6 % of cases at 5 to 20 N
+    assert 0.90 <= found / 400 < 0.99  # docs/theory.md 1.4: it fails in 2 to 6 % of cases at 5 to 20 N
 
 
 def test_both_methods_agree_with_gravity(odd_arm: sr.SoftModel) -> None:

@@ -94,7 +94,7 @@ def test_every_cell_runs_and_says_nothing_on_the_side(executed: Any, folder: Pat
 
 @pytest.mark.parametrize(
     ("cell", "entry", "expected", "tolerance"),
-    [  # reference values of theory.md, 1.4, 2.3 and 3; half a unit of the last digit that is shown, there or here
+    [  # values of docs/theory.md, 1.4, 2.3 and 3; half a unit of the last digit that is shown, there or here
         ("load", "stiffness [N m/rad]", [172.71] * 4, 0.0),
         ("equilibrium", "tip [m]", [1.01935, 0.38587, 0.09712], 1e-12),
         ("equilibrium", "springs [rad]", [0.05339, -0.09228, 0.03172, -0.04214], 1e-12),

@@ -189,7 +189,7 @@ def test_any_strains_put_the_tip_on_the_arc(angles: list[float], stretches: list
 
 
 def test_muscle_lengths_of_the_theory_put_the_tip_where_it_says() -> None:
-    """Theory 2.3: d = 0.04 m, torsion-free frames; printed with eight decimals."""
+    """docs/theory.md 2.3: d = 0.04 m, torsion-free frames; printed with eight decimals."""
     model = sr.load_model(PccArm())
     lengths = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
     tip = frame_placement(model, model.configuration(lengths, np.zeros(model.n_springs)), "tip")
@@ -200,8 +200,8 @@ def test_muscle_lengths_of_the_theory_put_the_tip_where_it_says() -> None:
 def test_lumped_chain_converges_at_second_order(rule: str, counts: tuple[int, ...]) -> None:
     """Position *and* orientation of the tip under an imposed strain with twist and stretch.
 
-    Theory 2.4: pairs in one order all along, and equal links with a hinge at each start, are first order only (in orientation,
-    in position). Asymptotically 2; 1.8 leaves room for the next order.
+    docs/theory.md 2.4: pairs in one order all along, and equal links with a hinge at each start, are first order only (in
+    orientation, in position). Asymptotically 2; 1.8 leaves room for the next order.
     """
     exact = screw(TOTAL, 0.5)
     errors = []
@@ -764,7 +764,7 @@ def test_joints_that_are_not_the_chain_of_their_section_are_refused(change: Call
 
 @pytest.mark.parametrize("rest", [(0.9, -1.4, 0.7, 1.05), (0.0, 2.0, 0.0, 1.0), (0.0, 0.0, 3.0, 0.9)])
 def test_a_section_with_a_rest_shape_is_accepted_where_it_says(rest: tuple) -> None:
-    """Origins set by hand from the closed form of theory 2.4: at zero the end stands at the screw of the rest strains."""
+    """Origins set by hand from docs/theory.md 2.4: at zero the end stands at the screw of the rest strains."""
     exact = screw(0.3 * (np.array(rest) - [0, 0, 0, 1]), 0.3)
     p, chord = exact[:3, 3], float(np.linalg.norm(exact[:3, 3]))
     u1, u2 = math.atan2(-p[1], p[2]), math.atan2(p[0], math.hypot(p[1], p[2]))

@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 import softrobots as sr
 from softrobots.constant_curvature import arc_from_muscles, chain_muscle_jacobian, chain_transform, muscle_residual
 
-POSITION = 1e-9  # the bound [m]
+POSITION = 1e-9  # what `solve_ik` promises [m]
 ANGLE = 1e-9  # and for orientations [rad]
 FORCE = np.array([0.8, -1.2, -0.5])
 

@@ -31,7 +31,7 @@ def test_lengths_in_pose_table_and_pictures_out(tmp_path: Path, capsys: pytest.C
     assert run_script("pcc_arm", ["--lengths", *map(str, LENGTHS), "--output", str(folder)]) == 0
     assert {path.name for path in folder.iterdir()} == {"equilibrium.npz", "summary.json", "shape.png", "scene.html"}
     summary = json.loads((folder / "summary.json").read_text())
-    # theory: two-segment reference, torsion-free frames, eight decimals.
+    # docs/theory.md 2.3: torsion-free frames, eight decimals.
     assert np.allclose(summary["tip_m"], (0.44957382, -0.31544214, 0.84384418), atol=5e-9)
     assert np.allclose(summary["tip_without_load_m"], summary["tip_m"], atol=1e-12)
     assert summary["arc_bending_deg"][0] == pytest.approx(np.degrees(0.726483157), abs=1e-7)

@@ -21,7 +21,7 @@ from softrobots.statics.loads import Load
 from tests.support.oracles import central_difference
 from tests.support.rods import Rod, elastica_moment_tip, elastica_tip, random_wrenches, rod_tip, steel_rod
 
-LENGTHS = np.array([0.50, 0.53, 0.55, 0.54, 0.51, 0.52])  # theory: the reference case, d = 0.04 m
+LENGTHS = np.array([0.50, 0.53, 0.55, 0.54, 0.51, 0.52])  # docs/theory.md 2.3, d = 0.04 m
 REFERENCE_TIP = (0.44957382, -0.31544214, 0.84384418)
 FORCE = np.array([1.0, 2.0, -3.0])
 ODD = {
@@ -594,7 +594,7 @@ def test_self_weight_is_that_of_a_heavy_rod(name: str, gravity: tuple, tilt: flo
 
 
 def test_a_steel_rod_of_50_links_is_right_to_a_tenth_of_a_millimetre() -> None:
-    """The issue's target: a spring-steel rod of 0.6 m, bent by up to 90 degrees; 50 sub-links lumped, or 30 sections."""
+    """A spring-steel rod of 0.6 m, bent by up to 90 degrees; 50 sub-links lumped, or 30 sections."""
     rod = steel_rod()
     pairs = random_wrenches(np.random.default_rng(2026), rod, 4)
     exact = [rod_tip(rod, tip, middle, tol=1e-7)[0] for tip, middle in pairs]  # right to 1e-9 m

@@ -98,7 +98,7 @@ def test_the_printed_numbers_are_those_of_the_papers(found: Found) -> None:
 @pytest.mark.parametrize(
     ("name", "place", "words", "value"),
     [
-        # theory: 1.1 (mean of the six k, unrounded, gives the same four digits), 1.3, 2.3 and 3, as they are printed there.
+        # docs/theory.md: 1.1 (mean of the six k, unrounded, gives the same four digits), 1.4, 2.3 and 3, as printed there.
         ("inflatable_arm", "(3)", "pressure for 17.51", 42.7),
         ("pcc_two_segments", "(15), (16)", "z of the tip", 0.87444230),
         ("pcc_two_segments", "section 3", "x of the tip, body", 0.44957382),
@@ -502,7 +502,7 @@ def test_the_arctangent_loses_half_the_circle() -> None:
     assert np.array_equal(same, np.abs(given) < 89.0) or np.count_nonzero(same != (np.abs(given) < 90.0)) <= 2  # gaps at jumps
     ends = [line.get_data_3d() for line in left.lines if line.get_marker() == "o"]
     tips = np.array([np.ravel(end) for end in ends if np.ravel(end)[2] > 0.7])
-    for tip in ((0.44957382, -0.31544214, 0.84384418), (0.41771528, -0.30235950, 0.87444230)):  # theory 2.3
+    for tip in ((0.44957382, -0.31544214, 0.84384418), (0.41771528, -0.30235950, 0.87444230)):  # docs/theory.md 2.3
         assert np.abs(tips - tip).max(axis=1).min() < 1e-8
     assert "[m]" in left.get_xlabel()
     assert "[degrees]" in right.get_ylabel()

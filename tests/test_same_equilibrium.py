@@ -26,7 +26,7 @@ from studies.interop.springs_read import springs_read
 from tests.conftest import CHECKOUT, load_script
 
 ROBOTS = tuple(FORCES)
-STATIC, SIMULATED, SINGLE = 1e-9, 1e-6, 1e-3  # what the issue asks for [rad or m]
+STATIC, SIMULATED, SINGLE = 1e-9, 1e-6, 1e-3  # allowed differences [rad or m]
 Tool = Callable[[str], ModuleType]
 
 

@@ -10,7 +10,7 @@ import softrobots as sr
 from softrobots.statics.sensitivity import motor_torque_slope, tip_columns
 from tests.support.oracles import central_difference
 
-# Step 1e-5 on equilibria solved to 1e-13: truncation 1e-10, rounding 1e-13 * 20 / 172 / 1e-5 = 1e-9; bound of the issue 1e-6.
+# Step 1e-5 on equilibria solved to 1e-13: truncation 1e-10, rounding 1e-13 * 20 / 172 / 1e-5 = 1e-9; 1e-6 is required.
 RELATIVE = 1e-6
 
 

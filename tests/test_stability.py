@@ -17,7 +17,7 @@ def test_one_link_buckles_at_k_over_l2() -> None:
 
 
 def test_two_links_buckle_at_the_closed_form(arm: sr.SoftModel) -> None:
-    a, c = 1.17, 0.57  # theory 1.4: 2 L - l1 and l2; 114.0657 N
+    a, c = 1.17, 0.57  # docs/theory.md 1.4: 2 L - l1 and l2; 114.0657 N
     expected = 172.71 / ((a + c) / 2 + np.sqrt((a - c) ** 2 / 4 + c**2))
     assert sr.critical_load(arm, (0, 0, 0), (-3, 0, 0)) == pytest.approx(expected, rel=1e-12)
     assert expected == pytest.approx(114.0657, abs=5e-5)

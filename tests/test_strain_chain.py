@@ -34,7 +34,7 @@ sections_ = st.tuples(angles_, angles_, angles_, st.floats(-0.04, 0.1)).map(np.a
 
 
 def exact_joints(*arguments: Any) -> list[Any]:
-    """The joint positions of theory 2.4 from mpmath's exponential, at section coordinates x, y, twist, elongation."""
+    """The joint positions of docs/theory.md 2.4 from mpmath's exponential, at section coordinates x, y, twist, elongation."""
     pose = exact_screw(*arguments)
     px, py, pz = pose[0, 3], pose[1, 3], pose[2, 3]
     u1, u2 = mp.atan2(-py, pz), mp.atan2(px, mp.hypot(py, pz))
@@ -154,7 +154,7 @@ def test_many_screws_at_once_are_the_same_as_one_by_one(sections: list, h: float
 
 @pytest.mark.parametrize("size", SIZES)
 def test_twists_are_the_integral_of_the_adjoint(size: float) -> None:
-    """Theory 2.4: `T(x) = int_0^1 exp(-s ad_x) ds`, a corner of one larger exponential: ten units in the last place."""
+    """docs/theory.md 2.4: `T(x) = int_0^1 exp(-s ad_x) ds`, a corner of one larger exponential: ten units in the last place."""
     z = section(size)
     adjoint = np.zeros((6, 6))
     adjoint[:3, :3] = adjoint[3:, 3:] = skew(z[:3])
@@ -234,7 +234,7 @@ def test_derivatives_are_exact_and_smooth_through_straight(size: float, unit: np
 
 
 def test_values_at_straight() -> None:
-    """Theory 2.4: half of the bending at each end, all of the stretch in the chord, all of the twist in the last joint."""
+    """Half of the bending at each end, all of the stretch in the chord, all of the twist in the last joint."""
     found = joint_map(np.zeros(4), H)
     assert np.array_equal(found.positions, [0, 0, H, 0, 0, 0])
     slopes = dict(u1=(0, 0.5), u2=(1, 0.5), c=(3, 1.0), r1=(0, 0.5), r2=(1, 0.5), r3=(2, 1.0))
@@ -272,7 +272,7 @@ def test_second_derivative_against_differences_of_the_first(z: np.ndarray, weigh
 
 
 def test_the_last_joint_turns_without_twist() -> None:
-    """Theory 2.4: 18.4 degrees at 90 degrees of bending in azimuth 45, and none in the planes of the axes."""
+    """docs/theory.md 2.4: 18.4 degrees at 90 degrees of bending in azimuth 45, and none in the planes of the axes."""
 
     def last(azimuth: float) -> float:
         bending = math.pi / 2
@@ -357,8 +357,8 @@ def test_what_is_no_number_is_out_of_range(place: int) -> None:
 @given(st.floats(0.01, 3.1), st.floats(0.01, 3.1))
 @settings(max_examples=200)
 def test_range_with_twist(kappa: float, twist: float) -> None:
-    """Theory 2.4: valid iff `kappa^2 sin(phi)/phi + tau^2 > 0`; that is `phi^2` times the share of the chord that points
-    forwards, so it is asked a little away from its zero."""
+    """docs/theory.md 2.4: valid iff `kappa^2 sin(phi)/phi + tau^2 > 0`; that is `phi^2` times the share of the chord that
+    points forwards, so it is asked a little away from its zero."""
     phi = math.hypot(kappa, twist)
     forwards = (kappa**2 * math.sin(phi) / phi + twist**2) / phi**2
     assume(abs(forwards) > 2e-3)
@@ -407,7 +407,7 @@ def test_sections_of_constant_twist_lie_on_a_helix(curvature: float, torsion: fl
 
 
 def test_every_oracle_of_this_file_agrees_with_the_others() -> None:
-    """mpmath's joints in the product written out give scipy's exponential: the oracles share nothing but the theory."""
+    """mpmath's joints in the product written out give scipy's exponential: the oracles share nothing but the equations."""
     for size in SIZES:
         z = section(size)
         with mp.workdps(50):

@@ -59,7 +59,7 @@ def test_methods_agree_on_the_motor_angles(arm: sr.SoftModel) -> None:
 
 
 def test_the_papers_method_lags_as_measured(arm: sr.SoftModel) -> None:
-    """theory 1.4: on a 0.5 m move in 1 s the largest error falls from centimetres to millimetres over gains 5 to 100."""
+    """On a 0.5 m move in 1 s the largest error falls from centimetres to millimetres over gains 5 to 100."""
     path = sr.straight_line((0.9, -0.2, 0.1), (0.6, 0.2, 0.1), 1.0, 400)
     largest = []
     for gain in (5, 10, 50, 100):

@@ -33,8 +33,8 @@ angles_ = st.one_of(
 diameters_ = st.floats(-3.0, 3.0).map(lambda x: 10.0**x)
 
 
-# The issue asks for 1e-12 times the condition number. Every map here is a dozen operations, each to half a unit in the last
-# place (1.1e-16) and sines to one: measured, 6e-16 to 1.2e-15. So the tests ask for a hundred times more than the issue.
+# Required: 1e-12 times the condition number. Every map here is a dozen operations, each to half a unit in the last
+# place (1.1e-16) and sines to one: measured, 6e-16 to 1.2e-15. So the tests ask for a hundred times more than that.
 TOLERANCE = 1e-14
 
 

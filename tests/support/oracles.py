@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-# theory: reference values of the equilibrium at k = 172.71 N m/rad, f = (0, 10, -15) N, five digits.
+# docs/theory.md 1.4: reference values of the equilibrium at k = 172.71 N m/rad, f = (0, 10, -15) N, five digits.
 REFERENCE_EQUILIBRIA = [
     ((0.0, 0.0, 0.0), (0.06696, -0.10022, 0.03264, -0.04858), (1.18654, 0.09618, -0.14450)),
     ((0.3, 0.6, -0.8), (0.05339, -0.09228, 0.03172, -0.04214), (1.01935, 0.38587, 0.09712)),
@@ -109,7 +109,7 @@ def arm_balance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residual (n, 4), tangent stiffness (n, 4, 4) and tip (n, 3) of the weightless paper's arm, for n cases.
 
-    theory 1.4 on the DH table: r = k q - J_k^T f, and entries f . (z_i x (z_j x (p_e - p_j))), i <= j, of d(J_k^T f)/dq.
+    docs/theory.md 1.4 on the DH table: r = k q - J_k^T f, entries f . (z_i x (z_j x (p_e - p_j))), i <= j, of d(J_k^T f)/dq.
     """
     angles = np.array([motors[:, 0], motors[:, 1], springs[:, 0], springs[:, 1], motors[:, 2], springs[:, 2], springs[:, 3]])
     half = np.pi / 2
