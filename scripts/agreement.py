@@ -34,7 +34,7 @@ from softrobots.cli.tools.kinematics import pose_error
 from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.export.mjcf import to_mjcf
-from softrobots.model.soft_model import MAX_DOF
+from softrobots.model.pinocchio_data import MAX_DOF
 from softrobots.view.figures import plots
 from studies.interop.cases import TOLERANCE, WELDED
 from studies.interop.mujoco_statics import static_equilibrium, tip_pose

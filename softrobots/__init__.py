@@ -25,7 +25,8 @@ from softrobots.core.errors import (
 )
 from softrobots.description.composition import mount
 from softrobots.model.loader import load_model
-from softrobots.model.soft_model import SoftModel, SpringGroup
+from softrobots.model.soft_model import SoftModel
+from softrobots.model.springs import SpringGroup
 from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
 from softrobots.robots.growth import grown_coordinates
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium

@@ -10,6 +10,7 @@ import pickle
 import re
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -32,7 +33,7 @@ from softrobots.core.files import csv_text, write_text
 from softrobots.description.renaming import prefix_names, shift_segments, used_names
 from softrobots.model.actuators import Actuators
 from softrobots.model.muscle_lengths import MuscleLengths
-from softrobots.model.springs import LinearSprings, SaturatingLink, SaturatingSprings
+from softrobots.model.springs import SpringGroup, Springs
 from softrobots.statics.loads import cross_matrix
 from softrobots.statics.probes import Probe, face_normal, touch
 from softrobots.statics.workspace_map import required_pressures
@@ -311,13 +312,13 @@ def test_joints_of_a_section_are_similar_and_mirrored(z: np.ndarray, h: float) -
 def test_springs_scale_and_are_no_harder_on_a_plateau(seed: int, bend: float, factor: float) -> None:
     """Stiffness and plateau times a factor, so energy and torque; energies of a limp link are below those of a linear one."""
     random = np.random.default_rng(seed)
-    linear = LinearSprings(random.uniform(10.0, 200.0, 4), random.uniform(-0.1, 0.1, 4))
+    linear = Springs(tuple("abcd"), random.uniform(10.0, 200.0, 4), random.uniform(-0.1, 0.1, 4), np.ones(4, dtype=bool))
     k, most = float(linear.stiffness[1]), 0.3 * float(linear.stiffness[1])
     linear.stiffness[2] = k
     y = linear.rest + bend * random.uniform(-1.0, 1.0, 4)
-    limp = SaturatingSprings(linear, (SaturatingLink((1, 2), k, most),))
-    harder = LinearSprings(factor * linear.stiffness, linear.rest)
-    stiff = SaturatingSprings(harder, (SaturatingLink((1, 2), factor * k, factor * most),))
+    limp = replace(linear, groups=(SpringGroup((1, 2), 0.05, 1e4, None, most),))
+    harder = replace(linear, stiffness=factor * linear.stiffness)
+    stiff = replace(harder, groups=(SpringGroup((1, 2), 0.05, 1e4, None, factor * most),))
     for law_, other in ((linear, harder), (limp, stiff)):
         for one, two in zip(law_.at(y), other.at(y), strict=True):
             assert np.allclose(np.multiply(factor, one), two, rtol=1e-15, atol=0.0)
@@ -362,7 +363,7 @@ def four_muscles() -> sr.SoftModel:
 def test_muscle_lengths_are_held_whatever_moves_freely(seed: int) -> None:
     """Sums over a segment are what the lengths say, in whatever way its sections share them; the springs see no difference."""
     robot, random = four_muscles(), np.random.default_rng(seed)
-    held = robot.structure.held
+    held = robot.structure.muscle_lengths
     assert isinstance(held, MuscleLengths)
     rest = np.array([tag.rest_length for tag in robot.muscles])
     lengths = held.consistent(rest + random.uniform(-0.03, 0.03, len(rest)))
@@ -371,9 +372,9 @@ def test_muscle_lengths_are_held_whatever_moves_freely(seed: int) -> None:
     arms = robot.structure.muscle_matrix
     assert np.allclose(rest + arms @ strains, lengths, rtol=0.0, atol=1e-14)
     assert np.allclose(arms @ held.free, 0.0, rtol=0.0, atol=1e-15)
-    law_ = robot.structure.strain_law
+    law_ = robot.structure.strain_springs
     mixed = held.free.T @ (law_.stiffness[:, None] * held.free)
-    assert np.allclose(mixed, np.diag(held.law.stiffness), rtol=0.0, atol=1e-12 * law_.stiffness.max())
+    assert np.allclose(mixed, np.diag(held.springs.stiffness), rtol=0.0, atol=1e-12 * law_.stiffness.max())
     spread = held.spread @ held.basis(np.ones(len(rest)))
     assert np.allclose(held.free.T @ (law_.stiffness[:, None] * spread), 0.0, rtol=0.0, atol=1e-10 * law_.stiffness.max())
 

@@ -289,7 +289,7 @@ def test_residual_is_the_derivative_of_an_energy_written_without_the_package(
     load = Load.of(arm, wrench=POINT_FORCES, gravity=gravity)
     for _ in range(2):
         motors = motors_of(rng, arm, oracle)
-        springs = rng.uniform(-0.1, 0.1, arm.n_springs) * np.where(arm.structure.law.turning, 1.0, 0.02)
+        springs = rng.uniform(-0.1, 0.1, arm.n_springs) * np.where(arm.springs.turning, 1.0, 0.02)
         tensions = motors if muscles == "forces" else None
 
         def energy(y: np.ndarray, motors=motors, tensions=tensions) -> np.ndarray:
@@ -302,7 +302,7 @@ def test_residual_is_the_derivative_of_an_energy_written_without_the_package(
         expected = central_difference(energy, springs, 1e-5)[0]
         assert np.abs(expected).max() > 0.1
         stretch = 5e-3 if oracle.arm.chain == "lumped" else 3e-6
-        slices = 0.0 if gravity is None else np.where(arm.structure.law.turning, 3e-6, stretch)
+        slices = 0.0 if gravity is None else np.where(arm.springs.turning, 3e-6, stretch)
         assert np.all(np.abs(found - expected) < 2e-8 + slices)
 
 
@@ -314,7 +314,7 @@ def test_tangent_and_coupling_are_derivatives_of_the_residual(muscles: str, fiel
     for wrench, gravity in ((POINT_FORCES, None), (moments, (0.5, -1.0, -9.0))):
         load = Load.of(arm, wrench=wrench, gravity=gravity)
         motors = motors_of(rng, arm, oracle)
-        springs = rng.uniform(-0.1, 0.1, arm.n_springs) * np.where(arm.structure.law.turning, 1.0, 0.02)
+        springs = rng.uniform(-0.1, 0.1, arm.n_springs) * np.where(arm.springs.turning, 1.0, 0.02)
         state = elastic_state(arm, motors, springs, load)
         tangent = central_difference(lambda y, u=motors, w=load: elastic_state(arm, u, y, w).residual, springs)
         coupling = -central_difference(lambda u, y=springs, w=load: elastic_state(arm, u, y, w).residual, motors)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +16,22 @@ from softrobots import inflated_beam
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 from softrobots.description.urdf_tags import InflatedLinkTag
-from softrobots.model.springs import LinearSprings, SaturatingLink, SaturatingSprings, spring_law
+from softrobots.model.springs import SpringGroup, Springs, spring_groups
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 
 K, M = 187.30, 9.45  # [Troise 2021] Table 3 at 20 kPa
 ARM = 0.57  # [m], hinge to tip of one link
 KNEE = M / K
 
-LAW = SaturatingSprings(
-    LinearSprings(np.array([K, K, 80.0, 120.0, 120.0]), np.array([0.0, 0.02, 0.3, -0.1, 0.05])),
-    (SaturatingLink((0, 1), K, M), SaturatingLink((3, 4), 120.0, 4.0)),
-)
+
+def saturating(stiffness: list[float], rest: list[float], plateaus: dict[tuple[int, ...], float]) -> Springs:
+    """Springs of given plateaus by their places."""
+    names = tuple("abcde"[: len(stiffness)])
+    groups = tuple(SpringGroup(places, 0.05, 1e4, None, most) for places, most in plateaus.items())
+    return Springs(names, np.array(stiffness), np.array(rest), np.ones(len(stiffness), dtype=bool), groups)
+
+
+LAW = saturating([K, K, 80.0, 120.0, 120.0], [0.0, 0.02, 0.3, -0.1, 0.05], {(0, 1): M, (3, 4): 4.0})
 """Two saturating links with rest angles and a linear spring between them."""
 
 ENERGY, TORQUE, TANGENT = range(3)
@@ -54,10 +60,10 @@ def test_torque_and_tangent_are_derivatives_of_the_energy(values: list[float]) -
     Next to a knee the tangent jumps: angles within two steps of one are moved away.
     """
     y, step = np.array(values), 1e-6
-    for link in LAW.links:
-        places = list(link.places)
+    for group in LAW.groups:
+        places = list(group.springs)
         bend = y[places] - LAW.rest[places]
-        if abs(np.linalg.norm(bend) - link.max_moment / link.stiffness) < 1e-4:
+        if abs(np.linalg.norm(bend) - group.max_moment / LAW.stiffness[places[0]]) < 1e-4:
             y[places] += 1e-3
     rows = step * np.eye(5)
     torque = [(LAW.at(y + row)[ENERGY] - LAW.at(y - row)[ENERGY]) / (2 * step) for row in rows]
@@ -70,7 +76,7 @@ def test_torque_and_tangent_are_derivatives_of_the_energy(values: list[float]) -
 
 def test_the_knee_itself_is_below_the_plateau() -> None:
     """Exact numbers: 128 N m/rad times 0.625 rad is 80 N m."""
-    law = SaturatingSprings(LinearSprings(np.full(2, 128.0), np.zeros(2)), (SaturatingLink((0, 1), 128.0, 80.0),))
+    law = saturating([128.0, 128.0], [0.0, 0.0], {(0, 1): 80.0})
     knee = np.array([0.375, -0.5])
     assert law.saturated(knee) == frozenset()
     assert np.array_equal(law.at(knee)[TANGENT], 128.0 * np.eye(2))
@@ -81,7 +87,7 @@ def test_the_knee_itself_is_below_the_plateau() -> None:
 
 @given(st.floats(0.0, 0.5), st.floats(-np.pi, np.pi), st.floats(-np.pi, np.pi))
 def test_the_law_is_the_same_in_all_directions(bend: float, direction: float, turn: float) -> None:
-    law = SaturatingSprings(LinearSprings(np.full(2, K), np.zeros(2)), (SaturatingLink((0, 1), K, M),))
+    law = saturating([K, K], [0.0, 0.0], {(0, 1): M})
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     y = bend * np.array([np.cos(direction), np.sin(direction)])
     if abs(K * bend - M) < 1e-9:  # rounding decides there on which side of the knee the tangent is taken
@@ -92,7 +98,7 @@ def test_the_law_is_the_same_in_all_directions(bend: float, direction: float, tu
 
 
 def test_one_spring_bent_alone_follows_the_moment_angle_law_of_the_paper() -> None:
-    law = SaturatingSprings(LinearSprings(np.full(2, K), np.zeros(2)), (SaturatingLink((0, 1), K, M),))
+    law = saturating([K, K], [0.0, 0.0], {(0, 1): M})
     angles = np.linspace(-0.3, 0.3, 61)
     expected = inflated_beam.moment(angles, stiffness=K, max_moment=M)
     for place in (0, 1):
@@ -121,7 +127,7 @@ def test_the_plateau_travels_in_the_urdf(limp: sr.SoftModel, tmp_path: Path) -> 
     assert [group.max_moment for group in limp.spring_groups] == [21.76, 15.0]
     assert limp != sr.load_model(sr.InflatableArm())
     twin = pickle.loads(pickle.dumps(limp))
-    assert twin.springs.links == limp.springs.links
+    assert twin.spring_groups == limp.spring_groups
     loaded = sr.solve_equilibrium(limp, (0.1, 0.2, 0.3), (0.0, 20.0, -30.0))
     assert any(loaded.saturated)
     again = sr.load_result(sr.save_result(loaded, tmp_path / "limp.npz"))
@@ -133,7 +139,7 @@ def test_one_number_holds_for_all_links_and_none_is_linear() -> None:
     assert sr.InflatableArm(max_moment=9.45).max_moment == (9.45, 9.45)
     linear = sr.load_model(sr.InflatableArm())
     assert "max_moment" not in linear.urdf
-    assert isinstance(linear.springs, LinearSprings)
+    assert linear.springs.linear
     assert linear.springs.saturated(np.full(4, 3.0)) == frozenset()
     by_number = sr.load_model(sr.InflatableArm(max_moment=9.45))
     assert by_number == sr.load_model(sr.InflatableArm(max_moment=(9.45, 9.45)))
@@ -166,34 +172,38 @@ def test_springs_of_a_link_with_a_plateau_must_be_alike(limp: sr.SoftModel) -> N
         sr.load_model(limp.urdf, springs=springs)
     del springs["spring_2_side"]  # a link that the caller makes rigid has no plateau
     half = sr.load_model(limp.urdf, springs=springs, motors=limp.motor_joints)
-    assert [link.max_moment for link in half.springs.links] == [21.76]
-    assert isinstance(sr.load_model(limp.urdf, springs={}).springs, LinearSprings)
+    assert [group.max_moment for group in half.spring_groups] == [21.76]
+    assert sr.load_model(limp.urdf, springs={}).springs.linear
 
 
 def test_each_link_has_its_own_law() -> None:
     """Linear links before one with a plateau do not hide it; a link may have one spring; a list of no springs says so."""
-    linear, names = LinearSprings(np.array([50.0, 60.0, 60.0, 70.0]), np.zeros(4)), ["a", "b", "c", "d"]
+    linear, names = saturating([50.0, 60.0, 60.0, 70.0], [0.0] * 4, {}), ["a", "b", "c", "d"]
     tags = [InflatedLinkTag(springs, 0.05, 1e4, most) for springs, most in ((("a",), None), (("x",), 1.0), (("b", "c"), 2.0))]
-    law = spring_law(linear, names, names, [*tags, InflatedLinkTag(("d",), 0.05, 1e4, 3.0)])
-    assert isinstance(law, SaturatingSprings)
-    assert law.linear is linear
-    assert law.links == (SaturatingLink((1, 2), 60.0, 2.0), SaturatingLink((3,), 70.0, 3.0))
-    assert spring_law(linear, names, names, tags[:2]) is linear
-    with pytest.raises(sr.DescriptionError, match=r"that no muscle length holds; these are: none$"):
-        spring_law(linear, names, ["e", "b_"], [InflatedLinkTag(("e", "b"), 0.05, 1e4, 3.0)])
+    groups = spring_groups([*tags, InflatedLinkTag(("d",), 0.05, 1e4, 3.0)], linear, names, {"a": 7})
+    assert groups == (
+        SpringGroup((0,), 0.05, 1e4, 7),
+        SpringGroup((1, 2), 0.05, 1e4, None, 2.0),
+        SpringGroup((3,), 0.05, 1e4, None, 3.0),
+    )
+    assert not replace(linear, groups=groups).linear
+    assert replace(linear, groups=groups[:1]).linear
+    assert linear.linear
+    with pytest.raises(sr.DescriptionError, match=r"not constrained by muscle lengths; available: none$"):
+        spring_groups([InflatedLinkTag(("e", "b"), 0.05, 1e4, 3.0)], linear, ["e", "b_"], {})
 
 
 def test_sections_and_hinges_that_muscles_hold_have_no_plateau() -> None:
     tube = sr.HelixTube().urdf()
     assert "inflated_link" in tube
-    with pytest.raises(sr.DescriptionError, match="must be joints with a spring each, that no muscle length holds"):
+    with pytest.raises(sr.DescriptionError, match="must be joints with a spring each, not constrained by muscle lengths"):
         sr.load_model(tube.replace("<softrobots:inflated_link ", '<softrobots:inflated_link max_moment="1.0" '))
     lumped = sr.PccArm(chain="lumped", hinges=2, segment_lengths=(0.5,))
     names = sr.load_model(lumped, muscles="forces").spring_joints[:2]
     tag = f'<softrobots:inflated_link springs="{" ".join(names)}" radius="0.03" pressure="1e4" max_moment="0.2"/></robot>'
     text = lumped.urdf().replace("</robot>", tag)
-    assert sr.load_model(text, muscles="forces").springs.links[0].max_moment == 0.2
-    with pytest.raises(sr.DescriptionError, match="no muscle length holds"):
+    assert sr.load_model(text, muscles="forces").spring_groups[-1].max_moment == 0.2
+    with pytest.raises(sr.DescriptionError, match="not constrained by muscle lengths"):
         sr.load_model(text)
 
 

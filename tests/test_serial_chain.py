@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.description.tag_reader import read_tags
+from softrobots.model.assembly import assemble
 from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain
 from softrobots.model.soft_model import SoftModel
-from softrobots.model.structure import Parts
 from softrobots.statics.kinematics import frame_placement
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.laws import law
@@ -223,7 +224,9 @@ def by_hand(kind: object) -> SoftModel:
     made.name = "hand"
     made.addJoint(0, kind, pin.SE3.Identity(), "screw")
     made.addFrame(pin.Frame("tip", 1, 0, pin.SE3.Identity(), pin.FrameType.BODY))
-    return SoftModel(pinocchio_model=made, urdf="", parts=Parts({}, ["screw"]), inflated_links=[], tip="tip")
+    return assemble(
+        made, "", read_tags('<robot name="hand"><link name="base"/></robot>'), springs={}, motors=["screw"], tip="tip"
+    )
 
 
 @pytest.mark.parametrize(
@@ -239,7 +242,7 @@ def by_hand(kind: object) -> SoftModel:
         ),
         (
             lambda: sr.load_model(sr.InflatableArm(max_moment=15.0)),
-            r"an inflated link of inflatable_arm has max_moment; .*linear springs \(solve_equilibrium takes",
+            r"an inflated link of inflatable_arm has max_moment; .*linear springs \(solve_equilibrium accepts",
         ),
         (lambda: by_hand(pin.JointModelHX(0.3)), "joint screw of hand is a JointModelHX; .*revolute, continuous and prismatic"),
         (lambda: by_hand(pin.JointModelSpherical()), "joint screw of hand is a JointModelSpherical"),

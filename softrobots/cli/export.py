@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> None:
         options["q_motors"] = motors_of(model, arguments.motors)
     path = export_model(model, arguments.output, name, overwrite=arguments.overwrite, **options)
     structure = model.structure
-    counts = {"sections": 0 if structure.sections is None else len(structure.section_table)}
+    counts = {"sections": len(structure.section_table) if structure.constant_strain else 0}
     counts |= {"springs": len(structure.spring_joints), "actuators": model.n_motors}
     answer = {"files": [path], "robot": model.pinocchio.name, "format": name, **counts, "welded": arguments.welded}
     sections = f"{counts['sections']} sections, " if counts["sections"] else ""

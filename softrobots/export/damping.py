@@ -44,7 +44,7 @@ def mass_matrix(model: SoftModel, q_motors: FloatArray) -> FloatArray:
     structure = model.structure
     joints = np.zeros(model.pinocchio.nv)
     joints[structure.motor_indices] = q_motors[: len(structure.motor_joints)]
-    joints[structure.spring_indices] = structure.strain_law.rest
+    joints[structure.spring_indices] = structure.strain_springs.rest
     pinocchio_model, data = model.workspace(None)
     upper = np.triu(pin.crba(pinocchio_model, data, model.embed(joints)))
     made: FloatArray = upper + np.triu(upper, 1).T
@@ -65,7 +65,7 @@ def lowest_frequency(model: SoftModel, mass: FloatArray) -> float:
         DescriptionError: If the springs move no mass.
     """
     springs = model.structure.spring_indices
-    root = 1.0 / np.sqrt(model.structure.strain_law.stiffness)
+    root = 1.0 / np.sqrt(model.structure.strain_springs.stiffness)
     slowest = np.linalg.eigvalsh(root[:, None] * mass[np.ix_(springs, springs)] * root)[-1]  # 1 / w^2, largest: most exact
     if not slowest > 0.0:
         raise DescriptionError(

@@ -21,7 +21,6 @@ from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import SpringTag
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.model.springs import LinearSprings
 
 ACTUATORS = ("driven", "welded")
 """What becomes of motor joints: they stay joints that are driven to their positions, or become fixed there."""
@@ -48,18 +47,18 @@ def check_linear(model: Any) -> SoftModel:
         ParameterError: If it is no `SoftModel`, has sections of constant strain, or springs that are not linear.
     """
     checked = check_model(model)
-    if checked.structure.sections is not None:
+    if checked.structure.constant_strain:
         raise ParameterError(
             "model",
             checked.pinocchio.name,
             'a chain of joint springs, as chain="lumped" makes it (pcc_arm_lumped, helix_tube_lumped): the six joints of a '
             "section of constant strain follow four coordinates by a map that is not linear, which no simulator holds",
         )
-    if type(checked.springs) is not LinearSprings:
+    if not checked.springs.linear:
         raise ParameterError(
             "model",
             checked.pinocchio.name,
-            f"a robot with linear springs, not {type(checked.springs).__name__}: simulators know no other law of a joint "
+            "a robot with linear springs, without max_moment: simulators know no other law of a joint "
             "spring, and a file with linear ones would be another robot",
         )
     return checked
@@ -101,11 +100,11 @@ def hold(model: Any, q_motors: Any = None) -> HeldRobot:
     structure = checked.structure
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     count = len(structure.motor_joints)
-    rest = structure.strain_law.rest - values[count:] @ structure.muscle_matrix / structure.strain_law.stiffness
+    rest = structure.strain_springs.rest - values[count:] @ structure.muscle_matrix / structure.strain_springs.stiffness
     springs = {
         name: SpringTag(stiffness, reference)
         for name, stiffness, reference in zip(
-            structure.spring_joints, structure.strain_law.stiffness.tolist(), rest.tolist(), strict=True
+            structure.spring_joints, structure.strain_springs.stiffness.tolist(), rest.tolist(), strict=True
         )
     }
     motors = dict(zip(structure.motor_joints, values[:count].tolist(), strict=True))

@@ -68,7 +68,7 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
     structure, tree = checked.structure, read_rigid_tree(checked.urdf)
     positions = dict(zip(structure.motor_joints, values.tolist(), strict=False))
     fixed = dict.fromkeys(locked_joints(checked), 0.0)
-    springs: Mapping[str, SpringTag] = {name: structure.parts.springs[name] for name in structure.spring_joints}
+    springs: Mapping[str, SpringTag] = {name: SpringTag(*spring) for name, spring in checked.spring_table.items()}
     welded = actuators == "welded"
     if welded:
         springs, fixed = hold(checked, values).springs, fixed | positions

@@ -112,7 +112,7 @@ def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[
     springs = structure.spring_indices
     elastic = mass[np.ix_(springs, springs)]
     for tag, row, value in zip(model.muscles, structure.muscle_matrix, values.tolist(), strict=True):
-        motion = row / structure.strain_law.stiffness
+        motion = row / structure.strain_springs.stiffness
         motion /= row @ motion
         gain = tag.strongest / (LENGTH_ERROR * tag.rest_length)
         servo = Servo(gain, 2.0 * math.sqrt(gain * float(motion @ elastic @ motion)), tag.strongest)

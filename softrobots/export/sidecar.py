@@ -17,7 +17,7 @@ from softrobots.description.paths import xacro_folder
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.tag_reader import read_tags
-from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag
+from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag, SpringTag
 from softrobots.export.number_sources import PackagedRobot, Rules, check_robot, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
@@ -98,7 +98,7 @@ class _Parts:
 
     def __init__(self, model: SoftModel, rules: Rules) -> None:
         self._model, self._rules = model, rules
-        self._tags = read_tags(model.urdf)
+        self._tags, self._springs = read_tags(model.urdf), model.spring_table
 
     def all(self) -> dict[str, Any]:
         """All of them, by kind."""
@@ -133,8 +133,8 @@ class _Parts:
             for name, value in ((name, value) for name, value in bounds if math.isfinite(value)):  # JSON has no infinity
                 made[name] = self._number(joint.name, name, value, position, "limit")
         made["damping"] = self._number(joint.name, "damping", joint.damping, damping, "dynamics")
-        spring = self._model.structure.parts.springs.get(joint.name)
-        if spring is not None:
+        if joint.name in self._springs:
+            spring = SpringTag(*self._springs[joint.name])
             for name, unit in (("stiffness", stiffness), ("rest", position)):
                 made[name] = self._number(joint.name, name, getattr(spring, name), unit, "softrobots:spring")
                 if self._tags.springs.get(joint.name) != spring:
@@ -147,7 +147,7 @@ class _Parts:
             return "motor"
         if joint in structure.spring_joints:
             return "spring"
-        return "section" if any(joint in tag.joints for tag in structure.parts.sections) else "locked"
+        return "section" if joint in structure.section_joints else "locked"
 
     def _inflated_link(self, tag: Any) -> dict[str, Any]:
         name = " ".join(tag.springs)

@@ -21,9 +21,8 @@ class Actuators:
         joint_limits: FloatArray,
         turning: Sequence[bool],
         muscles: Sequence[MuscleTag],
-        muscle_rest: FloatArray,
         softness: FloatArray,
-        held: MuscleLengths | None,
+        lengths: MuscleLengths | None,
     ) -> None:
         """Collect them.
 
@@ -32,12 +31,10 @@ class Actuators:
             joint_limits: Their limits, shape (m, 2) [rad or m].
             turning: Which of them turn.
             muscles: The muscles.
-            muscle_rest: Their rest lengths, shape (n,) [m].
             softness: Bending of the segment of each muscle per moment at its end, shape (n,) [rad/(N m)].
-            held: The muscles as lengths; None if their tensions are given or there are none.
+            lengths: The constraint of given muscle lengths; None if tensions are given or there are no muscles.
         """
-        self._held = held
-        lengths = held is not None
+        self._lengths = lengths
         distance = np.array([muscle.distance for muscle in muscles])
         self.muscle_lengths = read_only(np.array([(m.shortest, m.longest) for m in muscles]).reshape(-1, 2))
         """Limits of the muscle lengths, shape (n_muscles, 2) [m]."""
@@ -45,22 +42,23 @@ class Actuators:
         """Limits of the muscle tensions, shape (n_muscles, 2) [N]."""
         self.names = (*joints, *(muscle.name for muscle in muscles))
         """Name of each."""
-        self.limits = read_only(np.concatenate([joint_limits, self.muscle_lengths if lengths else self.muscle_forces]))
+        self.limits = read_only(np.concatenate([joint_limits, self.muscle_forces if lengths is None else self.muscle_lengths]))
         """Lower and upper limits, shape (n_motors, 2) [rad, m or N]."""
-        self.scale = read_only(np.concatenate([np.ones(len(joints)), distance if lengths else 1.0 / (softness * distance)]))
+        muscle_scale = 1.0 / (softness * distance) if lengths is None else distance
+        self.scale = read_only(np.concatenate([np.ones(len(joints)), muscle_scale]))
         """Change of each that moves the robot about as much as a radian, shape (n_motors,) [rad, m or N]."""
         self.turning = np.array([*turning, *(False for _ in muscles)], dtype=bool)
         """Which of them turn rather than slide or pull, shape (n_motors,), truth values."""
-        self.units = (*("rad" if turns else "m" for turns in turning), *("m" if lengths else "N" for _ in muscles))
+        self.units = (*("rad" if turns else "m" for turns in turning), *("N" if lengths is None else "m" for _ in muscles))
         """Unit of each."""
-        self.basis = read_only(np.diag(self.scale) if held is None else held.basis(self.scale))
+        self.basis = read_only(np.diag(self.scale) if lengths is None else lengths.basis(self.scale))
         """Independent changes, shape (n_motors, n), each about a radian's worth of motion."""
         self.independent = self.basis.shape[0] == self.basis.shape[1]
         """Whether each can be set by itself; more than three muscles along a segment must fit together."""
-        relaxed = np.concatenate([np.zeros(len(joints)), muscle_rest if lengths else np.zeros(len(muscles))])
+        relaxed = np.concatenate([np.zeros(len(joints)), [0.0 if lengths is None else m.rest_length for m in muscles]])
         self.relaxed = read_only(np.clip(relaxed, *self.limits.T))
         """Joints at zero, muscles at rest or without tension, as near as the limits allow, shape (n_motors,) [rad, m or N]."""
-        self._unit = "rad" if not muscles else "m" if lengths else "N"
+        self._unit = "rad" if not muscles else "N" if lengths is None else "m"
 
     def checked(self, value: Any, field: str) -> FloatArray:
         """Return positions that the robot can take, as a new array.
@@ -73,13 +71,13 @@ class Actuators:
             ParameterError: If the shape differs, a number is not finite, or no shape of the robot has such muscle lengths.
         """
         motors = finite_array(field, value, (len(self.names),), self._unit)
-        if self._held is not None:
-            self._held.check(field, motors)
+        if self._lengths is not None:
+            self._lengths.check(field, motors)
         return motors
 
     def admit(self, motors: FloatArray) -> bool:
         """Whether some shape of the robot has these positions, shape (n_motors,)."""
-        return self._held is None or self._held.refusal(motors) is None
+        return self._lengths is None or self._lengths.refusal(motors) is None
 
     def draw(self, random: np.random.Generator) -> FloatArray | None:
         """Draw positions uniformly within the limits (continuous joints: one turn), shape (n_motors,).
@@ -88,8 +86,8 @@ class Actuators:
         """
         low, high = self.limits.T
         drawn = random.uniform(np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi))
-        if self._held is not None:
-            drawn = self._held.consistent(drawn)
+        if self._lengths is not None:
+            drawn = self._lengths.consistent(drawn)
         return drawn if self.admit(drawn) and np.all((drawn >= low) & (drawn <= high)) else None
 
     def go(self, motors: FloatArray, step: FloatArray) -> FloatArray:
@@ -112,7 +110,7 @@ class Actuators:
             ahead = np.where(step > 0.0, high - motors, motors - low)
             share = float(np.min(np.where(step == 0.0, np.inf, ahead / np.maximum(np.abs(step), 1e-300)), initial=1.0))
             moved = motors + max(share, 0.0) * step
-        return np.asarray(moved if self._held is None else self._held.within_range(moved))
+        return np.asarray(moved if self._lengths is None else self._lengths.within_range(moved))
 
     def active_limits(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Limits that are reached: of actuators, and the range of sections with given muscle lengths.
@@ -128,8 +126,8 @@ class Actuators:
         slack, units = 1e-12 * self.scale, np.diag(1.0 / self.scale)
         rows = [-units[motors <= low + slack], units[motors >= high - slack]]
         curvatures = [np.zeros_like(row) for row in rows]
-        if self._held is not None:
-            normals, bends = self._held.reached_range(motors)
+        if self._lengths is not None:
+            normals, bends = self._lengths.reached_range(motors)
             rows.append(normals)
             curvatures.append(bends)
         return np.concatenate(rows), np.concatenate(curvatures)

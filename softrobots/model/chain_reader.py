@@ -7,71 +7,88 @@ x, y or z, `A` is a signed permutation, so that zeros stay exact.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
-from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.checks import LARGEST, FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain
-from softrobots.model.springs import LinearSprings, SpringLaw
 from softrobots.model.structure import Structure
 
 _ROUNDING = 4e-16  # of sines and cosines of quarter turns, as URDF's roll, pitch and yaw give them
 
 
-def read_chain(pinocchio_model: Any, structure: Structure, springs: SpringLaw, tip_frame: int, reach: float) -> SerialChain:
+def read_chain(pinocchio_model: Any, structure: Structure, tip_frame: int, *, limits: FloatArray, reach: float) -> SerialChain:
     """Read a robot as a serial chain.
 
-    Pinocchio's workspace is not made, so the chain may have any length. That the six joints of a section are the chain of
-    `strain_chain`, one behind the other with the rest shape in their origins, is what `load_model` has checked.
+    Pinocchio's workspace is not allocated, so the chain may have any length. `load_model` has checked that the six joints of a
+    section are the chain of `strain_chain`, one behind the other with the rest shape in their origins.
 
     Args:
         pinocchio_model: The rigid bodies.
-        structure: Which joints are motors, springs and sections; the muscles.
-        springs: The law of the springs.
+        structure: Motors, springs and sections; the muscles.
         tip_frame: Number of the tip among Pinocchio's frames.
+        limits: Limits of the actuators, shape (n_motors, 2) [rad, m or N].
         reach: Scale of residuals [m].
 
     Returns:
         The chain from base to tip.
 
     Raises:
-        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, or if the springs are not
-            linear.
+        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides.
     """
-    name = str(pinocchio_model.name)
-    if not isinstance(springs, LinearSprings):
-        raise DescriptionError(
-            f"an inflated link of {name} has max_moment; compiled solvers need linear springs (solve_equilibrium takes the "
-            "others, too)"
-        )
     tip = pinocchio_model.frames[tip_frame]
     elements, axes = _elements(pinocchio_model, _path(pinocchio_model, tip.parentJoint, str(tip.name)), structure)
     tip_rotation, tip_translation = _placed(tip.placement, axes)
-    count, muscles = len(structure.strain_law.names), len(structure.muscles)
-    held = structure.held
+    springs, given = structure.strain_springs, structure.muscle_lengths
+    count, muscles = len(springs.names), len(structure.muscles)
     return SerialChain(
-        name=name,
+        name=str(pinocchio_model.name),
         elements=elements,
         tip_rotation=tip_rotation,
         tip_translation=tip_translation,
-        stiffness=read_only(np.array(structure.strain_law.stiffness)),
-        rest=read_only(np.array(structure.strain_law.rest)),
+        stiffness=springs.stiffness,
+        rest=springs.rest,
         reach=reach,
         n_motors=len(structure.motor_joints),
-        limits=structure.actuators.limits,
-        muscle_input=structure.parts.muscle_input,
-        muscle_rest=structure.muscle_rest,
+        limits=limits,
+        muscle_input=structure.muscle_input,
+        muscle_rest=read_only(structure.muscle_rest),
         muscle_matrix=structure.muscle_matrix,
-        held=() if held is None else held.groups,
-        held_slope=read_only(np.zeros((0, muscles))) if held is None else held.slopes,
-        elastic=read_only(np.eye(count)) if held is None else held.elastic,
-        spread=read_only(np.zeros((count, muscles))) if held is None else held.spread,
-        free=read_only(np.eye(count)) if held is None else held.free,
+        held=() if given is None else given.groups,
+        held_slope=read_only(np.zeros((0, muscles))) if given is None else given.slopes,
+        elastic=read_only(np.eye(count)) if given is None else given.elastic,
+        spread=read_only(np.zeros((count, muscles))) if given is None else given.spread,
+        free=read_only(np.eye(count)) if given is None else given.free,
     )
+
+
+def chain_length(pinocchio_model: Any, tip_frame: int, strained: Collection[str]) -> float:
+    """Sum of the link lengths from base to tip, and of the travel of slides [m].
+
+    Args:
+        pinocchio_model: The rigid bodies.
+        tip_frame: Number of the tip among Pinocchio's frames.
+        strained: Joints of sections; their travel is strain and does not count.
+
+    Returns:
+        The length, at least 1e-6 m. A slide without limits counts as 1 m.
+    """
+    frame = pinocchio_model.frames[tip_frame]
+    length = float(np.linalg.norm(frame.placement.translation))
+    number = frame.parentJoint
+    while number > 0:
+        length += float(np.linalg.norm(pinocchio_model.jointPlacements[number].translation))
+        joint = pinocchio_model.joints[number]
+        if joint.shortname().startswith("JointModelP") and pinocchio_model.names[number] not in strained:
+            low, high = pinocchio_model.lowerPositionLimit[joint.idx_q], pinocchio_model.upperPositionLimit[joint.idx_q]
+            length += float(high - low) if high - low < LARGEST else 1.0
+        number = pinocchio_model.parents[number]
+    return max(length, 1e-6)
 
 
 def _path(model: Any, last: int, tip: str) -> list[int]:
@@ -94,8 +111,10 @@ def _elements(model: Any, path: list[int], structure: Structure) -> tuple[tuple[
     """The elements, and the axes of the last frame of the chain in Pinocchio's of the same joint, shape (3, 3)."""
     motors = {joint: place for place, joint in enumerate(structure.motor_joints)}
     strains = {joint: place for place, joint in enumerate(structure.spring_joints)}
-    sections = {row.joint_names[0]: number for number, row in enumerate(structure.section_table)} if structure.sections else {}
-    made: list[Element] = []
+    sections = (
+        {row.joint_names[0]: number for number, row in enumerate(structure.section_table)} if structure.constant_strain else {}
+    )
+    elements: list[Element] = []
     axes: FloatArray = np.eye(3)
     neutral = pin.neutral(model)
     while path:
@@ -108,14 +127,14 @@ def _elements(model: Any, path: list[int], structure: Structure) -> tuple[tuple[
             axes = np.eye(3)
             bodies = tuple(_body(model.inertias[number], axes) for number in numbers)
             strain = len(structure.spring_joints) + len(STRAINS) * sections[joint]
-            made.append(ChainSection(row.name, _snapped(rotation @ back), translation, row.length, strain, bodies))
+            elements.append(ChainSection(row.name, _snapped(rotation @ back), translation, row.length, strain, bodies))
         else:
             number, path = path[0], path[1:]
             slides, axes = _axes(model, number, neutral)
             places = motors.get(joint), strains.get(joint)
             body = _body(model.inertias[number], axes)
-            made.append(ChainJoint(joint, _snapped(rotation @ axes), translation, slides, *places, body))
-    return tuple(made), axes
+            elements.append(ChainJoint(joint, _snapped(rotation @ axes), translation, slides, *places, body))
+    return tuple(elements), axes
 
 
 def _axes(model: Any, number: int, neutral: FloatArray) -> tuple[bool, FloatArray]:

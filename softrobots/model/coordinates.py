@@ -6,7 +6,7 @@ Statics works on elastic coordinates `y` (free) at given actuator coordinates `u
 - the six joints of a section of constant strain follow its four section coordinates, `q = m(z) - m(z_rest)`
   (`SectionCoordinates`), so that all joints are at zero at rest.
 
-Muscles are laid over either in `softrobots.model.muscles`. With `M = dq/d(u, y)`, a load of torque `t(q)` and derivative `D =
+`softrobots.model.muscles` adds muscles to either. With `M = dq/d(u, y)`, a load of torque `t(q)` and derivative `D =
 dt/dq` becomes `M^T t` in these coordinates, and its derivative :math:`M^T D M + \sum_j t_j\, d^2 q_j`.
 """
 
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from softrobots.constant_curvature.strain_chain import STRAINS, SectionChain, joint_positions
+from softrobots.constant_curvature.strain_chain import SectionChain
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag
 from softrobots.model.joint_loads import Entries, JointLoad
@@ -49,10 +49,10 @@ class Point(Protocol):
 
     @property
     def valid(self) -> bool:
-        """Whether the chain can be there; joint positions mean nothing where it cannot."""
+        """Whether every section is within its range; joint positions are undefined otherwise."""
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
-        """Carry a joint load to these coordinates."""
+        """Transform a joint load to these coordinates."""
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Split a matrix of columns per joint, shape (m, nv), into columns per actuator and per elastic coordinate."""
@@ -62,20 +62,20 @@ class Coordinates(Protocol):
     """A map from actuator and elastic coordinates to joint positions."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> Point:
-        """Go to given coordinates, shapes (n_motors,) and (n_elastic,) [rad, m or N]."""
+        """Return the robot at given coordinates, shapes (n_motors,) and (n_elastic,) [rad, m or N]."""
 
 
 class DirectCoordinates:
-    """Every joint is an actuator or elastic by itself."""
+    """Every joint is an actuator coordinate or an elastic coordinate by itself."""
 
     def __init__(self, motor_indices: Any, elastic_indices: Any, count: int) -> None:
-        """Keep the places of both in Pinocchio's velocity vector of length `count`."""
+        """Take the places of both in Pinocchio's velocity vector of length `count`."""
         self.motor_indices, self.elastic_indices, self._count = motor_indices, elastic_indices, count
         self.entries = Entries.of(elastic_indices, np.concatenate([motor_indices, elastic_indices]), count)
         """Rows of the elastic coordinates, columns of both, in a matrix over the joints."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> DirectPoint:
-        """Go to given coordinates."""
+        """Return the robot at given coordinates."""
         joints: FloatArray = np.zeros(self._count)
         joints[self.motor_indices] = motors
         joints[self.elastic_indices] = elastic
@@ -88,47 +88,23 @@ class DirectPoint(NamedTuple):
     joints: FloatArray
     """Joint positions."""
     coordinates: DirectCoordinates
-    """Which joint is what."""
+    """Which joint is an actuator and which is elastic."""
 
     @property
     def valid(self) -> bool:
-        """Always."""
+        """True: direct coordinates have no range limit."""
         return True
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
-        """Pick rows and columns."""
+        """Select the rows and columns of the load that belong to the coordinates."""
         c, torque = self.coordinates, load.torque
         rows, n = load.derivative(c.entries), len(c.motor_indices)
         return ReducedLoad(torque[c.motor_indices], torque[c.elastic_indices], rows[:, n:], rows[:, :n], 0.0, 0.0)
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Pick columns."""
+        """Select the columns of actuators and of elastic coordinates."""
         c = self.coordinates
         return jacobian.take(c.motor_indices, axis=1), jacobian.take(c.elastic_indices, axis=1)
-
-
-class Sections:
-    """The sections of constant strain of a robot, base to tip, as arrays."""
-
-    def __init__(self, tags: Sequence[SectionTag], joint_indices: Any) -> None:
-        """Collect the tags; `joint_indices` are the places of their joints in the velocity vector, shape (n, 6)."""
-        self.names = tuple(tag.name for tag in tags)
-        """Name of each section."""
-        self.segments = np.array([tag.segment for tag in tags])
-        """Number of the segment of each, shape (n,)."""
-        self.joint_indices = joint_indices
-        """Places of the joints, shape (n, 6)."""
-        self.lengths = np.array([tag.length for tag in tags])
-        """Rest lengths, shape (n,) [m]."""
-        self.rest = rest_coordinates(tags)
-        """Section coordinates at rest, shape (n, 4) [rad, rad, rad, m]."""
-        stiffness = [(t.bending_stiffness, t.bending_stiffness, t.torsional_stiffness, t.axial_stiffness) for t in tags]
-        self.stiffness = np.array(stiffness) / self.lengths[:, None]
-        """Stiffness of the section coordinates, shape (n, 4) [N m/rad, N m/rad, N m/rad, N/m]."""
-        self.rest_joints = joint_positions(self.rest, self.lengths)
-        """Joint positions that the joint origins of the description carry, shape (n, 6)."""
-        self.coordinate_names = tuple(f"{name}_{strain}" for name in self.names for strain in STRAINS)
-        """Names of the section coordinates, (4 n)."""
 
 
 def rest_coordinates(tags: Sequence[SectionTag | LumpedSectionTag]) -> FloatArray:
@@ -141,20 +117,37 @@ def rest_coordinates(tags: Sequence[SectionTag | LumpedSectionTag]) -> FloatArra
 class SectionCoordinates:
     """Motors and springs are coordinates by themselves; sections have four coordinates for six joints."""
 
-    def __init__(self, motor_indices: Any, spring_indices: Any, sections: Sections, count: int) -> None:
-        """Order the elastic coordinates: springs, then four a section."""
-        self.motor_indices, self.spring_indices, self.sections, self.count = motor_indices, spring_indices, sections, count
+    def __init__(
+        self,
+        motor_indices: Any,
+        spring_indices: Any,
+        section_indices: Any,
+        lengths: FloatArray,
+        rest_joints: FloatArray,
+        count: int,
+    ) -> None:
+        """Order the elastic coordinates: springs, then four a section.
+
+        Args:
+            motor_indices: Places of the motor joints in Pinocchio's velocity vector.
+            spring_indices: Places of the spring joints.
+            section_indices: Places of the joints of each section, base to tip, shape (n, 6).
+            lengths: Rest length of each section, shape (n,) [m].
+            rest_joints: Joint positions that the joint origins of the description carry, shape (n, 6).
+            count: Length of Pinocchio's velocity vector.
+        """
+        self.motor_indices, self.spring_indices, self.section_indices = motor_indices, spring_indices, section_indices
+        self.lengths, self.rest_joints, self.count = lengths, rest_joints, count
         self.singles = np.concatenate([motor_indices, spring_indices])
         """Joints that are coordinates by themselves."""
-        order = np.concatenate([self.singles, np.repeat(sections.joint_indices[:, 0], 4)])
+        order = np.concatenate([self.singles, np.repeat(section_indices[:, 0], 4)])
         self.before = read_only((order[:, None] < order).astype(np.float64))
         """Which coordinate moves joints nearer to the base than which other, shape (n, n): 1 or 0."""
-        first = len(self.singles) + 4 * np.arange(len(sections.names))
-        self.places = first[:, None] + np.arange(4)
+        self.places = len(self.singles) + np.arange(4 * len(lengths)).reshape(-1, 4)
         """Places of the coordinates of each section, motors before all, shape (n_sections, 4)."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> SectionPoint:
-        """Go to given coordinates."""
+        """Return the robot at given coordinates."""
         return SectionPoint(self, motors, elastic)
 
 
@@ -164,13 +157,12 @@ class SectionPoint:
     def __init__(self, coordinates: SectionCoordinates, motors: FloatArray, elastic: FloatArray) -> None:
         """Evaluate the map of the sections, unless they are out of range."""
         self._c = coordinates
-        sections, n = coordinates.sections, len(coordinates.spring_indices)
-        z = elastic[n:].reshape(-1, 4)
+        n = len(coordinates.spring_indices)
         self._joints: FloatArray = np.zeros(coordinates.count)
         self._joints[coordinates.motor_indices] = motors
         self._joints[coordinates.spring_indices] = elastic[:n]
-        self._chain = SectionChain(z, sections.lengths)
-        self._joints[sections.joint_indices] = self._chain.positions - sections.rest_joints
+        self._chain = SectionChain(elastic[n:].reshape(-1, 4), coordinates.lengths)
+        self._joints[coordinates.section_indices] = self._chain.positions - coordinates.rest_joints
 
     @property
     def joints(self) -> FloatArray:
@@ -183,31 +175,31 @@ class SectionPoint:
         return self._chain.valid
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
-        """Carry a joint load over by the chain rule.
+        """Transform a joint load by the chain rule.
 
         Between two sections the derivative is a product of combined columns, within one it goes joint by joint.
         """
         c, chain = self._c, self._chain
-        at_sections = load.torque[c.sections.joint_indices]
+        at_sections = load.torque[c.section_indices]
         elastic = np.concatenate([load.torque[c.spring_indices], (at_sections[:, None, :] @ chain.first).ravel()])
         angular, by_force = self._combine(load.angular), self._combine(load.by_force)
-        made = (angular.T @ by_force) * c.before
-        made += made.T
+        derivative = (angular.T @ by_force) * c.before
+        derivative += derivative.T
         if load.by_moment is not None:
-            made += (angular.T @ self._combine(load.by_moment)) * c.before.T
+            derivative += (angular.T @ self._combine(load.by_moment)) * c.before.T
         singles = np.arange(len(c.singles))
-        made[singles, singles] += np.einsum("ij,ij->j", angular[:, singles], by_force[:, singles])
-        within = np.swapaxes(chain.first, -1, -2) @ (load.within(c.sections.joint_indices) @ chain.first)
-        made[c.places[:, :, None], c.places[:, None, :]] += within + chain.curvature(at_sections)
+        derivative[singles, singles] += np.einsum("ij,ij->j", angular[:, singles], by_force[:, singles])
+        within = np.swapaxes(chain.first, -1, -2) @ (load.within(c.section_indices) @ chain.first)
+        derivative[c.places[:, :, None], c.places[:, None, :]] += within + chain.curvature(at_sections)
         if load.gravity_derivative is not None:
-            made += self._combine(self._combine(load.gravity_derivative).T).T
+            derivative += self._combine(self._combine(load.gravity_derivative).T).T
         n = len(c.motor_indices)
-        return ReducedLoad(load.torque[c.motor_indices], elastic, made[n:, n:], made[n:, :n], 0.0, 0.0)
+        return ReducedLoad(load.torque[c.motor_indices], elastic, derivative[n:, n:], derivative[n:, :n], 0.0, 0.0)
 
     def _combine(self, matrix: FloatArray) -> FloatArray:
         """Columns per motor, spring and section coordinate of a matrix with columns per joint."""
         c = self._c
-        blocks = matrix[:, c.sections.joint_indices].transpose(1, 0, 2) @ self._chain.first  # (n, m, 4)
+        blocks = matrix[:, c.section_indices].transpose(1, 0, 2) @ self._chain.first  # (n, m, 4)
         flat = blocks.transpose(1, 0, 2).reshape(len(matrix), c.places.size)
         return np.concatenate([matrix[:, c.singles], flat], axis=1)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copyreg
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +18,10 @@ from softrobots.core.errors import DescriptionError, NameNotFound, ParameterErro
 from softrobots.description.sources import Robot, read_source
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import RobotTags, SectionTag, SpringTag
+from softrobots.model.assembly import assemble
 from softrobots.model.coordinates import rest_coordinates
 from softrobots.model.muscles import MUSCLE_INPUTS
 from softrobots.model.soft_model import SoftModel
-from softrobots.model.structure import Parts
 
 
 def load_model(
@@ -94,15 +96,17 @@ def load_model(
     _check_joints(model, label)
     for section in tags.sections:
         _check_section(model, section, label)
-    lumped = [section for section in tags.lumped_sections if all(name in spring_tags for name in section.joints.values())]
+    lumped = tuple(tag for tag in tags.lumped_sections if all(name in spring_tags for name in tag.joints.values()))
     if tags.muscles and len(lumped) < len(tags.lumped_sections):
         raise DescriptionError(f"{label} has muscles along lumped sections; each joint of those needs a spring")
-    return SoftModel(
-        pinocchio_model=model,
-        urdf=urdf,
-        parts=Parts(spring_tags, motor_names, tags.sections, lumped, tags.muscles, tags.lines, muscles),
-        inflated_links=tags.inflated_links,
+    return assemble(
+        model,
+        urdf,
+        replace(tags, lumped_sections=lumped),
+        springs=spring_tags,
+        motors=motor_names,
         tip=_tip(model, tags.tip if tip is None else tip, label),
+        muscle_input=muscles,
     )
 
 
@@ -182,12 +186,9 @@ def _tip(model: Any, tip: str | None, label: str) -> str:
     return str(leaves[0])
 
 
-def _rebuild(urdf: str, springs: dict[str, tuple[float, float]], motors: tuple[str, ...], tip: str, muscles: str) -> SoftModel:
-    return load_model(urdf, springs=springs, motors=motors, tip=tip, muscles=muscles)
-
-
 def _reduce(model: SoftModel) -> tuple[Any, ...]:
-    return _rebuild, (model.urdf, model.spring_table, model.structure.motor_joints, model.tip, model.muscle_input)
+    springs, motors = model.spring_table, model.structure.motor_joints
+    return partial(load_model, springs=springs, motors=motors, tip=model.tip, muscles=model.muscle_input), (model.urdf,)
 
 
-copyreg.pickle(SoftModel, _reduce)  # as the URDF and what was said about it; Pinocchio workspaces are not carried along
+copyreg.pickle(SoftModel, _reduce)  # as URDF text and arguments; Pinocchio's workspaces are not pickled

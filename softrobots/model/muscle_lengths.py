@@ -13,7 +13,8 @@ from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
 from softrobots.model.joint_loads import JointLoad
-from softrobots.model.muscles import HELD, ElasticLaw, Segments, muscle_arms
+from softrobots.model.muscles import MUSCLE_STRAINS, Segments, muscle_arms
+from softrobots.model.springs import Springs
 
 CONSISTENT = 1e-6
 """Muscle lengths of a segment that miss those of the nearest arc by more than this are refused [m]."""
@@ -29,7 +30,7 @@ class MuscleLengths:
         inner: Coordinates,
         tags: Sequence[MuscleTag],
         segments: Segments,
-        law: ElasticLaw,
+        springs: Springs,
         section_lengths: Mapping[int, float],
         largest_bending: float | None = None,
     ) -> None:
@@ -39,18 +40,18 @@ class MuscleLengths:
             inner: The robot without muscles.
             tags: The muscles.
             segments: Which of its elastic coordinates belong to which segment.
-            law: Stiffness of its elastic coordinates.
+            springs: Springs of its elastic coordinates.
             section_lengths: Rest length of the sections of each segment [m].
             largest_bending: Bending of one section that lengths may ask for [rad]; `LARGEST_BENDING` by default.
 
         Raises:
             DescriptionError: If the muscles of a segment do not fix its bending and elongation.
         """
-        self._inner, self._law, self._segments, self._section_lengths = inner, law, segments, section_lengths
+        self._inner, self._springs, self._segments, self._section_lengths = inner, springs, segments, section_lengths
         self._largest_bending = LARGEST_BENDING if largest_bending is None else largest_bending
         self._tags = tuple(tags)
         self._rest_lengths = np.array([tag.rest_length for tag in tags])
-        count = len(law.names)
+        count = len(springs.names)
         spread = np.zeros((count, len(tags)))
         self._misfit = np.zeros((len(tags), len(tags)))
         groups, slopes, modes, names, turning = [], [], [], [], []
@@ -59,8 +60,8 @@ class MuscleLengths:
             about_x, about_y = (np.array(segments[segment][key], dtype=int) for key in ("bend_x", "bend_y"))
             self._bent.append((segment, about_x, about_y))
             rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
-            places = {key: list(segments[segment][key]) for key in HELD if key in segments[segment]}
-            arms = muscle_arms([tags[row] for row in rows])[:, [HELD.index(key) for key in places]]
+            places = {key: list(segments[segment][key]) for key in MUSCLE_STRAINS if key in segments[segment]}
+            arms = muscle_arms([tags[row] for row in rows])[:, [MUSCLE_STRAINS.index(key) for key in places]]
             if np.linalg.matrix_rank(arms, tol=1e-9 * float(np.abs(arms).max())) < len(places):
                 raise DescriptionError(
                     f"the {len(rows)} muscles of segment {segment} do not fix its bending and elongation; "
@@ -69,13 +70,13 @@ class MuscleLengths:
             inverse = np.linalg.pinv(arms)
             self._misfit[np.ix_(rows, rows)] = np.eye(len(rows)) - arms @ inverse
             for key, row_of_inverse in zip(places, inverse, strict=True):
-                softness = 1.0 / law.stiffness[places[key]]
+                softness = 1.0 / springs.stiffness[places[key]]
                 spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
                 slope = np.zeros(len(tags))
                 slope[rows] = row_of_inverse
                 groups.append(tuple(places[key]))
                 slopes.append(slope)
-                basis = _differences(law.stiffness[places[key]])
+                basis = _differences(springs.stiffness[places[key]])
                 for number, mode in enumerate(basis.T, start=1):
                     column = np.zeros(count)
                     column[places[key]] = mode
@@ -92,19 +93,19 @@ class MuscleLengths:
         """Elastic coordinates of the robot without muscles by change of the lengths, shape (count, n_muscles)."""
         self.free = read_only(np.concatenate([np.eye(count)[free], np.array(modes).reshape(-1, count)]).T)
         """The same by free coordinates, shape (count, n)."""
-        stiffness = np.einsum("ik,i,ik->k", self.free, law.stiffness, self.free)
-        rest = (law.stiffness * law.rest) @ self.free / stiffness
-        self.elastic = read_only((self.free * law.stiffness[:, None]).T / stiffness[:, None])
+        stiffness = read_only(np.einsum("ik,i,ik->k", self.free, springs.stiffness, self.free))
+        rest = read_only(np.asarray((springs.stiffness * springs.rest) @ self.free / stiffness))
+        self.elastic = read_only((self.free * springs.stiffness[:, None]).T / stiffness[:, None])
         """Free coordinates by those without muscles, shape (n, count): `elastic @ free = 1`, `elastic @ spread = 0`."""
-        angles = np.array([*(law.turning[place] for place in free), *turning], dtype=bool)
-        self.law = ElasticLaw((*(law.names[place] for place in free), *names), stiffness, np.asarray(rest), angles)
-        """Stiffness of the free coordinates."""
+        angles = np.array([*(springs.turning[place] for place in free), *turning], dtype=bool)
+        self.springs = Springs((*(springs.names[place] for place in free), *names), stiffness, rest, angles)
+        """Springs of the free coordinates."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleLengthPoint:
         """Go to given coordinates."""
         count = len(motors) - len(self._tags)
         strains = self.strains(motors, elastic)
-        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self.spread, self.free, self._law, strains)
+        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self.spread, self.free, self._springs, strains)
 
     def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
@@ -218,8 +219,8 @@ class MuscleLengthPoint(NamedTuple):
     """Derivative of its elastic coordinates with respect to the lengths."""
     free: FloatArray
     """The same with respect to the free coordinates."""
-    law: ElasticLaw
-    """Its stiffness."""
+    springs: Springs
+    """Its springs."""
     strains: FloatArray
     """Its elastic coordinates."""
 
@@ -236,7 +237,7 @@ class MuscleLengthPoint(NamedTuple):
     def reduce(self, joints: JointLoad) -> ReducedLoad:
         """Carry over to lengths and free coordinates; the load on a muscle is its tension, spring-back included."""
         load = self.inner.reduce(joints)
-        unbalanced = load.elastic - self.law.stiffness * (self.strains - self.law.rest)
+        unbalanced = load.elastic - self.springs.stiffness * (self.strains - self.springs.rest)
         half = self.free.T @ load.derivative
         return ReducedLoad(
             np.concatenate([load.motors, unbalanced @ self.spread]),

@@ -17,7 +17,7 @@ neglected: 1 mm in 0.524 m for 0.8 rad at 0.04 m.)
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,23 +27,10 @@ from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
 from softrobots.model.joint_loads import JointLoad
 
 MUSCLE_INPUTS = ("lengths", "forces")
-"""What can be given of the muscles."""
+"""What `q_motors` can hold of the muscles."""
 
-HELD = ("bend_x", "bend_y", "stretch")
-"""The section coordinates that muscles feel: the sums of these over a segment."""
-
-
-class ElasticLaw(NamedTuple):
-    """Diagonal stiffness of elastic coordinates."""
-
-    names: tuple[str, ...]
-    """Name of each coordinate."""
-    stiffness: FloatArray
-    """Shape (n,) [N m/rad or N/m]."""
-    rest: FloatArray
-    """Relaxed coordinates, shape (n,) [rad or m]."""
-    turning: Any
-    """Which coordinates are angles rather than distances, shape (n,), truth values."""
+MUSCLE_STRAINS = ("bend_x", "bend_y", "stretch")
+"""The section coordinates whose sums over a segment give the muscle lengths."""
 
 
 Segments = Mapping[int, Mapping[str, Sequence[int]]]
@@ -55,7 +42,7 @@ def muscle_matrix(tags: Sequence[MuscleTag], segments: Segments, count: int) -> 
     matrix = np.zeros((len(tags), count))
     for row, tag in enumerate(tags):
         row_arms = muscle_arms([tag])[0]
-        for coordinate, arm in zip(HELD, row_arms, strict=True):
+        for coordinate, arm in zip(MUSCLE_STRAINS, row_arms, strict=True):
             matrix[row, list(segments[tag.segment].get(coordinate, ()))] = arm
     return matrix
 
@@ -69,11 +56,11 @@ class MuscleForces:
     """Coordinates of a robot whose muscles exert given tensions: motors, then tensions, are given; all strains are free."""
 
     def __init__(self, inner: Coordinates, matrix: FloatArray) -> None:
-        """Lay muscles of the length derivative `matrix`, shape (n_muscles, n_elastic), over a robot."""
+        """Add muscles whose lengths have the derivative `matrix`, shape (n_muscles, n_elastic), to a robot without them."""
         self._inner, self._matrix = inner, matrix
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleForcePoint:
-        """Go to given coordinates."""
+        """Return the robot at given coordinates."""
         count = len(motors) - len(self._matrix)
         return MuscleForcePoint(self._inner.at(motors[:count], elastic), self._matrix, motors[count:], elastic)
 
@@ -97,11 +84,11 @@ class MuscleForcePoint(NamedTuple):
 
     @property
     def valid(self) -> bool:
-        """Whether the chain can be there."""
+        """Whether every section is within its range."""
         return self.inner.valid
 
     def reduce(self, joints: JointLoad) -> ReducedLoad:
-        """Add what the muscles pull; the load on a muscle is its tension."""
+        """Add the tensions to the load; the load on a muscle is its tension."""
         load = self.inner.reduce(joints)
         return ReducedLoad(
             np.concatenate([load.motors, self.tensions]),
@@ -113,6 +100,6 @@ class MuscleForcePoint(NamedTuple):
         )
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Tensions alone move nothing."""
+        """Columns of the tensions are zero: at fixed elastic coordinates they move no joint."""
         motors, elastic = self.inner.columns(jacobian)
         return np.concatenate([motors, np.zeros((len(jacobian), len(self.tensions)))], axis=1), elastic

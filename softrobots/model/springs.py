@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.description.urdf_tags import InflatedLinkTag
@@ -17,175 +18,162 @@ from softrobots.description.urdf_tags import InflatedLinkTag
 POSITIVE = 1e-9
 """Smallest eigenvalue of a tangent stiffness that counts as positive, relative to the springs' own stiffness."""
 
-
 SpringState = tuple[float, FloatArray, FloatArray]
 """Springs at given coordinates: elastic energy [J]; the load they carry, its derivative, shape (n,) [N m or N]; and the tangent
 stiffness, the derivative of that, shape (n, n), read-only."""
 
 
-class SpringLaw(Protocol):
-    """What the statics asks of springs.
+@dataclass(frozen=True)
+class SpringGroup:
+    """The springs that stand for one inflated link."""
 
-    The residual, the tangent stiffness and the energy of `softrobots.statics.elastostatics` use `at` only; the paper's
-    recursions, and the scales and first steps of the solvers, use `stiffness` and `rest`.
+    springs: tuple[int, ...]
+    """Their places in `SoftModel.spring_joints`."""
+    radius: float
+    """Tube radius [m]."""
+    pressure: float
+    """Gauge pressure [Pa]."""
+    segment: int | None = None
+    """Number of the segment, if the group is one of its sections."""
+    max_moment: float | None = None
+    """Largest moment, beyond wrinkling [N m]; None: the springs are linear."""
+
+    @property
+    def wrinkling_moment(self) -> float:
+        """Moment of the first wrinkle [N m], [Troise 2021] (3)."""
+        return inflated_beam.wrinkling_moment(self.pressure, self.radius)
+
+
+class _Plateau(NamedTuple):
+    """An inflated link whose moment has reached its plateau."""
+
+    places: tuple[int, ...]
+    """Places of its springs among the elastic coordinates."""
+    stiffness: float
+    """Stiffness of each of them [N m/rad]."""
+    max_moment: float
+    """Moment of the plateau [N m]."""
+    angles: list[float]
+    """Angle of each spring from rest [rad]."""
+    bend: float
+    """Norm of the angles [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    r"""Springs of the elastic coordinates: independent and linear, but for inflated links with a largest moment.
+
+    A linear spring has :math:`\tau = k (y - y_0)`, [Troise 2021] (2). The moment of an inflated link with a largest moment `M`
+    is the law of `inflated_beam.moment` along the direction in which the link is bent, the same in all directions because the
+    tube is round: with the angles `s = y - rest` of its springs and :math:`\rho = |s|`,
+
+    .. math:: \tau = \min(k \rho, M) \, s / \rho
+
+    The energy grows as :math:`M \rho` beyond :math:`\rho = M / k`; there the tangent is zero along `s`, and :math:`M / \rho`
+    across. The tangent jumps at the knee; torque and energy do not.
     """
 
-    @property
-    def stiffness(self) -> FloatArray:
-        """Stiffness near rest, shape (n,) [N m/rad or N/m]."""
-
-    @property
-    def rest(self) -> FloatArray:
-        """Relaxed coordinates, shape (n,) [rad or m]."""
-
-    @property
-    def least_tangent(self) -> FloatArray:
-        """`stiffness` times `POSITIVE` as a diagonal matrix, shape (n, n), read-only: what a stable tangent exceeds."""
-
-    def at(self, y: FloatArray) -> SpringState:
-        """Energy, torque and tangent at coordinates `y`, shape (n,) [rad or m]."""
-
-    def saturated(self, y: FloatArray) -> frozenset[int]:
-        """Places of the springs that are on a plateau at `y`."""
-
-
-@dataclass(frozen=True)
-class LinearSprings:
-    """Independent linear springs, `torque = stiffness (y - rest)`, [Troise 2021] (2)."""
-
+    names: tuple[str, ...]
+    """Name of each coordinate."""
     stiffness: FloatArray
-    """Stiffness, shape (n,) [N m/rad or N/m]."""
+    """Stiffness near rest, shape (n,) [N m/rad or N/m]."""
     rest: FloatArray
     """Relaxed coordinates, shape (n,) [rad or m]."""
-
-    def at(self, y: FloatArray) -> SpringState:
-        """Energy `sum k (y - rest)^2 / 2`, torque `k (y - rest)` and tangent at coordinates `y`, shape (n,) [rad or m]."""
-        stretch = y - self.rest
-        torque = self.stiffness * stretch
-        return 0.5 * float(torque.dot(stretch)), torque, self._tangent
+    turning: Any
+    """Which coordinates are angles rather than distances, shape (n,), truth values."""
+    groups: tuple[SpringGroup, ...] = ()
+    """The springs of each inflated link; those of a group with `max_moment` have a plateau."""
 
     @cached_property
-    def _tangent(self) -> FloatArray:
-        return read_only(np.diag(self.stiffness))
+    def linear(self) -> bool:
+        """Whether no link has a largest moment."""
+        return all(group.max_moment is None for group in self.groups)
+
+    def at(self, y: FloatArray) -> SpringState:
+        """Return energy, torque and tangent at coordinates `y`, shape (n,) [rad or m]."""
+        stretch = y - self.rest
+        torque = self.stiffness * stretch
+        energy, tangent = 0.5 * float(torque.dot(stretch)), self._tangent
+        if self.linear:
+            return energy, torque, tangent
+        plateaus = self._plateaus(y)
+        if plateaus:
+            tangent = tangent.copy()
+        for places, stiffness, max_moment, angles, bend in plateaus:
+            energy -= 0.5 * stiffness * (bend - max_moment / stiffness) ** 2
+            across = max_moment / bend
+            for row, one in zip(places, angles, strict=True):
+                torque[row] = max_moment * (one / bend)
+                tangent[row, row] += across - stiffness
+                for column, other in zip(places, angles, strict=True):
+                    tangent[row, column] -= across / (bend * bend) * (one * other)
+        return energy, torque, read_only(tangent)
+
+    def saturated(self, y: FloatArray) -> frozenset[int]:
+        """Return the places of the springs whose link is on its plateau at coordinates `y`, shape (n,)."""
+        return frozenset(place for plateau in self._plateaus(y) for place in plateau.places)
 
     @cached_property
     def least_tangent(self) -> FloatArray:
         """`stiffness` times `POSITIVE` as a diagonal matrix, shape (n, n), read-only: what a stable tangent exceeds."""
         return read_only(POSITIVE * self._tangent)
 
-    def saturated(self, y: FloatArray) -> frozenset[int]:
-        """Places of the springs that are on a plateau: none."""
-        return frozenset()
+    @cached_property
+    def _tangent(self) -> FloatArray:
+        return read_only(np.diag(self.stiffness))
+
+    def _plateaus(self, y: FloatArray) -> list[_Plateau]:
+        """The links on their plateau at coordinates `y`."""
+        plateaus = []
+        for group in self.groups:
+            if group.max_moment is not None:
+                stiffness = float(self.stiffness[group.springs[0]])
+                angles = [float(y[place] - self.rest[place]) for place in group.springs]
+                bend = math.hypot(*angles)
+                if stiffness * bend > group.max_moment:
+                    plateaus.append(_Plateau(group.springs, stiffness, group.max_moment, angles, bend))
+        return plateaus
 
 
-class SaturatingLink(NamedTuple):
-    """The springs of an inflated link whose moment has a plateau."""
-
-    places: tuple[int, ...]
-    """Places of the springs among the elastic coordinates."""
-    stiffness: float
-    """Stiffness of each of them [N m/rad]."""
-    max_moment: float
-    """Moment of the plateau [N m]."""
-
-
-@dataclass(frozen=True)
-class SaturatingSprings:
-    r"""Linear springs, some of them springs of inflated links that go limp beyond a moment.
-
-    The moment of such a link is the law of `inflated_beam.moment` along the direction in which it is bent, the same in all
-    directions as a round tube is: with the angles `s = y - rest` of its springs and :math:`\rho = |s|`,
-
-    .. math:: \tau = \min(k \rho, M) \, s / \rho
-
-    The energy grows as :math:`M \rho` beyond :math:`\rho = M / k`; there the tangent is zero along `s`, and :math:`M / \rho`
-    across. It jumps at the knee; torque and energy do not.
-    """
-
-    linear: LinearSprings
-    """The springs without plateau."""
-    links: tuple[SaturatingLink, ...]
-    """The links with one."""
-
-    @property
-    def stiffness(self) -> FloatArray:
-        """Stiffness near rest, shape (n,) [N m/rad or N/m]."""
-        return self.linear.stiffness
-
-    @property
-    def rest(self) -> FloatArray:
-        """Relaxed coordinates, shape (n,) [rad or m]."""
-        return self.linear.rest
-
-    @property
-    def least_tangent(self) -> FloatArray:
-        """`stiffness` times `POSITIVE` as a diagonal matrix, shape (n, n), read-only: what a stable tangent exceeds."""
-        return self.linear.least_tangent
-
-    def at(self, y: FloatArray) -> SpringState:
-        """Energy, torque and tangent at coordinates `y`, shape (n,) [rad or m]."""
-        energy, torque, tangent = self.linear.at(y)
-        beyond = self._beyond_knee(y)
-        if beyond:
-            tangent = tangent.copy()
-        for link, angles, bend in beyond:
-            energy -= 0.5 * link.stiffness * (bend - link.max_moment / link.stiffness) ** 2
-            across = link.max_moment / bend
-            for row, one in zip(link.places, angles, strict=True):
-                torque[row] = link.max_moment * (one / bend)
-                tangent[row, row] += across - link.stiffness
-                for column, other in zip(link.places, angles, strict=True):
-                    tangent[row, column] -= across / (bend * bend) * (one * other)
-        return energy, torque, read_only(tangent)
-
-    def saturated(self, y: FloatArray) -> frozenset[int]:
-        """Places of the springs whose link is on its plateau at coordinates `y`, shape (n,)."""
-        return frozenset(place for link, _, _ in self._beyond_knee(y) for place in link.places)
-
-    def _beyond_knee(self, y: FloatArray) -> list[tuple[SaturatingLink, list[float], float]]:
-        """The links on their plateau, with the angles of their springs and the norm of those."""
-        found = []
-        for link in self.links:
-            angles = [float(y[place] - self.rest[place]) for place in link.places]
-            bend = math.hypot(*angles)
-            if link.stiffness * bend > link.max_moment:
-                found.append((link, angles, bend))
-        return found
-
-
-def spring_law(
-    linear: LinearSprings, names: Sequence[str], joints: Collection[str], tags: Sequence[InflatedLinkTag]
-) -> SpringLaw:
-    """The law of the springs of a robot: linear, unless a link has a largest moment.
+def spring_groups(
+    links: Sequence[InflatedLinkTag], springs: Springs, joints: Collection[str], segments: Mapping[str, int]
+) -> tuple[SpringGroup, ...]:
+    """Group the springs of each inflated link.
 
     Args:
-        linear: Stiffness and rest of the elastic coordinates.
-        names: Their names.
+        links: The inflated links. One whose springs the caller has left out altogether does not count.
+        springs: The springs of the elastic coordinates.
         joints: The spring joints of the robot.
-        tags: Its inflated links. One whose springs the caller has left out altogether does not count.
+        segments: Number of the segment by joint and section coordinate, for those of sections.
 
     Returns:
-        The law.
+        The groups, in the order of the links.
 
     Raises:
         DescriptionError: If the springs of a link with a largest moment differ in stiffness, or are not all elastic coordinates
-            by themselves (sections of constant strain, and hinges that muscle lengths hold, are not).
+            by themselves (sections of constant strain, and hinges that muscle lengths constrain, are not).
     """
-    links = []
-    for tag in tags:
-        if tag.max_moment is None or not any(name in names or name in joints for name in tag.springs):
-            continue
-        told = f"the inflated_link of {' '.join(tag.springs)} has max_moment {tag.max_moment} N m"
-        if not all(name in names and name in joints for name in tag.springs):
-            raise DescriptionError(
-                f"{told}; its springs must be joints with a spring each, that no muscle length holds; these are: "
-                f"{', '.join(name for name in names if name in joints) or 'none'}"
-            )
-        places = tuple(names.index(name) for name in tag.springs)
-        if len({float(linear.stiffness[place]) for place in places}) != 1:
-            raise DescriptionError(
-                f"{told}, the same in all directions; its springs must have the same stiffness, not "
-                f"{', '.join(str(float(linear.stiffness[place])) for place in places)} N m/rad"
-            )
-        links.append(SaturatingLink(places, float(linear.stiffness[places[0]]), tag.max_moment))
-    return SaturatingSprings(linear, tuple(links)) if links else linear
+    groups, names = [], springs.names
+    for link in links:
+        places = tuple(names.index(name) for name in link.springs if name in names)
+        if link.max_moment is not None and (places or any(name in joints for name in link.springs)):
+            _check_plateau(link, springs, joints)
+        if len(places) == len(link.springs):
+            groups.append(SpringGroup(places, link.radius, link.pressure, segments.get(link.springs[0]), link.max_moment))
+    return tuple(groups)
+
+
+def _check_plateau(link: InflatedLinkTag, springs: Springs, joints: Collection[str]) -> None:
+    subject = f"the inflated_link of {' '.join(link.springs)} has max_moment {link.max_moment} N m"
+    names = [name for name in springs.names if name in joints]
+    if not all(name in names for name in link.springs):
+        raise DescriptionError(
+            f"{subject}; its springs must be joints with a spring each, not constrained by muscle lengths; available: "
+            f"{', '.join(names) or 'none'}"
+        )
+    stiffness = [float(springs.stiffness[springs.names.index(name)]) for name in link.springs]
+    if len(set(stiffness)) != 1:
+        raise DescriptionError(
+            f"{subject}, the same in all directions; its springs must have the same stiffness, not "
+            f"{', '.join(map(str, stiffness))} N m/rad"
+        )

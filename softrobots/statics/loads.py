@@ -170,7 +170,7 @@ def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, Floa
         raise ParameterError("model", model, "a robot with sections (a PccArm or a HelixTube)")
     force = finite_array("force_per_length", force_per_length, (3,), "N/m")
     lengths = np.array([row.length for row in rows])
-    if model.structure.sections is not None:
+    if model.structure.constant_strain:
         lengths = 0.5 * (lengths + np.append(lengths[1:], 0.0))
     return {row.name: np.concatenate([share * force, np.zeros(3)]) for row, share in zip(rows, lengths.tolist(), strict=True)}
 

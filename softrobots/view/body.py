@@ -182,7 +182,7 @@ def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, point
             pose = poses[-1][-1]
         frames = np.concatenate(poses)
         muscles = {tag.name: _along(frames, tag) for tag in structure.muscles if tag.segment == number}
-        lines = {tag.name: _along(frames, tag) for tag in structure.parts.lines if tag.segment == number}
+        lines = {tag.name: _along(frames, tag) for tag in structure.lines if tag.segment == number}
         made.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles, lines))
     return tuple(made)
 

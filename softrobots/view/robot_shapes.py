@@ -103,7 +103,7 @@ class RobotShapes:
     def _elastic_joints(self) -> set[int]:
         """Numbers of the joints that have a spring, are part of a section, or are carried by such a joint."""
         pin_model, structure = self._model.pinocchio, self._model.structure
-        names = [*structure.spring_joints, *(name for tag in structure.parts.sections for name in tag.joints)]
+        names = [*structure.spring_joints, *structure.section_joints]
         elastic = {pin_model.getJointId(name) for name in names}
         for joint in range(1, pin_model.njoints):  # parents have lower numbers
             if pin_model.parents[joint] in elastic:

@@ -141,7 +141,7 @@ def stored_energy(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray) 
     """
     structure = robot.structure
     strains = np.asarray(structure.strains(motors, springs))
-    law = structure.strain_law
+    law = structure.strain_springs
     energies = 0.5 * law.stiffness * (strains - law.rest) ** 2
     for group in robot.spring_groups:
         if group.max_moment is not None:

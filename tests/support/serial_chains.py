@@ -87,5 +87,5 @@ def drawn(model: SoftModel, rng: np.random.Generator) -> tuple[np.ndarray, np.nd
     motors = None
     while motors is None:
         motors = model.actuators.draw(rng)
-    size = np.where(model.structure.law.turning, 0.5, 0.03)
+    size = np.where(model.springs.turning, 0.5, 0.03)
     return motors, model.rest + size * rng.uniform(-1.0, 1.0, model.n_springs)

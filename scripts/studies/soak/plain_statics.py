@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.description.tag_reader import read_tags
 from softrobots.model.soft_model import SoftModel
 from studies.soak.plain_sections import section_joints, section_slopes
 
@@ -82,12 +83,12 @@ class PlainStatics:
         self._masses = [(float(body.mass), np.array(body.lever)) for body in rigid.inertias]
         tip = rigid.frames[model.frame_id(model.tip)]
         self._tip_parent, self._tip = int(tip.parentJoint), np.array(tip.placement.translation)
-        parts = model.structure.parts
+        tags, table = read_tags(model.urdf), model.spring_table
         numbers = {str(name): number for number, name in enumerate(rigid.names)}
         column = {name: self._places[number] for name, number in numbers.items()}
-        springs = sorted(parts.springs, key=lambda name: numbers[name])
-        sections = sorted(parts.sections, key=lambda tag: numbers[tag.joints[0]])
-        self._motor_columns = [column[name] for name in sorted(parts.motors, key=lambda name: numbers[name])]
+        springs = sorted(table, key=lambda name: numbers[name])
+        sections = sorted(tags.sections, key=lambda tag: numbers[tag.joints[0]])
+        self._motor_columns = [column[name] for name in sorted(model.structure.motor_joints, key=lambda name: numbers[name])]
         self._spring_columns = [column[name] for name in springs]
         self._section_columns = np.array([[column[name] for name in tag.joints] for tag in sections], dtype=int).reshape(-1, 6)
         self._lengths = np.array([tag.length for tag in sections])
@@ -95,8 +96,8 @@ class PlainStatics:
         self._rest_sections = np.array(rest).reshape(-1, 4)
         stiffness = [[tag.bending_stiffness] * 2 + [tag.torsional_stiffness, tag.axial_stiffness] for tag in sections]
         by_section = np.array(stiffness).reshape(-1, 4) / self._lengths[:, None]
-        self._stiffness = np.concatenate([[parts.springs[name].stiffness for name in springs], by_section.ravel()])
-        self._rest = np.concatenate([[parts.springs[name].rest for name in springs], self._rest_sections.ravel()])
+        self._stiffness = np.concatenate([[table[name][0] for name in springs], by_section.ravel()])
+        self._rest = np.concatenate([[table[name][1] for name in springs], self._rest_sections.ravel()])
         names = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in ("bend_x", "bend_y", "twist", "stretch"))]
         self._plateaus = [
             ([names.index(names_of) for names_of in self._names(group)], group.max_moment)
@@ -117,7 +118,7 @@ class PlainStatics:
 
     def _muscle_rows(self, names: Sequence[str]) -> FloatArray:
         """Derivative of the muscle lengths with respect to springs and sections, shape (n_muscles, n)."""
-        parts = self.model.structure.parts
+        tags = read_tags(self.model.urdf)
         rows = np.zeros((len(self.model.muscles), len(names)))
         for row, muscle in zip(rows, self.model.muscles, strict=True):
             arms = {
@@ -125,10 +126,10 @@ class PlainStatics:
                 "bend_y": -muscle.distance * math.cos(muscle.azimuth),
                 "stretch": 1.0,
             }
-            for tag in parts.sections:
+            for tag in tags.sections:
                 for strain, arm in arms.items() if tag.segment == muscle.segment else ():
                     row[names.index(f"{tag.name}_{strain}")] = arm
-            for lumped in parts.lumped_sections:
+            for lumped in tags.lumped_sections:
                 for strain, arm in arms.items() if lumped.segment == muscle.segment else ():
                     if strain in lumped.joints:
                         row[names.index(lumped.joints[strain])] = arm

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from softrobots.core.checkpoint import discard
 from softrobots.core.errors import FileFormatError, NotConverged, OutputExists, ParameterError, SoftRobotsError
-from softrobots.model.soft_model import MAX_DOF
+from softrobots.model.pinocchio_data import MAX_DOF
 from softrobots.statics.loads import EARTH_GRAVITY
 
 

@@ -17,7 +17,7 @@ def motor_units(model: SoftModel) -> tuple[str, ...]:
 
 def spring_units(model: SoftModel) -> tuple[str, ...]:
     """Unit of each elastic coordinate, rad or m."""
-    return tuple("rad" if turns else "m" for turns in model.structure.law.turning.tolist())
+    return tuple("rad" if turns else "m" for turns in model.springs.turning.tolist())
 
 
 def load_units(units: Sequence[str]) -> tuple[str, ...]:

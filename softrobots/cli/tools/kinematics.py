@@ -20,7 +20,7 @@ from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.core.errors import DescriptionError, SoftRobotsError
 from softrobots.core.xml_input import parse_xml, read_xml
 from softrobots.description.sources import read_source
-from softrobots.model.soft_model import MAX_DOF
+from softrobots.model.pinocchio_data import MAX_DOF
 from softrobots.robots import Robot
 
 _WIDEST = (2.0 * np.pi, 1.0)

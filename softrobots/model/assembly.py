@@ -1,0 +1,177 @@
+"""From rigid bodies and the tags of a description to a `SoftModel`: springs, coordinates and actuators, in one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softrobots.constant_curvature.strain_chain import STRAINS, joint_positions
+from softrobots.core.checks import LARGEST, FloatArray, read_only
+from softrobots.description.urdf_tags import LumpedSectionTag, RobotTags, SectionTag, SpringTag
+from softrobots.model.actuators import Actuators
+from softrobots.model.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, rest_coordinates
+from softrobots.model.muscle_lengths import MuscleLengths
+from softrobots.model.muscles import MuscleForces, Segments, muscle_matrix
+from softrobots.model.pinocchio_data import PinocchioData
+from softrobots.model.soft_model import SoftModel
+from softrobots.model.springs import Springs, spring_groups
+from softrobots.model.structure import SectionRow, Structure
+
+
+def assemble(
+    rigid: Any,
+    urdf: str,
+    tags: RobotTags,
+    *,
+    springs: Mapping[str, SpringTag],
+    motors: Sequence[str],
+    tip: str,
+    muscle_input: str = "lengths",
+) -> SoftModel:
+    """Build the model of a robot; `softrobots.load_model` has checked the arguments.
+
+    Args:
+        rigid: The rigid bodies, a `pinocchio.Model`.
+        urdf: URDF text of the robot.
+        tags: Sections, muscles, lines and inflated links; lumped sections have a spring on every joint.
+        springs: Springs by joint name.
+        motors: Names of the motor joints.
+        tip: Name of the tip frame.
+        muscle_input: What is given of the muscles, "lengths" or "forces".
+
+    Returns:
+        The model.
+
+    Raises:
+        DescriptionError: If the muscles of a segment do not fix its shape, or the springs of an inflated link cannot have a
+            largest moment.
+    """
+    motor_joints, spring_joints = (tuple(sorted(names, key=rigid.getJointId)) for names in (motors, springs))
+    motor_indices, spring_indices = velocity_indices(rigid, motor_joints), velocity_indices(rigid, spring_joints)
+    section_tags = sorted(tags.sections, key=lambda tag: rigid.getJointId(tag.joints[0]))
+    lumped_tags = sorted(tags.lumped_sections, key=lambda tag: rigid.getJointId(tag.joints["bend_x"]))
+    sections = _section_rows(section_tags, first=len(spring_joints))
+    lumped = [_lumped_row(tag, spring_joints) for tag in lumped_tags]
+    strain_springs = _strain_springs(rigid, [springs[name] for name in spring_joints], spring_joints, section_tags)
+    segments = _segments([*sections, *lumped])
+    matrix = read_only(muscle_matrix(tags.muscles, segments, len(strain_springs.names)))
+
+    coordinates: Coordinates = DirectCoordinates(motor_indices, spring_indices, rigid.nv)
+    elastic_limits: FloatArray = np.tile([-np.inf, np.inf], (rigid.nv, 1))
+    elastic_limits[spring_indices] = _joint_limits(rigid, spring_joints)
+    if sections:
+        indices = np.array([velocity_indices(rigid, row.joint_names) for row in sections])
+        elastic_limits[indices] = [_joint_limits(rigid, row.joint_names) for row in sections]
+        lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("length", "rest_joints"))
+        coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
+    given_lengths, elastic = None, strain_springs
+    if tags.muscles and muscle_input == "forces":
+        coordinates = MuscleForces(coordinates, matrix)
+    elif tags.muscles:
+        section_lengths = {row.segment: row.length for row in sections or lumped}
+        largest = None if sections else np.pi / 2
+        given_lengths = MuscleLengths(coordinates, tags.muscles, segments, strain_springs, section_lengths, largest)
+        coordinates, elastic = given_lengths, given_lengths.springs
+
+    structure = Structure(
+        motor_joints=motor_joints,
+        spring_joints=spring_joints,
+        motor_indices=motor_indices,
+        spring_indices=spring_indices,
+        constant_strain=bool(sections),
+        section_table=tuple(sections or lumped),
+        strain_springs=strain_springs,
+        muscles=tags.muscles,
+        muscle_input=muscle_input,
+        muscle_matrix=matrix,
+        muscle_lengths=given_lengths,
+        lines=tags.lines,
+        elastic_limits=read_only(elastic_limits),
+    )
+    actuators = Actuators(
+        motor_joints,
+        _joint_limits(rigid, motor_joints),
+        [_kind(rigid, name).startswith("JointModelR") for name in motor_joints],
+        tags.muscles,
+        np.array([float((1.0 / strain_springs.stiffness[list(segments[m.segment]["bend_x"])]).sum()) for m in tags.muscles]),
+        given_lengths,
+    )
+    segment_of = {name: row.segment for name, row in structure.section_of.items()}
+    groups = spring_groups(tags.inflated_links, elastic, spring_joints, segment_of)
+    return SoftModel(
+        pinocchio=rigid,
+        urdf=urdf,
+        tip=tip,
+        structure=structure,
+        actuators=actuators,
+        coordinates=coordinates,
+        springs=replace(elastic, groups=groups),
+        data=PinocchioData(rigid),
+    )
+
+
+def velocity_indices(rigid: Any, names: Sequence[str]) -> Any:
+    """Return the places of joints in Pinocchio's velocity vector, read-only."""
+    indices = np.array([rigid.joints[rigid.getJointId(name)].idx_v for name in names], dtype=np.intp)
+    indices.setflags(write=False)
+    return indices
+
+
+def _kind(rigid: Any, name: str) -> str:
+    return str(rigid.joints[rigid.getJointId(name)].shortname())
+
+
+def _joint_limits(rigid: Any, names: Sequence[str]) -> FloatArray:
+    """Lower and upper limits of joints, shape (n, 2) [rad or m]; infinite for continuous ones and beyond `LARGEST`."""
+    limits = np.zeros((len(names), 2))
+    for row, name in enumerate(names):
+        joint = rigid.joints[rigid.getJointId(name)]
+        place = joint.idx_q
+        limits[row] = (-np.inf, np.inf) if joint.nq == 2 else (rigid.lowerPositionLimit[place], rigid.upperPositionLimit[place])
+    limits[limits <= -LARGEST], limits[limits >= LARGEST] = -np.inf, np.inf  # URDF has no slide without limits
+    return read_only(limits)
+
+
+def _section_rows(tags: Sequence[SectionTag], first: int) -> list[SectionRow]:
+    """Sections of constant strain, whose coordinates begin at place `first` among the strains."""
+    if not tags:
+        return []
+    rest = rest_coordinates(tags)
+    joints = joint_positions(rest, np.array([tag.length for tag in tags]))
+    places = first + np.arange(4 * len(tags)).reshape(-1, 4)
+    return [
+        SectionRow(t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, dict(zip(STRAINS, row, strict=True)))
+        for t, at, z, row in zip(tags, joints, rest, places.tolist(), strict=True)
+    ]
+
+
+def _lumped_row(tag: LumpedSectionTag, spring_joints: tuple[str, ...]) -> SectionRow:
+    places = {name: spring_joints.index(joint) for name, joint in tag.joints.items()}
+    joints = tuple(tag.joints.values())
+    rest = rest_coordinates([tag])[0]
+    return SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, joints, np.zeros(6), rest, places)
+
+
+def _strain_springs(rigid: Any, tags: Sequence[SpringTag], joints: tuple[str, ...], sections: Sequence[SectionTag]) -> Springs:
+    """Springs of the joints, then of the coordinates of the sections: `(EI, EI, GJ, EA) / length`."""
+    stiffness, rest = (np.array([getattr(tag, name) for tag in tags], dtype=np.float64) for name in ("stiffness", "rest"))
+    turning = [not _kind(rigid, name).startswith("JointModelP") for name in joints]
+    if sections:
+        moduli = [(t.bending_stiffness, t.bending_stiffness, t.torsional_stiffness, t.axial_stiffness) for t in sections]
+        by_section = np.array(moduli) / np.array([[tag.length] for tag in sections])
+        stiffness = np.concatenate([stiffness, by_section.ravel()])
+        rest = np.concatenate([rest, rest_coordinates(sections).ravel()])
+        turning += [name != "stretch" for name in STRAINS] * len(sections)
+    names = (*joints, *(f"{tag.name}_{strain}" for tag in sections for strain in STRAINS))
+    return Springs(names, read_only(stiffness), read_only(rest), np.array(turning, dtype=bool))
+
+
+def _segments(rows: Sequence[SectionRow]) -> Segments:
+    segments: dict[int, dict[str, list[int]]] = {}
+    for row in rows:
+        for name, place in row.places.items():
+            segments.setdefault(row.segment, {}).setdefault(name, []).append(place)
+    return segments

@@ -1,0 +1,51 @@
+"""Pinocchio's working memory for a robot, one for each thread and gravity."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.errors import DescriptionError
+
+MAX_DOF = 300
+"""Largest number of coordinates: Pinocchio's workspace takes seconds and 0.9 GB there, eight times that at twice as many."""
+
+_CACHED_GRAVITIES = 8  # copies of Pinocchio's model in each thread
+
+
+class PinocchioData(threading.local):
+    """Pinocchio data of a robot, allocated by each thread on first use and freed when the thread ends.
+
+    Pinocchio keeps gravity in its model, so that each gravity needs a copy of the model; the data is shared by all gravities,
+    because no function of the statics reads what an earlier call left there.
+    """
+
+    def __init__(self, model: Any) -> None:
+        """Take a `pinocchio.Model`."""
+        self._model = model
+        self._pairs: dict[Any, tuple[Any, Any]] = {}
+
+    def at(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
+        """Return model and data of the calling thread; see `SoftModel.workspace`."""
+        pair = self._pairs.get(gravity)
+        if pair is None:
+            pair = self._pairs[gravity] = self._pair(gravity)
+        return pair
+
+    def _pair(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
+        if gravity is None:
+            if self._model.nv > MAX_DOF:
+                raise DescriptionError(
+                    f"{self._model.name} has {self._model.nv} coordinates; Pinocchio's workspace is allocated for at most "
+                    f"{MAX_DOF} (use softrobots.compile for longer chains)"
+                )
+            return self._model, self._model.createData()
+        _, data = self.at(None)
+        model = self._model.copy()
+        model.gravity.linear = np.array(gravity)
+        cached = [key for key in self._pairs if key is not None]
+        if len(cached) >= _CACHED_GRAVITIES:
+            del self._pairs[cached[0]]
+        return model, data
