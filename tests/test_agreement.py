@@ -22,6 +22,7 @@ from studies.interop.outcomes import Question
 from tests.conftest import CHECKOUT, load_script
 from tests.support.helix_rods import HelixRod, solve_helix_rod
 from tests.support.muscle_rods import MuscleSegment, solve_muscle_arm
+from tests.support.tables import each_row
 
 FORMS = {"link": ("pseudo-rigid, hinge in the middle", "pseudo-rigid, hinge at l1 = 5 %", "lumped", "sections")}
 FRESH = {
@@ -219,7 +220,7 @@ def test_it_writes_tables_numbers_and_a_picture(
     assert "not empty" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "told"),
     [
         (["--cases", "0"], "--cases"),

@@ -11,6 +11,7 @@ import pytest
 
 import softrobots as sr
 from tests.support.closed_form_calls import CALLS
+from tests.support.tables import each_row
 
 UNITS = {
     "m": "length radius wall_thickness position distance hinge_offset probe_distance offset displacement outer_radius "
@@ -54,7 +55,7 @@ def unit_of(call: str, name: str) -> str:
     return f"[{unit}]" if unit else ""
 
 
-@pytest.mark.parametrize(("call", "name"), arguments_of((float, list, np.ndarray)))
+@each_row(("call", "name"), arguments_of((float, list, np.ndarray)))
 def test_a_number_that_is_none_is_told_with_its_name_and_unit(call: str, name: str) -> None:
     value = CALLS[call][1][name]
     if name == "arcs":
@@ -69,8 +70,8 @@ def test_a_number_that_is_none_is_told_with_its_name_and_unit(call: str, name: s
     assert unit_of(call, name) in error.requirement
 
 
-@pytest.mark.parametrize(("call", "name"), arguments_of(float))
-@pytest.mark.parametrize("factor", [-1.0, 0.0])
+@each_row(("call", "name"), arguments_of(float))
+@each_row("factor", [-1.0, 0.0])
 def test_a_number_out_of_range_is_told_with_its_name_and_what_came(call: str, name: str, factor: float) -> None:
     """Zero and below zero: taken, or refused with the name of this argument, the number and its unit."""
     function, given = CALLS[call]
@@ -84,7 +85,7 @@ def test_a_number_out_of_range_is_told_with_its_name_and_what_came(call: str, na
         assert set(re.findall(r"\[[^], ]*\]", error.requirement)) <= {unit_of(call, error.field.removeprefix("wish."))}
 
 
-@pytest.mark.parametrize(("call", "name"), arguments_of((sr.constant_curvature.Arc, sr.helix.HelixShape)))
+@each_row(("call", "name"), arguments_of((sr.constant_curvature.Arc, sr.helix.HelixShape)))
 def test_something_else_than_an_arc_or_a_shape_is_told_with_its_name(call: str, name: str) -> None:
     error = refused(call, name, 0.5)
     assert error.field == name
@@ -92,7 +93,7 @@ def test_something_else_than_an_arc_or_a_shape_is_told_with_its_name(call: str, 
     assert type(CALLS[call][1][name]).__name__ in error.requirement
 
 
-@pytest.mark.parametrize(("call", "name"), arguments_of(str))
+@each_row(("call", "name"), arguments_of(str))
 def test_an_unknown_word_is_told_with_the_words_that_there_are(call: str, name: str) -> None:
     """Each of the words is one that the call takes."""
     function, given = CALLS[call]
@@ -162,7 +163,7 @@ LIMITS: list[tuple[str, str, list[Any], list[Any], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("call", "name", "taken", "out", "told"), LIMITS)
+@each_row(("call", "name", "taken", "out", "told"), LIMITS)
 def test_a_limit_is_where_it_is_told(call: str, name: str, taken: list[Any], out: list[Any], told: str) -> None:
     """The last number inside is taken; the first one outside is refused, with its name, the number and the limit."""
     function, given = CALLS[call]
@@ -191,7 +192,7 @@ FORMS: list[tuple[str, str, list[Any], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("call", "name", "others", "told"), FORMS)
+@each_row(("call", "name", "others", "told"), FORMS)
 def test_a_wrong_form_is_told_with_the_right_one(call: str, name: str, others: list[Any], told: str) -> None:
     for value in others:
         error = refused(call, name, value)
@@ -211,7 +212,7 @@ def test_the_derivative_of_muscles_tells_what_it_refuses() -> None:
         assert f"[{UNIT_OF[name]}]" in caught.value.requirement or bad == [0.0, 1.0]
 
 
-@pytest.mark.parametrize("method", ["displacement", "angle", "contact", "moment", "small_angles"])
+@each_row("method", ["displacement", "angle", "contact", "moment", "small_angles"])
 def test_each_method_of_a_bending_test_tells_what_it_refuses(method: str) -> None:
     test = sr.inflated_beam.BendingTest(probe_distance=0.5, hinge_offset=0.03, offset=0.06)
     names = {"displacement": ["angle"], "contact": ["angle"], "angle": ["displacement"]}.get(method, ["displacement", "force"])
@@ -241,7 +242,7 @@ NO_COMMON_SHAPE = [
 ]
 
 
-@pytest.mark.parametrize(("call", "name", "other"), NO_COMMON_SHAPE)
+@each_row(("call", "name", "other"), NO_COMMON_SHAPE)
 def test_shapes_that_do_not_broadcast_are_told(call: str, name: str, other: str) -> None:
     function, given = CALLS[call]
     three = given[other]
@@ -294,7 +295,7 @@ DEFAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("call", "name", "value"), DEFAULTS)
+@each_row(("call", "name", "value"), DEFAULTS)
 def test_the_default_is_the_one_that_is_documented(call: str, name: str, value: Any) -> None:
     function, given = CALLS[call]
     without = {key: other for key, other in given.items() if key != name}

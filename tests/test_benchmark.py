@@ -30,6 +30,7 @@ from studies.benchmark.race import Race, Settings, figure, quick_settings
 from studies.benchmark.results import AT_LEAST, AT_MOST, Curve, Results, Row, as_json, read_results, require_whole, table
 from studies.benchmark.scipy_solvers import solvers
 from tests.conftest import CHECKOUT, load_script, missing
+from tests.support.tables import each_row
 
 SAME = 1e-8
 """[rad]: residuals are below 1e-10 f L, 2e-9 N m, over at least 80 N m/rad, which a load can soften by a few times."""
@@ -241,7 +242,7 @@ def test_ratios_are_taken_within_rounds() -> None:
     assert np.median(slow) / np.median(fast) == 3.5
 
 
-@pytest.mark.parametrize(("one", "other"), [([1.0], [1.0, 2.0]), ([], []), ([1.0], [0.0]), ([0.0], [1.0]), ([1.0], [np.nan])])
+@each_row(("one", "other"), [([1.0], [1.0, 2.0]), ([], []), ([1.0], [0.0]), ([0.0], [1.0]), ([1.0], [np.nan])])
 def test_ratios_of_nothing_are_refused(one: list, other: list) -> None:
     with pytest.raises(sr.ParameterError, match="denominator"):
         ratio(np.array(one), np.array(other))
@@ -393,7 +394,7 @@ def test_results_come_back_from_json(tmp_path: Path) -> None:
     assert as_json(back) == as_json(made_up())
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"rows": [{"job": 1}]}', '{"rows": [], "curves": [{}], "machine": {}}', "3"])
+@each_row("text", ["{", "[]", '{"rows": [{"job": 1}]}', '{"rows": [], "curves": [{}], "machine": {}}', "3"])
 def test_other_files_are_refused(text: str, tmp_path: Path) -> None:
     file = tmp_path / "results.json"
     file.write_text(text, encoding="utf-8")

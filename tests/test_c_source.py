@@ -24,6 +24,7 @@ from softrobots.compiled.c.c_source import to_c
 from softrobots.compiled.drivers import intrinsics, trigonometry
 from tests.conftest import missing
 from tests.support.c_libraries import build_library
+from tests.support.tables import each_row
 
 TRIGONOMETRY = "\n\n".join(map(inspect.getsource, trigonometry.FUNCTIONS))
 EVERYTHING = f'''"""All that the language has.
@@ -537,13 +538,13 @@ def later(x: float) -> float:
 '''
 
 
-@pytest.mark.parametrize(("statement", "message"), INSIDE, ids=[text.split("\n")[0][:40] for text, _ in INSIDE])
+@each_row(("statement", "message"), INSIDE)
 def test_a_function_outside_the_language_is_refused_with_its_line(statement: str, message: str) -> None:
     with pytest.raises(sr.ParameterError, match=rf"(?s)line \d+: .*{message}"):
         to_c(MODULE.format(statement), prefix="p_", exported=["f"])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         ("import math", "constants .* and functions only"),

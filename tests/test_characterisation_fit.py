@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import curve_fit
 
 from softrobots import ParameterError, inflated_beam
+from tests.support.tables import each_row
 
 TUBE = {"pressure": 50e3, "radius": 0.055}
 WRINKLING = inflated_beam.wrinkling_moment(**TUBE)
@@ -186,7 +187,7 @@ def test_small_stiffnesses_and_unit_angles_are_taken() -> None:
         assert fit.n_linear == len(angle)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("angle", "moment", "field", "told"),
     [
         ([0.0, 0.1, -0.2, 0.0], [0.0, 1.0, -2.0, 0.0], "angle", "at least three angles different from zero"),

@@ -25,6 +25,7 @@ from softrobots.statics import workspace
 from tests.conftest import CHECKOUT
 from tests.support.load_cases import fingerprint
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 GRID = TargetGrid.plane(1.2, 3)  # 18 targets
 LOADS = (0.0, 20.0)
@@ -243,7 +244,7 @@ def damaged(content: bytes, place: int) -> bytes:
     return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
 
 
-@pytest.mark.parametrize(
+@each_row(
     "damage",
     [
         lambda content: b"",
@@ -252,7 +253,6 @@ def damaged(content: bytes, place: int) -> bytes:
         lambda content: damaged(content, content.index(np.float64(2.0).tobytes())),  # a bit of a number
         lambda content: damaged(content, content.index(b"NUMPY")),
     ],
-    ids=["empty", "a byte less", "half", "a bit of a number", "a bit of a header"],
 )
 def test_a_damaged_block_is_no_block(damage: Callable[[bytes], bytes], tmp_path: Path) -> None:
     kept = Checkpoint(tmp_path, {"job": "test"})
@@ -295,7 +295,7 @@ def test_only_blocks_of_the_same_case_number_and_arrays_count(tmp_path: Path) ->
     assert kept.folder == tmp_path / "one"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("content", "message"),
     [(b"", "no JSON"), (b"[1]", "does not say"), (b'{"job": 3}', "does not say"), (b"\xff", "UTF-8"), (b'{"job": ', "no JSON")],
 )

@@ -24,6 +24,7 @@ from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.urdf_rules import RULES
 from tests.conftest import missing
 from tests.support.foreign import BRANCHED, SPRINGS
+from tests.support.tables import each_row
 
 ARM = urdf_folder() / "inflatable_arm.urdf"
 
@@ -79,7 +80,7 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
     assert capsys.readouterr().out == f"softrobots {sr.__version__}\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "message"),
     [
         ([], "required: COMMAND"),
@@ -356,7 +357,7 @@ def test_urdf_check_also_writes_what_is_right(told, tmp_path: Path) -> None:
 FILE = "FILE"  # stands for a URDF file
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "message"),
     [
         ([], "ROBOT must be one of inflatable_arm, pcc_arm, pcc_arm_lumped, helix_tube, helix_tube_lumped, or a file"),
@@ -403,8 +404,8 @@ def test_urdf_refuses_files_that_are_no_robot(told, tmp_path: Path) -> None:
         assert err.startswith("error: ")
 
 
-@pytest.mark.parametrize("words", [["urdf", "--check"], ["export", "-o", "made.xml"]])
-@pytest.mark.parametrize("name", ["robot.urdf", "robot.urdf.xacro"])
+@each_row("words", [["urdf", "--check"], ["export", "-o", "made.xml"]])
+@each_row("name", ["robot.urdf", "robot.urdf.xacro"])
 def test_files_that_are_no_text_are_refused(
     words: list[str], name: str, told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -439,7 +440,7 @@ def test_export_answers_machines(told, tmp_path: Path) -> None:
     assert json.loads(out) == {"files": [str(made)], "robot": "pcc_arm", "format": "mjcf", **counts}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "message"),
     [
         (["inflatable_arm", "--motors", "1", "2"], "--motors must be 3 numbers: motor_1 [rad], motor_2 [rad], motor_3 [rad]"),
@@ -457,7 +458,7 @@ def test_export_refuses(words: list[str], message: str, told, tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("word", ["wrist", "wrist=", "wrist=soft", "=20", "wrist=20,far"])
+@each_row("word", ["wrist", "wrist=", "wrist=soft", "=20", "wrist=20,far"])
 def test_export_refuses_words_that_are_no_spring(word: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["export", "arm.urdf", "--spring", word, "-o", "arm.xml"])

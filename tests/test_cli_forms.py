@@ -20,6 +20,7 @@ from softrobots.cli import bench
 from softrobots.cli.main import main
 from softrobots.compiled.run.machines import available_backend
 from softrobots.view.figures import pcc_plots
+from tests.support.tables import each_row
 
 LENGTHS = ("0.50", "0.53", "0.55", "0.54", "0.51", "0.52")
 """Muscle lengths of docs/theory.md 2.3; distance 0.04 m is the default."""
@@ -194,7 +195,7 @@ def test_pcc_fits_more_than_three_muscles_within_a_tolerance(told) -> None:
     assert "miss those of the arcs by up to 0.00025" in out
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "message"),
     [
         (["forward", "0.5", "0.5"], "L must be a multiple of 3 numbers"),
@@ -236,7 +237,7 @@ def test_pcc_refuses(words: list[str], message: str, told, tmp_path: Path, monke
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "message"),
     [
         (["pcc"], "required: FORM"),
@@ -291,7 +292,7 @@ def test_pcc_draws_backbone_and_muscles_as_long_as_they_are() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "message"),
     [
         (lambda arcs: pcc_plots.arm(sr.constant_curvature.Arc(np.ones((2, 2)), 1.0, 0.0)), "those of one chain"),
@@ -448,7 +449,7 @@ def test_helix_limits_are_those_of_theory(answer, told) -> None:
     assert [float(word) for word in row] == pytest.approx((math.radians(2.5), 0.4882, 0.4871), abs=5.1e-5)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "message"),
     [
         (["forward", "--contraction", "1.2"], "contraction"),

@@ -17,6 +17,7 @@ import softrobots as sr
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.view.figures.arm_plots import loaded_shape
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from tests.support.tables import each_row
 
 Told = Callable[..., tuple[int, str, str]]
 
@@ -543,7 +544,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("words", "message"), REFUSED, ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
+@each_row(("words", "message"), REFUSED)
 def test_bad_input_is_refused(
     words: tuple[str, ...], message: str, told: Told, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,6 +21,7 @@ from tests.conftest import missing
 from tests.support.foreign import BRANCHED
 from tests.support.load_cases import cases, directions
 from tests.support.oracles import REFERENCE_EQUILIBRIA, arm_balance, arm_energy
+from tests.support.tables import each_row
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 STIFFNESS = sr.inflated_beam.MEAN_STIFFNESS
@@ -376,7 +377,7 @@ def test_estimates_with_gravity(plain: CompiledModel, rng: np.random.Generator) 
     assert np.max(apart(found.forces[well], forces[well])) < 1e-8
 
 
-@pytest.mark.parametrize("motors", [(0.4, 0.3, 0.0), (0.2, np.pi / 2.0 - 0.4, 0.8)])
+@each_row("motors", [(0.4, 0.3, 0.0), (0.2, np.pi / 2.0 - 0.4, 0.8)])
 def test_hidden_forces_are_said_to_be_hidden(solver: CompiledModel, motors: tuple[float, float, float]) -> None:
     """Without load: along a straight arm; and sideways where the tip is above the first motor."""
     torques = measured(solver.model, np.array([motors]), np.zeros((1, 3)))
@@ -622,7 +623,7 @@ def test_a_first_waypoint_out_of_reach(solver: CompiledModel) -> None:
 # --- What is refused
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "words"),
     [
         (lambda c: c.equilibrium((0.0, 0.0)), "q_motors"),

@@ -19,6 +19,7 @@ from softrobots.description.tag_reader import read_tags
 from softrobots.statics.kinematics import frame_placement
 from tests.conftest import missing
 from tests.support.foreign import INERTIAL, joint
+from tests.support.tables import each_row
 
 XYZ, RPY = (0.02, -0.03, 0.05), (0.3, -1.1, 0.7)
 SMALL: dict[str, Callable[[], object]] = {
@@ -291,7 +292,7 @@ ARM = sr.InflatableArm()
 SECTIONS, LUMPED = SMALL["pcc"](), SMALL["pcc_lumped"]()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "options", "error", "message"),
     [
         ((stand(), "topp", ARM), {}, sr.NameNotFound, r"'topp' \(did you mean 'top'\?\); available: floor, top"),
@@ -325,7 +326,7 @@ def test_what_does_not_fit_is_refused(arguments: tuple, options: dict, error: ty
         sr.mount(*arguments, **options)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("robot", "positions", "error", "message"),
     [
         (ARM, {"motor_9": 0.0}, sr.NameNotFound, "no movable joint is called 'motor_9'"),

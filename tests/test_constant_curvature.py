@@ -21,6 +21,7 @@ from softrobots import constant_curvature as cc
 from softrobots.constant_curvature import Arc
 from softrobots.core.errors import ParameterError
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 FRAMES = ("torsion_free", "bending_plane")
 BENDINGS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, math.pi)
@@ -134,9 +135,9 @@ def _digits():
 # Required: 1e-12 relative. Entries are compared one by one, so that the tilt of a nearly straight arc counts in full.
 
 
-@pytest.mark.parametrize("bending", BENDINGS)
-@pytest.mark.parametrize("frame", FRAMES)
-@pytest.mark.parametrize("azimuth", [0.7, -2.5])
+@each_row("bending", BENDINGS)
+@each_row("frame", FRAMES)
+@each_row("azimuth", [0.7, -2.5])
 def test_pose_of_an_arc_is_exact(bending: float, frame: str, azimuth: float) -> None:
     exact = exact_arc_pose(mp.mpf(0.5), mp.mpf(bending), mp.mpf(azimuth), frame)
     assert worst_error(cc.transform(Arc(0.5, bending, azimuth), frame), exact) < 1e-12
@@ -160,8 +161,8 @@ def test_pose_and_derivatives_by_strains_are_exact(bending: float) -> None:
     assert worst_error(cc.strain_jacobian(strains), exact_jacobian(exact_screw, strains), half_turn) < 1e-12
 
 
-@pytest.mark.parametrize(("frame", "bending"), FRAMES_AND_BENDINGS)
-@pytest.mark.parametrize("azimuths", [cc.AZIMUTHS, UNEVEN, FIVE])
+@each_row(("frame", "bending"), FRAMES_AND_BENDINGS)
+@each_row("azimuths", [cc.AZIMUTHS, UNEVEN, FIVE])
 def test_pose_and_derivatives_by_muscles_are_exact(frame: str, bending: float, azimuths: tuple[float, ...]) -> None:
     lengths = paper_lengths(bending, 0.7, azimuths)
     exact = exact_muscle_pose([mp.mpf(length) for length in lengths], D, azimuths, frame)
@@ -531,7 +532,7 @@ ARC = Arc(0.5, 0.8, 0.7)
 INCONSISTENT = (0.5, 0.52, 0.5, 0.52, 0.5)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "field"),
     [
         (lambda: Arc(-0.5, 0.1, 0.0), "length"),

@@ -23,6 +23,7 @@ from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube, PccArm
 from tests.support.laws import law
 from tests.support.oracles import tube_points
+from tests.support.tables import each_row
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO
 KINDS = (sr.InflatableArm, PccArm, HelixTube)
@@ -236,7 +237,7 @@ def test_collision_shapes_across_a_hinge_do_not_touch(arm: sr.SoftModel) -> None
     assert min(result.min_distance for result in data.distanceResults) > 0.01
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         ({"radios": "0.05"}, "no argument 'radios'; declared: link_lengths, hinge_offset, radius"),
@@ -281,7 +282,7 @@ def robot_with(joint: str = "", inside: str = "") -> str:
     return f'<robot name="r" xmlns:softrobots="{NAMESPACE}"><joint name="j" type="revolute">{joint}</joint>{inside}</robot>'
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         ("<mujoco/>", "root tag <mujoco>; <robot> is required"),
@@ -310,7 +311,7 @@ def test_malformed_tags_are_refused(text: str, message: str) -> None:
         read_tags(text)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("parameters", "field"),
     [
         ({"link_lengths": ()}, "link_lengths"),

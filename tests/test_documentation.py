@@ -23,6 +23,7 @@ from softrobots.cli.main import parser
 from softrobots.compiled import Status
 from tests.conftest import CHECKOUT, missing
 from tests.support.documentation import PageError, PageRunner, blocks, differences, missing_package
+from tests.support.tables import each_row
 
 DOCS = CHECKOUT / "docs"
 PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in DOCS.glob("*.md"))]
@@ -101,7 +102,7 @@ def test_a_good_page_runs(tmp_path: Path) -> None:
     assert runner.module.__name__ not in sys.modules
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("old", "new", "told"),
     [
         ("0.123457", "0.123459", r"page.md:8: the output is another one\ntold    x 0.123459"),
@@ -228,7 +229,7 @@ def test_every_equation_becomes_mathml(name: str, site: Callable[[str], ModuleTy
             equations.display_block(block.text)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("latex", "told"),
     [
         (r"\frac{a", "braces"),

@@ -12,6 +12,7 @@ import softrobots as sr
 from softrobots.statics.elastostatics import METHODS
 from tests.support.laws import law
 from tests.support.oracles import REFERENCE_EQUILIBRIA, arm_energy
+from tests.support.tables import each_row
 
 FORCE = np.array([0.0, 10.0, -15.0])
 angle = st.floats(-3.1, 3.1)
@@ -119,7 +120,7 @@ def test_several_wrenches_superpose_for_small_loads(arm: sr.SoftModel) -> None:
     assert np.allclose(both.q_springs, one.q_springs + other.q_springs, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@each_row("seed", range(4))
 def test_world_fixed_moment_is_not_conservative_and_is_balanced(arm: sr.SoftModel, seed: int) -> None:
     rng = np.random.default_rng(seed)
     motors, wrench = rng.uniform(-2, 2, 3), np.r_[5 * rng.normal(size=3), 4 * rng.normal(size=3)]
@@ -247,7 +248,7 @@ def test_results_are_read_only_and_know_their_inputs(arm: sr.SoftModel) -> None:
     assert np.array_equal(found.eigenvalues, np.sort(found.eigenvalues))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         ({"q_motors": (0, 0)}, "q_motors"),

@@ -13,6 +13,7 @@ from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_rules import check_rules
 from softrobots.export import to_json, to_mjcf, to_pinocchio, to_sdf
 from tests.support.foreign import mass_error
+from tests.support.tables import each_row
 
 Tool = Callable[[str], Any]
 BALL = "0.01 0.01 0.01"
@@ -84,7 +85,7 @@ def test_names_of_the_exporter_give_way(tool: Tool) -> None:
         assert plant.num_positions() == 2
 
 
-@pytest.mark.parametrize(("name", "write"), [("world", to_mjcf), ("world", to_sdf), ("a::b", to_sdf), ("__a__", to_sdf)])
+@each_row(("name", "write"), [("world", to_mjcf), ("world", to_sdf), ("a::b", to_sdf), ("__a__", to_sdf)])
 def test_names_that_a_format_keeps_for_itself_are_refused(name: str, write: Any) -> None:
     with pytest.raises(sr.DescriptionError, match=name):
         write(loaded(two_links(inner=name)))

@@ -16,6 +16,7 @@ from softrobots.view.animation_frames import growth_frames
 from softrobots.view.body import body_at
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.viewer import view
+from tests.support.tables import each_row
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +91,7 @@ def test_the_front_is_straight_at_the_tip_and_formed_behind(tube: sr.HelixTube) 
     assert fresh[:, 3].sum() > formed[:, 3].sum()  # a straight tube is longer
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("length", "front", "field"),
     [(0.0, 0.0, "length"), (1.1, 0.0, "length"), (0.001, 0.0, "length"), (np.nan, 0.0, "length"), (0.5, -0.1, "front")],
 )
@@ -229,7 +230,7 @@ def test_a_distributed_force_needs_sections(arm: sr.SoftModel, model: sr.SoftMod
         sr.distributed_force(model, (0, 0))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("old", "new", "message"),
     [
         ('name="actuator" segment="1"', 'name="actuator" segment="2"', "line 'actuator'.*runs along segment 2; available: 1"),

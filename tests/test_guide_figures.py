@@ -17,6 +17,7 @@ from softrobots import inflated_beam
 from softrobots.inflated_beam import TABLE_3, CharacterisationRow
 from softrobots.view.figures import equilibrium_plots, link_plots
 from tests.conftest import CHECKOUT
+from tests.support.tables import each_row
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}
 
@@ -127,7 +128,7 @@ def test_markers_tell_what_only_the_probe_holds() -> None:
     assert empty.get_markerfacecolor() == "white"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("make", "name"),
     [
         (lambda: link_plots.deflection(10.0, stiffness=172.71, hinge_offset=0.6, pressure=50e3, **TUBE), "hinge_offset"),

@@ -18,6 +18,7 @@ from softrobots import helix
 from softrobots.core.errors import FileFormatError, MissingDependency, OutputExists, ParameterError, StraightTube
 from softrobots.helix import ActuatorTable
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 PRESSURES = (0.0, 10e3, 25e3, 40e3, 60e3)
 LENGTHENING = (0.50, 0.58, 0.71, 0.80, 0.86)  # an inverse pneumatic muscle; invented numbers
@@ -153,7 +154,7 @@ def test_what_spreadsheets_add_is_read(tmp_path: Path) -> None:
 HEAD = "pressure_Pa,contraction\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         ("", "line 1: it names nothing"),
@@ -202,8 +203,8 @@ def test_a_file_that_cannot_be_read_says_so(tmp_path: Path) -> None:
 # --- Bad input
 
 
-@pytest.mark.parametrize("kind", helix.INTERPOLATIONS)
-@pytest.mark.parametrize(
+@each_row("kind", helix.INTERPOLATIONS)
+@each_row(
     ("method", "value", "field", "named"),
     [
         ("contraction_at", 60e3 + 1e-6, "pressure", "0.0 to 60000.0"),
@@ -223,7 +224,7 @@ def test_beyond_the_table_nothing_is_said(kind: str, method: str, value: object,
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("pressure", "contraction", "kind", "field"),
     [
         ([0.0], [0.5], "linear", "pressure"),

@@ -19,6 +19,7 @@ from softrobots.view.figures import helix_plots
 from softrobots.view.figures.helix_sheet import draw
 from tests.conftest import missing
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 PICTURES = {"helix_grid.png", "helix_shapes.png", "helix_grasp.png"}
 TABLES = {"shapes.csv", "contraction_limits.csv", "grasp_forces.csv"}
@@ -150,7 +151,7 @@ def test_a_folder_that_is_not_empty_is_refused(folder: Path, tmp_path: Path, cap
     assert [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()] == ["keep"]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         (["--contractions", "0"], "contraction"),
@@ -316,7 +317,7 @@ def test_grasp_says_that_it_is_a_model() -> None:
 NAN = float("nan")
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "field"),
     [
         (lambda: helix_plots.grid([], ANGLES, D, 1.0), "contractions"),

@@ -22,6 +22,7 @@ from scipy.spatial.distance import cdist
 from softrobots import ParameterError, SoftRobotsError, helix
 from softrobots.core.errors import OutputExists, SelfIntersection
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 DIAMETER = 0.0331
 
@@ -76,7 +77,7 @@ def nearest_over_wall(contraction: float, angle: float) -> float:
 CASES = [(lam, deg) for lam in (0.05, 0.3, 0.5, 0.66, 0.8, 0.97) for deg in (0.3, 2.5, 5.0, 10.0, 30.0, 50.0, 70.0)]
 
 
-@pytest.mark.parametrize(("contraction", "degrees"), CASES)
+@each_row(("contraction", "degrees"), CASES)
 def test_turn_distance_is_the_local_minimum_over_points(contraction: float, degrees: float) -> None:
     angle = math.radians(degrees)
     found = helix.self_contact(helix.forward(contraction, angle, DIAMETER))
@@ -137,8 +138,8 @@ def test_walls_meet_just_below_the_limit_and_not_above(degrees: float) -> None:
     assert helix.self_contact(helix.forward(limit - 0.02 * (1.0 - limit), angle, DIAMETER)).touches
 
 
-@pytest.mark.parametrize("degrees", [2.5, 10.0, 40.0, 48.0, 55.0, 70.0])
-@pytest.mark.parametrize("contraction", [0.05, 0.15, 0.25, 0.4, 0.6, 0.85, 0.98])
+@each_row("degrees", [2.5, 10.0, 40.0, 48.0, 55.0, 70.0])
+@each_row("contraction", [0.05, 0.15, 0.25, 0.4, 0.6, 0.85, 0.98])
 def test_contact_is_found_where_walls_meet(contraction: float, degrees: float) -> None:
     angle = math.radians(degrees)
     found = helix.self_contact(helix.forward(contraction, angle, DIAMETER))
@@ -242,7 +243,7 @@ def test_a_turn_rises_by_the_diameter_at_the_simple_limit(degrees: float) -> Non
     assert all(2.0 * math.pi * centre_line(share, angle)[1] < 1.0 for share in np.linspace(0.001, limit, 50)[:-1])
 
 
-@pytest.mark.parametrize("degrees", [0.0, 72.4, 80.0, 89.9])
+@each_row("degrees", [0.0, 72.4, 80.0, 89.9])
 def test_the_simple_rule_forbids_every_contraction_where_its_limit_is_1(degrees: float) -> None:
     angle = math.radians(degrees)
     assert float(helix.simple_contraction_limit(angle)) == 1.0
@@ -346,10 +347,8 @@ def test_the_ends_of_a_planar_arc_meet_when_their_chord_is_a_diameter(contractio
     assert found.touches.tolist() == [False, False, False, True, True, True, True]
 
 
-@pytest.mark.parametrize(
-    ("contraction", "degrees"), [(0.3, 5.0), (0.45, 2.5), (0.2, 10.0), (0.6, 1.0), (0.15, 30.0), (0.66, 5.0)]
-)
-@pytest.mark.parametrize("count", [0.3, 0.6, 0.75, 0.85, 0.93, 0.97, 1.0, 2.0])
+@each_row(("contraction", "degrees"), [(0.3, 5.0), (0.45, 2.5), (0.2, 10.0), (0.6, 1.0), (0.15, 30.0), (0.66, 5.0)])
+@each_row("count", [0.3, 0.6, 0.75, 0.85, 0.93, 0.97, 1.0, 2.0])
 def test_short_tubes_have_what_their_length_allows(contraction: float, degrees: float, count: float) -> None:
     """All pairs of points of the tube that are farther along it than the hump of the distance."""
     angle = math.radians(degrees)
@@ -400,7 +399,7 @@ def test_the_sentence_says_what_touches_and_by_how_much() -> None:
     assert numbers == pytest.approx([extremes[2], DIAMETER - extremes[2], DIAMETER], rel=3e-3)  # three digits
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("contraction", "degrees", "turns", "said"),
     [
         (0.66, 5.0, math.inf, "does not touch itself: the centre lines"),
@@ -442,7 +441,7 @@ def test_a_warning_points_at_the_caller() -> None:
     assert caught[0].filename == __file__
 
 
-@pytest.mark.parametrize(("contraction", "on_contact"), [(0.3, "ignore"), (0.9, "warn"), (0.9, "error"), (0.9, "ignore")])
+@each_row(("contraction", "on_contact"), [(0.3, "ignore"), (0.9, "warn"), (0.9, "error"), (0.9, "ignore")])
 def test_nothing_is_said_without_contact_or_where_asked_not_to(contraction: float, on_contact: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -462,16 +461,14 @@ def test_a_short_tube_passes_the_check_that_an_endless_one_fails() -> None:
 GOOD = helix.forward(0.66, math.radians(5.0), DIAMETER)
 
 
-@pytest.mark.parametrize(
-    "turns", [0.0, -1.0, math.nan, -math.inf, [math.inf, math.nan], "many", None, True, 1j, [[1.0], [1.0, 2.0]]]
-)
+@each_row("turns", [0.0, -1.0, math.nan, -math.inf, [math.inf, math.nan], "many", None, True, 1j, [[1.0], [1.0, 2.0]]])
 def test_bad_turns_are_refused(turns: Any) -> None:
     with pytest.raises(ParameterError, match="turns"):
         helix.self_contact(GOOD, turns)
 
 
-@pytest.mark.parametrize("check", [helix.self_contact, helix.check_self_contact])
-@pytest.mark.parametrize("shape", [None, (0.08, 0.05, 0.03), "helix"])
+@each_row("check", [helix.self_contact, helix.check_self_contact])
+@each_row("shape", [None, (0.08, 0.05, 0.03), "helix"])
 def test_what_is_no_helix_is_refused(check: Any, shape: Any) -> None:
     with pytest.raises(ParameterError, match="HelixShape"):
         check(shape)
@@ -484,20 +481,20 @@ def test_shapes_that_do_not_broadcast_are_refused() -> None:
         helix.contraction_limit([0.1, 0.2], [1.0, 1.0, 1.0])
 
 
-@pytest.mark.parametrize("on_contact", ["raise", "", None, 1])
+@each_row("on_contact", ["raise", "", None, 1])
 def test_an_unknown_choice_is_refused_before_anything_is_computed(on_contact: Any) -> None:
     with pytest.raises(ParameterError, match="'error', 'warn', 'ignore'"):
         helix.check_self_contact(GOOD, on_contact=on_contact)
 
 
-@pytest.mark.parametrize("limit", [helix.contraction_limit, helix.simple_contraction_limit])
-@pytest.mark.parametrize("angle", [-1e-9, 0.5 * math.pi, 2.0, math.nan, math.inf, "steep", None, [0.1, math.nan]])
+@each_row("limit", [helix.contraction_limit, helix.simple_contraction_limit])
+@each_row("angle", [-1e-9, 0.5 * math.pi, 2.0, math.nan, math.inf, "steep", None, [0.1, math.nan]])
 def test_bad_angles_are_refused(limit: Any, angle: Any) -> None:
     with pytest.raises(ParameterError, match="angle"):
         limit(angle)
 
 
-@pytest.mark.parametrize("diameter", [0.0, -0.03, math.nan, math.inf, "thick"])
+@each_row("diameter", [0.0, -0.03, math.nan, math.inf, "thick"])
 def test_bad_diameters_are_refused(diameter: Any) -> None:
     with pytest.raises(ParameterError, match="diameter"):
         helix.contraction_limit(0.1, diameter)

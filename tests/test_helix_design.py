@@ -19,6 +19,7 @@ from softrobots import helix
 from softrobots.core.errors import FileFormatError, OutputExists, ParameterError, SelfIntersection
 from softrobots.helix import DesignWarning, HelixDesign, Wish
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 D = 0.0331  # the paper's tube
 TURN = 2.0 * math.pi
@@ -333,7 +334,7 @@ def saved(path: Path) -> dict[str, Any]:
     return document
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "words"),
     [
         ({"contraction": 1.5}, "contraction"),
@@ -370,7 +371,7 @@ def test_a_file_that_lacks_something_says_what(name: str, tmp_path: Path):
         HelixDesign.load(path)
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b"[1, 2]", b"3", b"\xff\xfe\x00", b" " * 1_000_001, b"[" * 100_000])
+@each_row("content", [b"", b"{", b"[1, 2]", b"3", b"\xff\xfe\x00", b" " * 1_000_001, b"[" * 100_000])
 def test_a_file_that_is_no_design_is_refused(content: bytes, tmp_path: Path):
     path = tmp_path / "design.json"
     path.write_bytes(content)
@@ -388,7 +389,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path):
 # --- Bad input
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "field"),
     [
         ({"object_radius": 0.0}, "object_radius"),
@@ -421,14 +422,14 @@ def test_a_bad_wish_is_refused(change: dict[str, Any], field: str):
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize(("radius", "field"), [(0.0, "radius"), (-0.1, "radius"), ("wide", "radius"), (True, "radius")])
+@each_row(("radius", "field"), [(0.0, "radius"), (-0.1, "radius"), ("wide", "radius"), (True, "radius")])
 def test_a_bad_antenna_is_refused(radius: Any, field: str):
     with pytest.raises(ParameterError) as caught:
         helix.design_antenna(radius, 0.08, diameter=D, turns=1.5)
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize(
+@each_row(
     "wish",
     [
         "grasp",

@@ -22,6 +22,7 @@ from softrobots import helix
 from softrobots.core.errors import OutputExists, ParameterError
 from softrobots.helix import Pattern, pinch_pattern, write_template, write_template_pages, write_template_table
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 D = 0.0331  # the paper's tube
 REFERENCE = (0.66, math.radians(5.0), D, 1.2)
@@ -47,7 +48,7 @@ def test_gap_and_contraction_are_inverse(contraction: float, stopper: float):
     assert float(helix.contraction_from_stoppers(stopper, gap)) == pytest.approx(contraction, rel=1e-14)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "arguments"),
     [
         (helix.contraction_from_stoppers, (0.0, 0.01)),
@@ -105,9 +106,9 @@ def test_a_length_of_whole_periods_loses_none_to_rounding():
         assert (plan.count, plan.plain_end) == (count, 0.0)
 
 
-@pytest.mark.parametrize("hand", ["right", "left"])
-@pytest.mark.parametrize("azimuth", [0.0, 2.0, -1.0, 40.0])
-@pytest.mark.parametrize("angle", [0.0, 0.1, 1.2])
+@each_row("hand", ["right", "left"])
+@each_row("azimuth", [0.0, 2.0, -1.0, 40.0])
+@each_row("angle", [0.0, 0.1, 1.2])
 def test_rolled_up_the_points_lie_on_the_helix_of_the_line(hand: str, azimuth: float, angle: float):
     plan = pinch_pattern((0.66, angle, D, 0.6), 0.011, handedness=hand, start_azimuth=azimuth)
     sign = 1.0 if hand == "right" else -1.0
@@ -603,7 +604,7 @@ def refused(call: Callable[[], Any]) -> ParameterError:
     return caught.value
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "field", "requirement"),
     [
         ({"actuator": (1.0, 0.1, D, 1.0)}, "contraction", "below 1: at 1 there is nothing to pinch"),
@@ -681,13 +682,13 @@ def test_the_shapes_that_do_not_fit_are_told(call: Callable[..., Any], arguments
     assert (error.field, error.value) == (field, ((2,), (3,)))
 
 
-@pytest.mark.parametrize("arc", [-0.01, 10.0, math.nan, "far"])
+@each_row("arc", [-0.01, 10.0, math.nan, "far"])
 def test_points_off_the_line_are_refused(arc: Any):
     with pytest.raises(ParameterError, match="arc"):
         pinch_pattern(REFERENCE, 0.02).locate(arc)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "arguments"),
     [
         (helix.shape_error, ("plan",)),
@@ -702,7 +703,7 @@ def test_a_shape_error_of_nothing_is_refused(call: Callable[..., Any], arguments
         call(*arguments)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "field"),
     [
         ({"page_length": 0.0}, "page_length"),

@@ -15,6 +15,7 @@ from softrobots import helix
 from softrobots.core.errors import ParameterError
 from softrobots.helix import PAPER_CYLINDER, GraspForce, grasp_force
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 PAPER: dict[str, Any] = {
     "object_radius": PAPER_CYLINDER.object_radius,
@@ -231,7 +232,7 @@ def test_the_result_is_frozen() -> None:
         grasp.force = 1.0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "field"),
     [
         ({"pressure": -1.0}, "pressure"),

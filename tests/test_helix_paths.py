@@ -30,6 +30,7 @@ from tests.support.helix_forms import (
     length_by_chords,
 )
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 # Paper's reference; inner path beyond the axis, and on it; straight; planar; the actuator across more than along; tight; wide.
 ACTUATORS = [
@@ -567,8 +568,8 @@ NUMBERS = (0.0854, 0.0523, 0.028)
 BY_SHAPE = [helix.points, helix.tangents, helix.normals, helix.binormals, helix.frames]
 
 
-@pytest.mark.parametrize("function", BY_SHAPE)
-@pytest.mark.parametrize(
+@each_row("function", BY_SHAPE)
+@each_row(
     ("arguments", "field"),
     [
         ((NUMBERS, 0.0), "shape"),
@@ -590,7 +591,7 @@ def test_curves_refuse_bad_input(function: Callable[..., Any], arguments: tuple[
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize(
+@each_row(
     "function",
     [
         helix.actuator_curvature_torsion,
@@ -599,7 +600,7 @@ def test_curves_refuse_bad_input(function: Callable[..., Any], arguments: tuple[
         lambda *arguments: helix.actuator_tension(*arguments, 1e4),
     ],
 )
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "field"),
     [
         ((0.0, 0.1, D), "contraction"),
@@ -620,7 +621,7 @@ def test_actuators_out_of_range_are_refused(function: Callable[..., Any], argume
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "field"),
     [
         (lambda: helix.curvature_torsion(NUMBERS), "shape"),

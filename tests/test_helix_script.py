@@ -12,6 +12,7 @@ import pytest
 import softrobots as sr
 from softrobots.view import animation_frames
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 
 @pytest.fixture(autouse=True)
@@ -81,7 +82,7 @@ def test_a_wish_that_cannot_be_made_is_refused_or_moved(tmp_path: Path, capsys: 
     assert summary["turn_height_m"] > 0.033  # turns a diameter apart, nearly above each other
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         (["--contraction", "1.2"], "contraction"),

@@ -34,6 +34,7 @@ from tests.support.helix_forms import (
     length_by_chords,
 )
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 DIAMETERS = (1e-3, D, 1.0, 1e3)
 
@@ -86,8 +87,8 @@ def _digits():
 # --- The paper's formulas over the whole domain
 
 
-@pytest.mark.parametrize("contraction", CONTRACTIONS)
-@pytest.mark.parametrize("diameter", DIAMETERS)
+@each_row("contraction", CONTRACTIONS)
+@each_row("diameter", DIAMETERS)
 def test_forward_is_the_papers_12_to_the_last_digits(contraction: float, diameter: float) -> None:
     """Not only to the condition number: of the inputs as they are, each path to the rounding of its own size `|R + i b|`."""
     angles = [angle for angle in ANGLES if (contraction, angle) != (1.0, 0.0)]
@@ -134,8 +135,8 @@ INNER = (1 - 1e-12, 0.999, 0.6, 1e-5, 1e-30, 0.0, -1e-9, -0.3, -0.999, -(1 - 1e-
 PITCHES = (1e-12, 1e-6, 0.01, 0.3, 1.0, 50.0, 1e6)
 
 
-@pytest.mark.parametrize("inner", INNER)
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 300.0])
+@each_row("inner", INNER)
+@each_row("scale", [1e-3, 1.0, 300.0])
 def test_inverse_is_the_papers_and_forward_of_it_is_the_shape(inner: float, scale: float) -> None:
     for pitch in PITCHES:
         shape = HelixShape(scale, inner * scale, pitch * scale)
@@ -189,8 +190,8 @@ def test_centre_line_never_passes_the_axis(contraction: float, angle: float, dia
 # --- Limits
 
 
-@pytest.mark.parametrize("angle", [1e-15, 1e-6, 5 * DEG, 45 * DEG, 1.5, math.pi / 2 - 1e-9])
-@pytest.mark.parametrize("diameter", DIAMETERS)
+@each_row("angle", [1e-15, 1e-6, 5 * DEG, 45 * DEG, 1.5, math.pi / 2 - 1e-9])
+@each_row("diameter", DIAMETERS)
 def test_a_full_length_actuator_winds_around_a_straight_tube(angle: float, diameter: float) -> None:
     shape = helix.forward(1.0, angle, diameter)
     assert float(shape.outer_radius) == diameter / 2
@@ -200,8 +201,8 @@ def test_a_full_length_actuator_winds_around_a_straight_tube(angle: float, diame
     assert float(helix.inverse(shape).contraction) == 1.0
 
 
-@pytest.mark.parametrize("contraction", CONTRACTIONS[:-1])
-@pytest.mark.parametrize("diameter", DIAMETERS)
+@each_row("contraction", CONTRACTIONS[:-1])
+@each_row("diameter", DIAMETERS)
 def test_an_actuator_along_the_tube_makes_a_planar_arc(contraction: float, diameter: float) -> None:
     shape = helix.forward(contraction, 0.0, diameter)
     exact = mp.mpf(diameter) / (1 - mp.mpf(contraction))
@@ -461,7 +462,7 @@ NAN, INF = float("nan"), float("inf")
 CIRCLE = 2 * np.pi
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "field"),
     [
         (lambda: helix.forward(0.0, 0.1, D), "contraction"),

@@ -34,6 +34,7 @@ from softrobots.statics.kinematics import frame_placement
 from softrobots.view.body import body_at
 from tests.support.helix_rods import actuator_frames, gauss
 from tests.support.laws import law
+from tests.support.tables import each_row
 from tests.support.urdf_reading import changed, check_portable, edited, gazebo_numbers, link_masses, link_poses, within_joint
 
 DEG = math.pi / 180.0
@@ -482,7 +483,7 @@ def test_sections_of_a_grown_tube_are_not_longer_than_before() -> None:
     assert HelixTube(elastic_sections=24).grown(0.5).elastic_sections == 8
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("robot", "length", "field"),
     [
         (HelixTube(), 0.0, "length"),
@@ -519,71 +520,71 @@ def test_a_tube_that_would_grow_into_itself_is_refused() -> None:
 NAN, INF = float("nan"), float("inf")
 
 
-@pytest.mark.parametrize(
-    ("parameters", "field"),
-    [
-        ({"length": 0.0}, "length"),
-        ({"length": -1.5}, "length"),
-        ({"length": NAN}, "length"),
-        ({"length": "1.5"}, "length"),
-        ({"length": (1.5, 1.5)}, "length"),
-        ({"length": None}, "length"),
-        ({"length": 400.0}, "length"),  # 1000 sections are too few
-        ({"diameter": 0.0}, "diameter"),
-        ({"diameter": -0.03}, "diameter"),
-        ({"diameter": INF}, "diameter"),
-        ({"diameter": True}, "diameter"),
-        ({"contraction": 0.0}, "contraction"),
-        ({"contraction": -0.5}, "contraction"),
-        ({"contraction": 1.0 + 2.0**-52}, "contraction"),
-        ({"contraction": NAN}, "contraction"),
-        ({"angle": -1e-9}, "angle"),
-        ({"angle": math.pi / 2}, "angle"),
-        ({"angle": 5.0}, "angle"),
-        ({"angle": NAN}, "angle"),
-        ({"handedness": "Right"}, "handedness"),
-        ({"handedness": 1}, "handedness"),
-        ({"handedness": None}, "handedness"),
-        ({"upright": "base"}, "upright"),
-        ({"upright": None}, "upright"),
-        ({"upright": "axis", "angle": 0.0, "contraction": 1.0 - 1e-9}, "upright"),  # an axis 33000 km away
-        ({"pressure": -1.0}, "pressure"),
-        ({"pressure": NAN}, "pressure"),
-        ({"wall_thickness": 0.0}, "wall_thickness"),
-        ({"wall_thickness": 0.0017}, "wall_thickness"),
-        ({"young_modulus": 0.0}, "young_modulus"),
-        ({"young_modulus": INF}, "young_modulus"),
-        ({"poisson_ratio": -1.0}, "poisson_ratio"),
-        ({"poisson_ratio": 0.51}, "poisson_ratio"),
-        ({"density": 0.0}, "density"),
-        ({"actuator_density": -0.01}, "actuator_density"),
-        ({"bending_stiffness": 0.0}, "bending_stiffness"),
-        ({"bending_stiffness": "stiff"}, "bending_stiffness"),
-        ({"torsional_stiffness": -1.0}, "torsional_stiffness"),
-        ({"torsional_stiffness": NAN}, "torsional_stiffness"),
-        ({"axial_stiffness": INF}, "axial_stiffness"),
-        ({"axial_stiffness": False}, "axial_stiffness"),
-        ({"chain": "rigid"}, "chain"),
-        ({"chain": None}, "chain"),
-        ({"elastic_sections": 0}, "elastic_sections"),
-        ({"elastic_sections": 12.0}, "elastic_sections"),
-        ({"elastic_sections": 1001}, "elastic_sections"),
-        ({"elastic_sections": 4}, "elastic_sections"),  # too few for 2.7 turns
-        ({"hinges": -3}, "hinges"),
-        ({"hinges": "24"}, "hinges"),
-        ({"hinges": 1001}, "hinges"),
-        ({"hinge_rule": "start"}, "hinge_rule"),
-        ({"torsion": 1}, "torsion"),
-        ({"extension": "false"}, "extension"),
-        ({"rgba": (1.0, 0.0, 0.0)}, "rgba"),
-        ({"rgba": (1.0, 0.0, 0.0, 1.1)}, "rgba"),
-        ({"rgba": "blue"}, "rgba"),
-        ({"damping_time": -0.1}, "damping_time"),
-        ({"base_mass": 0.0}, "base_mass"),
-        ({"allow_self_contact": 1}, "allow_self_contact"),
-        ({"allow_self_contact": None}, "allow_self_contact"),
-    ],
-)
+BAD_PARAMETERS: list[tuple[dict[str, object], str]] = [
+    ({"length": 0.0}, "length"),
+    ({"length": -1.5}, "length"),
+    ({"length": NAN}, "length"),
+    ({"length": "1.5"}, "length"),
+    ({"length": (1.5, 1.5)}, "length"),
+    ({"length": None}, "length"),
+    ({"length": 400.0}, "length"),  # 1000 sections are too few
+    ({"diameter": 0.0}, "diameter"),
+    ({"diameter": -0.03}, "diameter"),
+    ({"diameter": INF}, "diameter"),
+    ({"diameter": True}, "diameter"),
+    ({"contraction": 0.0}, "contraction"),
+    ({"contraction": -0.5}, "contraction"),
+    ({"contraction": 1.0 + 2.0**-52}, "contraction"),
+    ({"contraction": NAN}, "contraction"),
+    ({"angle": -1e-9}, "angle"),
+    ({"angle": math.pi / 2}, "angle"),
+    ({"angle": 5.0}, "angle"),
+    ({"angle": NAN}, "angle"),
+    ({"handedness": "Right"}, "handedness"),
+    ({"handedness": 1}, "handedness"),
+    ({"handedness": None}, "handedness"),
+    ({"upright": "base"}, "upright"),
+    ({"upright": None}, "upright"),
+    ({"upright": "axis", "angle": 0.0, "contraction": 1.0 - 1e-9}, "upright"),  # an axis 33000 km away
+    ({"pressure": -1.0}, "pressure"),
+    ({"pressure": NAN}, "pressure"),
+    ({"wall_thickness": 0.0}, "wall_thickness"),
+    ({"wall_thickness": 0.0017}, "wall_thickness"),
+    ({"young_modulus": 0.0}, "young_modulus"),
+    ({"young_modulus": INF}, "young_modulus"),
+    ({"poisson_ratio": -1.0}, "poisson_ratio"),
+    ({"poisson_ratio": 0.51}, "poisson_ratio"),
+    ({"density": 0.0}, "density"),
+    ({"actuator_density": -0.01}, "actuator_density"),
+    ({"bending_stiffness": 0.0}, "bending_stiffness"),
+    ({"bending_stiffness": "stiff"}, "bending_stiffness"),
+    ({"torsional_stiffness": -1.0}, "torsional_stiffness"),
+    ({"torsional_stiffness": NAN}, "torsional_stiffness"),
+    ({"axial_stiffness": INF}, "axial_stiffness"),
+    ({"axial_stiffness": False}, "axial_stiffness"),
+    ({"chain": "rigid"}, "chain"),
+    ({"chain": None}, "chain"),
+    ({"elastic_sections": 0}, "elastic_sections"),
+    ({"elastic_sections": 12.0}, "elastic_sections"),
+    ({"elastic_sections": 1001}, "elastic_sections"),
+    ({"elastic_sections": 4}, "elastic_sections"),  # too few for 2.7 turns
+    ({"hinges": -3}, "hinges"),
+    ({"hinges": "24"}, "hinges"),
+    ({"hinges": 1001}, "hinges"),
+    ({"hinge_rule": "start"}, "hinge_rule"),
+    ({"torsion": 1}, "torsion"),
+    ({"extension": "false"}, "extension"),
+    ({"rgba": (1.0, 0.0, 0.0)}, "rgba"),
+    ({"rgba": (1.0, 0.0, 0.0, 1.1)}, "rgba"),
+    ({"rgba": "blue"}, "rgba"),
+    ({"damping_time": -0.1}, "damping_time"),
+    ({"base_mass": 0.0}, "base_mass"),
+    ({"allow_self_contact": 1}, "allow_self_contact"),
+    ({"allow_self_contact": None}, "allow_self_contact"),
+]
+
+
+@each_row(("parameters", "field"), BAD_PARAMETERS)
 def test_bad_parameters_of_the_tube_are_refused(parameters: dict, field: str) -> None:
     with pytest.raises(sr.ParameterError, match=field) as caught:
         HelixTube(**parameters)
@@ -591,11 +592,10 @@ def test_bad_parameters_of_the_tube_are_refused(parameters: dict, field: str) ->
 
 
 def test_every_field_is_tested_with_bad_values() -> None:
-    (mark,) = (m for m in test_bad_parameters_of_the_tube_are_refused.pytestmark if m.name == "parametrize")
-    assert {field for _, field in mark.args[1]} == {field.name for field in dataclasses.fields(HelixTube)}
+    assert {field for _, field in BAD_PARAMETERS} == {field.name for field in dataclasses.fields(HelixTube)}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         ({"lenght": "1.5"}, "no argument 'lenght'; declared: length, diameter"),
@@ -755,14 +755,14 @@ MOVED = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), MOVED)
+@each_row(("change", "message"), MOVED)
 def test_files_whose_joints_are_not_at_the_rest_shape_are_refused(change: Callable, message: str) -> None:
     sr.load_model(one_section())
     with pytest.raises(sr.DescriptionError, match=message):
         sr.load_model(edited(one_section(), change))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "change", "message"),
     [
         (one_section, changed("section", SECTION, rest="0 12 5"), "a positive stretch are required"),

@@ -15,6 +15,7 @@ import softrobots as sr
 from tests.conftest import load_script
 from tests.support.helix_rods import actuator_frames
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 
 def script() -> ModuleType:
@@ -95,7 +96,7 @@ def test_its_closed_form_is_the_helix_and_its_grid_is_the_papers() -> None:
         assert np.allclose(script().analytic(tube, places), exact, atol=1e-13, rtol=0)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         (["--cases", "-1"], "--cases"),

@@ -21,6 +21,7 @@ from softrobots import helix
 from softrobots.core.errors import MissingDependency, ParameterError
 from softrobots.helix import bent_tube
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 D = 0.0331
 LENGTH = 1.5
@@ -315,7 +316,7 @@ def test_the_result_is_frozen() -> None:
 # --- Bad input
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("function", "position", "said"),
     [
         (lambda s: 0.5 + s, 0.75, "in (0, 1]"),
@@ -354,7 +355,7 @@ def test_an_angle_out_of_range_is_refused(value: float) -> None:
         assert caught.value.field == "angle"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "field"),
     [
         ({"contraction": 0.0}, "contraction"),

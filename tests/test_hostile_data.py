@@ -37,6 +37,7 @@ from tests.conftest import CHECKOUT, load_script
 from tests.support import hostile_data as data
 from tests.support.hostile import HOSTILE_NUMBERS
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 SECONDS = 1.0
 """CPU time of a refusal [s]. Measured: 0.1 s at most, in the largest YAML file."""
@@ -87,7 +88,7 @@ def test_damaged_files_are_refused_or_valid(reader: str, seed: int, tmp_path_fac
     assert time.process_time() - start < SECONDS
 
 
-@pytest.mark.parametrize("reader", data.READERS)
+@each_row("reader", data.READERS)
 def test_what_is_not_damaged_is_read(reader: str, tmp_path: Path) -> None:
     corpus, _, read, ending = data.READERS[reader]
     for content in corpus():
@@ -118,14 +119,14 @@ def loop(path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("read", [sr.read_waypoints, sr.load_result, HelixDesign.load, read_parameters])
+@each_row("place", PLACES)
+@each_row("read", [sr.read_waypoints, sr.load_result, HelixDesign.load, read_parameters])
 def test_what_is_no_file_is_refused_at_once(read: Callable[[Path], object], place: str, tmp_path: Path) -> None:
     refused(read, PLACES[place](tmp_path), "^cannot read |the most that is read|it names nothing")
 
 
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-32", "cp037"])
-@pytest.mark.parametrize(
+@each_row("encoding", ["utf-16", "utf-16-le", "utf-32", "cp037"])
+@each_row(
     ("read", "name", "text"),
     [
         (sr.read_waypoints, "a.csv", PATH),
@@ -155,7 +156,7 @@ def test_a_pipe_that_somebody_writes_to_is_read(tmp_path: Path) -> None:
 # --- CSV
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         (PATH + "2,1,2,5\0\n", "a character of number 0"),
@@ -176,14 +177,13 @@ def test_a_pipe_that_somebody_writes_to_is_read(tmp_path: Path) -> None:
         (PATH + "2,1e31,2,3\n", "at most 1e"),
         (PATH + "1,1,2,3\n", "increasing"),
     ],
-    ids=range(14),
 )
 def test_tables_that_are_made_to_do_harm(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     refused(sr.read_waypoints, tmp_path / "a.csv", message)
 
 
-@pytest.mark.parametrize("number", [number for number in HOSTILE_NUMBERS if not number.strip(" +0123456789.e-")])
+@each_row("number", [number for number in HOSTILE_NUMBERS if not number.strip(" +0123456789.e-")])
 def test_a_number_is_what_a_table_says_or_refused(number: str, tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text(f'x,y,z\n1,2,"{number}"\n1,2,3\n', encoding="utf-8")
@@ -244,8 +244,8 @@ def test_json_that_python_takes_or_dies_of(reader: str, text: str, message: str,
     refused(read, tmp_path / name, message)
 
 
-@pytest.mark.parametrize("text", ["", "null", "[]", "3", '"robot"', "true"])
-@pytest.mark.parametrize("reader", ["design", "benchmark", "parameters"])
+@each_row("text", ["", "null", "[]", "3", '"robot"', "true"])
+@each_row("reader", ["design", "benchmark", "parameters"])
 def test_json_that_is_no_object(reader: str, text: str, tmp_path: Path) -> None:
     read, name = JSON_READERS[reader]
     (tmp_path / name).write_text(text, encoding="utf-8")
@@ -264,7 +264,7 @@ def test_figures_that_no_unit_can_tell_are_refused(figure: str, tmp_path: Path) 
 # --- YAML
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         ("a: &a [1, 1]\nb: &b [*a, *a]\n", "line 1: no anchors"),  # a few lines more make billions
@@ -303,7 +303,6 @@ def test_figures_that_no_unit_can_tell_are_refused(figure: str, tmp_path: Path) 
         ("a: 'b\n", "unexpected end"),
         ("a: b: c\n", "not allowed here"),
     ],
-    ids=range(35),
 )
 def test_parameter_files_that_are_made_to_do_harm(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
@@ -350,7 +349,7 @@ class Harm:
         return opens, (self.path,)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("content", "message"),
     [
         (with_header(described("(10000000000000,)")), "has not the size"),
@@ -371,7 +370,6 @@ class Harm:
         (b"\x93NUMPY", ""),
         (b"not an array", ""),
     ],
-    ids=range(17),
 )
 def test_arrays_that_claim_what_they_are_not(content: bytes, message: str, tmp_path: Path) -> None:
     file = archive(
@@ -392,9 +390,7 @@ def test_a_pickle_is_never_loaded(tmp_path: Path) -> None:
     assert proof.exists()  # it is one that does harm
 
 
-@pytest.mark.parametrize(
-    "name", ["../../outside.npy", "/outside.npy", "a/b.npy", "a.txt", "a", "..npy", "C:\\a.npy", "a\nb.npy"]
-)
+@each_row("name", ["../../outside.npy", "/outside.npy", "a/b.npy", "a.txt", "a", "..npy", "C:\\a.npy", "a\nb.npy"])
 def test_names_that_lead_elsewhere_are_refused(name: str, tmp_path: Path) -> None:
     file = archive(tmp_path / "a.npz", [("kind.npy", member("equilibrium")), (name, member(1.0))])
     refused(sr.load_result, file, "a member called")
@@ -484,7 +480,7 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
     refused(sr.load_result, saved(tmp_path, "equilibrium", {"urdf": np.array("/dev/zero")}), "its urdf is no URDF text")
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("kind", "changes", "message"),
     [
         ("equilibrium", {"kind": None}, "has no 'kind'"),
@@ -509,13 +505,12 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("workspace_map", {"grid_x": np.array([0.8, 0.6])}, "increasing"),
         ("ik_solution", {"steps": np.array(2.5)}, "counts in something else"),
     ],
-    ids=range(21),
 )
 def test_results_that_claim_what_they_are_not(kind: str, changes: dict[str, Any], message: str, tmp_path: Path) -> None:
     refused(sr.load_result, saved(tmp_path, kind, changes), message)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@each_row("kind", KINDS)
 def test_cut_off_anywhere_a_result_is_refused(kind: str, tmp_path: Path) -> None:
     content = data.result_corpus()[list(KINDS).index(kind)]
     for end in range(0, len(content), len(content) // 12):
@@ -610,7 +605,7 @@ def test_a_watched_file_may_lie_about_its_size(arm: sr.SoftModel, monkeypatch: p
 # --- The command line
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "message"),
     [
         (["link_lengths=[" + "1," * 20_000 + "]"], "at most 1000"),
@@ -628,7 +623,6 @@ def test_a_watched_file_may_lie_about_its_size(arm: sr.SoftModel, monkeypatch: p
         (["radius=${1+1}"], "radius"),
         (["rgba=[1,2,3,4]"], "rgba"),
     ],
-    ids=range(14),
 )
 def test_values_of_parameters_that_are_made_to_do_harm(words: list[str], message: str, told) -> None:
     start = time.process_time()

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots import inflated_beam
 from tests.support.closed_form_calls import ARC, CALLS, DESIGN, PLAN, SHAPE
+from tests.support.tables import each_row
 
 
 class Thrower:
@@ -117,7 +118,7 @@ def test_any_numbers_give_finite_numbers_or_an_error(name: str, data: st.DataObj
         answered(call, arguments | {key: data.draw(st.lists(NUMBERS, min_size=1, max_size=4))})
 
 
-@pytest.mark.parametrize("name", CALLS)
+@each_row("name", CALLS)
 def test_anything_else_gives_an_answer_or_an_error(name: str) -> None:
     """Every argument replaced by every thing that is no number, or one in an unusual form."""
     call, arguments = CALLS[name]

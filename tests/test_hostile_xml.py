@@ -54,6 +54,7 @@ from tests.support.hostile_descriptions import (
     urdf_corpus,
 )
 from tests.support.hostile_xml_cases import BOMB, REFUSED, ROBOT, VALID, fixed, mjcf
+from tests.support.tables import each_row
 
 Corpus = Callable[[], list[bytes]]
 Read = Callable[[Path], None]
@@ -113,7 +114,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict]:
     return {Path(line["file"]).stem: line for line in lines}
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@each_row("name", REFUSED)
 def test_hostile_file_is_refused_at_once(name: str, outcomes: dict[str, dict]) -> None:
     assert name in outcomes, f"the process ended before or at this file; read were {len(outcomes)}"
     outcome = outcomes[name]
@@ -132,7 +133,7 @@ def test_unusual_file_is_read(name: str, outcomes: dict[str, dict]) -> None:
 # --- Damage at random
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("corpus", "read", "damage", "cases"),
     [
         (urdf_corpus, read_description, damaged_xml, 30),
@@ -144,7 +145,6 @@ def test_unusual_file_is_read(name: str, outcomes: dict[str, dict]) -> None:
         (obj, read_mesh, damaged_bytes, 15),
         (dae, read_mesh, damaged_xml, 15),
     ],
-    ids=["URDF", "URDF text", "MJCF", "SDF", "mount", "STL", "OBJ", "DAE"],
 )
 def test_damaged_file_is_refused_or_read(corpus: Corpus, read: Read, damage: Damage, cases: int, tmp_path: Path) -> None:
     """Anything else that is raised, a number that is not finite, and a reader that takes long, fails."""
@@ -176,7 +176,7 @@ def test_damaged_file_is_refused_or_read(corpus: Corpus, read: Read, damage: Dam
 # --- What is read is what is written
 
 
-@pytest.mark.parametrize("text", [*HOSTILE_NUMBERS, "1", "-1.5", ".5", "5.", "+2e-3", "1E5", " 3 "])
+@each_row("text", [*HOSTILE_NUMBERS, "1", "-1.5", ".5", "5.", "+2e-3", "1E5", " 3 "])
 def test_numbers_are_read_as_xml_spells_them(text: str) -> None:
     """Python's own float() is the other reader: what it makes a number of is that number here, or none."""
     try:
@@ -191,7 +191,7 @@ def test_numbers_are_read_as_xml_spells_them(text: str) -> None:
         assert math.isnan(value)
 
 
-@pytest.mark.parametrize("value", ["nan", "inf", "1,5", "0x1", "", "1_0", "1e31", "1 2"])
+@each_row("value", ["nan", "inf", "1,5", "0x1", "", "1_0", "1e31", "1 2"])
 def test_a_mass_that_is_none_is_not_left_out(value: str) -> None:
     """Pinocchio's own parser takes the link for one without mass, and says nothing: that is why it is looked at before."""
     text = BRANCHED.replace('mass value="0.5"', f'mass value="{value}"')
@@ -296,7 +296,7 @@ def test_a_mesh_of_another_kind_is_left_out_and_the_kinds_are_told(tmp_path: Pat
         assert RobotShapes(sr.load_model(drawn(str(file)), springs={})).shapes == ()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("old", "new", "told"),
     [
         ("0 0 0 1 0 0", "0 0 0 1 0 zero", "many numbers as it says"),

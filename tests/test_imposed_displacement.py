@@ -16,6 +16,7 @@ from softrobots import inflated_beam
 from softrobots.statics.imposed_displacement import imposed_at
 from softrobots.statics.loads import Load
 from softrobots.statics.probes import Probe
+from tests.support.tables import each_row
 
 K, M = 169.44, 21.76  # [Troise 2021] Table 3 at 50 kPa
 REACH = 0.47  # [m], from the hinge to the probe at h = 500 mm
@@ -226,9 +227,7 @@ def test_a_displaced_robot_survives_a_file(limp: sr.SoftModel, along: object, tm
         assert np.array_equal(getattr(again, name), getattr(held, name)), name
 
 
-@pytest.mark.parametrize(
-    ("name", "change"), [("q_springs", 1e-8), ("reaction", 1e-5), ("displacement", 1e-9), ("origin", 1e-9)]
-)
+@each_row(("name", "change"), [("q_springs", 1e-8), ("reaction", 1e-5), ("displacement", 1e-9), ("origin", 1e-9)])
 def test_a_file_that_is_not_in_balance_is_refused(limp: sr.SoftModel, name: str, change: float, tmp_path: Path) -> None:
     held = sr.solve_imposed_displacement(limp, (0.1, 0.2, 0.3), 0.05, direction=(0, 0, 1))
     path = sr.save_result(held, tmp_path / "held.npz")
@@ -252,7 +251,7 @@ def test_a_way_that_the_link_does_not_have_is_told(one: sr.SoftModel) -> None:
         sr.solve_imposed_displacement(one, (0, 0), 0.1, direction=(0, 0, 1), max_iterations=3)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         ({"displacement": np.nan}, "displacement"),

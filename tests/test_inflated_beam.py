@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from softrobots import ParameterError, inflated_beam
 from tests.support.laws import law
 from tests.support.oracles import PRINTED_WRINKLING_MOMENTS
+from tests.support.tables import each_row
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}
 
@@ -112,8 +113,8 @@ def test_fit_recovers_known_parameters_within_three_standard_errors(seed: int, s
     assert fit.wrinkling_moment == pytest.approx(20.53, abs=0.005)
 
 
-@pytest.mark.parametrize("plateau", [21.76, 20.0, 12.0])
-@pytest.mark.parametrize("noise", [0.2, 0.5, 1.0])
+@each_row("plateau", [21.76, 20.0, 12.0])
+@each_row("noise", [0.2, 0.5, 1.0])
 def test_noise_does_not_pull_the_slope(noise: float, plateau: float) -> None:
     """Over 100 noisy repetitions the mean slope is the true one, and errors are as large as the standard error says.
 
@@ -163,7 +164,7 @@ def test_tank_conserves_gas() -> None:
 GOOD = {"pressure": 30e3, "young_modulus": 138e6, **TUBE}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "field"),
     [
         (lambda: inflated_beam.wrinkling_moment(-1.0, 0.05), "pressure"),

@@ -29,6 +29,7 @@ from softrobots.robots import HelixTube, InflatableArm, PccArm, Robot
 from tests.conftest import missing, skip_without_bullet_wheels
 from tests.support.foreign import BRANCHED, INERTIAL, joint
 from tests.support.mujoco_balance import assert_mujoco_balances
+from tests.support.tables import each_row
 
 FILE = urdf_folder() / "inflatable_arm.urdf"
 FILES = [urdf_folder() / f"{name}.urdf" for name in sr.ROBOTS]
@@ -97,7 +98,7 @@ TWICE = MIMIC.replace(
 LIGHT = ELBOW.replace("0 2 0", "0 1 0").replace('<mass value="0.5"/>', '<mass value="0"/>')
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "urdf", "what"),
     [
         ("ikpy", ELBOW, "position_error"),  # an axis that is no unit vector
@@ -200,7 +201,7 @@ def test_the_draw_keeps_the_limits_and_can_be_repeated(monkeypatch: pytest.Monke
     assert np.all(values.std(axis=0) > 0.3)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("source", "options", "error", "message"),
     [
         (FILE, {"tools": ["Gazebo"]}, sr.NameNotFound, "no tool is called 'Gazebo'; available: yourdfpy, MuJoCo"),

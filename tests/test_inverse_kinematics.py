@@ -11,6 +11,7 @@ from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.inverse_kinematics import elbow_side
 from softrobots.statics.kinematics import frame_placement
 from tests.support.oracles import flexible_table, rigid_table
+from tests.support.tables import each_row
 
 FORCE = (0.0, 10.0, -15.0)
 TOLERANCE = 1e-9  # what `solve_ik` promises [m]
@@ -147,7 +148,7 @@ def test_unreachable_under_load_is_the_best_that_scipy_finds(arm: sr.SoftModel) 
     assert caught.value.residual == pytest.approx(best, abs=1e-6)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         ({"target": (1, 0)}, "target"),

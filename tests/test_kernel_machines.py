@@ -26,6 +26,7 @@ from softrobots.compiled.run import machines
 from softrobots.compiled.run.machines import NumbaRun, PythonRun, available_backend, cache_folder, make_run
 from softrobots.model.soft_model import SoftModel
 from tests.support.serial_chains import ROBOTS
+from tests.support.tables import each_row
 
 GRAVITY = np.array([0.5, -1.0, -9.6])
 
@@ -291,8 +292,8 @@ def test_numba_and_python_find_the_same(numba_arm: Any, arm: SoftModel, rng: np.
             assert np.abs(alone - found[row]).max() < 1e-9 or not close[row]
 
 
-@pytest.mark.parametrize("direction", [(1.0, 0.5, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 1e-9)])
-@pytest.mark.parametrize("size", [np.nan, np.inf, 1e154, 1e200, 1e308])
+@each_row("direction", [(1.0, 0.5, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 1e-9)])
+@each_row("size", [np.nan, np.inf, 1e154, 1e200, 1e308])
 def test_what_is_no_number_has_a_status(numba_arm: Any, arm: SoftModel, size: float, direction: tuple[float, ...]) -> None:
     """In every back end: nothing raises, and nothing is certified; of a load whose square is infinite all would be small."""
     force = size * np.array(direction) if np.isfinite(size) else np.array([size, *direction[1:]])

@@ -21,6 +21,7 @@ from softrobots import SelfIntersection, helix
 from softrobots.core.errors import ParameterError
 from softrobots.helix import HANDEDNESS, PATHS, HelixShape
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 TURN = 2.0 * math.pi
 HANDS = {"right": 1.0, "left": -1.0}
@@ -533,7 +534,7 @@ def test_a_table_is_the_same_in_other_units_and_from_its_file(
         table.contraction_at(pressures[-1] * (1.0 + 1e-9))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "field", "shapes"),
     [
         (lambda: helix.turns(helix.forward([0.6, 0.7], 0.2, 0.03), [0.1, 0.2, 0.3], 1.0), "angle", ((2,), (3,))),

@@ -24,6 +24,7 @@ from softrobots.view.live.input import Lines, Terminal, WatchedFile, commands_fr
 from softrobots.view.live.keys import KeyMoves
 from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
 from softrobots.view.warm_start import next_equilibrium, next_solution
+from tests.support.tables import each_row
 
 START = Wanted(np.array([0.0, 0.5, -0.5]), None, np.array([0.0, 0.0, -1.0]), None)
 NOW = Wanted(np.array([0.1, 0.2, 0.3]), np.array([0.8, 0.1, 0.2]), np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, -9.81]))
@@ -83,7 +84,7 @@ def test_lines_and_objects_say_what_is_wanted(line: str, expected: Wanted) -> No
     assert told(changed(line, NOW, START)) == told(expected)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("line", "message"),
     [
         ("targte 1 2 3", "no command is called 'targte' .did you mean 'target'"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
+from tests.support.tables import each_row
 
 
 def true_case(
@@ -156,7 +157,7 @@ def test_torques_that_no_force_gives_are_an_error_with_the_best(arm: sr.SoftMode
     assert caught.value.best.residual == caught.value.residual > 0.1
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         ({"q_motors": (0, 0)}, "q_motors"),

@@ -11,6 +11,7 @@ from softrobots.model.joint_loads import Entries, JointLoad
 from softrobots.statics.loads import AppliedLoad, Load
 from tests.support.foreign import BRANCHED, LIMIT, SPRINGS
 from tests.support.oracles import central_difference, flexible_jacobian
+from tests.support.tables import each_row
 
 MODELS = {
     "one link": sr.load_model(sr.InflatableArm(link_lengths=(0.6,))),
@@ -82,7 +83,7 @@ def test_force_and_wrench_at_one_frame_add_up(arm: sr.SoftModel) -> None:
     assert Load.of(arm, (1, 2, 3), gravity=sr.EARTH_GRAVITY).conservative
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "error", "message"),
     [
         (

@@ -14,6 +14,7 @@ import softrobots as sr
 from softrobots.model.pinocchio_data import MAX_DOF
 from softrobots.statics.kinematics import frame_placement
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
+from tests.support.tables import each_row
 
 
 def test_springs_of_the_caller_on_a_foreign_file() -> None:
@@ -124,7 +125,7 @@ def test_gravities_take_turns_in_one_workspace(arm: sr.SoftModel, rng: np.random
     assert [solve(arm, *case) for case in cases] == [solve(alone[id(case[0])], *case) for case in cases]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("source", "options", "error", "message"),
     [
         (BRANCHED, {}, sr.DescriptionError, r"no joint springs.*shoulder, elbow.*springs=\{\}"),
@@ -228,7 +229,7 @@ def test_a_folder_and_a_binary_file_are_refused(tmp_path: Path) -> None:
         sr.load_model(binary)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("motors", "springs", "field"),
     [
         ((0.0, 0.0), None, "q_motors"),

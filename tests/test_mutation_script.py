@@ -12,6 +12,7 @@ import pytest
 import softrobots as sr
 from studies.mutants import KILLED, NOT_TESTED, SURVIVED, TIMED_OUT, Explanation, Mutant, judge, read_explanations, read_mutants
 from tests.conftest import CHECKOUT, load_script
+from tests.support.tables import each_row
 
 GENERATED = '''
 from mutmut.mutation.trampoline import wrap_in_trampoline as _mutmut_mutated
@@ -117,7 +118,7 @@ def test_only_words_of_an_error_are_wording(folder: Path) -> None:
     assert [mutant.wording for mutant in read_mutants(folder, "softrobots/halves.py")] == [False, True, False, False, False]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "text"),
     [
         ("halves.py.meta", "{"),
@@ -155,7 +156,7 @@ def test_explanations_are_read(tmp_path: Path) -> None:
     assert read_explanations(file) == [explained(), explained(new="a > b")]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("groups", "told"),
     [
         ([{"reason": " ", "mutants": []}], "a reason and mutants"),

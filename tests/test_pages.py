@@ -24,6 +24,7 @@ from softrobots.view.viewer import view
 from studies.gallery import EXHIBITS
 from tests.conftest import CHECKOUT
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 FOLDER = CHECKOUT / "docs" / "pages"
 LIMITS = {"helix_growth": 3e6, "pcc_arm": 2e6, "inflatable_arm": 0.5e6, "ur5_bench": 2e6}
@@ -246,7 +247,7 @@ def test_commands_survive_packing() -> None:
     assert last["keys"] == [{"time": 1, "value": [round(0.1 / RESOLUTION) * RESOLUTION, 0.0]}]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "message"),
     [
         (lambda: read_page("<html></html>"), "holds no script or no commands"),

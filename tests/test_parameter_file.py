@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots.robots.parameter_file import ParameterFile, read_parameters, read_robot, write_parameters
 from tests.support.laws import law
+from tests.support.tables import each_row
 
 NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True).filter(lambda name: name != "robot")
 SCALARS = (
@@ -161,7 +162,7 @@ def test_arguments_of_a_xacro_file_come_from_a_file_too(told, tmp_path: Path) ->
     assert (status, "did you mean 'length'" in err) == (2, True)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "words", "message"),
     [
         (
@@ -202,7 +203,7 @@ def test_results_come_with_their_robot(told, tmp_path: Path) -> None:
     assert (status, "--result must be given without --parameters" in err) == (2, True)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "robot", "message"),
     [
         ("radius: 0.05\n", None, "given here or in the file: inflatable_arm, "),
@@ -220,7 +221,7 @@ def test_robots_that_a_file_does_not_make(text: str, robot: str | None, message:
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize(
+@each_row(
     "values",
     [
         {"a": math.nan},
@@ -233,7 +234,6 @@ def test_robots_that_a_file_does_not_make(text: str, robot: str | None, message:
         {"a": [[[1]]]},
         {"a": 10**301},
     ],
-    ids=range(9),
 )
 def test_what_no_file_can_hold_is_not_written(values: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(sr.ParameterError, match="what a file of parameters can hold"):

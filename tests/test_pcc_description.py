@@ -30,6 +30,7 @@ from softrobots.robots import PccArm
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.body import body, body_at
 from tests.support.laws import law
+from tests.support.tables import each_row
 from tests.support.urdf_reading import (
     Mass,
     changed,
@@ -495,7 +496,7 @@ def test_a_measured_arm_answers_as_it_was_measured(form: dict) -> None:
 NAN, INF = float("nan"), float("inf")
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("parameters", "field"),
     [
         ({"segment_lengths": ()}, "segment_lengths"),
@@ -555,7 +556,7 @@ def test_bad_parameters_of_the_arm_are_refused(parameters: dict, field: str) -> 
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("parameters", "field"),
     [
         ({"bending": 0.0}, "bending"),
@@ -580,7 +581,7 @@ def test_sections_too_light_for_tiny_links_are_refused() -> None:
     assert check_portable(PccArm(linear_density=4e-4, segment_lengths=(0.5,), elastic_sections=4).urdf())
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         ({"lengths": "[0.5]"}, "no argument 'lengths'; declared: segment_lengths, offset"),
@@ -718,7 +719,7 @@ TAGS = [
 ]
 
 
-@pytest.mark.parametrize(("text", "change", "message"), TAGS)
+@each_row(("text", "change", "message"), TAGS)
 def test_malformed_tags_are_refused(text: Callable[[], str], change: Callable, message: str) -> None:
     read_tags(text())
     with pytest.raises(sr.DescriptionError, match=message):
@@ -755,7 +756,7 @@ CHAINS_ = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), CHAINS_)
+@each_row(("change", "message"), CHAINS_)
 def test_joints_that_are_not_the_chain_of_their_section_are_refused(change: Callable, message: str) -> None:
     sr.load_model(one_section())
     with pytest.raises(sr.DescriptionError, match=message):
@@ -790,7 +791,7 @@ def test_a_section_with_a_rest_shape_is_accepted_where_it_says(rest: tuple) -> N
     assert np.allclose(segment.poses[-1], moved, atol=1e-13)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "error", "message"),
     [
         ({"muscles": "tensions"}, sr.ParameterError, "muscles.*'lengths', 'forces'"),

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 
 import softrobots as sr
 from softrobots.constant_curvature import arc_from_muscles, chain_muscle_jacobian, chain_transform, muscle_residual
+from tests.support.tables import each_row
 
 POSITION = 1e-9  # what `solve_ik` promises [m]
 ANGLE = 1e-9  # and for orientations [rad]
@@ -225,7 +226,7 @@ def test_an_orientation_out_of_reach_is_said() -> None:
     assert within(arm, best.q_motors)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("robot", "orientation", "freedom", "needed"),
     [
         (sr.InflatableArm(), np.eye(3), 3, 6),
@@ -243,7 +244,7 @@ def test_an_orientation_without_the_freedom_is_refused(
     assert caught.value.field == "orientation"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "orientation",
     [
         (0.0, 0.0, 0.0),
@@ -361,7 +362,7 @@ def test_limits_are_never_exceeded_under_load(rng: np.random.Generator) -> None:
     assert missed > 0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         ({"q_motors0": np.full(6, 0.7)}, "q_motors0.*within the motor limits"),

@@ -17,6 +17,7 @@ from softrobots.view.figures import body_plots
 from tests.conftest import CHECKOUT
 from tests.support.oracles import central_difference
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 
@@ -66,7 +67,7 @@ def test_waypoints_and_the_lumped_chain(tmp_path: Path, capsys: pytest.CaptureFi
     assert "largest tip error on the way" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "status", "message"),
     [
         (["--target", "0", "0", "3"], 1, "cannot reach"),

@@ -20,6 +20,7 @@ from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 from tests.support.oracles import central_difference
 from tests.support.rods import Rod, elastica_moment_tip, elastica_tip, random_wrenches, rod_tip, steel_rod
+from tests.support.tables import each_row
 
 LENGTHS = np.array([0.50, 0.53, 0.55, 0.54, 0.51, 0.52])  # docs/theory.md 2.3, d = 0.04 m
 REFERENCE_TIP = (0.44957382, -0.31544214, 0.84384418)
@@ -817,7 +818,7 @@ def test_lengths_that_no_arc_explains_name_their_segment(azimuths: tuple, segmen
     assert caught.value.field == "q_motors"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("motors", "message"),
     [
         (LENGTHS[:5], r"q_motors.*shape \(5,\)"),
@@ -851,7 +852,7 @@ def test_the_largest_bending_is_170_degrees_a_section() -> None:
     assert sr.solve_equilibrium(model(), np.r_[0.524 + 1.001 * change * shape, 0.524, 0.524, 0.524]).stable  # four sections may
 
 
-@pytest.mark.parametrize("motors", [np.zeros(5), np.zeros(7), np.full(6, np.inf), None])
+@each_row("motors", [np.zeros(5), np.zeros(7), np.full(6, np.inf), None])
 def test_bad_forces_are_refused(motors: np.ndarray | None) -> None:
     with pytest.raises(sr.ParameterError, match="q_motors"):
         sr.solve_equilibrium(model("forces"), motors)
@@ -868,7 +869,7 @@ def test_a_chain_without_stretch_refuses_lengths_that_need_it() -> None:
         sr.solve_equilibrium(arm, bent + [0, 0, 0, 0.002, 0.002, 0.002])
 
 
-@pytest.mark.parametrize("choice", ["pressure", "", None, 1])
+@each_row("choice", ["pressure", "", None, 1])
 def test_an_unknown_choice_of_muscles_is_refused(choice: object) -> None:
     with pytest.raises(sr.ParameterError, match=r"muscles.*'lengths', 'forces'"):
         sr.load_model(sr.PccArm(), muscles=choice)

@@ -18,6 +18,7 @@ from softrobots.statics.stability import critical_point
 from softrobots.view.figures import equilibrium_plots
 from tests.support.laws import law
 from tests.support.oracles import arm_balance
+from tests.support.tables import each_row
 
 PUSH = (-1, 0, 0)
 LEVER, OFFSET = 0.57, 0.03  # from the hinge to the tip, and to the motor [m]
@@ -257,7 +258,7 @@ def test_more_than_two_modes_at_once_are_refused(arm: sr.SoftModel, monkeypatch:
         sr.post_buckling_branches(arm, (0, 0, 0), PUSH)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "error", "words"),
     [
         ({"direction": (1, 0, 0), "max_force": 300.0}, sr.NoCriticalLoad, "stays stable up to 300 N"),

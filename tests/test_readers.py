@@ -26,6 +26,7 @@ from softrobots.view.robot_shapes import RobotShapes
 from studies.interop.newton import balance_point
 from tests.conftest import missing
 from tests.support.foreign import ARM
+from tests.support.tables import each_row
 
 Tool = Callable[[str], ModuleType]
 
@@ -277,7 +278,7 @@ SLIDE = '<body name="c"><joint name="s" type="slide"{}/><geom size=".1"/></body>
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/></fixed></tendon>'
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "reason"),
     [
         (bodies("", joint='<freejoint name="f"/>'), "free joints f of body b .a floating base is not at rest"),
@@ -630,7 +631,7 @@ def test_names_of_nested_models(tool: Tool) -> None:
     assert frame_placement(model, model.configuration(()), "arm__b").translation[2] == 1.0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "reason"),
     [
         (

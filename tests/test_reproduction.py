@@ -44,6 +44,7 @@ from studies.papers.rows import (
 from tests.conftest import CHECKOUT, load_script
 from tests.support.oracles import PRINTED_WRINKLING_MOMENTS, central_difference, flexible_jacobian, flexible_table, rigid_table
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 Found = dict[str, tuple[Row, ...]]
 
@@ -274,7 +275,7 @@ def test_claims_hold_or_do_not() -> None:
         assert not row.claims
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "message"),
     [
         (lambda: rounded("a", "b", "four", 4.0), "printed = 'four'"),

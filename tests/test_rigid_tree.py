@@ -22,6 +22,7 @@ from softrobots.description.third_party import UR5, package_folders, robot_file
 from softrobots.description.urdf_tags import SpringTag
 from tests.conftest import missing
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS
+from tests.support.tables import each_row
 
 SHIPPED = [urdf_folder() / f"{name}.urdf" for name in sr.ROBOTS]
 
@@ -137,7 +138,7 @@ def test_a_slider_without_limits_can_slide() -> None:
     assert model.motor_limits[place][1] >= 1e6
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "told"),
     [
         ("<robot name='a'>", "not well-formed"),
@@ -150,7 +151,6 @@ def test_a_slider_without_limits_can_slide() -> None:
         (BRANCHED.replace('<child link="hand"/>', '<child link="hnad"/>'), "hand"),
         (BRANCHED.replace('<origin xyz="0.3 0 0"', '<origin xyz="0.3 0"', 1), "0.3 0"),
     ],
-    ids=["no XML", "no URDF", "no links", "two roots", "no number", "no shape", "unknown shape", "not a tree", "short vector"],
 )
 def test_what_is_no_tree_is_refused(text: str, told: str) -> None:
     with pytest.raises(sr.DescriptionError, match=told):

@@ -24,6 +24,7 @@ from studies.interop.outcomes import Question
 from studies.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
 from studies.interop.springs_read import springs_read
 from tests.conftest import CHECKOUT, load_script
+from tests.support.tables import each_row
 
 ROBOTS = tuple(FORCES)
 STATIC, SIMULATED, SINGLE = 1e-9, 1e-6, 1e-3  # allowed differences [rad or m]
@@ -353,7 +354,7 @@ def test_a_tool_that_does_not_agree_ends_with_status_1(tmp_path: Path, capsys: p
     assert "| inflatable arm | failed |" in printed
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"springs": []}', '{"springs": [], "equilibrium": [1], "kinematics": []}', None])
+@each_row("text", ["", "[]", '{"springs": []}', '{"springs": [], "equilibrium": [1], "kinematics": []}', None])
 def test_other_files_are_refused(text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     file = tmp_path / "other.json"
     if text is not None:

@@ -18,6 +18,7 @@ from softrobots.description.paths import xacro_folder
 from softrobots.description.urdf_tags import InflatedLinkTag
 from softrobots.model.springs import SpringGroup, Springs, spring_groups
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
+from tests.support.tables import each_row
 
 K, M = 187.30, 9.45  # [Troise 2021] Table 3 at 20 kPa
 ARM = 0.57  # [m], hinge to tip of one link
@@ -145,19 +146,19 @@ def test_one_number_holds_for_all_links_and_none_is_linear() -> None:
     assert by_number == sr.load_model(sr.InflatableArm(max_moment=(9.45, 9.45)))
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "9", (9.45,), (1.0, 2.0, 3.0), (9.45, None)])
+@each_row("value", [0.0, -1.0, np.nan, np.inf, "9", (9.45,), (1.0, 2.0, 3.0), (9.45, None)])
 def test_a_largest_moment_that_is_none_is_refused(value: object) -> None:
     with pytest.raises(sr.ParameterError, match="max_moment"):
         sr.InflatableArm(max_moment=value)
 
 
-@pytest.mark.parametrize("text", ["0", "[9.45,-1]", "nan", "[1,2,3]"])
+@each_row("text", ["0", "[9.45,-1]", "nan", "[1,2,3]"])
 def test_xacro_refuses_it_too(text: str) -> None:
     with pytest.raises(sr.DescriptionError, match="max_moment"):
         expand(xacro_folder() / sr.InflatableArm.XACRO, {"max_moment": text})
 
 
-@pytest.mark.parametrize("text", ["0.0", "-3", "inf", "stiff"])
+@each_row("text", ["0.0", "-3", "inf", "stiff"])
 def test_a_bad_attribute_is_refused(text: str, limp: sr.SoftModel) -> None:
     with pytest.raises(sr.DescriptionError, match=r"max_moment.*is required"):
         sr.load_model(limp.urdf.replace('max_moment="15.0"', f'max_moment="{text}"'))

@@ -12,6 +12,7 @@ import pytest
 import softrobots as sr
 from softrobots.statics.trajectory import METHODS
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -62,7 +63,7 @@ def test_ik_trajectory_serves_until_interrupted(tmp_path: Path, monkeypatch: pyt
     assert "ssh -L" in out
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "status", "message"),
     [
         (["--end", "3", "0", "0"], 1, "waypoint .* cannot reach"),

@@ -21,6 +21,7 @@ from softrobots.statics.kinematics import frame_placement
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.laws import law
 from tests.support.serial_chains import HEAVY, ROBOTS, drawn, moved_by, odd, pcc, placed, section_frames
+from tests.support.tables import each_row
 
 # --- Oracle: the chain as its docstrings say, written out; nothing here calls the package or Pinocchio
 
@@ -229,7 +230,7 @@ def by_hand(kind: object) -> SoftModel:
     )
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("model", "message"),
     [
         (

@@ -20,6 +20,7 @@ from studies.mutants import read_explanations
 from studies.recorded_run import command_of
 from tests.conftest import CHECKOUT, load_script
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 
 def test_the_page_names_tests_that_exist() -> None:
@@ -149,7 +150,7 @@ def test_a_copy_follows_the_checkout(tmp_path: Path) -> None:
 # --- Explanations
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "told"),
     [
         ("{", "it is no JSON"),

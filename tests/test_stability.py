@@ -9,6 +9,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.statics.elastostatics import is_stable
+from tests.support.tables import each_row
 
 
 def test_one_link_buckles_at_k_over_l2() -> None:
@@ -41,8 +42,8 @@ def test_smallest_eigenvalue_changes_sign_at_the_limit(arm: sr.SoftModel) -> Non
     assert above.stable
 
 
-@pytest.mark.parametrize("symmetric", [True, False])
-@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), -float("inf")])
+@each_row("symmetric", [True, False])
+@each_row("wrong", [float("nan"), float("inf"), -float("inf")])
 def test_a_tangent_that_is_not_finite_is_never_certified(arm: sr.SoftModel, symmetric: bool, wrong: float) -> None:
     """Eigen's factorisation passes a NaN."""
     for row, column in itertools.combinations_with_replacement(range(arm.n_springs), 2):
@@ -142,7 +143,7 @@ def test_tension_has_no_limit(arm: sr.SoftModel) -> None:
     assert caught.value.max_force == 500.0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         ({"direction": (0, 0, 0)}, "direction.*different from zero"),

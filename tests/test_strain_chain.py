@@ -21,6 +21,7 @@ from softrobots.constant_curvature.strain_chain import JOINTS, SectionChain, in_
 from softrobots.constant_curvature.stumpff import stumpff
 from tests.support.oracles import central_difference
 from tests.support.screw_motions import H, exact_screw, exact_stumpff, rotation, screw_matrix
+from tests.support.tables import each_row
 
 SIZES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, math.pi - 0.1)  # of the rotation over a section [rad]
 UNIT = np.array([0.55, -0.72, 0.42]) / np.linalg.norm([0.55, -0.72, 0.42])  # bending in a slanted plane, with twist
@@ -123,9 +124,9 @@ def test_stumpff_functions_at_small_angles_are_exact_to_the_last_places() -> Non
 # --- The screw motion
 
 
-@pytest.mark.parametrize("size", [*SIZES, math.pi, 4.0, 2 * math.pi, 9.0])
-@pytest.mark.parametrize("unit", [UNIT, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8)])
-@pytest.mark.parametrize("stretch", [0.0, STRETCH, -STRETCH])
+@each_row("size", [*SIZES, math.pi, 4.0, 2 * math.pi, 9.0])
+@each_row("unit", [UNIT, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8)])
+@each_row("stretch", [0.0, STRETCH, -STRETCH])
 def test_screw_is_the_exponential(size: float, unit: np.ndarray, stretch: float) -> None:
     """mpmath's to ten units in the last place, a hundred about a whole turn, where the series of `stumpff` cancel most.
 
@@ -181,9 +182,9 @@ def test_slope_of_the_twists(z: np.ndarray, covector: np.ndarray) -> None:
 # --- The chain
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("unit", [UNIT, -UNIT, (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8)])
-@pytest.mark.parametrize("stretch", [0.0, STRETCH, -STRETCH])
+@each_row("size", SIZES)
+@each_row("unit", [UNIT, -UNIT, (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8)])
+@each_row("stretch", [0.0, STRETCH, -STRETCH])
 def test_the_chain_carries_the_section_exactly(size: float, unit: np.ndarray, stretch: float) -> None:
     """Position and orientation. 1e-14 is some ten units in the last place of six products."""
     z = np.array([*(size * np.asarray(unit)), stretch])
@@ -286,7 +287,7 @@ def test_the_last_joint_turns_without_twist() -> None:
 # --- Range
 
 
-@pytest.mark.parametrize("azimuth", np.deg2rad(np.arange(0, 360, 15)))
+@each_row("azimuth", np.deg2rad(np.arange(0, 360, 15)))
 def test_bending_in_any_azimuth_is_in_range_below_half_a_turn(azimuth: float) -> None:
     """The range ends where the chord points forwards by 1e-3 of itself, 0.1 degrees before 180."""
 
@@ -347,7 +348,7 @@ def test_sections_without_a_chain_are_out_of_range(z: tuple) -> None:
     assert not in_range(np.array([np.zeros(4), z, np.zeros(4)]), np.full(3, H))
 
 
-@pytest.mark.parametrize("place", range(4))
+@each_row("place", range(4))
 def test_what_is_no_number_is_out_of_range(place: int) -> None:
     z = np.zeros(4)
     z[place] = math.nan

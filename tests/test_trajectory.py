@@ -10,6 +10,7 @@ import pytest
 import softrobots as sr
 from softrobots.statics.trajectory import METHODS
 from tests.support.oracles import paper_closed_loop
+from tests.support.tables import each_row
 
 FORCE = (0.0, 10.0, -15.0)
 PATH = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 100)
@@ -191,7 +192,7 @@ def test_bad_input_is_refused(arm: sr.SoftModel, method: str) -> None:
             sr.follow_trajectory(arm, PATH.positions[:4], method="paper")
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "message"),
     [
         (lambda: sr.quintic(1.5), "share"),
@@ -221,7 +222,7 @@ def test_waypoints_are_read_from_csv(tmp_path: Path) -> None:
     assert sr.read_waypoints(file).times.tolist() == [0.0, 0.05]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         ("", r"line 1: it names nothing; x, y, z are required"),

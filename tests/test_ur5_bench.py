@@ -21,6 +21,7 @@ from studies.ur5.bench import PROBE, TOUCH, UR5_JOINTS, UR5Bench
 from studies.ur5.bench_run import BenchRun, push_link
 from tests.conftest import missing
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 ROW = TABLE_3[4]  # 50 kPa
 
@@ -103,7 +104,7 @@ def test_what_other_evaluations_would_make_of_the_data_is_as_documented() -> Non
     assert np.allclose(np.max(by_point, axis=0), [0.005, 0.020], rtol=0.0, atol=5e-4)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("numbers", "field"),
     [
         ({"probe_distance": 0.0}, "probe_distance"),
@@ -248,7 +249,7 @@ def test_a_link_without_a_largest_moment_stays_linear(bench: UR5Bench) -> None:
     assert not any(state.equilibrium.wrinkled for state in run.states)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "field"),
     [
         ({"link": sr.InflatableArm()}, "link"),
@@ -341,7 +342,7 @@ def test_without_robot_data_the_script_says_what_to_install(
     assert "pip install 'softrobots[robots]'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "told"),
     [
         (["--pressures", "15"], "pressures of Table 3"),

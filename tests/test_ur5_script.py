@@ -14,6 +14,7 @@ import softrobots as sr
 from softrobots.description.third_party import UR5, robot_file
 from tests.conftest import missing
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 NAME = "ur5_with_soft_arm"
 
@@ -93,7 +94,7 @@ def test_other_arms_are_carried_and_orientation_comes_back(robot: str, tmp_path:
     assert "margin" in capsys.readouterr().out or robot == "pcc_arm"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "status", "message"),
     [
         (["--payload", "-1"], 2, "--payload"),

@@ -13,6 +13,7 @@ from softrobots.description.paths import urdf_folder
 from softrobots.description.urdf_rules import RULES, check_rules
 from softrobots.robots import Robot
 from tests.support.foreign import BRANCHED, INERTIAL
+from tests.support.tables import each_row
 
 FILES = sorted(urdf_folder().glob("*.urdf"))
 ARM = (urdf_folder() / "inflatable_arm.urdf").read_text(encoding="utf-8")
@@ -93,7 +94,7 @@ CHANGES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("rule", "before", "after", "message"), CHANGES, ids=lambda text: text[:30])
+@each_row(("rule", "before", "after", "message"), CHANGES)
 def test_a_change_breaks_the_rule_that_it_should(rule: str, before: str, after: str, message: str) -> None:
     found = broken(changed(rule, before, after))
     assert list(found) == [rule]
@@ -177,7 +178,7 @@ def mounted_by_hand(carrier: str) -> str:
     return arm.replace("</robot>", carrier.split(">", 1)[1])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("source", "message"),
     [
         ("<robots/>", "root tag <robots>"),
@@ -191,7 +192,7 @@ def test_what_is_no_urdf_is_refused(source: str, message: str) -> None:
         check_description(source)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("before", "after", "what", "message"),
     [
         ('stiffness="172.71"', 'stiffness="-1"', "tags of softrobots", "a positive one is required"),

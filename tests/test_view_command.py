@@ -24,6 +24,7 @@ from softrobots.cli.main import main
 from softrobots.view import animation_frames, slider_page
 from softrobots.view.browser import show_share
 from tests.support.pictures import coloured, listening, pixels
+from tests.support.tables import each_row
 
 COMMAND = [sys.executable, "-m", "softrobots", "view"]
 # A terminal of its own, so that Ctrl-C reaches it.
@@ -354,7 +355,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("words", BAD)
+@each_row("words", BAD)
 def test_bad_words_are_refused(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

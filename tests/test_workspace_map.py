@@ -23,6 +23,7 @@ from softrobots.view.figures import map_plots
 from tests.support.laws import law
 from tests.support.load_cases import fingerprint
 from tests.support.scripts import run_script
+from tests.support.tables import each_row
 
 DOWN = np.array([0.0, 0.0, -1.0])
 LOADS = (0.0, 8.0, 16.0, 24.0, 32.0, 40.0)
@@ -191,7 +192,7 @@ def test_a_map_is_saved_and_loaded_whole(weighed: WorkspaceMap, tmp_path: Path) 
         sr.save_result(weighed, files[0])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "change", "message"),
     [
         ("q_springs", lambda a: a + 1e-6, "in balance"),
@@ -217,7 +218,7 @@ def test_a_changed_file_is_refused(
         sr.load_result(tmp_path / "changed.npz")
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "message"),
     [
         ({"loads": (0.0, 5.0, 5.0)}, "loads must be increasing"),
@@ -406,7 +407,7 @@ def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
     assert "--scheduler ADDRESS" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         (["--cells", "0"], "cells"),
