@@ -15,7 +15,7 @@ def each_row(names: str | tuple[str, ...], rows: Iterable[Any]) -> Callable[[Cal
     """Run a test for every row of a table, as one item: for many short cases of one kind, such as input that is refused.
 
     Takes the arguments of `pytest.mark.parametrize`. Every row is tried; rows that fail are named, with the first one as the
-    cause of the error. Each row has a `tmp_path` of its own, and what it does with `monkeypatch` is undone; other fixtures are shared.
+    cause. Each row has a `tmp_path` of its own, and what it does with `monkeypatch` is undone; other fixtures are shared.
     """
     words = re.findall(r"\w+", names) if isinstance(names, str) else list(names)
     cases = [(row,) if len(words) == 1 else tuple(row) for row in rows]
