@@ -297,7 +297,13 @@ def test_only_blocks_of_the_same_case_number_and_arrays_count(tmp_path: Path) ->
 
 @each_row(
     ("content", "message"),
-    [(b"", "no JSON"), (b"[1]", "does not say"), (b'{"job": 3}', "does not say"), (b"\xff", "UTF-8"), (b'{"job": ', "no JSON")],
+    [
+        (b"", "not JSON"),
+        (b"[1]", "not the description"),
+        (b'{"job": 3}', "not the description"),
+        (b"\xff", "UTF-8"),
+        (b'{"job": ', "not JSON"),
+    ],
 )
 def test_a_case_that_cannot_be_read_is_refused(content: bytes, message: str, tmp_path: Path) -> None:
     (tmp_path / CASE).write_bytes(content)
@@ -336,13 +342,13 @@ def test_what_differs_is_told_in_a_line(theirs: dict[str, str], tmp_path: Path) 
 
 def test_other_folders_are_refused(tmp_path: Path, arm: sr.SoftModel) -> None:
     (tmp_path / "thesis.tex").write_bytes(b"")
-    with pytest.raises(sr.OutputExists, match=r"holds thesis\.tex and no case\.json"):
+    with pytest.raises(sr.OutputExists, match=r"contains thesis\.tex and no case\.json"):
         mapped(arm, tmp_path)
-    with pytest.raises(sr.OutputExists, match=r"holds thesis\.tex"):
+    with pytest.raises(sr.OutputExists, match=r"contains thesis\.tex"):
         sr.sample_workspace(arm, 3, checkpoint=tmp_path)
     with pytest.raises(sr.OutputExists, match="is a file"):
         Checkpoint(tmp_path / "thesis.tex", {})
-    with pytest.raises(sr.OutputError, match="cannot look at"):
+    with pytest.raises(sr.OutputError, match="cannot read the folder"):
         Checkpoint(tmp_path / ("x" * 300), {})
     for nothing in (3, ""):
         with pytest.raises(sr.ParameterError, match="checkpoint must be a path"):

@@ -349,7 +349,7 @@ def build_docs(*words: str) -> int:
 def test_a_folder_that_is_no_site_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     assert build_docs("--output", str(tmp_path)) == 2
-    assert "is not empty (it holds mine.txt)" in capsys.readouterr().err
+    assert "is not empty (it contains mine.txt)" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 

@@ -408,7 +408,7 @@ def test_everything_is_written_by_the_module_that_writes() -> None:
 
 def test_folders_are_made_once_or_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(sr.OutputError, match="cannot make the folder"):
+    with pytest.raises(sr.OutputError, match="cannot create the folder"):
         make_folder(tmp_path / "file" / "inner")
     assert make_folder(tmp_path / "a" / "b").is_dir()
     assert make_folder(tmp_path / "a" / "b").is_dir()

@@ -147,7 +147,7 @@ def test_a_folder_that_is_not_empty_is_refused(folder: Path, tmp_path: Path, cap
     assert run_script("helix_atlas", ["--output", str(tmp_path / "mine.txt"), "--no-plots"]) == 2
     assert "mine.txt is a file" in capsys.readouterr().err
     assert run_script("helix_atlas", ["--docs", str(tmp_path / "mine.txt")]) == 2
-    assert "cannot make the folder" in capsys.readouterr().err
+    assert "cannot create the folder" in capsys.readouterr().err
     assert [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()] == ["keep"]
 
 

@@ -342,7 +342,7 @@ def saved(path: Path) -> dict[str, Any]:
         ({"computed": {"tube_length": 0.4}}, "tube_length"),
         ({"computed": {"tube_length": 10**400}}, "a number is larger"),
         ({"computed": {}}, "tube_length"),
-        ({"angle": float("nan")}, "NaN is no number"),
+        ({"angle": float("nan")}, "NaN is not a number"),
         ({"angle": "0.1"}, "angle"),
         ({"turns": None}, "turns"),
         ({"handedness": "up"}, "handedness"),

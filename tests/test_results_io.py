@@ -163,7 +163,7 @@ def test_damaged_files_are_refused_or_harmless(results: dict, kind: str, tmp_pat
             refused += 1
     assert refused > 100
     bad.write_bytes(good[: len(good) // 2])
-    with pytest.raises(sr.FileFormatError, match="it is no NPZ archive") as caught:
+    with pytest.raises(sr.FileFormatError, match="it is not an NPZ archive") as caught:
         sr.load_result(bad)
     assert "pickle" not in str(caught.value)  # NumPy's advice for such a file
 

@@ -100,7 +100,7 @@ def test_ik_trajectory_refuses_bad_input_and_leaves_nothing(
 def test_ik_trajectory_refuses_a_folder_that_is_not_empty(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     (tmp_path / "mine.txt").write_text("keep", encoding="utf-8")
     assert run_script("ik_trajectory", ["--output", str(tmp_path), "--no-plots"]) == 2
-    assert "is not empty (it holds mine.txt)" in capsys.readouterr().err
+    assert "is not empty (it contains mine.txt)" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
     for folder in (tmp_path / "mine.txt", tmp_path / "mine.txt" / "below"):
         assert run_script("ik_trajectory", ["--output", str(folder), "--no-plots"]) == 2

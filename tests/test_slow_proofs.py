@@ -153,7 +153,7 @@ def test_a_copy_follows_the_checkout(tmp_path: Path) -> None:
 @each_row(
     ("text", "told"),
     [
-        ("{", "it is no JSON"),
+        ("{", "it is not JSON"),
         ("[]", "is no table"),
         ('{"explanations": [{"reason": " ", "mutants": []}]}', "a group must have a reason"),
         ('{"explanations": [{"reason": "a", "mutants": [{"module": "m"}]}]}', "a mutant must have texts"),

@@ -1,1 +1,1 @@
-"""Checks of input, errors, safe files and records; no robotics."""
+"""Argument checks, errors, and safe reading and writing of files; no robotics."""

@@ -1,8 +1,8 @@
-"""Linear algebra on one thread, wherever an equilibrium is sought or asked about.
+"""Limit of BLAS to one thread for the linear algebra of the statics.
 
-The matrices are small (4 to 300 rows). From about a hundred rows on, BLAS splits them over all cores, which gains nothing, and
-costs a hundred times the work itself while another program uses one of the cores (measured: 0.2 ms become 25 to 130 ms).
-It also rounds differently then: without this, bytes would depend on the cores, and on what other threads do at the time.
+The matrices are small (4 to 300 rows). From about a hundred rows on, BLAS splits them over all cores, which gains nothing and
+takes a hundred times as long while another program uses one of the cores (measured: 25 to 130 ms instead of 0.2 ms). It also
+rounds differently then, so that results would depend on the number of cores and on what other threads do.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-_LARGE = 48  # rows; smaller matrices stay on one thread by themselves
+_LARGE = 48  # rows; BLAS keeps smaller matrices on one thread anyway
 _LOCK = threading.Lock()
-_NOTHING = nullcontext()
 
 
 class _Limit:
-    """The one limit of the process, shared by all threads that are solving: set by the first, lifted by the last."""
+    """The limit of the process, shared by all threads that solve: set by the first, lifted by the last."""
 
     users = 0
     controller: Any = None
@@ -29,9 +28,9 @@ def one_blas_thread(rows: int) -> AbstractContextManager[None]:
     """Keep BLAS on one thread in a `with` block.
 
     Args:
-        rows: Size of the matrices; for small ones nothing is done.
+        rows: Number of rows of the matrices; nothing is done for small ones.
     """
-    return _NOTHING if rows < _LARGE else _limited()
+    return nullcontext() if rows < _LARGE else _limited()
 
 
 @contextmanager

@@ -1,6 +1,7 @@
-"""Reading of files that somebody else made: never more than a limit, whatever the file system says of their size.
+"""Read untrusted files up to a size limit.
 
-The size that a file system tells is none for devices, pipes and files of the kernel, and may have grown since it was told.
+The limit does not rely on the size that the file system reports: for devices, pipes and files of the kernel there is none, and
+a file may grow while it is read.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ _PART = 1 << 20  # bytes read at a time
 
 
 def read_bytes(path: Path, largest: int) -> bytes:
-    """The content of a file.
+    """Return the content of a file.
 
     Args:
-        path: The file. Of a pipe, what is written to it until it is closed; one that nobody writes to is empty.
-        largest: How many bytes it may have.
+        path: The file. A pipe is read until it is closed; without a writer it is empty.
+        largest: Maximum size in bytes.
 
     Returns:
         The bytes.
@@ -35,32 +36,32 @@ def read_bytes(path: Path, largest: int) -> bytes:
             parts.append(part)
             size += len(part)
             if size > largest:
-                raise FileFormatError(f"{path} has more than {largest} bytes, which is the most that is read")
+                raise FileFormatError(f"{path} has more than {largest} bytes; at most {largest} are read")
     return b"".join(parts)
 
 
 def read_text(path: Path, largest: int) -> str:
-    """The text of a file in UTF-8, with or without a byte order mark.
+    """Return the text of a UTF-8 file, with or without a byte order mark.
 
     Args:
         path: The file.
-        largest: How many bytes it may have.
+        largest: Maximum size in bytes.
 
     Returns:
         The text.
 
     Raises:
-        FileFormatError: If the file cannot be read, is larger, or is no UTF-8.
+        FileFormatError: If the file cannot be read, is larger, or is not UTF-8.
     """
     try:
         return read_bytes(path, largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FileFormatError(f"{path} is no text in UTF-8: {error}") from error
+        raise FileFormatError(f"{path} is not text in UTF-8: {error}") from error
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[IO[bytes]]:
-    """Open a file for reading; what goes wrong with it is an error of ours.
+    """Open a file for reading, as a context manager that turns errors of the system into `FileFormatError`.
 
     Args:
         path: The file.
@@ -76,14 +77,12 @@ def opened(path: Path) -> Iterator[IO[bytes]]:
             yield file
     except FileFormatError:
         raise
-    except OSError as error:
-        raise FileFormatError(f"cannot read {path}: {error.strerror or error}") from error
-    except ValueError as error:  # a name with a NUL in it, or text that is no UTF-8
-        raise FileFormatError(f"cannot read {path}: {error}") from error
+    except (OSError, ValueError) as error:  # ValueError: a name with a NUL in it, or text that is not UTF-8
+        raise FileFormatError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
 
 
 def _open(name: str, flags: int) -> int:
-    """Open without waiting for somebody to write: a pipe that nobody has open is empty."""
+    """Opener that does not wait for a writer: a pipe without one is empty."""
     descriptor = os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
     os.set_blocking(descriptor, True)
     return descriptor

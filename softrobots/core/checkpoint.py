@@ -1,8 +1,8 @@
-"""Finished blocks of a long job in a folder, so that a run that was interrupted, even killed, goes on from there.
+"""Checkpoints of a long job: finished blocks in a folder, from which an interrupted or killed run continues.
 
-The folder holds `case.json`, which says what the job is, and `block_<number>.npz` (no pickle) for each finished block. Each
-file appears whole or not at all. A block is used only if it belongs to the same case and has the arrays that are asked for: one
-that is damaged is computed again. Several runs of one case may share a folder; they write the same bytes.
+The folder contains `case.json` with the inputs of the job, and `block_<number>.npz` (no pickle) for each finished block. Files
+are written atomically. A block is used only if it belongs to the same case and has the requested arrays; a damaged one is
+computed again. Several runs of one case may share a folder; they write the same bytes.
 """
 
 from __future__ import annotations
@@ -22,79 +22,79 @@ from softrobots.core.json_text import read_json
 from softrobots.core.npz_file import read_arrays
 
 CASE = "case.json"
-"""The file that says what the job is."""
+"""The file with the inputs of the job."""
 
 _FORMAT = 1
 _LARGEST_CASE = 100_000  # bytes
-_SHOWN = 60  # characters of a text of it in an error
-_NAMED = 5  # things in an error that only another case has
-_LONG = 400  # characters of what a case says; of more its hash stands in the file
+_SHOWN = 60  # characters of an input in an error
+_NAMED = 5  # inputs in an error that only the other case has
+_LONG = 400  # characters of an input; a longer one is replaced by its hash
 
 
 class Checkpoint:
-    """The folder of the finished blocks of one job; made when the first block is kept."""
+    """Folder of the finished blocks of one job; created with the first block."""
 
     def __init__(self, folder: str | os.PathLike[str], case: Mapping[str, Any]) -> None:
-        """Look at the folder.
+        """Check that the folder can be used for this job.
 
         Args:
             folder: A folder of a run of the same case, an empty one, or one that does not exist.
-            case: What the answers depend on, by name: numbers, texts, None, and lists of these.
+            case: Inputs that the results depend on, by name: numbers, texts, None, and lists of these.
 
         Raises:
-            ParameterError: If `folder` is no path, or its blocks belong to another case; the message says what differs.
-            FileFormatError: If it says unreadably what its case is.
-            OutputExists: If it is a file, or holds anything else.
-            OutputError: If it cannot be looked at.
+            ParameterError: If `folder` is not a path, or its blocks belong to another case; the message lists the differences.
+            FileFormatError: If its `case.json` cannot be read.
+            OutputExists: If it is a file, or contains other files.
+            OutputError: If it cannot be read.
         """
         self._folder = as_path("checkpoint", folder)
         self._case = {"format": str(_FORMAT), **{name: _text(value) for name, value in case.items()}}
         self._mark = hashlib.sha256(json.dumps(self._case, sort_keys=True).encode()).hexdigest()
-        self._made = _holds_case(self._folder)
-        if self._made:
+        self._exists = _has_case(self._folder)
+        if self._exists:
             self._check_same(_read_case(self._folder / CASE))
 
     @property
     def folder(self) -> Path:
-        """Where the blocks are."""
+        """Folder of the blocks."""
         return self._folder
 
     def block(self, number: int, arrays: Mapping[str, tuple[type, tuple[int, ...]]]) -> dict[str, Any] | None:
-        """The arrays of a finished block.
+        """Return the arrays of a finished block.
 
         Args:
             number: Number of the block.
-            arrays: Name, type of numbers and shape of each of its arrays.
+            arrays: Data type and shape of each of its arrays, by name.
 
         Returns:
             The arrays by name; None if the block is not finished, or is damaged.
         """
-        if not self._made:
+        if not self._exists:
             return None
         try:
-            held = read_arrays(self._file(number))
+            content = read_arrays(self._file(number))
         except FileFormatError:
             return None
-        if str(held.pop("mark", "")) != f"{self._mark} {number}" or held.keys() != arrays.keys():
+        if str(content.pop("mark", "")) != f"{self._mark} {number}" or content.keys() != arrays.keys():
             return None
-        fits = all(held[name].dtype == kind and held[name].shape == shape for name, (kind, shape) in arrays.items())
-        return held if fits else None
+        fits = all(content[name].dtype == kind and content[name].shape == shape for name, (kind, shape) in arrays.items())
+        return content if fits else None
 
     def keep(self, number: int, arrays: Mapping[str, Any]) -> None:
         """Write a finished block.
 
         Raises:
             OutputError: If it cannot be written; the blocks before it stay.
-            ParameterError: If a run of another case has begun in the folder since it was looked at.
-            FileFormatError: If that run says unreadably what its case is.
+            ParameterError: If a run of another case has started in the folder since the checkpoint was opened.
+            FileFormatError: If the `case.json` of that run cannot be read.
         """
-        if not self._made:
+        if not self._exists:
             make_folder(self._folder)
             try:
                 write_text(self._folder / CASE, json.dumps(self._case, indent=1) + "\n", overwrite=False)
             except OutputExists:  # another run was first
                 self._check_same(_read_case(self._folder / CASE))
-            self._made = True
+            self._exists = True
         content = {"mark": np.array(f"{self._mark} {number}"), **arrays}
         write_atomically(self._file(number), lambda file: np.savez(file, **content))
 
@@ -104,23 +104,21 @@ class Checkpoint:
     def _check_same(self, theirs: Mapping[str, str]) -> None:
         if theirs == self._case:
             return
-        ours = [name for name in self._case if theirs.get(name) != self._case[name]]
+        changed = [name for name in self._case if theirs.get(name) != self._case[name]]
         others = sorted(theirs.keys() - self._case.keys())
-        names = [*ours, *others[:_NAMED]]
-        found = [f"{_short(name)} was {_short(theirs.get(name))} and is {_short(self._case.get(name))}" for name in names]
-        told = "; ".join(found)
+        names = [*changed, *others[:_NAMED]]
+        differences = [f"{_short(name)} was {_short(theirs.get(name))} and is {_short(self._case.get(name))}" for name in names]
         if len(others) > _NAMED:
-            told += f"; and {len(others) - _NAMED} more"
-        raise ParameterError(
-            "checkpoint", str(self._folder), f"a new folder, or one with blocks of the same case; there {told} now"
-        )
+            differences.append(f"and {len(others) - _NAMED} more")
+        requirement = f"a new folder, or one with blocks of the same case; there {'; '.join(differences)} now"
+        raise ParameterError("checkpoint", str(self._folder), requirement)
 
 
 def discard(folder: str | os.PathLike[str]) -> None:
-    """Delete a folder of finished blocks; other files in it stay, and then so does the folder.
+    """Delete a folder of finished blocks; a folder with other files stays, with those files.
 
     Raises:
-        ParameterError: If it is no path.
+        ParameterError: If it is not a path.
         OutputError: If a file cannot be deleted.
     """
     place = as_path("checkpoint", folder)
@@ -128,19 +126,19 @@ def discard(folder: str | os.PathLike[str]) -> None:
         if (place / CASE).is_file():
             for file in [*place.glob("block_*.npz"), *place.glob(".*.part")]:
                 file.unlink()
-            (place / CASE).unlink()  # last: until then the folder says what it is
+            (place / CASE).unlink()  # last: until then the folder is known as a checkpoint
             if not any(place.iterdir()):
                 place.rmdir()
     except OSError as error:
         raise OutputError(f"cannot delete the blocks in {place}: {error}") from error
 
 
-def _holds_case(folder: Path) -> bool:
-    """Whether a folder has blocks; refuse one that holds anything else.
+def _has_case(folder: Path) -> bool:
+    """Whether a folder is a checkpoint, rather than new or empty.
 
     Raises:
-        OutputExists: If it is a file, or not empty and without a case.
-        OutputError: If it cannot be looked at.
+        OutputExists: If it is a file, or contains files without a `case.json`.
+        OutputError: If it cannot be read.
     """
     try:
         if not folder.exists():
@@ -151,28 +149,28 @@ def _holds_case(folder: Path) -> bool:
     except OutputError:
         raise
     except (OSError, ValueError) as error:
-        raise OutputError(f"cannot look at {folder}: {error}") from error
+        raise OutputError(f"cannot read the folder {folder}: {error}") from error
     if names and CASE not in names:
-        raise OutputExists(f"{folder} holds {names[0]} and no {CASE}; a folder for finished blocks must be new or empty")
+        raise OutputExists(f"{folder} contains {names[0]} and no {CASE}; a folder for finished blocks must be new or empty")
     return bool(names)
 
 
 def _read_case(file: Path) -> dict[str, str]:
-    found = read_json(file, _LARGEST_CASE)
-    if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
-        raise FileFormatError(f"{file} does not say of which case the blocks beside it are")
-    return found
+    case = read_json(file, _LARGEST_CASE)
+    if not isinstance(case, dict) or not all(isinstance(value, str) for value in case.values()):
+        raise FileFormatError(f"{file} is not the description of a case: an object of texts is required")
+    return case
 
 
 def _text(value: Any) -> str:
-    """What stands in the file for a value: all its digits, or a hash of them."""
+    """Return an input as JSON in full precision, or the hash of that."""
     text = json.dumps(value)
     return text if len(text) <= _LONG else f"sha256:{hashlib.sha256(text.encode()).hexdigest()} of {len(text)} characters"
 
 
 def _short(text: str | None) -> str:
-    """A text of a file as an error shows it: printable, and not long."""
+    """Return a printable text of limited length for an error."""
     if text is None:
         return "nothing"
-    shown = text if text.isprintable() else repr(text)
-    return shown if len(shown) <= _SHOWN else shown[: _SHOWN - 3] + "..."
+    printable = text if text.isprintable() else repr(text)
+    return printable if len(printable) <= _SHOWN else printable[: _SHOWN - 3] + "..."

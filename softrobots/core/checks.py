@@ -1,6 +1,6 @@
-"""Checks of what callers pass in: numbers, vectors and choices.
+"""Argument checks: numbers, arrays and choices.
 
-Each returns the checked value in its final type, or raises before any work is done.
+Each function returns the checked value in its final type, or raises `ParameterError`.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ from softrobots.core.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
 
-_NOT_NUMBERS = (bool, np.bool_, str, bytes, np.datetime64, np.timedelta64)  # although float() may take them
-
-_SHORT = 1000  # numbers of an array that is checked as a list
-
 LARGEST = 1e30
-"""Numbers beyond this in size are refused, and positive ones below its inverse: their squares and cubes would overflow."""
+"""Largest magnitude accepted, and inverse of the smallest positive number: squares and cubes of others would overflow."""
+
+_NOT_NUMBERS = (bool, np.bool_, str, bytes, np.datetime64, np.timedelta64)  # although float() accepts some of them
+_SHORT = 1000  # size up to which an array is checked as a list
 
 
 def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, unit: str = "") -> FloatArray:
@@ -29,8 +28,8 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
 
     Args:
         name: Name of the parameter, for the error.
-        value: Anything that NumPy can turn into numbers.
-        shape: Required shape, where None stands for any length; None alone for any shape.
+        value: Anything that NumPy can convert to numbers.
+        shape: Required shape, in which None stands for any length; None alone for any shape.
         unit: Unit for the error, e.g. "N".
 
     Returns:
@@ -41,20 +40,19 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
     """
     try:
         given = np.asarray(value)
-        mask = getattr(value, "mask", None)  # of a NumPy array with gaps
+        mask = getattr(value, "mask", None)  # of a masked array
         array = _as_floats(given) if given.dtype.kind in "fiu" and not (isinstance(mask, np.ndarray) and mask.any()) else None
     except Exception as error:  # an object of the caller may raise anything
         raise ParameterError(name, value, _array_text(shape, unit)) from error
-    if array is None:  # text, truth values, complex numbers, objects, gaps
+    if array is None:  # text, booleans, complex numbers, objects, masked elements
         raise ParameterError(name, value, _array_text(shape, unit))
     if shape is not None and array.shape != shape and not _fits(array.shape, shape):
         raise ParameterError(name, value, f"{_array_text(shape, unit)} (it has shape {array.shape})")
     if array.size > _SHORT:
-        refused = not np.abs(array).max() <= LARGEST  # a list of a large one would take five times its memory
-    else:
-        # A comparison refuses NaN too, and on a short list it is several times faster than NumPy's reductions.
-        refused = not all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
-    if refused:
+        accepted = np.abs(array).max() <= LARGEST  # False for NaN too; a list would take five times the memory
+    else:  # on a short list the comparison is several times faster than NumPy's reductions
+        accepted = all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
+    if not accepted:
         raise ParameterError(name, value, _array_text(shape, unit) + _too_large(bool(np.all(np.isfinite(array)))))
     return array
 
@@ -72,10 +70,10 @@ def positive_array(name: str, value: Any, unit: str) -> FloatArray:
 
 
 def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
-    """Return `value` as an array of numbers, zero or above, any shape.
+    """Return `value` as an array of non-negative numbers, any shape.
 
     Raises:
-        ParameterError: If a number is not finite or below zero.
+        ParameterError: If a number is not finite or is negative.
     """
     array = finite_array(name, value, None, unit)
     if np.any(array < 0.0):
@@ -84,10 +82,10 @@ def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
 
 
 def common_shape(name: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape that arrays of these shapes broadcast to.
+    """Return the shape to which arrays of these shapes broadcast.
 
     Raises:
-        ParameterError: If there is none.
+        ParameterError: If they do not broadcast.
     """
     try:
         return np.broadcast_shapes(*shapes)
@@ -114,7 +112,7 @@ def finite_number(name: str, value: Any, unit: str = "") -> float:
 
 
 def positive_number(name: str, value: Any, unit: str = "") -> float:
-    """Return `value` as a finite float above zero.
+    """Return `value` as a finite positive float.
 
     Raises:
         ParameterError: If it is not one.
@@ -126,7 +124,7 @@ def positive_number(name: str, value: Any, unit: str = "") -> float:
 
 
 def non_negative_number(name: str, value: Any, unit: str = "") -> float:
-    """Return `value` as a finite float, zero or above.
+    """Return `value` as a finite non-negative float.
 
     Raises:
         ParameterError: If it is not one.
@@ -138,7 +136,7 @@ def non_negative_number(name: str, value: Any, unit: str = "") -> float:
 
 
 def positive_integer(name: str, value: Any, most: int | None = None) -> int:
-    """Return `value` as an integer above zero, and not above `most` if that is given.
+    """Return `value` as a positive integer, at most `most` if that is given.
 
     Raises:
         ParameterError: If it is not one.
@@ -151,7 +149,7 @@ def positive_integer(name: str, value: Any, most: int | None = None) -> int:
 
 
 def unit_vector(name: str, value: Any) -> FloatArray:
-    """Return the direction of `value`, shape (3,), as a vector of length 1.
+    """Return the unit vector in the direction of `value`, shape (3,).
 
     Raises:
         ParameterError: If the shape differs, a number is not finite, or all are zero.
@@ -175,7 +173,7 @@ def choice(name: str, value: Any, options: Sequence[str]) -> str:
 
 
 def listed(name: str, value: Any, count: int, requirement: str) -> list[Any]:
-    """Return a tuple, a list or an array of `count` things as a list.
+    """Return a tuple, list or array of `count` elements as a list.
 
     Raises:
         ParameterError: If it is something else.
@@ -203,9 +201,9 @@ def increasing(name: str, values: FloatArray, unit: str) -> FloatArray:
 
 
 def _as_floats(given: NDArray[Any]) -> FloatArray:
-    """A copy of an array of numbers; infinite where a longer float has a number that this one has not."""
+    """Return a copy in double precision; longer floats may become infinite."""
     if given.dtype.itemsize <= 8:
-        return given.astype(np.float64)
+        return given.astype(np.float64)  # without the cost of errstate
     with np.errstate(over="ignore"):
         return given.astype(np.float64)
 
@@ -215,7 +213,11 @@ def _fits(shape: tuple[int, ...], required: tuple[int | None, ...]) -> bool:
 
 
 def _array_text(shape: tuple[int | None, ...] | None, unit: str) -> str:
-    return f"an array of {_shape_text(shape)}finite numbers" + _unit_text(unit)
+    shape_text = ""
+    if shape is not None:
+        inside = ", ".join("n" if n is None else str(n) for n in shape)
+        shape_text = f"shape ({inside}{',' if len(shape) == 1 else ''}) of "
+    return f"an array of {shape_text}finite numbers" + _unit_text(unit)
 
 
 def _unit_text(unit: str) -> str:
@@ -230,10 +232,3 @@ def _too_large(finite: bool) -> str:
 def _too_small(zero_or_negative: bool) -> str:
     """Addition to a requirement of positive numbers for those that are positive and yet refused."""
     return "" if zero_or_negative else f", at least {1.0 / LARGEST:g}"
-
-
-def _shape_text(shape: tuple[int | None, ...] | None) -> str:
-    if shape is None:
-        return ""
-    inside = ", ".join("n" if n is None else str(n) for n in shape)
-    return f"shape ({inside}{',' if len(shape) == 1 else ''}) of "

@@ -1,4 +1,4 @@
-"""Columns of numbers out of a CSV file whose first line names them."""
+"""Read columns of numbers from a CSV file by the names in its first line."""
 
 from __future__ import annotations
 
@@ -17,42 +17,42 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import FileFormatError
 
 LARGEST_FILE = 100_000_000
-"""Bytes of a file."""
+"""Maximum number of characters of a file."""
 
 MOST_ROWS = 1_000_000
-"""Rows of numbers in a file."""
+"""Maximum number of rows of numbers."""
 
 _LONGEST_LINE = 1_000_000  # characters
 
 
 class Table(NamedTuple):
-    """Some columns of a file."""
+    """Columns of a file."""
 
     columns: tuple[str, ...]
-    """Their names."""
+    """Names of the columns."""
     numbers: FloatArray
-    """What they hold, all finite, shape (n_rows, n_columns)."""
+    """Values, all finite, shape (n_rows, n_columns)."""
     lines: Sequence[int]
-    """The line of the file on which each row ends, from 1."""
+    """Line number of the end of each row, from 1."""
 
 
 def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()) -> Table:
     """Read columns of a CSV file by name.
 
-    Other columns are ignored, and so are lines with nothing in them. Every other line must have as many cells as the first: one
-    with more or fewer is damaged, or has decimal commas.
+    Other columns and empty lines are ignored. Every other line must have as many cells as the first: one with more or fewer is
+    damaged, or has decimal commas.
 
     Args:
         path: The file, in UTF-8.
-        required: Columns that it must have, each once.
-        optional: Columns that it may have, once.
+        required: Columns that the file must have, each once.
+        optional: Columns that the file may have, at most once.
 
     Returns:
-        The columns that it has, those of `optional` first.
+        The columns present, those of `optional` first.
 
     Raises:
         FileFormatError: If the file cannot be read or is too large, lacks a column or has it twice, or (naming the line) has a
-            cell that is no finite number, or more or fewer cells than the first line.
+            cell that is not a finite number, or more or fewer cells than the first line.
     """
     numbers, lines = array("d"), array("q")
     with opened(path) as file, io.TextIOWrapper(file, encoding="utf-8-sig", newline="") as text:
@@ -68,7 +68,7 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()
                 if len(cells) != len(names):
                     raise FileFormatError(f"{where}: {len(cells)} cells; {len(names)} are required")
                 if len(lines) == MOST_ROWS:
-                    raise FileFormatError(f"{where}: more than {MOST_ROWS} rows, which is the most that is read")
+                    raise FileFormatError(f"{where}: more than {MOST_ROWS} rows; at most {MOST_ROWS} are read")
                 numbers.extend(_number(f"{where}: {names[place]}", cells[place]) for place in places)
                 lines.append(reader.line_num)
         except csv.Error as error:
@@ -78,37 +78,37 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()
 
 
 def _lines(path: Path, file: io.TextIOWrapper) -> Iterator[str]:
-    """The lines of a text with their ends, none of them too long, and all together not too long."""
+    """Yield the lines of a text with their ends, up to the limits of a line and of the file."""
     size = 0
     while line := file.readline(_LONGEST_LINE + 1):
         size += len(line)
         if len(line) > _LONGEST_LINE:
-            raise FileFormatError(f"{path} has a line of more than {_LONGEST_LINE} characters, which is the most that is read")
+            raise FileFormatError(f"{path} has a line of more than {_LONGEST_LINE} characters, the most that is read")
         if size > LARGEST_FILE:
-            raise FileFormatError(f"{path} has more than {LARGEST_FILE} characters, which is the most that is read")
+            raise FileFormatError(f"{path} has more than {LARGEST_FILE} characters, the most that is read")
         if "\0" in line:
-            raise FileFormatError(f"{path} is no text in UTF-8: it holds a character of number 0")
+            raise FileFormatError(f"{path} is not text in UTF-8: it contains a NUL character")
         yield line
 
 
 def _columns(path: Path, names: Sequence[str], required: Sequence[str], optional: Sequence[str]) -> tuple[str, ...]:
-    """Which columns are there, checked."""
+    """Names of the columns present, checked to occur as often as they must."""
     if any(names.count(name) != 1 for name in required) or any(names.count(name) > 1 for name in optional):
         named = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
-        may = f", and {', '.join(optional)} at most once" if optional else ""
+        allowed = f", and {', '.join(optional)} at most once" if optional else ""
         raise FileFormatError(
-            f"{path}, line 1: it names {named[:500] or 'nothing'}; {', '.join(required)} are required, each once{may}"
+            f"{path}, line 1: it names {named[:500] or 'nothing'}; {', '.join(required)} are required, each once{allowed}"
         )
     return (*(name for name in optional if name in names), *required)
 
 
 def _number(what: str, cell: str) -> float:
-    """A cell as a number; Python's own reader also takes `1_000` and digits of other scripts."""
+    """Return a cell as a number; unlike `float`, without `1_000` and digits of other scripts."""
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        shown = cell if len(cell) <= 60 else f"{cell[:57]}..."
-        raise FileFormatError(f"{what} = {shown!r}; a finite number is required")
+        start = cell if len(cell) <= 60 else f"{cell[:57]}..."
+        raise FileFormatError(f"{what} = {start!r}; a finite number is required")
     return value

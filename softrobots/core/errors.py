@@ -1,7 +1,7 @@
-"""Every error that softrobots raises on purpose, in one hierarchy.
+"""Errors of the package, derived from `SoftRobotsError`.
 
-Each error says what came, what was required and what is available, and carries the same facts as attributes. All derive
-from `SoftRobotsError`; each also derives from the built-in exception that a caller would expect.
+Each error states the value, the requirement and the alternatives, and carries the same facts as attributes. Each also derives
+from the built-in exception that a caller would expect.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ class SoftRobotsError(Exception):
     """Base of every error of this package."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle as message and attributes, so that an error crosses from a worker process whole."""
+        """Pickle as message and attributes, so that worker processes can return errors."""
         return _rebuild, (type(self), self.args, self.__dict__)
 
 
 class ParameterError(SoftRobotsError, ValueError):
-    """A value that is not acceptable: wrong shape, not finite, out of range, unknown option.
+    """An invalid value: wrong shape, not finite, out of range, unknown option.
 
     Attributes:
         field: Name of the parameter.
-        value: What came.
-        requirement: What was required.
+        value: The invalid value.
+        requirement: What it must be.
     """
 
     def __init__(self, field: str, value: Any, requirement: str) -> None:
-        """Say that `field` came as `value` although `requirement` was required."""
+        """Create the error `<field> = <value>: <field> must be <requirement>`."""
         super().__init__(f"{field} = {_short(value)}: {field} must be {requirement}")
         self.field = field
         self.value = value
@@ -37,20 +37,20 @@ class ParameterError(SoftRobotsError, ValueError):
 
 
 class DescriptionError(SoftRobotsError, ValueError):
-    """A robot description (xacro or URDF) that cannot be made or read."""
+    """A robot description (xacro, URDF, MJCF or SDF) that cannot be generated or read."""
 
 
 class NameNotFound(SoftRobotsError, LookupError):
-    """A joint, frame or option name that the robot does not have.
+    """An unknown name of a joint, frame or option.
 
     Attributes:
         kind: What the name stands for, e.g. "frame".
-        name: The name that came.
+        name: The unknown name.
         available: The names that exist.
     """
 
     def __init__(self, kind: str, name: str, available: Iterable[str], *, lines: Iterable[str] = ()) -> None:
-        """Say that no `kind` is called `name`, and which ones there are: by name, or in `lines` that tell more of each."""
+        """Create the error with a list of the available names, or with `lines` that describe them."""
         self.kind = kind
         self.name = name
         self.available = tuple(available)
@@ -60,38 +60,38 @@ class NameNotFound(SoftRobotsError, LookupError):
         super().__init__(f"no {kind} is called {name!r}{hint}; available:{listed}")
 
     def __str__(self) -> str:
-        """Return the message itself (LookupError's children may quote it)."""
+        """Return the message itself (subclasses of LookupError may quote it)."""
         return str(self.args[0])
 
 
 class StraightTube(SoftRobotsError, ValueError):
-    """A tube that is not bent at all: angle 0 and contraction 1, or so near that no helix radius can be told."""
+    """A tube without helix radius: contraction 1 and angle 0, up to rounding."""
 
 
 class SelfIntersection(SoftRobotsError, ValueError):
     """A helix whose tube would run into itself.
 
     Attributes:
-        contact: The `softrobots.helix.SelfContact` that tells where and by how much.
+        contact: The `softrobots.helix.SelfContact` with place and amount.
     """
 
     def __init__(self, message: str, *, contact: Any) -> None:
-        """Say what touches what, and keep the finding."""
+        """Create the error with the contact."""
         super().__init__(message)
         self.contact = contact
 
 
 class NotConverged(SoftRobotsError, RuntimeError):
-    """An iteration that ended without an answer; it carries the best iterate.
+    """An iteration that did not converge.
 
     Attributes:
         best: The best iterate: an `Equilibrium`, `LoadEstimate` or `IkSolution` that does not meet the tolerance.
-        residual: Its residual, in the unit that the message states.
-        iterations: How many iterations were spent.
+        residual: Its residual, in the unit given in the message.
+        iterations: Number of iterations.
     """
 
     def __init__(self, message: str, *, best: Any, residual: float, iterations: int) -> None:
-        """Say what did not converge and keep the best iterate."""
+        """Create the error with the best iterate."""
         super().__init__(message)
         self.best = best
         self.residual = residual
@@ -99,9 +99,9 @@ class NotConverged(SoftRobotsError, RuntimeError):
 
 
 class EquilibriumNotFound(NotConverged):
-    """No static equilibrium was reached.
+    """No static equilibrium was found.
 
-    `best` is an `Equilibrium` above the tolerance, or the `ImposedDisplacement` as far as the displacement could be followed.
+    `best` is an `Equilibrium` above the tolerance, or the `ImposedDisplacement` up to the last displacement that was reached.
     """
 
 
@@ -110,25 +110,25 @@ class LoadNotFound(NotConverged):
 
 
 class TargetUnreachable(NotConverged):
-    """No motor angles bring the loaded tip to the target.
+    """No motor coordinates bring the loaded tip to the target.
 
     `best` is the `IkSolution` nearest to the target, `residual` its distance [m].
     """
 
 
 class NeutralEquilibrium(SoftRobotsError, ArithmeticError):
-    """An equilibrium that is neither stable nor unstable: its tangent stiffness is singular, so it has no derivative."""
+    """An equilibrium with singular tangent stiffness: neither stable nor unstable, and without derivatives."""
 
 
 class NoCriticalLoad(SoftRobotsError, RuntimeError):
-    """The equilibrium path stays stable up to the largest load that was tried.
+    """The equilibrium path is stable up to the largest load considered.
 
     Attributes:
         max_force: That load [N].
     """
 
     def __init__(self, message: str, *, max_force: float) -> None:
-        """Say how far the path was followed."""
+        """Create the error with the largest load."""
         super().__init__(message)
         self.max_force = max_force
 
@@ -142,15 +142,15 @@ class OutputError(SoftRobotsError, OSError):
 
 
 class OutputExists(OutputError, FileExistsError):
-    """A file or a folder that is not empty stands where a result would be written."""
+    """The output exists already: a file, or a folder that is not empty."""
 
 
 class FileFormatError(SoftRobotsError, ValueError):
-    """A results or waypoint file that cannot be read."""
+    """A file that cannot be read: results, waypoints, parameters, measurements."""
 
 
 class ClusterError(SoftRobotsError, RuntimeError):
-    """A cluster of worker processes cannot be reached, or does not do its work."""
+    """A cluster of worker processes cannot be reached, or fails."""
 
 
 class ViewerError(SoftRobotsError, RuntimeError):
@@ -158,23 +158,23 @@ class ViewerError(SoftRobotsError, RuntimeError):
 
 
 class MissingDependency(SoftRobotsError, ImportError):
-    """A package of an optional extra is needed and not installed."""
+    """A package of an optional extra is not installed."""
 
     def __init__(self, package: str, extra: str) -> None:
-        """Say what to type."""
+        """Create the error with the command that installs the extra."""
         super().__init__(f"{package} is not installed; it is part of an extra: pip install 'softrobots[{extra}]'")
 
 
 def _rebuild(kind: type[SoftRobotsError], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> SoftRobotsError:
-    made = kind.__new__(kind, *arguments)
-    made.args = arguments
-    made.__dict__.update(attributes)
-    return made
+    error = kind.__new__(kind, *arguments)
+    error.args = arguments
+    error.__dict__.update(attributes)
+    return error
 
 
 def _short(value: Any, limit: int = 120) -> str:
     try:
         text = repr(value).replace("\n", " ")
-    except Exception:  # nested too deeply, an integer of more digits than Python writes, an object of the caller
+    except Exception:  # too deep a nesting, an integer of too many digits, an object of the caller
         text = f"<{type(value).__name__}>"
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,6 +1,6 @@
-"""Writing files and folders: nothing is overwritten silently, and a file appears whole or not at all.
+"""Write files and folders: atomically, and without overwriting silently.
 
-Everything that the package and its scripts write goes through here.
+The package and its scripts write all their files with these functions.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import IO, Any
 
 from softrobots.core.errors import OutputError, OutputExists, ParameterError
 
-_NAME = 60  # characters of a name that its draft keeps: with all of them it may be longer than a name can be
+_NAME = 60  # characters of a file name that its draft keeps; all of them and the suffix could exceed the limit of a name
 
 
 def as_path(name: str, value: Any) -> Path:
@@ -36,24 +36,24 @@ def as_path(name: str, value: Any) -> Path:
 
 
 def new_file(path: str | os.PathLike[str], *, overwrite: bool) -> Path:
-    """Return `path` if a file may be written there, making its parent folders.
+    """Return `path` if a file can be written there; create its parent folders.
 
     Raises:
-        ParameterError: If it is no path.
+        ParameterError: If it is not a path.
         OutputExists: If it exists and `overwrite` is false, or is a folder, a device or a pipe.
-        OutputError: If its folder cannot be made or written to, or the file is write-protected.
+        OutputError: If its folder cannot be created or written to, or the file is write-protected.
     """
     target = as_path("path", path)
     try:
         place = _place(target)
-        held = place.stat() if place.exists() else None
-        if held is not None and stat.S_ISDIR(held.st_mode):
+        mode = place.stat().st_mode if place.exists() else None
+        if mode is not None and stat.S_ISDIR(mode):
             raise OutputExists(f"{target} is a folder; a file name is required")
-        if held is not None and not stat.S_ISREG(held.st_mode):  # to move a file there would replace the device
+        if mode is not None and not stat.S_ISREG(mode):  # moving a file there would replace the device
             raise OutputExists(f"{target} is a device or a pipe; the name of a file is required")
-        if (held is not None or target.is_symlink()) and not overwrite:
+        if (mode is not None or target.is_symlink()) and not overwrite:
             raise OutputExists(f"{target} exists; choose another name or allow overwriting")
-        if held is not None and not held.st_mode & 0o222:
+        if mode is not None and not mode & 0o222:
             raise OutputError(f"cannot write {target}: it is write-protected")
         place.parent.mkdir(parents=True, exist_ok=True)
         _check_writable(place.parent)
@@ -65,15 +65,15 @@ def new_file(path: str | os.PathLike[str], *, overwrite: bool) -> Path:
 
 
 def free_folder(path: str | os.PathLike[str]) -> Path:
-    """Return `path` if it can become a folder of results; nothing is made yet.
+    """Return `path` if it can be used as an output folder; nothing is created yet.
 
     Args:
         path: A folder that does not exist or is empty.
 
     Raises:
-        ParameterError: If it is no path.
-        OutputExists: If it, or a folder that it would be in, is a file, or if it holds anything.
-        OutputError: If it cannot be looked at or written to.
+        ParameterError: If it is not a path.
+        OutputExists: If it or one of its parents is a file, or if it is not empty.
+        OutputError: If it cannot be read or written to.
     """
     target = as_path("path", path)
     try:
@@ -81,44 +81,43 @@ def free_folder(path: str | os.PathLike[str]) -> Path:
         existing = next((p for p in (target, *target.parents) if p.is_dir()), None)
         names = sorted(p.name for p in target.iterdir()) if target.is_dir() else []
     except (OSError, ValueError) as error:
-        raise OutputError(f"cannot look at {target}: {error}") from error
+        raise OutputError(f"cannot read the folder {target}: {error}") from error
     if blocking is not None:
         raise OutputExists(f"{blocking} is a file; an output folder must be new or empty")
     if names:
-        held = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
-        raise OutputExists(f"{target} is not empty (it holds {held}); an output folder must be new or empty")
+        content = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+        raise OutputExists(f"{target} is not empty (it contains {content}); an output folder must be new or empty")
     if existing is not None:
         _check_writable(existing)
     return target
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """Make a folder and those that it is in, if they are not there, and return its path.
+    """Create a folder and its parents unless they exist, and return its path.
 
     Raises:
-        ParameterError: If it is no path.
-        OutputError: If it cannot be made, e.g. because a file is in the way.
+        ParameterError: If it is not a path.
+        OutputError: If it cannot be created, e.g. because a file has its name.
     """
     target = as_path("path", path)
     try:
         target.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
-        raise OutputError(f"cannot make the folder {target}: {error}") from error
+        raise OutputError(f"cannot create the folder {target}: {error}") from error
     return target
 
 
 def write_atomically(target: Path, write: Callable[[IO[bytes]], object], *, overwrite: bool = True) -> None:
-    """Write a file beside its place and move it there; an interruption leaves the old file, or none.
+    """Write a file atomically: after an interruption the old file is there, or none.
 
-    The content is on the disk before the file gets its name. A file that is replaced hands its permissions on; through a
-    symbolic link the file is replaced that it points to. Of several writers of one file the last wins, or with
-    `overwrite=False` the first, and the file is whole. A process that is killed may leave a hidden file `.NAME.*.part`;
-    nothing reads it again.
+    The content is written and synced to a draft in the same folder, which is then renamed. A replaced file keeps its
+    permissions; of a symbolic link the file that it points to is replaced. Of several writers of one file the last wins, or
+    the first with `overwrite=False`. A process that is killed may leave a hidden file `.NAME.*.part`, which is never read.
 
     Args:
-        target: The file; its folder exists.
-        write: Writes the content into an open binary file.
-        overwrite: Replace a file that is there by now.
+        target: The file; its folder must exist.
+        write: Function that writes the content to an open binary file.
+        overwrite: Replace an existing file.
 
     Raises:
         OutputExists: If the file exists and `overwrite` is false.
@@ -140,14 +139,12 @@ def write_atomically(target: Path, write: Callable[[IO[bytes]], object], *, over
         else:
             _move_to_free_name(part, place)
         _sync_folder(place.parent)
-    except OutputError:
-        _remove(part)
-        raise
-    except OSError as error:
-        _remove(part)
-        raise OutputError(f"cannot write {target}: {error}") from error
-    except BaseException:
-        _remove(part)
+    except BaseException as error:
+        if part is not None:
+            with contextlib.suppress(OSError):
+                part.unlink()
+        if isinstance(error, OSError) and not isinstance(error, OutputError):
+            raise OutputError(f"cannot write {target}: {error}") from error
         raise
 
 
@@ -155,7 +152,7 @@ def write_bytes(path: str | os.PathLike[str], content: bytes, *, overwrite: bool
     """Write a file of bytes and return its path.
 
     Raises:
-        ParameterError: If the path is none.
+        ParameterError: If `path` is not a path.
         OutputExists: If the file exists and `overwrite` is false, or is a folder, a device or a pipe.
         OutputError: If the file cannot be written.
     """
@@ -168,19 +165,19 @@ def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> P
     """Write a text file in UTF-8 and return its path.
 
     Raises:
-        ParameterError: If the path is none.
+        ParameterError: If `path` is not a path.
         OutputExists: If the file exists and `overwrite` is false, or is a folder, a device or a pipe.
-        OutputError: If the file cannot be written, or the text has no UTF-8.
+        OutputError: If the file cannot be written, or the text cannot be encoded in UTF-8.
     """
     try:
         content = text.encode("utf-8")
-    except UnicodeEncodeError as error:  # half of a pair, as in a file name that is no text
+    except UnicodeEncodeError as error:  # a lone surrogate, as in file names that are not text
         raise OutputError(f"cannot write {path}: {error}") from error
     return write_bytes(path, content, overwrite=overwrite)
 
 
 def csv_text(names: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """Return a table as CSV: a line of names, then one a row; floats with all their digits."""
+    """Return a table as CSV: a line of column names, then one line a row; floats in full precision."""
     stream = io.StringIO(newline="")
     writer = csv.writer(stream)
     writer.writerow(names)
@@ -189,40 +186,40 @@ def csv_text(names: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def _place(target: Path) -> Path:
-    """Where a path leads to: through symbolic links, if there are any.
+    """Resolve symbolic links.
 
     Raises:
-        OutputError: If links lead round in circles.
+        OutputError: If links form a loop.
     """
     try:
         place = target.resolve() if target.is_symlink() else target
     except (OSError, RuntimeError) as error:  # RuntimeError: Python before 3.13
         raise OutputError(f"cannot write {target}: {error}") from error
-    if place.is_symlink():  # Python 3.13 stops in the circle, and says nothing
-        raise OutputError(f"cannot write {target}: symbolic links lead round in circles")
+    if place.is_symlink():  # Python 3.13 stops in a loop without an error
+        raise OutputError(f"cannot write {target}: its symbolic links form a loop")
     return place
 
 
 def _check_writable(folder: Path) -> None:
-    """Refuse a folder in which no file can be made, before hours of work.
+    """Check that files can be created in a folder, before hours of work.
 
     Raises:
-        OutputError: If permissions, or a disk that can only be read, are against it.
+        OutputError: If permissions or a read-only disk prevent it.
     """
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids):
-        raise OutputError(f"cannot write in {folder}: no permission, or a disk that can only be read")
+        raise OutputError(f"cannot write in {folder}: no permission, or a read-only disk")
 
 
 def _move_to_free_name(part: Path, place: Path) -> None:
-    """Give a finished file its name, unless another one has got it.
+    """Rename a finished draft without replacing another file.
 
     Raises:
-        OutputExists: If another file has it.
-        OSError: If it cannot be moved.
+        OutputExists: If the name exists.
+        OSError: If the draft cannot be renamed.
     """
     taken = OutputExists(f"{place} exists; choose another name or allow overwriting")
     try:
-        os.link(part, place)  # unlike a renaming, this replaces nothing
+        os.link(part, place)  # unlike a rename, this never replaces a file
     except FileExistsError as error:
         raise taken from error
     except OSError as error:  # a file system without hard links
@@ -234,16 +231,10 @@ def _move_to_free_name(part: Path, place: Path) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Have the new name on the disk, too, where the file system does that."""
+    """Sync the new name to the disk, where the file system supports it."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(handle)
         finally:
             os.close(handle)
-
-
-def _remove(part: Path | None) -> None:
-    if part is not None:
-        with contextlib.suppress(OSError):
-            part.unlink()

@@ -1,4 +1,4 @@
-"""JSON as the standard has it: finite numbers, no name twice in an object, not nested without end."""
+"""Strict JSON: finite numbers, no duplicate names in an object, limited nesting."""
 
 from __future__ import annotations
 
@@ -12,45 +12,45 @@ from softrobots.core.bounded_reading import read_text
 from softrobots.core.errors import FileFormatError
 
 DEEPEST = 40
-"""How many arrays and objects may be inside each other."""
+"""Maximum nesting depth of arrays and objects."""
 
 
 def parse_json(text: str) -> Any:
-    """The value of a JSON text.
+    """Parse a JSON text.
 
-    Python's own reader also takes NaN and Infinity, reads 1e999 as infinite, and of two members of one name keeps the last.
+    Python's own parser also accepts NaN and Infinity, reads 1e999 as infinite, and of duplicate names keeps the last.
 
     Args:
         text: The text.
 
     Returns:
-        Dictionaries, lists, texts, finite numbers, truth values and None, nested at most `DEEPEST` deep.
+        Dictionaries, lists, strings, finite numbers, booleans and None, nested at most `DEEPEST` deep.
 
     Raises:
-        FileFormatError: If it is no such text.
+        FileFormatError: If the text is not such JSON.
     """
     try:
         value = json.loads(text, object_pairs_hook=_object, parse_constant=_refuse)
     except FileFormatError:
         raise
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"it is no JSON: {error}") from error
+        raise FileFormatError(f"it is not JSON: {error}") from error
     _check(value)
     return value
 
 
 def read_json(path: Path, largest: int) -> Any:
-    """The value in a JSON file.
+    """Read a JSON file.
 
     Args:
         path: The file, in UTF-8.
-        largest: How many bytes it may have.
+        largest: Maximum size in bytes.
 
     Returns:
         As `parse_json`.
 
     Raises:
-        FileFormatError: If the file cannot be read, is larger, or is no such text.
+        FileFormatError: If the file cannot be read, is larger, or is not such JSON.
     """
     text = read_text(path, largest)
     try:
@@ -60,23 +60,23 @@ def read_json(path: Path, largest: int) -> Any:
 
 
 def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(members)
-    if len(made) < len(members):
+    result = dict(members)
+    if len(result) < len(members):
         twice = next(name for name, count in Counter(name for name, _ in members).items() if count > 1)
         raise FileFormatError(f"an object has two members called {twice[:60]!r}")
-    return made
+    return result
 
 
 def _refuse(word: str) -> Any:
-    raise FileFormatError(f"{word} is no number of JSON")
+    raise FileFormatError(f"{word} is not a number in JSON")
 
 
 def _check(value: Any) -> None:
-    """Refuse what is nested too deep, or a number too large, without recursion."""
+    """Raise FileFormatError for nesting too deep or a number too large, without recursion."""
     level, depth = [value], 0
     while level:
         if depth > DEEPEST:
-            raise FileFormatError(f"arrays or objects are inside each other more than {DEEPEST} deep")
+            raise FileFormatError(f"arrays or objects are nested more than {DEEPEST} deep")
         inner: list[Any] = []
         for item in level:
             if isinstance(item, dict):

@@ -1,4 +1,4 @@
-"""Progress bars on stderr, for whoever asks for them."""
+"""Optional progress bars on stderr."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ Step = TypeVar("Step")
 def with_progress(
     steps: Iterable[Step], progress: bool | str, *, label: str, unit: str, total: int | None = None, done: int = 0
 ) -> Iterable[Step]:
-    """Go through steps with a progress bar, if one is asked for.
+    """Wrap an iterable in a progress bar.
 
     Args:
         steps: The steps.
-        progress: Whether to show one; a text is its label.
-        label: Its label otherwise.
-        unit: What a step is called.
-        total: Number of steps, with those that are done; None: the steps know it.
-        done: Number of steps before these, that are done.
+        progress: Whether to show a bar; a text replaces its label.
+        label: Default label.
+        unit: Name of a step.
+        total: Number of steps including those done before; None for the length of `steps`.
+        done: Number of steps done before.
 
     Returns:
         The same steps.

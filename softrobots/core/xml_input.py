@@ -1,8 +1,8 @@
-"""XML of other people: the one door that it comes through, before any parser of a library sees it.
+"""Check and parse untrusted XML before any other parser reads it.
 
-Libraries trust what they read. Measured: Pinocchio's parser ends the process at a chain of 4000 links, for each of which it
-calls itself, and takes 20 s for an element with 100000 attributes; expat expands entities. So a document is looked at here
-first, and what no robot needs is refused. The largest description among 1200 that we know has 6000 tags and 0.2 MB.
+Other parsers trust their input. Measured: Pinocchio's crashes at a chain of 4000 links, because it recurses for each of them,
+and takes 20 s for an element with 100000 attributes; expat expands entities. So documents are checked here first, and what no
+robot needs is refused. The largest of 1200 robot descriptions examined has 6000 tags and 0.2 MB.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError, FileFormatError
 
 LARGEST_FILE = 10_000_000
-"""Bytes, or characters, that a description may have."""
+"""Maximum number of bytes, or characters, of a description."""
 MOST_TAGS = 40_000
-"""Tags and comments that it may have."""
+"""Maximum number of tags and comments."""
 MOST_ATTRIBUTES = 100
-"""Attributes that one element may have."""
+"""Maximum number of attributes of one element."""
 DEEPEST = 400
-"""Elements that may be within each other. MJCF nests a body for every joint; Python's own serialiser calls itself for each."""
+"""Maximum nesting depth. MJCF nests a body for every joint, and Python's own serialiser recurses for each."""
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF32_LE, "utf-32"),  # before that of UTF-16, which it begins with
+    (codecs.BOM_UTF32_LE, "utf-32"),  # before the mark of UTF-16, with which it starts
     (codecs.BOM_UTF32_BE, "utf-32"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
@@ -39,16 +39,17 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
 def read_xml(path: Path) -> str:
-    """Read the text of a file: UTF-8, what its first bytes or its declaration say, but not every encoding that there is.
+    """Read the text of an XML file in the encoding of its byte order mark or declaration; UTF-8 by default.
 
     Args:
         path: The file.
 
     Returns:
-        The text; an encoding that it declares is UTF-8.
+        The text; a declared encoding is changed to UTF-8.
 
     Raises:
-        DescriptionError: If the file cannot be read, is too large, or is in another encoding than it says or than are known.
+        DescriptionError: If the file cannot be read, is too large, declares another than the usual encodings, or is not in the
+            encoding that it declares.
     """
     try:
         data = read_bytes(path, LARGEST_FILE)
@@ -57,8 +58,8 @@ def read_xml(path: Path) -> str:
         raise DescriptionError(f"cannot read {str(path)[:200]!r}: {reason[:300]}") from error
     codec = next((name for mark, name in _MARKS if data.startswith(mark)), None)
     if codec is None:
-        said = _HEAD.match(data[:400].decode("ascii", "replace"))
-        codec = "utf-8" if said is None else (said[2] or said[3] or "").lower()
+        declaration = _HEAD.match(data[:400].decode("ascii", "replace"))
+        codec = "utf-8" if declaration is None else (declaration[2] or declaration[3] or "").lower()
         if codec not in _CODECS:
             raise DescriptionError(f"{path} declares the encoding {codec!r}; one of {', '.join(_CODECS)} is required")
     try:
@@ -68,13 +69,13 @@ def read_xml(path: Path) -> str:
 
 
 def as_unicode(text: str) -> str:
-    """Take byte order marks and blanks off the front of a text, and let it declare UTF-8 if it declares an encoding.
+    """Return decoded XML without leading byte order marks and blanks, and with UTF-8 as its declared encoding, if any.
 
-    What was said of the bytes that it was read from no longer holds, and parsers would believe it.
+    A declared encoding of the original bytes no longer holds, and parsers would apply it.
     """
     text = text.lstrip("\ufeff \t\r\n")
-    said = _HEAD.match(text)
-    return text if said is None else f'{said[1]}"utf-8"{text[said.end() :]}'
+    declaration = _HEAD.match(text)
+    return text if declaration is None else f'{declaration[1]}"utf-8"{text[declaration.end() :]}'
 
 
 def parse_xml(text: str, source: str) -> ElementTree.Element:
@@ -85,7 +86,7 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
 
     Args:
         text: The document.
-        source: Where it comes from, for the error.
+        source: Name of its source, for the error.
 
     Returns:
         The root element.
@@ -102,7 +103,7 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
         if count > most:
             raise DescriptionError(f"{source} has {count} {what}; at most {most} are read")
     if "\0" in text:
-        raise DescriptionError(f"{source} is not well-formed XML: it has NUL characters, as UTF-16 without a mark would")
+        raise DescriptionError(f"{source} is not well-formed XML: it has NUL characters, like UTF-16 without a byte order mark")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise DescriptionError(f"{source} declares a document type or entities; plain XML is required")
     try:
@@ -112,7 +113,7 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
     level, depth = [root], 1
     while level:
         if depth > DEEPEST:
-            raise DescriptionError(f"{source} has elements more than {DEEPEST} deep within each other")
+            raise DescriptionError(f"{source} has elements nested more than {DEEPEST} deep")
         crowded = next((element for element in level if len(element.keys()) > MOST_ATTRIBUTES), None)
         if crowded is not None:
             raise DescriptionError(f"{source} has an element <{crowded.tag}> with more than {MOST_ATTRIBUTES} attributes")
@@ -121,15 +122,14 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
 
 
 def number_in(text: str | None, most: float = LARGEST) -> float:
-    """A number as XML files spell it, NaN if it is none.
+    """Parse a number in XML, NaN if it is not one.
 
     Args:
-        text: Decimal digits, with point and exponent if need be; not `1_000`, `0x10`, `inf` or digits of other scripts, which
-            some parsers take and others do not.
-        most: How large it may be, either way.
+        text: Decimal number; not `1_000`, `0x10`, `inf` or digits of other scripts, which only some parsers accept.
+        most: Largest magnitude.
 
     Returns:
-        The number; NaN, too, if it is infinite or larger.
+        The number; NaN also if it is larger.
     """
     stripped = (text or "").strip()
     if len(stripped) > 400 or not _NUMBER.fullmatch(stripped):
