@@ -11,7 +11,7 @@ import pytest
 import softrobots as sr
 from softrobots.cli.tools import packages
 from softrobots.cli.tools.known_tools import TOOLS
-from softrobots.cli.tools.packages import EXTRAS, PACKAGES, Package, PackageState, extra_states
+from softrobots.cli.tools.packages import EXTRAS, Package, missing_of_extras, required_packages
 from softrobots.compiled.run.machines import available_backend, cache_folder, cache_is_kept
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.view.meshcat_page.server import end_server, start_server
@@ -53,7 +53,7 @@ def test_doctor_asks_every_tool_if_told_and_answers_machines(told) -> None:
     assert asked == {name: tool.version for name, tool in TOOLS.items() if tool.version is not None}
     assert max(row["position_error"] for row in answer["kinematics"]) < 1e-5  # single precision in PyBullet
     assert (answer["ok"], answer["wrong"], answer["softrobots"]) == (True, [], sr.__version__)
-    assert {row["name"] for row in answer["packages"]} == {package.name for package in PACKAGES}
+    assert {row["name"]: row["version"] for row in answer["packages"]} == {row.name: row.version for row in required_packages()}
     assert list(answer["extras"]) == list(EXTRAS)
     assert answer["urdf_files"] == [{"file": str(ARM), "up_to_date": True}]
 
@@ -117,19 +117,23 @@ def test_doctor_tells_what_is_missing_and_what_to_type(told, monkeypatch: pytest
 
 def test_an_extra_is_complete_without_what_cannot_be_had_for_this_python(monkeypatch: pytest.MonkeyPatch) -> None:
     """PyBullet has no wheels above Python 3.11; viser is part of two extras."""
-    states = [PackageState(package, None if package.name in ("pybullet", "viser") else "9999") for package in PACKAGES]
-    for version, lacking in (((3, 11), ("pybullet",)), ((3, 12), ())):
+    monkeypatch.setattr(packages, "installed_version", lambda name: None if name in ("pybullet", "viser") else "9999")
+    for version, lacking in (((3, 11), ["pybullet"]), ((3, 12), [])):
         monkeypatch.setattr(packages.sys, "version_info", version)
-        found = {extra.name: extra.missing for extra in extra_states(states)}
-        assert found == {name: () for name in EXTRAS} | {
-            "interop": lacking,
-            "viser": ("viser",),
-            "interop-kinematics": ("viser",),
-        }
+        lacks = {"interop": lacking, "viser": ["viser"], "interop-kinematics": ["viser"]}
+        assert missing_of_extras(required_packages()) == {name: [] for name in EXTRAS} | lacks
 
 
-def test_every_extra_is_told_and_holds_something() -> None:
-    assert set(EXTRAS) == {package.extra for package in PACKAGES} - {""}
+def test_every_extra_has_a_package_and_an_installation_without_metadata_is_told(told, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert set(EXTRAS) == {extra for package in required_packages() for extra in package.extras}
+
+    def requires(name: str) -> None:
+        raise packages.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(packages.metadata, "requires", requires)
+    status, out, _ = told("doctor")
+    assert status == 1
+    assert out.endswith("wrong:\n  softrobots has no metadata here: install it with pip\n")
 
 
 @pytest.mark.usefixtures("one_robot")
@@ -194,12 +198,10 @@ def test_the_packages_are_those_of_pyproject() -> None:
         place = head[1] if head else place
         for name, least in re.findall(r'"([\w-]+)(?:\[\w+\])?>=([\d.]+)', line):
             listed.setdefault(name, set()).add(("" if place == "dependencies" else place, least))
-    ours = {package.name: {(package.extra, package.minimum)} for package in PACKAGES}
-    for package in PACKAGES:
-        if package.also:
-            ours[package.name].add((package.also, package.minimum))
+    ours = {row.name: {(extra, row.minimum) for extra in row.extras or ("",)} for row in required_packages()}
     of_users = {name: {entry for entry in listed[name] if entry[0] not in ("dev", "test")} for name in listed}
-    assert ours == {name: entries for name, entries in of_users.items() if entries}
+    stale = "the installation is older than pyproject.toml: install it again"
+    assert ours == {name: entries for name, entries in of_users.items() if entries}, stale
     alone = {name for name, entries in of_users.items() if not entries}
     assert alone == {
         "build",
@@ -220,6 +222,6 @@ def test_the_packages_are_those_of_pyproject() -> None:
     [("2.0", "2.0", True), ("2.10.1", "2.9", True), ("1.26.4", "2.0", False), ("2.0rc1", "2.0", True), (None, "1", False)],
 )
 def test_versions_are_compared_by_their_numbers(version: str | None, minimum: str, ok: bool) -> None:
-    state = PackageState(Package("p", minimum, "", ""), version)
-    assert state.ok == ok
-    assert bool(state.advice) != ok
+    package = Package("p", minimum, (), None, version)
+    assert package.ok == ok
+    assert bool(package.advice) != ok

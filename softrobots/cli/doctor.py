@@ -13,7 +13,7 @@ from softrobots.cli.reports.answers import add_json, aligned, tell
 from softrobots.cli.tools.checks import row_problems
 from softrobots.cli.tools.kinematics import KinematicsRow, compare_kinematics
 from softrobots.cli.tools.known_tools import installed_tools
-from softrobots.cli.tools.packages import extra_states, package_states
+from softrobots.cli.tools.packages import EXTRAS, missing_of_extras, required_packages
 from softrobots.compiled.run.machines import available_backend, cache_folder, cache_is_kept
 from softrobots.core.errors import SoftRobotsError, ViewerError
 from softrobots.description.paths import urdf_folder, xacro_folder
@@ -97,22 +97,25 @@ def _places(report: _Report) -> Path | None:
 
 
 def _packages(report: _Report) -> None:
-    """Every package, installed or not, and every extra."""
-    states = package_states()
-    extras = extra_states(states)
-    report.wrong.extend(f"{state.package.name}: {state.advice}" for state in states if not state.ok and not state.package.extra)
-    report.answer["packages"] = [
-        {**state.package._asdict(), "version": state.version, "ok": state.ok, "advice": state.advice} for state in states
-    ]
-    report.answer["extras"] = {extra.name: {**extra._asdict(), "complete": extra.complete} for extra in extras}
+    """Every required package, installed or not, and every extra."""
+    try:
+        packages = required_packages()
+    except SoftRobotsError as error:
+        report.wrong.append(str(error))
+        return
+    missing = missing_of_extras(packages)
+    report.wrong.extend(f"{package.name}: {package.advice}" for package in packages if not package.ok and not package.extras)
+    report.answer["packages"] = [{**package._asdict(), "ok": package.ok, "advice": package.advice} for package in packages]
+    report.answer["extras"] = {
+        name: {"purpose": purpose, "missing": missing[name], "complete": not missing[name]} for name, purpose in EXTRAS.items()
+    }
     rows = []
-    for state in states:
-        package = state.package
-        advice = state.advice if package.wanted else ""
-        rows.append((package.name, state.version or "-", package.extra or "required", advice or package.purpose))
+    for package in packages:
+        advice = package.advice if package.wanted or package.ok else "not for this Python"
+        rows.append((package.name, package.version or "-", ", ".join(package.extras) or "required", advice))
     report.add("Packages", rows)
-    told = {extra.name: "complete" if extra.complete else f"lacks {', '.join(extra.missing)}" for extra in extras}
-    report.add("Extras: pip install 'softrobots[EXTRA]'", [(extra.name, told[extra.name], extra.purpose) for extra in extras])
+    states = {name: f"lacks {', '.join(names)}" if names else "complete" for name, names in missing.items()}
+    report.add("Extras: pip install 'softrobots[EXTRA]'", [(name, states[name], EXTRAS[name]) for name in EXTRAS])
 
 
 def _page(report: _Report) -> None:

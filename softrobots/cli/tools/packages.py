@@ -1,36 +1,14 @@
-"""The packages that softrobots needs, and those of its extras: which are installed."""
+"""The packages that softrobots requires, out of its own metadata, and which of them are installed."""
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from importlib import metadata
 from typing import NamedTuple
 
 from softrobots.cli.tools.known_tools import installed_version
-
-
-class Package(NamedTuple):
-    """A package on PyPI."""
-
-    name: str
-    """Its name there."""
-    minimum: str
-    """The oldest version that will do."""
-    extra: str
-    """The extra of softrobots that it is part of; empty: required."""
-    purpose: str
-    """What it is for."""
-    last_python: tuple[int, int] | None = None
-    """The last Python that it has wheels for; None: it has them for all."""
-    also: str = ""
-    """Another extra that it is part of."""
-
-    @property
-    def wanted(self) -> bool:
-        """Whether it can be had for this Python."""
-        return self.last_python is None or sys.version_info[:2] <= self.last_python
-
+from softrobots.core.errors import SoftRobotsError
 
 EXTRAS = {
     "plot": "plots: --plot, the figures of scripts",
@@ -45,98 +23,86 @@ EXTRAS = {
     "bench": "rigid inverse kinematics to compare speed with",
     "docs": "the documentation as a site: scripts/build_docs.py",
 }
-"""What each extra of `pyproject.toml` gives; `dev` is all of them and the tools of development."""
-
-PACKAGES = (
-    Package("pin", "4.0", "", "Pinocchio: kinematics, Jacobians, gravity"),
-    Package("eigenpy", "3.13", "", "Pinocchio's bridge to Eigen, and its factorisation of small matrices"),
-    Package("numpy", "2.2", "", "arrays"),
-    Package("xacro", "2.1.1", "", "the generator of every URDF"),
-    Package("yourdfpy", "0.0.60", "", "a second opinion on URDF files"),
-    Package("meshcat", "0.3.2", "", "the browser view"),
-    Package("threadpoolctl", "3.5", "", "one thread for linear algebra"),
-    Package("tqdm", "4.66", "", "progress bars"),
-    Package("pyyaml", "6.0.3", "", "files of parameters: --parameters"),
-    Package("shtab", "1.13", "", "completion of the command in shells"),
-    Package("matplotlib", "3.10.8", "plot", "plots", also="docs"),
-    Package("scipy", "1.13", "helix", "actuators that vary along the tube"),
-    Package("numba", "0.61.2", "fast", "compiled solvers"),
-    Package("dask", "2024.8", "cluster", "sweeps on many machines"),
-    Package("example-robot-data", "6", "robots", "third-party robots"),
-    Package("pin-pink", "4.4", "bench", "rigid inverse kinematics, to compare with"),
-    Package("daqp", "0.11", "bench", "its quadratic programmes"),
-    Package("mujoco", "3.2.7", "interop", "simulator"),
-    Package("drake", "1.43", "interop", "simulator", last_python=(3, 14)),
-    Package("pybullet", "3.2.7", "interop", "simulator; no wheels above Python 3.11", last_python=(3, 11)),
-    Package("urchin", "0.0.30", "interop-kinematics", "kinematics"),
-    Package("ikpy", "4.2", "interop-kinematics", "kinematics"),
-    Package("roboticstoolbox-python", "1.4", "interop-kinematics", "kinematics"),
-    Package("viser", "1.1", "viser", "sliders in the browser", also="interop-kinematics"),
-    Package("playwright", "1.45", "pictures", "pictures of the browser view, by an installed chromium"),
-    Package("pillow", "11", "pictures", "animated pictures"),
-    Package("mkdocs-material", "9.7", "docs", "the documentation site"),
-    Package("mkdocstrings", "1.0.6", "docs", "its reference, from docstrings"),
-    Package("mkdocs-jupyter", "0.26.3", "docs", "its notebook"),
-    Package("latex2mathml", "3.81", "docs", "its equations"),
-    Package("ruff", "0.6", "docs", "its signatures"),
-)
-"""Every package that softrobots imports, as `pyproject.toml` asks for it."""
+"""Purpose of each extra of `pyproject.toml` that a user may want; `dev` and `test` are for development."""
 
 
-class PackageState(NamedTuple):
-    """Whether a package is there."""
+class Package(NamedTuple):
+    """A requirement of softrobots, and its state here."""
 
-    package: Package
-    """The package."""
+    name: str
+    """Name on PyPI."""
+    minimum: str
+    """The oldest version that is sufficient."""
+    extras: tuple[str, ...]
+    """Extras of softrobots that require it, in the order of `EXTRAS`; empty if every installation does."""
+    below_python: tuple[int, int] | None
+    """The first Python that it is not required for; None if it is required for all."""
     version: str | None
     """The installed version, or None."""
 
     @property
+    def wanted(self) -> bool:
+        """Whether it is required for this Python."""
+        return self.below_python is None or sys.version_info[:2] < self.below_python
+
+    @property
     def ok(self) -> bool:
         """Whether it is installed and new enough."""
-        return self.version is not None and _numbers(self.version) >= _numbers(self.package.minimum)
+        return self.version is not None and _numbers(self.version) >= _numbers(self.minimum)
 
     @property
     def advice(self) -> str:
-        """What to do about it; empty if there is nothing to do."""
+        """How to install or upgrade it; empty if it is fine."""
         if self.ok:
             return ""
-        wanted = f"softrobots[{self.package.extra}]" if self.package.extra else f"{self.package.name}>={self.package.minimum}"
-        found = "missing" if self.version is None else f"{self.version} is older than {self.package.minimum}"
-        return f"{found}: pip install -U '{wanted}'" if self.version else f"{found}: pip install '{wanted}'"
+        wanted = f"softrobots[{self.extras[0]}]" if self.extras else f"{self.name}>={self.minimum}"
+        if self.version is None:
+            return f"missing: pip install '{wanted}'"
+        return f"{self.version} is older than {self.minimum}: pip install -U '{wanted}'"
 
 
-class ExtraState(NamedTuple):
-    """Whether an extra is complete."""
+def required_packages() -> tuple[Package, ...]:
+    """Return every package that softrobots or an extra of `EXTRAS` requires, required ones first; nothing is imported.
 
-    name: str
-    """The extra."""
-    purpose: str
-    """What it gives."""
-    missing: tuple[str, ...]
-    """Packages of it that are missing or too old, of those that can be had for this Python."""
+    Raises:
+        SoftRobotsError: If softrobots itself is not installed, but runs from a bare folder.
+    """
+    try:
+        lines = metadata.requires("softrobots") or []
+    except metadata.PackageNotFoundError as error:
+        raise SoftRobotsError("softrobots has no metadata here: install it with pip") from error
+    packages: dict[str, Package] = {}
+    for extra in ("", *EXTRAS):
+        for line in lines:
+            name, minimum, needed_by, below = _parsed(line)
+            if needed_by == extra:
+                extras = (*(packages[name].extras if name in packages else ()), *([extra] if extra else []))
+                packages[name] = Package(name, minimum, extras, below, installed_version(name))
+    return tuple(packages.values())
 
-    @property
-    def complete(self) -> bool:
-        """Whether nothing is missing."""
-        return not self.missing
+
+def missing_of_extras(packages: tuple[Package, ...]) -> dict[str, list[str]]:
+    """Return the packages that each extra lacks: those missing or too old, of those that this Python can have."""
+    lacking = [package for package in packages if not package.ok and package.wanted]
+    return {extra: [package.name for package in lacking if extra in package.extras] for extra in EXTRAS}
 
 
-def extra_states(states: Sequence[PackageState]) -> tuple[ExtraState, ...]:
-    """Whether each extra of `EXTRAS` is complete, from the states of all packages."""
-    lacking = [state.package for state in states if not state.ok and state.package.wanted]
-    return tuple(
-        ExtraState(extra, purpose, tuple(package.name for package in lacking if extra in (package.extra, package.also)))
-        for extra, purpose in EXTRAS.items()
+def _parsed(line: str) -> tuple[str, str, str, tuple[int, int] | None]:
+    """Name, oldest version, extra or "", and first Python without it, of a line of our own metadata."""
+    requirement, _, marker = line.partition(";")
+    name = re.match(r"[\w.-]+", requirement)
+    minimum = re.search(r">=\s*([\d.]+)", requirement)
+    extra = re.search(r"extra == ['\"]([\w-]+)", marker)
+    below = re.search(r"python_version < ['\"](\d+)\.(\d+)", marker)
+    return (
+        name[0] if name else "",
+        minimum[1] if minimum else "0",
+        extra[1] if extra else "",
+        (int(below[1]), int(below[2])) if below else None,
     )
-
-
-def package_states() -> tuple[PackageState, ...]:
-    """The state of every package of `PACKAGES`; nothing is imported."""
-    return tuple(PackageState(package, installed_version(package.name)) for package in PACKAGES)
 
 
 def _numbers(version: str) -> tuple[int, ...]:
     """The leading numbers of a version, `1.2.3rc1` as (1, 2, 3)."""
-    found = re.match(r"\d+(\.\d+)*", version)
-    return tuple(int(part) for part in found[0].split(".")) if found else ()
+    match = re.match(r"\d+(\.\d+)*", version)
+    return tuple(int(part) for part in match[0].split(".")) if match else ()
