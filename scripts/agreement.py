@@ -35,7 +35,7 @@ from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.export.mjcf import to_mjcf
 from softrobots.model.pinocchio_data import MAX_DOF
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from studies.interop.cases import TOLERANCE, WELDED
 from studies.interop.mujoco_statics import static_equilibrium, tip_pose
 from studies.interop.outcomes import Question
@@ -400,7 +400,7 @@ def line(cells: Sequence[Any]) -> str:
 def figure(results: Mapping[str, dict[str, Any]]) -> Any:
     """Draw the errors over the number of segments, a panel a study, with the slopes of orders one and two."""
     width = min(len(results), 3)
-    drawn = plots.new_figure((4.4 * width, 4.3 * math.ceil(len(results) / width)))
+    drawn = canvas.new_figure((4.4 * width, 4.3 * math.ceil(len(results) / width)))
     grid = drawn.subplots(math.ceil(len(results) / width), width, squeeze=False).ravel()
     for axes, result in zip(grid, results.values(), strict=False):
         panel(axes, result)
@@ -419,7 +419,7 @@ def panel(axes: Any, result: dict[str, Any]) -> None:
     counts = np.array(result["counts"], dtype=float)
     for name, form in sorted(result["forms"].items(), key=lambda item: STYLES.index(item[0])):
         points = [(row["n"], 1e3 * row["error_m"]) for row in form["rows"]]
-        axes.loglog(*zip(*points, strict=True), label=name, **plots.line_style(STYLES.index(name)))
+        axes.loglog(*zip(*points, strict=True), label=name, **canvas.line_style(STYLES.index(name)))
     if "mujoco" in result:
         points = [(row["n"], 1e3 * row["error_m"]) for row in result["mujoco"]["rows"]]
         style = {"ls": "none", "marker": "o", "ms": 10, "mfc": "none", "mec": "black", "mew": 0.9}
@@ -457,7 +457,7 @@ def run(arguments: argparse.Namespace) -> None:
             raise sr.ParameterError("--docs", arguments.docs, "given without --robot and --no-mujoco")
         check_page(arguments.docs, "agreement", page=PAGE)
     if arguments.output is not None or arguments.docs is not None:
-        plots.require_matplotlib()
+        canvas.require_matplotlib()
     folder = None if arguments.output is None else free_folder(arguments.output)
     if not arguments.no_mujoco:
         find_tool("MuJoCo").load()
@@ -472,9 +472,9 @@ def run(arguments: argparse.Namespace) -> None:
         make_folder(folder)
         write_text(folder / "agreement.json", text + "\n", overwrite=False)
         write_text(folder / "agreement.md", shown + "\n", overwrite=False)
-        plots.write_png(figure(results), folder / "agreement.png", overwrite=False)
+        canvas.write_png(figure(results), folder / "agreement.png", overwrite=False)
     if arguments.docs is not None:
-        plots.write_png(figure(results), arguments.docs / "docs" / "images" / "agreement.png", overwrite=True)
+        canvas.write_png(figure(results), arguments.docs / "docs" / "images" / "agreement.png", overwrite=True)
         command = command_of("agreement", parser(), arguments, "cases", "seed")
         write_record(arguments.docs, "agreement", shown, told, command=command, page=PAGE)
     print(text if arguments.json else f"\n{shown}")

@@ -33,7 +33,7 @@ from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.description.composition import fix_joints
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.statics.kinematics import backbone
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from studies.recorded_run import check_page, command_of, write_record
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -418,7 +418,7 @@ def arm_tables(arm: Mapping[str, Any]) -> list[str]:
 
 def link_figure(link: Mapping[str, Any]) -> Any:
     """Draw the validity region, the stiffness over pressure, and the differences over the load at the pressure of the arm."""
-    drawn = plots.new_figure((12.0, 9.0))
+    drawn = canvas.new_figure((12.0, 9.0))
     (region, stiffness), below = drawn.subplots(2, 2)
     rows, loads = link["rows"], np.array(link["loads_N"])
     pressures = 1e-3 * np.array([row["pressure_Pa"] for row in rows])
@@ -434,25 +434,25 @@ def link_figure(link: Mapping[str, Any]) -> Any:
         for which, (limit, style) in enumerate(zip(LIMITS, ("--", "-"), strict=True)):
             forces = [row["leaves_at_N"][name][0][which] for row in rows]
             if all(forces):
-                look = plots.line_style(number) | {"ls": style, "markevery": (number, 4)}
+                look = canvas.line_style(number) | {"ls": style, "markevery": (number, 4)}
                 region.plot(pressures, forces, label=f"{name}: {limit:g} % off", **look)
     region.set(xlabel="gauge pressure [kPa]", ylabel="tip force [N]", title="Tip deflection of one link")
     region.set_ylim(0.0, loads[-1])
     measured = np.array([(row.pressure, row.stiffness, row.stiffness_std) for row in TABLE_3])
-    points = {"ls": "", "marker": "o", "color": plots.COLOURS[0], "ms": 6, "capsize": 4}
+    points = {"ls": "", "marker": "o", "color": canvas.COLOURS[0], "ms": 6, "capsize": 4}
     stiffness.errorbar(1e-3 * measured[:, 0], measured[:, 1], measured[:, 2], label="measured, Table 3, +- one sigma", **points)
     by_beam = [row["stiffness_by_1_Nm"] for row in rows]
-    stiffness.plot(pressures, by_beam, color=plots.COLOURS[1], ls="-", label=f"by (1), E = {link['modulus_Pa'] / 1e6:.1f} MPa")
+    stiffness.plot(pressures, by_beam, color=canvas.COLOURS[1], ls="-", label=f"by (1), E = {link['modulus_Pa'] / 1e6:.1f} MPa")
     stiffness.axhline(MEAN_STIFFNESS, color="0.5", ls="--", lw=1.2, label="mean, as in the paper")
     share = ((LENGTH - HINGE) / LENGTH) ** 2
     told = "hinge at 30 mm that deflects as (1)"
-    stiffness.plot(pressures, [share * k for k in by_beam], color=plots.COLOURS[2], ls="-.", label=told)
+    stiffness.plot(pressures, [share * k for k in by_beam], color=canvas.COLOURS[2], ls="-.", label=told)
     stiffness.set(xlabel="gauge pressure [kPa]", ylabel="stiffness k [N m/rad]", title="Stiffness of the hinge")
     stiffness.set_ylim(0.0, 210.0)
     row = row_at(link, SHOWN)
     for axes, which, word in zip(below, (0, 1), ("deflection", "rotation"), strict=True):
         for number, (name, percent) in enumerate(row["percent"].items()):
-            axes.plot(loads, percent[which], markevery=3, label=name, **plots.line_style(number))
+            axes.plot(loads, percent[which], markevery=3, label=name, **canvas.line_style(number))
         axes.axvspan(row["wrinkles_at_N"], loads[-1], facecolor="none", edgecolor="0.6", hatch="//", lw=0.0)
         axes.axvline(row["wrinkles_at_N"], color="black", lw=2.5)
         axes.set(xlabel="tip force [N]", ylabel="difference from the exact beam [%]")
@@ -466,7 +466,7 @@ def link_figure(link: Mapping[str, Any]) -> Any:
 
 def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Mapping[str, np.ndarray]]) -> Any:
     """Draw one posture, and how the errors are distributed."""
-    drawn = plots.new_figure((12.0, 9.0))
+    drawn = canvas.new_figure((12.0, 9.0))
     panels = drawn.subplots(2, 2)
     shape, others = panels[0, 0], panels.ravel()[1:]
     rod, case = arm_rod(rods).planar(), Case(np.array([0.0, 0.7, -1.0]), np.array([0.0, 0.0, -15.0]))
@@ -481,7 +481,7 @@ def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Ma
         hinges = Hinges(tuple(arm["hinges"][name]["places_m"]), arm["hinges"][name]["stiffness_Nm"])
         model = sr.load_model(hinges.robot(2))
         points = backbone(model, sr.solve_equilibrium(model, case.motors, case.force).q)
-        shape.plot(points[:, 0], points[:, 2], label=name, **plots.line_style(number))
+        shape.plot(points[:, 0], points[:, 2], label=name, **canvas.line_style(number))
     shape.set(xlabel="x [m]", ylabel="z [m]", title="The arm under 15 N downwards", aspect="equal")
     looks = (
         ("bend and shear", 0, 1e3, "tip error [mm]"),
@@ -493,7 +493,7 @@ def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Ma
         rows = {name: found for name, found in errors[kind].items() if name != RIGID}
         for number, (name, found) in enumerate(rows.items()):
             sizes = unit * np.sort(found[:, column])
-            axes.plot(sizes, np.linspace(0.0, 100.0, len(sizes)), markevery=0.2, label=name, **plots.line_style(number))
+            axes.plot(sizes, np.linspace(0.0, 100.0, len(sizes)), markevery=0.2, label=name, **canvas.line_style(number))
         axes.set(xlabel=label, ylabel="share of the cases [%]", title=f"Against beams that {kind}")
         axes.set_xlim(0.0, None)
     for axes in panels.ravel():
@@ -529,7 +529,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.docs is not None:
         check_page(arguments.docs, "beam_validity", page=PAGE)
     if arguments.output is not None or arguments.docs is not None:
-        plots.require_matplotlib()
+        canvas.require_matplotlib()
     folder = None if arguments.output is None else free_folder(arguments.output)
     rods = tests_rods()
     link = study_link(rods, PRESSURES, LOADS)
@@ -545,10 +545,10 @@ def run(arguments: argparse.Namespace) -> None:
         write_text(folder / "beam_validity.json", text + "\n", overwrite=False)
         write_text(folder / "beam_validity.md", table(result) + "\n", overwrite=False)
         for name, figure in figures.items():
-            plots.write_png(figure, folder / name, overwrite=False)
+            canvas.write_png(figure, folder / name, overwrite=False)
     if arguments.docs is not None:
         for name, figure in figures.items():
-            plots.write_png(figure, arguments.docs / "docs" / "images" / name, overwrite=True)
+            canvas.write_png(figure, arguments.docs / "docs" / "images" / name, overwrite=True)
         command = command_of("beam_validity", parser(), arguments, "cases", "seed")
         write_record(arguments.docs, "beam_validity", table(result), result, command=command, page=PAGE)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import make_folder, new_file, write_text
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from studies.benchmark.jobs import JOBS, measure
 from studies.benchmark.pictures import PICTURES, picture
 from studies.benchmark.race import Settings, quick_settings
@@ -57,7 +57,7 @@ def write_pictures(results: Results, folder: Path, *, overwrite: bool) -> list[P
     """Draw what there are curves for; return the files."""
     names = [name for name in PICTURES if any(curve.picture == name for curve in results.curves)]
     make_folder(folder)
-    return [plots.write_png(picture(results, name), folder / f"benchmark_{name}.png", overwrite=overwrite) for name in names]
+    return [canvas.write_png(picture(results, name), folder / f"benchmark_{name}.png", overwrite=overwrite) for name in names]
 
 
 def page_with(checkout: Path, text: str) -> str:
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.rounds < 1:
         raise sr.ParameterError("--rounds", arguments.rounds, "at least 1")
     if arguments.plots is not None or arguments.docs is not None:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     if arguments.json is not None:
         new_file(arguments.json, overwrite=False)
     if arguments.docs is not None and arguments.saved is None:  # tells at once what keeps the page from being written

@@ -22,7 +22,7 @@ from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import positive_number
 from softrobots.core.files import csv_text, free_folder, make_folder, write_text
 from softrobots.helix import atlas
-from softrobots.view.figures import helix_plots, plots
+from softrobots.view.figures import canvas, helices
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
 PICTURES = ("helix_grid", "helix_shapes", "helix_grasp")
@@ -58,7 +58,7 @@ def parser() -> argparse.ArgumentParser:
 def run(arguments: argparse.Namespace) -> None:
     """Do the whole job."""
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     if arguments.docs is not None and (arguments.output is not None or arguments.no_plots):
         raise sr.ParameterError("--docs", arguments.docs, "given without --output and --no-plots")
     angles, pressure = np.radians(arguments.angles), positive_number("pressure", arguments.pressure, "Pa")
@@ -72,15 +72,15 @@ def run(arguments: argparse.Namespace) -> None:
     forces = force_table(test, pressure)
     figures: list[Any] = []
     if not arguments.no_plots:  # the quick ones first, so that what is wrong is told at once
-        lines, grasp = helix_plots.radius_and_pitch(angles, arguments.diameter), helix_plots.grasp(test, pressure)
-        figures = [helix_plots.grid(arguments.contractions, angles, arguments.diameter, arguments.length), lines, grasp]
+        lines, grasp = helices.radius_and_pitch(angles, arguments.diameter), helices.grasp(test, pressure)
+        figures = [helices.grid(arguments.contractions, angles, arguments.diameter, arguments.length), lines, grasp]
     make_folder(folder)
     if arguments.docs is not None:
         for name, figure in zip(PICTURES[:2], figures, strict=False):
-            print(plots.write_png(figure, folder / f"{name}.png", overwrite=True))
+            print(canvas.write_png(figure, folder / f"{name}.png", overwrite=True))
         return
     for name, figure in zip(PICTURES, figures, strict=False):
-        plots.write_png(figure, folder / f"{name}.png", overwrite=False)
+        canvas.write_png(figure, folder / f"{name}.png", overwrite=False)
     shapes.write_csv(folder / "shapes.csv")
     write_text(folder / "contraction_limits.csv", csv_text(LIMIT_COLUMNS, limits), overwrite=False)
     write_text(folder / "grasp_forces.csv", csv_text(FORCE_COLUMNS, forces), overwrite=False)

@@ -25,7 +25,7 @@ from softrobots import helix
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.statics.loads import Load
-from softrobots.view.figures import body_plots, plots
+from softrobots.view.figures import canvas, loaded_robot
 
 PIECES = {"pinch": "pinches", "tape": "tapes", "stoppers": "gaps"}
 """What the template counts, by method."""
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> Path:
     """Do the whole job and return the folder of the results."""
     gravity = gravity_of(arguments)
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     design = _design(arguments)
     count = {} if arguments.sections is None else {"elastic_sections": arguments.sections, "hinges": arguments.sections}
     tube = sr.HelixTube.from_design(design, pressure=arguments.pressure, upright=arguments.upright, **count)
@@ -94,12 +94,12 @@ def run(arguments: argparse.Namespace) -> Path:
         loaded = sr.solve_equilibrium(model, (), arguments.force, wrench=wind, gravity=gravity)
         summary = summarise(tube, design, pattern, loaded)
         step("pictures")
-        figure = None if arguments.no_plots else body_plots.shape(loaded)
+        figure = None if arguments.no_plots else loaded_robot.shape(loaded)
         make_folder(folder)
         with sr.view(model, loaded) as viewer:
             viewer.write_html(folder / "scene.html", title="Helical tube under load")
         if figure is not None:
-            plots.write_png(figure, folder / "shape.png", overwrite=False)
+            canvas.write_png(figure, folder / "shape.png", overwrite=False)
         step("files")
         sr.save_result(loaded, folder / "equilibrium.npz")
         design.save(folder / "design.json")

@@ -32,7 +32,7 @@ from softrobots.description.paths import urdf_folder
 from softrobots.robots import HelixTube
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.body import body_at
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 
 ANGLES = (2.5, 5.0, 10.0)
 CONTRACTIONS = (0.5, 0.6, 0.7, 0.8, 0.9)
@@ -220,7 +220,7 @@ def csv_of(rows: list[Row]) -> str:
 
 def figure(rows: list[Row], tolerance: float) -> Any:
     """Draw the committed tube with the frames of its chain on the analytic helix, and the errors of all tubes."""
-    made = plots.new_figure((12.0, 6.2))
+    made = canvas.new_figure((12.0, 6.2))
     grid_ = made.add_gridspec(1, 2, width_ratios=(1.0, 1.2))
     _draw_chain(made.add_subplot(grid_[0], projection="3d"))
     axes = made.add_subplot(grid_[1])
@@ -229,10 +229,10 @@ def figure(rows: list[Row], tolerance: float) -> Any:
     places = [i + gap * groups.index(row.case.group) for i, row in enumerate(rows)]
     heights = [max(row.distance, 1e-18) for row in rows]  # some are 0
     for number, form in enumerate(FORMS):
-        for hand, face in zip(helix.HANDEDNESS, (plots.COLOURS[number], "none"), strict=True):
+        for hand, face in zip(helix.HANDEDNESS, (canvas.COLOURS[number], "none"), strict=True):
             chosen = [i for i, row in enumerate(rows) if (row.case.form, row.case.tube.handedness) == (form, hand)]
             if chosen:
-                style = {"s": 16, "marker": "os^"[number], "facecolors": face, "edgecolors": plots.COLOURS[number], "lw": 0.9}
+                style = {"s": 16, "marker": "os^"[number], "facecolors": face, "edgecolors": canvas.COLOURS[number], "lw": 0.9}
                 dots = [places[i] for i in chosen], [heights[i] for i in chosen]
                 axes.scatter(*dots, label=f"{form}, {hand}-handed", **style)
     axes.axhline(tolerance, color="black", lw=1.2)
@@ -264,12 +264,12 @@ def _draw_chain(axes: Any) -> None:
     line = analytic(first, np.linspace(0.0, first.centre_length, 400))[:, :3, 3]
     axes.plot(*line.T, color="black", lw=1.3, label="analytic centre line")
     axes_of_frames = (
-        (0, {"color": plots.COLOURS[3], "lw": 1.2}, "x axes of the sections, towards the helix axis"),
-        (2, {"color": plots.COLOURS[2], "lw": 3.0}, "z axes, along the tube"),
+        (0, {"color": canvas.COLOURS[3], "lw": 1.2}, "x axes of the sections, towards the helix axis"),
+        (2, {"color": canvas.COLOURS[2], "lw": 3.0}, "z axes, along the tube"),
     )
     for number, (tube, name) in enumerate(((first, FILES[0]), (second, FILES[1]))):
         frames = chain_frames(sr.load_model(urdf_folder() / f"{name}.urdf"), boundaries(tube))
-        style = {"color": plots.COLOURS[number], "marker": "os"[number], "ms": 5.0 - number, "ls": "none"}
+        style = {"color": canvas.COLOURS[number], "marker": "os"[number], "ms": 5.0 - number, "ls": "none"}
         axes.plot(*frames[:, :3, 3].T, label=f"{('ends of sections', 'hinges')[number]} ({name}.urdf)", **style)
         for frame in frames[:-1] if number == 0 else ():
             for column, style, _ in axes_of_frames:
@@ -299,7 +299,7 @@ def run(arguments: argparse.Namespace) -> bool:
     if arguments.docs is not None and arguments.no_plots:
         raise sr.ParameterError("--docs", arguments.docs, "given without --no-plots")
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     folder = free_folder(arguments.output or Path("output") / f"helix_validation_{datetime.now():%Y%m%d_%H%M%S}")
     cases = [*committed(), *([] if arguments.no_grid else grid()), *drawn(arguments.cases, arguments.seed)]
     rows = [measure(case) for case in tqdm(cases, desc="tubes", unit="tube")]
@@ -314,7 +314,7 @@ def run(arguments: argparse.Namespace) -> bool:
     if not arguments.no_plots:
         drawing = figure(rows, arguments.tolerance)
         for place, overwrite in ((folder, False), *([(arguments.docs, True)] if arguments.docs else [])):
-            files.append(plots.write_png(drawing, place / NAMES[2], overwrite=overwrite))
+            files.append(canvas.write_png(drawing, place / NAMES[2], overwrite=overwrite))
     print(f"\nwritten: {', '.join(map(str, files))}")
     return passed
 

@@ -20,7 +20,7 @@ from softrobots.cli.options.command_line import add_load, exit_status, gravity_o
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import METHODS
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas, trajectories
 from studies.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 
 LINE = {"start": START, "end": END, "duration": DURATION, "steps": STEPS}
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> Path:
     gravity = gravity_of(arguments)
     path = _path(arguments)
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     model = sr.load_model(sr.InflatableArm(stiffness=arguments.stiffness, pressure=arguments.pressure))
     Load.of(model, arguments.force, gravity=gravity)
     folder = free_folder(arguments.output or Path("output") / f"ik_trajectory_{datetime.now():%Y%m%d_%H%M%S}")
@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> Path:
         sr.save_csv(trajectory, folder / "trajectory.csv")
         write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
         for name, figure in figures.items():
-            plots.write_png(figure, folder / f"{name}.png", overwrite=False)
+            canvas.write_png(figure, folder / f"{name}.png", overwrite=False)
         viewer.write_html(folder / "scene.html", title="Inflatable arm, loaded, sag compensated")
         print(table(summary, trajectory.method))
         tell_written(folder)
@@ -183,10 +183,10 @@ def _figures(
     if paper is not None and paper is not trajectory:
         errors["the paper's method"] = paper.tip_error
     return {
-        "poses": plots.poses(trajectory),
-        "motor_angles": plots.motor_angles(trajectory, rigid),
-        "tip_errors": plots.tip_errors(errors, trajectory.times),
-        "link_moments": plots.link_moments(trajectory),
+        "poses": trajectories.poses(trajectory),
+        "motor_angles": trajectories.motor_angles(trajectory, rigid),
+        "tip_errors": trajectories.tip_errors(errors, trajectory.times),
+        "link_moments": trajectories.link_moments(trajectory),
     }
 
 

@@ -31,7 +31,7 @@ from softrobots.core.files import make_folder, new_file, write_text
 from softrobots.core.json_text import read_json
 from softrobots.description.paths import urdf_folder
 from softrobots.export import to_mjcf, to_sdf
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from studies.interop.cases import WELDED, equilibrium_cases
 from studies.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
 from studies.interop.springs_read import FORMATS, springs_read
@@ -217,7 +217,7 @@ def page_with(text: str, results: Results) -> str:
 
 def figure(results: Results) -> Any:
     """Draw every difference against its tolerance."""
-    made = plots.new_figure((11.0, 5.6))
+    made = canvas.new_figure((11.0, 5.6))
     left, right = made.subplots(1, 2, width_ratios=(1.35, 1.0))
     _draw_equilibria(left, results["equilibrium"])
     _draw_kinematics(right, results["kinematics"])
@@ -232,12 +232,12 @@ def _draw_equilibria(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
             found = [row[f"{key}_difference"] for row in chosen]
             values = [max(value, SMALLEST) for value in found if value is not None]
             if values:
-                style = {"s": 26, "marker": marker, "facecolors": "none", "edgecolors": plots.COLOURS[colour], "lw": 1.0}
+                style = {"s": 26, "marker": marker, "facecolors": "none", "edgecolors": canvas.COLOURS[colour], "lw": 1.0}
                 axes.scatter(values, [height + shift] * len(values), **style)
                 allowed = getattr(SIMULATORS[tool], f"{key}_tolerance")
-                axes.plot([allowed] * 2, [height + shift - 0.14, height + shift + 0.14], color=plots.COLOURS[colour], lw=2.2)
+                axes.plot([allowed] * 2, [height + shift - 0.14, height + shift + 0.14], color=canvas.COLOURS[colour], lw=2.2)
     for label, marker, colour in (("forces balance", "o", 0), ("simulated", "^", 1)):
-        axes.scatter([], [], marker=marker, facecolors="none", edgecolors=plots.COLOURS[colour], label=label)
+        axes.scatter([], [], marker=marker, facecolors="none", edgecolors=canvas.COLOURS[colour], label=label)
     axes.plot([], [], color="0.3", lw=2.2, label="allowed")
     _finish(axes, [f"{tool}, {ROBOTS[robot]}" for tool, robot in pairs], "largest difference of a joint [rad or m]")
     axes.set_title("Equilibrium against Pinocchio, a mark a case")
@@ -249,12 +249,12 @@ def _draw_kinematics(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
         chosen = [row for row in rows if row["tool"] == tool and not row["problem"]]
         for key, shift, marker, colour in (("position_error", -0.12, "s", 2), ("rotation_error", 0.12, "D", 3)):
             values = [max(row[key], SMALLEST) for row in chosen]
-            style = {"s": 24, "marker": marker, "facecolors": "none", "edgecolors": plots.COLOURS[colour], "lw": 1.0}
+            style = {"s": 24, "marker": marker, "facecolors": "none", "edgecolors": canvas.COLOURS[colour], "lw": 1.0}
             axes.scatter(values, [height + shift] * len(values), **style)
         if chosen:
             axes.plot([chosen[0]["precision"]] * 2, [height - 0.26, height + 0.26], color="0.3", lw=2.2)
     for label, marker, colour in (("position [m]", "s", 2), ("rotation [rad]", "D", 3)):
-        axes.scatter([], [], marker=marker, facecolors="none", edgecolors=plots.COLOURS[colour], label=label)
+        axes.scatter([], [], marker=marker, facecolors="none", edgecolors=canvas.COLOURS[colour], label=label)
     axes.plot([], [], color="0.3", lw=2.2, label="allowed")
     _finish(axes, tools, "largest error of a link")
     axes.set_title("Links against Pinocchio, a mark a file")
@@ -298,7 +298,7 @@ def write_docs(results: Results, checkout: Path) -> list[Path]:
         raise sr.FileFormatError(f"cannot read {checkout / PAGE}: {error}") from error
     updated, drawing = page_with(page, results), figure(results)
     files = [write_text(checkout / "docs" / "interoperability.json", as_json(results), overwrite=True)]
-    files.append(plots.write_png(drawing, checkout / "docs" / "images" / "interoperability.png", overwrite=True))
+    files.append(canvas.write_png(drawing, checkout / "docs" / "images" / "interoperability.png", overwrite=True))
     files.append(write_text(checkout / PAGE, updated, overwrite=True))
     return files
 
@@ -340,7 +340,7 @@ def run(arguments: argparse.Namespace) -> bool:
     if not 1 <= arguments.poses <= POSES:
         raise sr.ParameterError("--poses", arguments.poses, f"from 1 to {POSES}")
     if arguments.docs is not None:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     if arguments.output is not None:
         new_file(arguments.output, overwrite=False)
     results = measure(arguments) if arguments.saved is None else read_results(arguments.saved)

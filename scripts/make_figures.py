@@ -22,7 +22,7 @@ from softrobots.core.progress import with_progress
 from softrobots.description.expansion import expand
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.view.browser import take_picture
-from softrobots.view.figures import equilibrium_plots, link_plots, plots
+from softrobots.view.figures import canvas, equilibria, inflated_link
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 EXAMPLES = DOCS / "examples"
@@ -34,13 +34,13 @@ PUSH = (-1.0, 0.0, 0.0)
 
 def link_deflection() -> Any:
     """Deflection along the link of the paper under 10 N at its end."""
-    return link_plots.deflection(10.0, stiffness=MEAN_STIFFNESS, hinge_offset=0.03, pressure=50e3, **LINK)
+    return inflated_link.deflection(10.0, stiffness=MEAN_STIFFNESS, hinge_offset=0.03, pressure=50e3, **LINK)
 
 
 def link_pressure() -> Any:
     """Stiffness and largest moment over pressure, the paper's Table 3 beside its equations."""
     modulus = inflated_beam.young_modulus_from_stiffness(MEAN_STIFFNESS, pressure=30e3, **LINK)
-    return link_plots.pressure_effects(TABLE_3, young_modulus=modulus, **LINK)
+    return inflated_link.pressure_effects(TABLE_3, young_modulus=modulus, **LINK)
 
 
 def arm_buckling() -> Any:
@@ -52,13 +52,13 @@ def arm_buckling() -> Any:
     for sideways in (0.0, 0.1, 1.0):
         label = f"pushed with {sideways:g} N sideways" if sideways else "pushed exactly along the axis"
         branches[label] = [sr.solve_equilibrium(arm, (0, 0, 0), (-force, sideways, 0)) for force in forces]
-    return equilibrium_plots.growing_load(branches, PUSH, critical=critical)
+    return equilibria.growing_load(branches, PUSH, critical=critical)
 
 
 def arm_branches() -> Any:
     """Every branch of the straight arm pushed along its axis."""
     arm = sr.load_model(sr.InflatableArm())
-    return equilibrium_plots.branches(sr.post_buckling_branches(arm, (0, 0, 0), PUSH, max_force=150.0), (0, 0, 1))
+    return equilibria.branches(sr.post_buckling_branches(arm, (0, 0, 0), PUSH, max_force=150.0), (0, 0, 1))
 
 
 def link_reaction() -> Any:
@@ -73,7 +73,7 @@ def link_reaction() -> Any:
             held = sr.solve_imposed_displacement(link, (0, 0), way, start=held, **probe)
             run.append(held)
         runs[f"{row.pressure / 1e3:g} kPa"] = run
-    return equilibrium_plots.reaction(runs)
+    return equilibria.reaction(runs)
 
 
 def finger_grip() -> Any:
@@ -81,14 +81,14 @@ def finger_grip() -> Any:
     finger, way_to_close = _example("soft_finger.py")["SoftFinger"](), _example("three_fingers.py")["way_to_close"]
     model = sr.load_model(finger, muscles="forces")
     pressures = np.linspace(0.0, finger.max_pressure, 17)
-    figure = plots.new_figure((10.0, 4.4))
+    figure = canvas.new_figure((10.0, 4.4))
     left, right = figure.subplots(1, 2)
     free = [sr.solve_equilibrium(model, (finger.tension(p),)) for p in pressures]
     turned = [one.transform_tip_to_world.rotation for one in free]
     angles = np.degrees([np.arctan2(turn[0, 2], turn[2, 2]) for turn in turned])
-    style = {"ls": "", "marker": plots.MARKERS[0], "color": plots.COLOURS[0]}
+    style = {"ls": "", "marker": canvas.MARKERS[0], "color": canvas.COLOURS[0]}
     closed_form = np.degrees([finger.closing_angle(p) for p in pressures])
-    left.plot(1e-3 * pressures, closed_form, color=plots.COLOURS[1], label="p A d L / EI")
+    left.plot(1e-3 * pressures, closed_form, color=canvas.COLOURS[1], label="p A d L / EI")
     left.plot(1e-3 * pressures, angles, label="eight hinges", **style)
     left.set(ylabel="closing angle [degrees]", title="Free finger")
     for number, radius in enumerate((0.010, 0.015, 0.020)):
@@ -98,7 +98,7 @@ def finger_grip() -> Any:
             if way >= 0.0:
                 held = sr.solve_imposed_displacement(model, (finger.tension(pressure),), way, direction=PUSH)
                 points.append((1e-3 * pressure, held.reaction))
-        right.plot(*np.transpose(points), label=f"cylinder of {2e3 * radius:g} mm", **plots.line_style(number))
+        right.plot(*np.transpose(points), label=f"cylinder of {2e3 * radius:g} mm", **canvas.line_style(number))
     right.set(ylabel="force of a finger on the cylinder [N]", title="Grip of a hand of three fingers")
     for axes in (left, right):
         axes.set_xlabel("gauge pressure [kPa]")
@@ -166,11 +166,11 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> None:
     """Make the figures that are asked for; existing ones are replaced."""
-    plots.require_matplotlib()
+    canvas.require_matplotlib()
     for name in with_progress(arguments.only, True, label="figures", unit="figure"):
         target = arguments.output / f"{name}.png"
         if name in FIGURES:
-            plots.write_png(FIGURES[name](), target, overwrite=True)
+            canvas.write_png(FIGURES[name](), target, overwrite=True)
         else:
             make, title = SCENES[name]
             with tempfile.TemporaryDirectory() as folder, make() as viewer:

@@ -20,7 +20,7 @@ from softrobots.cli.options.command_line import add_load, exit_status, gravity_o
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.robots.pcc_arm import CHAINS
 from softrobots.statics.loads import Load
-from softrobots.view.figures import body_plots, plots
+from softrobots.view.figures import canvas, loaded_robot
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 """The default muscle lengths [m]."""
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> Path:
         raise sr.ParameterError("--direction", arguments.direction, "given with --target")
     waypoints = None if arguments.csv is None else sr.read_waypoints(arguments.csv)
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     model = sr.load_model(_robot(arguments))
     Load.of(model, arguments.force, gravity=gravity)
     folder = free_folder(arguments.output or Path("output") / f"pcc_arm_{datetime.now():%Y%m%d_%H%M%S}")
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> Path:
         shown = last = sr.solve_equilibrium(model, lengths, arguments.force, gravity=gravity)
     results["equilibrium"] = last
     summary = summarise(last)
-    figure = None if arguments.no_plots else body_plots.shape(last)
+    figure = None if arguments.no_plots else loaded_robot.shape(last)
     with sr.view(model, shown) as viewer:
         make_folder(folder)
         for name, result in results.items():
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> Path:
             sr.save_csv(shown, folder / "trajectory.csv")
         write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
         if figure is not None:
-            plots.write_png(figure, folder / "shape.png", overwrite=False)
+            canvas.write_png(figure, folder / "shape.png", overwrite=False)
         viewer.write_html(folder / "scene.html", title="PCC arm")
         print(table(summary))
         if waypoints is not None:

@@ -25,7 +25,7 @@ from softrobots.cli.options.command_line import (
     tell_written,
 )
 from softrobots.core.files import free_folder, make_folder
-from softrobots.view.figures import body_plots, plots
+from softrobots.view.figures import canvas, workspaces
 
 
 def parser() -> argparse.ArgumentParser:
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> Path:
     if arguments.segments < 1:
         raise sr.ParameterError("--segments", arguments.segments, "at least 1")
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     robot = sr.PccArm(
         segment_lengths=(arguments.length,) * arguments.segments, muscle_distance=arguments.distance,
         muscle_contraction=arguments.contraction, muscle_extension=arguments.extension,
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> Path:
         make_folder(folder)
         sr.save_result(reach, folder / "workspace.npz")
     if not arguments.no_plots:
-        plots.write_png(body_plots.workspace(reach), folder / "workspace.png", overwrite=False)
+        canvas.write_png(workspaces.workspace(reach), folder / "workspace.png", overwrite=False)
     tips, radius = reach.tip_positions, np.linalg.norm(reach.tip_positions[:, :2], axis=1)
     rows = [
         ("samples reached", f"{len(tips)}"),

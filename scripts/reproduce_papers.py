@@ -15,7 +15,7 @@ import softrobots as sr
 from softrobots.cli.options.command_line import exit_status, tell_written
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.core.progress import with_progress
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from studies.marked_text import marked
 from studies.papers import rendering
 from studies.papers.curves import write_curves
@@ -66,7 +66,7 @@ def write_docs(found: rendering.Rows, checkout: Path, *, progress: bool) -> list
     make_folder(page.parent / "images")
     for paper, name in with_progress(names, progress, label="figures", unit="figure"):
         target = page.parent / "images" / f"{PREFIX}{name}.png"
-        files.append(plots.write_png(PICTURES[paper][name].draw(), target, overwrite=True))
+        files.append(canvas.write_png(PICTURES[paper][name].draw(), target, overwrite=True))
     return files
 
 
@@ -79,14 +79,14 @@ def write_folder(found: rendering.Rows, folder: Path, *, figures: bool, progress
         write_curves(paper, folder)
     names = [(paper, name) for paper in found for name in PICTURES[paper]] if figures else []
     for paper, name in with_progress(names, progress and figures, label="figures", unit="figure"):
-        plots.write_png(PICTURES[paper][name].draw(), folder / f"{name}.png", overwrite=False)
+        canvas.write_png(PICTURES[paper][name].draw(), folder / f"{name}.png", overwrite=False)
 
 
 def run(arguments: argparse.Namespace) -> bool:
     """Do the whole job; tell whether every claim holds."""
     figures = arguments.output is not None and not arguments.no_plots
     if figures or arguments.docs is not None:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     folder = None if arguments.output is None else free_folder(arguments.output)
     if arguments.docs is not None:
         if set(arguments.paper) != set(PAPERS):

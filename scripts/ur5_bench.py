@@ -27,7 +27,7 @@ from softrobots.cli.options.command_line import exit_status, serve, tell_written
 from softrobots.core.checks import non_negative_number, positive_integer
 from softrobots.core.files import csv_text, free_folder, make_folder, write_text
 from softrobots.inflated_beam import CharacterisationRow, fit_characterisation
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from studies.ur5 import bench_plots
 from studies.ur5.bench import UR5_JOINTS, UR5Bench
 from studies.ur5.bench_run import BenchRun, Measurement, push_link
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> Path:
     if arguments.seed < 0:
         raise sr.ParameterError("--seed", arguments.seed, "a whole number from 0")
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     folder = free_folder(arguments.output or Path("output") / f"ur5_bench_{datetime.now():%Y%m%d_%H%M%S}")
     pushes: list[tuple[CharacterisationRow, BenchRun, Measurement]] = []
     for number, row in enumerate(rows):
@@ -96,8 +96,8 @@ def run(arguments: argparse.Namespace) -> Path:
         text = json.dumps({"settings": settings, "results": results}, indent=2) + "\n"
         write_text(folder / "results.json", text, overwrite=False)
         if not arguments.no_plots:
-            plots.write_png(bench_plots.force_displacement(pushes), folder / "force_displacement.png", overwrite=False)
-            plots.write_png(bench_plots.moment_angle(pushes), folder / "moment_angle.png", overwrite=False)
+            canvas.write_png(bench_plots.force_displacement(pushes), folder / "force_displacement.png", overwrite=False)
+            canvas.write_png(bench_plots.moment_angle(pushes), folder / "moment_angle.png", overwrite=False)
         title = f"UR5 pushes the inflated link at {scene.bench.pressure / 1e3:g} kPa"
         viewer.write_html(folder / "scene.html", title=title)
         print(table(results))

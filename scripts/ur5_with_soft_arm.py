@@ -27,7 +27,7 @@ from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.description.composition import fix_joints
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.third_party import UR5, robot_file
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas, trajectories
 
 UR5_PAYLOAD = 5.0
 """What a UR5 may carry, by its maker [kg]."""
@@ -105,7 +105,7 @@ def run(arguments: argparse.Namespace) -> Path:
             "--keep-orientation", True, "left out with --to: a line is followed with the position of the tip"
         )
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     ur5 = robot_file(UR5)
     arm, held = soft_arm(arguments)
     urdf = mounted(ur5, arm, held)
@@ -117,7 +117,7 @@ def run(arguments: argparse.Namespace) -> Path:
     follow = compensate if arguments.to is None else follow_line
     before, after = follow(model, arguments, load, rigid)
     summary = summarise(before, after, rigid, load, arm)
-    figure = None if arguments.no_plots else plots.poses(after, shown=2 if arguments.to is None else 6)
+    figure = None if arguments.no_plots else trajectories.poses(after, shown=2 if arguments.to is None else 6)
     with sr.view(model, after) as viewer:
         make_folder(folder)
         sr.save_result(after, folder / "result.npz")
@@ -126,7 +126,7 @@ def run(arguments: argparse.Namespace) -> Path:
         write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n", overwrite=False)
         write_text(folder / "table.txt", table(summary) + "\n", overwrite=False)
         if figure is not None:
-            plots.write_png(figure, folder / "poses.png", overwrite=False)
+            canvas.write_png(figure, folder / "poses.png", overwrite=False)
         viewer.write_html(folder / "scene.html", title=f"UR5 with a soft arm, {load.payload:g} kg at its tip")
         print(table(summary))
         tell_written(folder)

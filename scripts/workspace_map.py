@@ -22,7 +22,7 @@ from softrobots.cli.options.command_line import add_gravity, add_resume, blocks_
 from softrobots.compiled import sweeps
 from softrobots.core.checks import finite_number, positive_integer, positive_number
 from softrobots.core.files import new_file
-from softrobots.view.figures import map_plots, plots
+from softrobots.view.figures import canvas, workspaces
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images" / "workspace_map.png"
 CELLS = {"plane": 160, "box": 19}
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.docs is not None and (arguments.output is not None or arguments.no_plots or arguments.resume):
         raise sr.ParameterError("--docs", str(arguments.docs), "given without --output, --resume and --no-plots")
     if not arguments.no_plots:
-        plots.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # tells at once what is missing
     largest = positive_number("--max-load", arguments.max_load, "N")
     shown = None if arguments.shown_load is None else finite_number("--shown-load", arguments.shown_load, "N")
     count = positive_integer("--loads", arguments.loads, 10_000)
@@ -106,8 +106,8 @@ def run(arguments: argparse.Namespace) -> None:
         maps = maps_with(None)
     spent = time.perf_counter() - began
     if not arguments.no_plots:
-        figure = map_plots.workspace_maps(maps, load=shown)
-        plots.write_png(figure, picture, overwrite=arguments.overwrite or arguments.docs is not None)
+        figure = workspaces.workspace_maps(maps, load=shown)
+        canvas.write_png(figure, picture, overwrite=arguments.overwrite or arguments.docs is not None)
     print(summary(maps, spent))
     print(f"\nwritten: {', '.join(map(str, wanted))}")
 

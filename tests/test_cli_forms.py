@@ -19,7 +19,7 @@ from softrobots import constant_curvature, helix
 from softrobots.cli import bench
 from softrobots.cli.main import main
 from softrobots.compiled.run.machines import available_backend
-from softrobots.view.figures import pcc_plots
+from softrobots.view.figures import segments
 from tests.support.tables import each_row
 
 LENGTHS = ("0.50", "0.53", "0.55", "0.54", "0.51", "0.52")
@@ -270,7 +270,7 @@ def test_pcc_draws_backbone_and_muscles_as_long_as_they_are() -> None:
     """Lengths of the drawn lines, as sums of chords: below the arcs by bending^2 / 24 / 40^2, 1.4e-5 of them at most."""
     lengths = np.array(LENGTHS, dtype=float).reshape(2, 3)
     arcs = constant_curvature.arc_from_muscles(lengths, 0.04)
-    axes = pcc_plots.arm(arcs).axes[0]
+    axes = segments.arm(arcs).axes[0]
     drawn: dict[str, list[float]] = {}
     for line in axes.lines:
         points = np.array(line.get_data_3d()).T
@@ -295,11 +295,11 @@ def test_pcc_draws_backbone_and_muscles_as_long_as_they_are() -> None:
 @each_row(
     ("call", "message"),
     [
-        (lambda arcs: pcc_plots.arm(sr.constant_curvature.Arc(np.ones((2, 2)), 1.0, 0.0)), "those of one chain"),
-        (lambda arcs: pcc_plots.arm(arcs, (0.04, 0.04, 0.04)), "one for each of 2 segments"),
-        (lambda arcs: pcc_plots.arm(arcs, 0.0), "positive"),
-        (lambda arcs: pcc_plots.arm(arcs, azimuths=0.0), "azimuths"),
-        (lambda arcs: pcc_plots.arm(arcs, frame="world"), "frame"),
+        (lambda arcs: segments.arm(sr.constant_curvature.Arc(np.ones((2, 2)), 1.0, 0.0)), "those of one chain"),
+        (lambda arcs: segments.arm(arcs, (0.04, 0.04, 0.04)), "one for each of 2 segments"),
+        (lambda arcs: segments.arm(arcs, 0.0), "positive"),
+        (lambda arcs: segments.arm(arcs, azimuths=0.0), "azimuths"),
+        (lambda arcs: segments.arm(arcs, frame="world"), "frame"),
     ],
 )
 def test_pictures_of_what_is_no_arm_are_refused(call, message: str) -> None:

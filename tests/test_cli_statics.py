@@ -15,7 +15,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.core.errors import NeutralEquilibrium
-from softrobots.view.figures.arm_plots import loaded_shape
+from softrobots.view.figures.loaded_robot import loaded_shape
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.tables import each_row
 

@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from softrobots.view.figures import helix_sheet, map_plots, plots
+from softrobots.view.figures import canvas, helix_sheet, trajectories, workspaces
 from softrobots.view.meshcat_page.body import PULL_COLOUR, PUSH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
 from softrobots.view.meshcat_page.shapes import FORCE_COLOUR, PATH_COLOUR
 from softrobots.view.scene import WRINKLING_COLOURS
@@ -64,11 +64,11 @@ def lightness(colours: list[object]) -> list[float]:
 
 WRINKLING = [colour for _, colour in WRINKLING_COLOURS]
 PALETTES = {
-    "lines": list(plots.COLOURS),
+    "lines": list(canvas.COLOURS),
     "wrinkling": WRINKLING,
     "page of a muscle arm": [PULL_COLOUR, PUSH_COLOUR, TUBE_COLOUR, PATH_COLOUR, FORCE_COLOUR],
     "page of a growing tube": [PULL_COLOUR, TUBE_COLOUR, TAIL_COLOUR],
-    "maps": list(map_plots.SHADES),
+    "maps": list(workspaces.SHADES),
     "helices": [helix_sheet.WALL, helix_sheet.WALL_IN_CONTACT, helix_sheet.ACTUATOR, helix_sheet.OPPOSITE],
 }
 
@@ -101,19 +101,19 @@ def test_areas_of_maps_and_helices_differ_in_grey() -> None:
 
 def test_lines_that_look_alike_in_grey_differ_in_style_and_marker() -> None:
     """Six colours cannot be six greys: every line has a style and a marker of its own, over one round of the colours."""
-    styles = [plots.line_style(number) for number in range(len(plots.COLOURS))]
+    styles = [canvas.line_style(number) for number in range(len(canvas.COLOURS))]
     alike = [pair for pair in combinations(styles, 2) if abs(lab(pair[0]["color"])[0] - lab(pair[1]["color"])[0]) < 15.0]
     assert alike
     for one, other in alike:
         assert one["ls"] != other["ls"]
         assert one["marker"] != other["marker"]
-    assert plots.line_style(len(plots.COLOURS)) == styles[0]
+    assert canvas.line_style(len(canvas.COLOURS)) == styles[0]
 
 
 def test_lines_are_drawn_in_these_styles() -> None:
     """Read back from figures: no two lines of one plot share colour, style and marker."""
     times = np.linspace(0.0, 1.0, 30)
-    figure = plots.tip_errors({f"method {number}": np.full(30, 10.0**-number) for number in range(6)}, times)
+    figure = trajectories.tip_errors({f"method {number}": np.full(30, 10.0**-number) for number in range(6)}, times)
     drawn = {(line.get_color(), str(line.get_linestyle()), line.get_marker()) for line in figure.axes[0].lines}
     assert len(drawn) == 6
     assert len({marker for _, _, marker in drawn}) == 6

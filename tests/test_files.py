@@ -23,7 +23,7 @@ import softrobots as sr
 from softrobots.cli.main import main
 from softrobots.core.checkpoint import Checkpoint
 from softrobots.core.files import free_folder, make_folder, new_file, write_atomically, write_bytes, write_text
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas, trajectories
 from tests.conftest import CHECKOUT, missing
 from tests.support.scripts import run_script
 
@@ -59,7 +59,7 @@ def _viewer(arm: sr.SoftModel, file: Path) -> object:
 
 
 def _picture(path: sr.Trajectory, file: Path) -> object:
-    return plots.write_png(plots.tip_errors({"way": path.tip_error}, path.times), file, overwrite=True)
+    return canvas.write_png(trajectories.tip_errors({"way": path.tip_error}, path.times), file, overwrite=True)
 
 
 WRITERS: dict[str, Callable[[sr.Trajectory, Path], object]] = {

@@ -15,7 +15,7 @@ import pytest
 import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.inflated_beam import TABLE_3, CharacterisationRow
-from softrobots.view.figures import equilibrium_plots, link_plots
+from softrobots.view.figures import equilibria, inflated_link
 from tests.conftest import CHECKOUT
 from tests.support.tables import each_row
 
@@ -44,7 +44,7 @@ def check_axes(figure: Any) -> None:
 
 def test_the_bent_link_ends_where_closed_forms_say() -> None:
     """Bending F l^3 / 3, the printed sign twice that, shear F l / (P + j G S), the hinge F l2^2 / k."""
-    figure = link_plots.deflection(10.0, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE)
+    figure = inflated_link.deflection(10.0, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE)
     check_axes(figure)
     modulus = inflated_beam.young_modulus_from_stiffness(172.71, pressure=50e3, **TUBE)
     cap, wall, second = 50e3 * math.pi * 0.055**2, 2 * math.pi * 0.055 * 0.0005, math.pi * 0.055**3 * 0.0005
@@ -56,7 +56,7 @@ def test_the_bent_link_ends_where_closed_forms_say() -> None:
 
 
 def test_laws_have_their_slope_their_plateau_and_their_wrinkling_moment() -> None:
-    figure = link_plots.moment_angle_laws(TABLE_3, 0.055)
+    figure = inflated_link.moment_angle_laws(TABLE_3, 0.055)
     check_axes(figure)
     drawn = lines(figure.axes[0])
     for row in TABLE_3:
@@ -69,7 +69,7 @@ def test_laws_have_their_slope_their_plateau_and_their_wrinkling_moment() -> Non
 
 
 def test_measured_plateaus_lie_between_wrinkling_and_the_upper_bound() -> None:
-    figure = link_plots.pressure_effects(TABLE_3, young_modulus=138e6, **TUBE)
+    figure = inflated_link.pressure_effects(TABLE_3, young_modulus=138e6, **TUBE)
     check_axes(figure)
     left, right = (lines(axes) for axes in figure.axes)
     labels = ("upper bound, pi p r^3", "largest moment, measured", "wrinkling moment (3)")
@@ -95,7 +95,7 @@ def pushed() -> dict[str, list[sr.Equilibrium]]:
 
 def test_the_straight_arm_loses_its_stiffness_in_proportion(pushed: dict[str, list[sr.Equilibrium]]) -> None:
     """k - F ((a + c)/2 + sqrt((a - c)^2/4 + c^2)), with the levers a and c of the two hinges."""
-    figure = equilibrium_plots.growing_load(pushed, (-2, 0, 0), critical=114.0657)
+    figure = equilibria.growing_load(pushed, (-2, 0, 0), critical=114.0657)
     check_axes(figure)
     left, right = (lines(axes) for axes in figure.axes)
     slope = (1.17 + 0.57) / 2 + math.hypot((1.17 - 0.57) / 2, 0.57)
@@ -117,7 +117,7 @@ def test_markers_tell_what_only_the_probe_holds() -> None:
             link, (0, 0), way, direction=(0, 1, 0), frame="link_1", point=(0.47, 0, 0), along=(1, 0, 0), start=held
         )
         run.append(held)
-    figure = equilibrium_plots.reaction({"10 kPa": run})
+    figure = equilibria.reaction({"10 kPa": run})
     check_axes(figure)
     test = inflated_beam.BendingTest()
     angles = [float(test.angle(way)) for way in ways]
@@ -131,18 +131,18 @@ def test_markers_tell_what_only_the_probe_holds() -> None:
 @each_row(
     ("make", "name"),
     [
-        (lambda: link_plots.deflection(10.0, stiffness=172.71, hinge_offset=0.6, pressure=50e3, **TUBE), "hinge_offset"),
-        (lambda: link_plots.deflection(math.nan, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE), "force"),
-        (lambda: link_plots.moment_angle_laws((), 0.055), "rows"),
-        (lambda: link_plots.moment_angle_laws("10", 0.055), "rows"),
-        (lambda: link_plots.moment_angle_laws([(10e3, 180.0)], 0.055), "rows"),  # type: ignore[list-item]
-        (lambda: link_plots.moment_angle_laws([CharacterisationRow(1e4, -1.0, 0.0, None)], 0.055), "stiffness"),
-        (lambda: link_plots.moment_angle_laws([CharacterisationRow(1e4, 170.0, 0.0, 0.0)], 0.055), "max_moment"),
-        (lambda: link_plots.moment_angle_laws(TABLE_3, 0.0), "radius"),
-        (lambda: link_plots.pressure_effects(TABLE_3, young_modulus=0.0, **TUBE), "young_modulus"),
-        (lambda: equilibrium_plots.growing_load({}, (1, 0, 0)), "lines"),
-        (lambda: equilibrium_plots.growing_load({"a": []}, (1, 0, 0)), "lines"),
-        (lambda: equilibrium_plots.reaction({"a": [1]}), "lines"),  # type: ignore[list-item]
+        (lambda: inflated_link.deflection(10.0, stiffness=172.71, hinge_offset=0.6, pressure=50e3, **TUBE), "hinge_offset"),
+        (lambda: inflated_link.deflection(math.nan, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE), "force"),
+        (lambda: inflated_link.moment_angle_laws((), 0.055), "rows"),
+        (lambda: inflated_link.moment_angle_laws("10", 0.055), "rows"),
+        (lambda: inflated_link.moment_angle_laws([(10e3, 180.0)], 0.055), "rows"),  # type: ignore[list-item]
+        (lambda: inflated_link.moment_angle_laws([CharacterisationRow(1e4, -1.0, 0.0, None)], 0.055), "stiffness"),
+        (lambda: inflated_link.moment_angle_laws([CharacterisationRow(1e4, 170.0, 0.0, 0.0)], 0.055), "max_moment"),
+        (lambda: inflated_link.moment_angle_laws(TABLE_3, 0.0), "radius"),
+        (lambda: inflated_link.pressure_effects(TABLE_3, young_modulus=0.0, **TUBE), "young_modulus"),
+        (lambda: equilibria.growing_load({}, (1, 0, 0)), "lines"),
+        (lambda: equilibria.growing_load({"a": []}, (1, 0, 0)), "lines"),
+        (lambda: equilibria.reaction({"a": [1]}), "lines"),  # type: ignore[list-item]
     ],
 )
 def test_what_cannot_be_drawn_is_refused(make: Any, name: str) -> None:
@@ -152,12 +152,12 @@ def test_what_cannot_be_drawn_is_refused(make: Any, name: str) -> None:
 
 def test_directions_critical_loads_and_rigid_robots_are_refused(pushed: dict[str, list[sr.Equilibrium]]) -> None:
     with pytest.raises(sr.ParameterError, match="direction"):
-        equilibrium_plots.growing_load(pushed, (0, 0, 0))
+        equilibria.growing_load(pushed, (0, 0, 0))
     with pytest.raises(sr.ParameterError, match="critical"):
-        equilibrium_plots.growing_load(pushed, (1, 0, 0), critical=-1.0)
+        equilibria.growing_load(pushed, (1, 0, 0), critical=-1.0)
     rigid = sr.solve_equilibrium(sr.load_model(sr.InflatableArm(), springs={}), np.zeros(7))
     with pytest.raises(sr.ParameterError, match="springs"):
-        equilibrium_plots.growing_load({"rigid": [rigid]}, (1, 0, 0))
+        equilibria.growing_load({"rigid": [rigid]}, (1, 0, 0))
 
 
 def test_the_script_makes_what_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

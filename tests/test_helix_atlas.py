@@ -15,7 +15,7 @@ import pytest
 
 from softrobots import helix
 from softrobots.core.errors import ParameterError, StraightTube
-from softrobots.view.figures import helix_plots
+from softrobots.view.figures import helices
 from softrobots.view.figures.helix_sheet import draw
 from tests.conftest import missing
 from tests.support.scripts import run_script
@@ -203,7 +203,7 @@ def test_the_command_line_explains_itself(arguments: list[str], status: int, cap
 def test_tubes_of_the_grid_have_one_scale() -> None:
     """Widths and heights on the sheet against extents from the points: seen 25 degrees from above, and the bar of the scale."""
     contractions, length = (0.9, 0.6), 0.7
-    figure = helix_plots.grid(contractions, ANGLES, D, length)
+    figure = helices.grid(contractions, ANGLES, D, length)
     (axes,) = figure.axes
     bar = axes.lines[0].get_xdata()
     told = next(text.get_text() for text in axes.texts if re.fullmatch(r"[\d.]+ cm", text.get_text()))
@@ -248,18 +248,18 @@ def test_the_drawn_helix_winds_the_right_way(handedness: str, sign: float) -> No
 
 def test_self_contact_is_marked() -> None:
     """At 5 degrees turns touch below 0.3739 (docs/theory.md 3)."""
-    figure = helix_plots.grid([0.38, 0.36], [math.radians(5.0)], D, 1.0)
+    figure = helices.grid([0.38, 0.36], [math.radians(5.0)], D, 1.0)
     captions = [text.get_text() for text in figure.axes[0].texts if "turns" in text.get_text()]
     assert ["in contact" in caption for caption in captions] == [False, True]
     assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()][-1] == "in contact: the tube runs into itself"
     free, touching = (painted.get_facecolor()[:, 2].mean() for painted in figure.axes[0].collections)
     assert touching < 0.7 * free  # yellow, not grey
-    without = helix_plots.grid([0.38], [math.radians(5.0)], D, 1.0)
+    without = helices.grid([0.38], [math.radians(5.0)], D, 1.0)
     assert len(without.axes[0].get_legend().get_texts()) == 2
 
 
 def test_captions_tell_the_shape() -> None:
-    figure = helix_plots.grid([0.66], [math.radians(5.0)], D, 1.0)
+    figure = helices.grid([0.66], [math.radians(5.0)], D, 1.0)
     caption = next(text.get_text() for text in figure.axes[0].texts if "turns" in text.get_text())
     assert caption.startswith("$R_o$ = 8.54 cm\n$b$ = 2.8 cm/rad\n")  # docs/theory.md 3: 0.0854078008, 0.0279647090 m
     turns = 1.0 / (math.cos(math.radians(5.0)) * 2 * math.pi * math.hypot(0.0854078008, 0.0279647090))
@@ -267,7 +267,7 @@ def test_captions_tell_the_shape() -> None:
 
 
 def test_radius_and_pitch_run_from_start_to_end_and_change_style_at_contact() -> None:
-    figure = helix_plots.radius_and_pitch(ANGLES, D)
+    figure = helices.radius_and_pitch(ANGLES, D)
     radius, pitch, close = figure.axes
     limits = [0.4882, 0.3739, 0.2689]  # docs/theory.md 3
     for axes in (radius, pitch, close):
@@ -298,7 +298,7 @@ def _as_arrays(line: Any) -> Any:
 
 
 def test_grasp_says_that_it_is_a_model() -> None:
-    figure = helix_plots.grasp()
+    figure = helices.grasp()
     left, right = figure.axes
     assert "our model, not data of the paper" in figure.get_suptitle()
     forces = [line for line in left.lines if str(line.get_label()).startswith("force")]
@@ -320,30 +320,30 @@ NAN = float("nan")
 @each_row(
     ("call", "field"),
     [
-        (lambda: helix_plots.grid([], ANGLES, D, 1.0), "contractions"),
-        (lambda: helix_plots.grid(0.5, ANGLES, D, 1.0), "contractions"),
-        (lambda: helix_plots.grid([0.5, NAN], ANGLES, D, 1.0), "contractions"),
-        (lambda: helix_plots.grid([0.5, 0.0], ANGLES, D, 1.0), "contraction"),
-        (lambda: helix_plots.grid([0.5] * 21, ANGLES, D, 1.0), "contractions"),
-        (lambda: helix_plots.grid([0.5], [], D, 1.0), "angles"),
-        (lambda: helix_plots.grid([0.5], [np.pi / 2], D, 1.0), "angle"),
-        (lambda: helix_plots.grid([0.5], ANGLES, 0.0, 1.0), "diameter"),
-        (lambda: helix_plots.grid([0.5], ANGLES, D, 0.0), "length"),
-        (lambda: helix_plots.grid([0.5], ANGLES, D, 101 * D), "length"),
-        (lambda: helix_plots.grid([0.99], [1.55], D, 100 * D), "length"),  # 4850 windings
-        (lambda: helix_plots.grid([0.5], ANGLES, D, 1.0, "up"), "handedness"),
-        (lambda: helix_plots.radius_and_pitch([], D), "angles"),
-        (lambda: helix_plots.radius_and_pitch([0.0, 0.1], D), "angles"),
-        (lambda: helix_plots.radius_and_pitch([0.8], D), "angles"),
-        (lambda: helix_plots.radius_and_pitch([0.1, 0.2, 0.3, 0.4], D), "angles"),
-        (lambda: helix_plots.radius_and_pitch([0.1], -D), "diameter"),
-        (lambda: helix_plots.grasp((0.02, 0.08, 1.5, (0.0,), D)), "test"),
-        (lambda: helix_plots.grasp(pressure=0.0), "pressure"),
-        (lambda: helix_plots.grasp(helix.PAPER_CYLINDER._replace(deflections=())), "deflections"),
-        (lambda: helix_plots.grasp(helix.PAPER_CYLINDER._replace(deflections=(0.001,) * 7)), "deflections"),
-        (lambda: helix_plots.grasp(helix.PAPER_CYLINDER._replace(deflections=(0.02,))), "deflection"),
-        (lambda: helix_plots.grasp(helix.PAPER_CYLINDER._replace(diameter="thick")), "diameter"),
-        (lambda: helix_plots.grasp(helix.PAPER_CYLINDER._replace(object_radius=NAN)), "object_radius"),
+        (lambda: helices.grid([], ANGLES, D, 1.0), "contractions"),
+        (lambda: helices.grid(0.5, ANGLES, D, 1.0), "contractions"),
+        (lambda: helices.grid([0.5, NAN], ANGLES, D, 1.0), "contractions"),
+        (lambda: helices.grid([0.5, 0.0], ANGLES, D, 1.0), "contraction"),
+        (lambda: helices.grid([0.5] * 21, ANGLES, D, 1.0), "contractions"),
+        (lambda: helices.grid([0.5], [], D, 1.0), "angles"),
+        (lambda: helices.grid([0.5], [np.pi / 2], D, 1.0), "angle"),
+        (lambda: helices.grid([0.5], ANGLES, 0.0, 1.0), "diameter"),
+        (lambda: helices.grid([0.5], ANGLES, D, 0.0), "length"),
+        (lambda: helices.grid([0.5], ANGLES, D, 101 * D), "length"),
+        (lambda: helices.grid([0.99], [1.55], D, 100 * D), "length"),  # 4850 windings
+        (lambda: helices.grid([0.5], ANGLES, D, 1.0, "up"), "handedness"),
+        (lambda: helices.radius_and_pitch([], D), "angles"),
+        (lambda: helices.radius_and_pitch([0.0, 0.1], D), "angles"),
+        (lambda: helices.radius_and_pitch([0.8], D), "angles"),
+        (lambda: helices.radius_and_pitch([0.1, 0.2, 0.3, 0.4], D), "angles"),
+        (lambda: helices.radius_and_pitch([0.1], -D), "diameter"),
+        (lambda: helices.grasp((0.02, 0.08, 1.5, (0.0,), D)), "test"),
+        (lambda: helices.grasp(pressure=0.0), "pressure"),
+        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(deflections=())), "deflections"),
+        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(deflections=(0.001,) * 7)), "deflections"),
+        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(deflections=(0.02,))), "deflection"),
+        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(diameter="thick")), "diameter"),
+        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(object_radius=NAN)), "object_radius"),
     ],
 )
 def test_figures_refuse_bad_input(call: Callable[[], Any], field: str) -> None:
@@ -354,4 +354,4 @@ def test_figures_refuse_bad_input(call: Callable[[], Any], field: str) -> None:
 
 def test_the_straight_tube_is_refused() -> None:
     with pytest.raises(StraightTube):
-        helix_plots.grid([0.5, 1.0], [0.0, 0.1], D, 1.0)
+        helices.grid([0.5, 1.0], [0.0, 0.1], D, 1.0)

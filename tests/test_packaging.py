@@ -16,7 +16,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.view.browser import open_browser
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from tests.conftest import CHECKOUT
 
 PACKAGE = CHECKOUT / "softrobots"
@@ -303,7 +303,7 @@ def test_a_missing_extra_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(sr.MissingDependency, match=r"matplotlib is not installed.*pip install 'softrobots\[plot\]'"):
-        plots.require_matplotlib()
+        canvas.require_matplotlib()
     if shutil.which("chromium"):
         with pytest.raises(sr.MissingDependency, match=r"playwright is not installed.*softrobots\[pictures\]"), open_browser():
             pass

@@ -13,7 +13,7 @@ import softrobots as sr
 from softrobots import constant_curvature
 from softrobots.statics.workspace import workspace_at
 from softrobots.view.body import body
-from softrobots.view.figures import body_plots
+from softrobots.view.figures import loaded_robot, workspaces
 from tests.conftest import CHECKOUT
 from tests.support.oracles import central_difference
 from tests.support.scripts import run_script
@@ -176,7 +176,7 @@ def test_workspace_refuses_bad_input(pcc: sr.SoftModel, tmp_path: Path) -> None:
 
 def test_figures_show_what_they_say(pcc: sr.SoftModel) -> None:
     loaded = sr.solve_equilibrium(pcc, LENGTHS, (6, 4, -3))
-    axes = body_plots.shape(loaded).axes[0]
+    axes = loaded_robot.shape(loaded).axes[0]
     lines = [np.array(line.get_data_3d()) for line in axes.lines]
     ends = [line[:, -1] for line in lines]
     assert any(np.allclose(end, loaded.tip_position, atol=1e-12) for end in ends)
@@ -187,14 +187,14 @@ def test_figures_show_what_they_say(pcc: sr.SoftModel) -> None:
     texts = [text.get_text() for text in axes.get_legend().get_texts()]
     assert {"backbone", "muscle that pulls", "muscle that pushes", "without load, same muscle lengths"} <= set(texts)
     found = sr.sample_workspace(pcc, 30)
-    views = body_plots.workspace(found).axes
+    views = workspaces.workspace(found).axes
     dots = views[0].collections[0].get_offsets()
     assert sorted(map(tuple, dots)) == sorted(map(tuple, found.tip_positions[:, [0, 2]]))
     assert "manipulability" in views[3].get_ylabel()
     with pytest.raises(sr.ParameterError, match="a Workspace"):
-        body_plots.workspace(loaded)
+        workspaces.workspace(loaded)
     with pytest.raises(sr.ParameterError, match="with sections"):
-        body_plots.shape(sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), (0, 0, 0)))
+        loaded_robot.shape(sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), (0, 0, 0)))
 
 
 def test_the_second_robot_in_the_readme_runs() -> None:

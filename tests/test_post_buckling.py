@@ -15,7 +15,7 @@ import softrobots as sr
 from softrobots.statics import force_path, post_buckling
 from softrobots.statics.post_buckling import FUNDAMENTAL, RING
 from softrobots.statics.stability import critical_point
-from softrobots.view.figures import equilibrium_plots
+from softrobots.view.figures import equilibria
 from tests.support.laws import law
 from tests.support.oracles import arm_balance
 from tests.support.tables import each_row
@@ -278,7 +278,7 @@ def test_bad_input_is_refused(arm: sr.SoftModel, options: dict, error: type[Exce
 def test_the_figure_shows_what_is_stable_and_what_is_not(tool: Callable[[str], ModuleType]) -> None:
     tool("matplotlib")
     found = sr.post_buckling_branches(link(None, 172.71), (0, 0), PUSH)
-    left, right = equilibrium_plots.branches(found, (0, 0, 2)).axes
+    left, right = equilibria.branches(found, (0, 0, 2)).axes
     assert [text.get_text() for text in left.get_legend().get_texts()] == [branch.label for branch in found]
     for row, branch in enumerate(found):
         whole, dashed = (np.asarray(line.get_ydata(), dtype=float) for line in left.lines[2 * row : 2 * row + 2])
@@ -289,6 +289,6 @@ def test_the_figure_shows_what_is_stable_and_what_is_not(tool: Callable[[str], M
         assert np.asarray(right.lines[2 * row].get_ydata())[branch.stable] == pytest.approx(branch.softest[branch.stable])
     for wrong in ((), [1], 5):
         with pytest.raises(sr.ParameterError, match="EquilibriumBranch"):
-            equilibrium_plots.branches(wrong, (0, 0, 1))
+            equilibria.branches(wrong, (0, 0, 1))
     with pytest.raises(sr.ParameterError, match="across"):
-        equilibrium_plots.branches(found, (0, 0, 0))
+        equilibria.branches(found, (0, 0, 0))

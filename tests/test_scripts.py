@@ -175,31 +175,31 @@ def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.Captur
 
 def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     """Lines, axis labels with units, legends: read back from the figures."""
-    from softrobots.view.figures import plots
+    from softrobots.view.figures import trajectories
 
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 12)
     loaded = sr.follow_trajectory(arm, path.positions, (0, 10, -15), times=path.times, elbow="up")
     rigid = sr.follow_trajectory(arm, path.positions, times=path.times, elbow="up")
-    angles = plots.motor_angles(loaded, rigid).axes[0]
+    angles = trajectories.motor_angles(loaded, rigid).axes[0]
     assert len(angles.lines) == 6
     assert np.array_equal(angles.lines[0].get_ydata(), loaded.q_motors[:, 0])
     assert np.array_equal(angles.lines[1].get_ydata(), rigid.q_motors[:, 0])
     assert angles.get_ylabel() == "motor angle [rad]"
-    moments = plots.link_moments(loaded).axes[0]
+    moments = trajectories.link_moments(loaded).axes[0]
     assert moments.get_ylim()[1] > arm.spring_groups[0].wrinkling_moment
-    scene = plots.poses(loaded).axes[0]
+    scene = trajectories.poses(loaded).axes[0]
     ends = np.array(scene.lines[1].get_data_3d())[:, -1]
     assert np.allclose(ends, loaded.tip_positions[0], atol=1e-12)
-    errors = plots.tip_errors({"a": loaded.tip_error}, loaded.times).axes[0]
+    errors = trajectories.tip_errors({"a": loaded.tip_error}, loaded.times).axes[0]
     assert errors.get_yscale() == "log"
     with pytest.raises(sr.ParameterError, match="a Trajectory"):
-        plots.poses(None)
+        trajectories.poses(None)
     with pytest.raises(sr.ParameterError, match="shown"):
-        plots.poses(loaded, shown=-2)
+        trajectories.poses(loaded, shown=-2)
     with pytest.raises(sr.ParameterError, match="errors"):
-        plots.tip_errors({"a": loaded.tip_error[:3]}, loaded.times)
+        trajectories.tip_errors({"a": loaded.tip_error[:3]}, loaded.times)
     with pytest.raises(sr.ParameterError, match="13 waypoints"):
-        plots.motor_angles(loaded, sr.follow_trajectory(arm, path.positions[:3]))
+        trajectories.motor_angles(loaded, sr.follow_trajectory(arm, path.positions[:3]))
     plain = sr.load_model(arm.urdf, springs={"spring_1_up": 100.0}, motors=arm.motor_joints)
     with pytest.raises(sr.ParameterError, match="with inflated links"):
-        plots.link_moments(sr.follow_trajectory(plain, path.positions[:2]))
+        trajectories.link_moments(sr.follow_trajectory(plain, path.positions[:2]))

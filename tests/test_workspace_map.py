@@ -19,7 +19,7 @@ import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, load_case, map_workspace, mapping, scheduling
 from softrobots.compiled.sweeps.scheduling import run_blocks
-from softrobots.view.figures import map_plots
+from softrobots.view.figures import workspaces
 from tests.support.laws import law
 from tests.support.load_cases import fingerprint
 from tests.support.scripts import run_script
@@ -362,12 +362,12 @@ def test_another_version_of_softrobots_is_refused(arm: sr.SoftModel, monkeypatch
 
 def test_the_picture_shows_the_map(weighed: WorkspaceMap, tool: Callable[[str], ModuleType]) -> None:
     tool("matplotlib")
-    figure = map_plots.workspace_maps(weighed, load=17.0)
+    figure = workspaces.workspace_maps(weighed, load=17.0)
     reach, payload, pressure, *bars = figure.axes
     assert "16 N" in reach.get_title()
     shown = reach.collections[0].get_array().reshape(4, 5).T
-    assert shown.tolist() == map_plots.outcome(weighed, 2)[:, 0].tolist()
-    assert {map_plots.NOT_REACHED, map_plots.CARRIED, map_plots.WRINKLED} == set(np.unique(shown).tolist())
+    assert shown.tolist() == workspaces.outcome(weighed, 2)[:, 0].tolist()
+    assert {workspaces.NOT_REACHED, workspaces.CARRIED, workspaces.WRINKLED} == set(np.unique(shown).tolist())
     drawn = payload.collections[0].get_array().reshape(4, 5).T
     assert np.array_equal(np.isnan(drawn), ~weighed.reached[:, 0, :, 0])
     assert np.nanmax(np.abs(drawn - weighed.payload[:, 0])) == 0.0
@@ -376,9 +376,9 @@ def test_the_picture_shows_the_map(weighed: WorkspaceMap, tool: Callable[[str], 
     assert np.allclose(kilopascal[kept], weighed.required_pressure[:, 0, :, 2][kept] / 1e3, rtol=1e-12)
     assert [bar.get_ylabel().rsplit(" ", 1)[1] for bar in bars] == ["[N]", "[kPa]"]
     with pytest.raises(sr.ParameterError, match="a WorkspaceMap"):
-        map_plots.workspace_maps(None)
+        workspaces.workspace_maps(None)
     with pytest.raises(sr.ParameterError, match="load"):
-        map_plots.workspace_maps(weighed, load=np.nan)
+        workspaces.workspace_maps(weighed, load=np.nan)
 
 
 def test_the_script_writes_map_and_picture(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -217,9 +217,9 @@ def _limit(arguments: argparse.Namespace) -> None:
     ]
 
     def draw() -> Any:
-        from softrobots.view.figures import helix_plots
+        from softrobots.view.figures import helices
 
-        return helix_plots.radius_and_pitch(arguments.angle, arguments.diameter)
+        return helices.radius_and_pitch(arguments.angle, arguments.diameter)
 
     written = write_plot(arguments, draw)
     rows = [("angle [rad]", "smallest contraction [-]", "by the simple rule [-]")]
@@ -232,10 +232,10 @@ def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Pa
     values = {fact.name: fact.value for fact in facts}
 
     def draw() -> Any:
-        from softrobots.view.figures import helix_plots
+        from softrobots.view.figures import helices
 
         tilt, share = [float(values["angle"])], [float(values["contraction"])]
-        return helix_plots.grid(share, tilt, float(values["diameter"]), values["length"], values["handedness"])
+        return helices.grid(share, tilt, float(values["diameter"]), values["length"], values["handedness"])
 
     written = [*files, *write_plot(arguments, draw)]
     tell(arguments, answer_of(facts) | {"files": written}, [*lines_of(facts), *written_lines(written)])

@@ -138,6 +138,6 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
 
 
 def _path_figure(found: Trajectory) -> Any:
-    from softrobots.view.figures import plots
+    from softrobots.view.figures import trajectories
 
-    return plots.poses(found)
+    return trajectories.poses(found)

@@ -223,9 +223,9 @@ def _answer(arguments: argparse.Namespace, chain: Chain, facts: list[Fact]) -> N
     ]
 
     def draw() -> Any:
-        from softrobots.view.figures import pcc_plots
+        from softrobots.view.figures import segments
 
-        return pcc_plots.arm(chain.arcs, chain.distance, chain.azimuths, chain.offsets, chain.frame)
+        return segments.arm(chain.arcs, chain.distance, chain.azimuths, chain.offsets, chain.frame)
 
     written = write_plot(arguments, draw)
     tell(arguments, answer_of(facts) | {"files": written}, [*_lines(facts), *written_lines(written)])

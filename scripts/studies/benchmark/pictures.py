@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from softrobots.view.figures import plots
+from softrobots.view.figures import canvas
 from studies.benchmark.results import Results
 
 PICTURES = {
@@ -31,12 +31,12 @@ def picture(results: Results, name: str) -> Any:
         MissingDependency: If matplotlib is not installed.
     """
     title, size, cost = PICTURES[name]
-    figure = plots.new_figure((8.0, 5.2))
+    figure = canvas.new_figure((8.0, 5.2))
     axes = figure.add_subplot()
     curves = [curve for curve in results.curves if curve.picture == name]
     for number, curve in enumerate(curves):
         axes.loglog(
-            curve.sizes, [1e6 * seconds for seconds in curve.seconds], label=curve.label, **plots.line_style(number),
+            curve.sizes, [1e6 * seconds for seconds in curve.seconds], label=curve.label, **canvas.line_style(number),
         )  # fmt: skip
     if name == "sizes":
         largest = max((size for curve in curves for size in curve.sizes), default=0)

@@ -1,6 +1,6 @@
 """The figures of the three papers that can be drawn again. Needs matplotlib (extra `plot`).
 
-Figures of trajectories and of helices are those of `softrobots.view.figures.plots` and `softrobots.view.figures.helix_plots`;
+Figures of trajectories and of helices are those of `softrobots.view.figures.canvas` and `softrobots.view.figures.helices`;
 here are the others.
 """
 
@@ -15,9 +15,9 @@ from softrobots import constant_curvature as cc
 from softrobots import helix
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from softrobots.inflated_beam import TABLE_3
-from softrobots.view.figures import helix_plots, link_plots, plots
+from softrobots.view.figures import helices, inflated_link, trajectories
+from softrobots.view.figures.canvas import COLOURS, equal_box, new_figure
 from softrobots.view.figures.helix_sheet import draw, sheet
-from softrobots.view.figures.plots import COLOURS, equal_box, new_figure
 from studies.papers import pcc_equations, pcc_two_segments
 from studies.papers.arm_path import GAIN, movement
 from studies.papers.inflatable_arm import RADIUS
@@ -36,7 +36,7 @@ class Picture(NamedTuple):
 
 def moment_angle_law() -> Any:
     """Moment over angle of the link from Table 3, a line a pressure: after [Troise 2021] Figure 9."""
-    return link_plots.moment_angle_laws(TABLE_3, 1e-3 * float(RADIUS))
+    return inflated_link.moment_angle_laws(TABLE_3, 1e-3 * float(RADIUS))
 
 
 def tracking() -> Any:
@@ -47,7 +47,7 @@ def tracking() -> Any:
         f"recursion of Figure 6, gain {GAIN:g} 1/s": ours.closed_loop.tip_error,
         "Newton at every waypoint": ours.loaded.tip_error,
     }
-    return plots.tip_errors(errors, ours.loaded.times)
+    return trajectories.tip_errors(errors, ours.loaded.times)
 
 
 def two_segments() -> Any:
@@ -109,13 +109,14 @@ PICTURES: Mapping[str, Mapping[str, Picture]] = {
     "inflatable_arm": {
         "arm_law": Picture(moment_angle_law, "Figure 9: the curves, from Table 3. The points of the tests are not published."),
         "arm_poses": Picture(
-            lambda: plots.poses(movement().loaded), "Figure 10: the arm along a path; start and end are ours."
+            lambda: trajectories.poses(movement().loaded), "Figure 10: the arm along a path; start and end are ours."
         ),
         "arm_angles": Picture(
-            lambda: plots.motor_angles(movement().loaded, movement().rigid), "Figure 11: angles of the motors on our path."
+            lambda: trajectories.motor_angles(movement().loaded, movement().rigid),
+            "Figure 11: angles of the motors on our path.",
         ),
         "arm_moments": Picture(
-            lambda: plots.link_moments(movement().loaded),
+            lambda: trajectories.link_moments(movement().loaded),
             "Section 4: moments of the links on our path, and the limit at 50 kPa.",
         ),
         "arm_tracking": Picture(tracking, "Figure 6: how near the recursion follows our path."),
@@ -127,18 +128,18 @@ PICTURES: Mapping[str, Mapping[str, Picture]] = {
     },
     "helical_actuation": {
         "helix_grid": Picture(
-            lambda: helix_plots.grid(PAPER_CONTRACTIONS[::-1], PAPER_ANGLES, PAPER_DIAMETER, 1.0),
+            lambda: helices.grid(PAPER_CONTRACTIONS[::-1], PAPER_ANGLES, PAPER_DIAMETER, 1.0),
             "Figure 5: helices by angle and contraction.",
             "helix_grid.png",
         ),
         "helix_scaled": Picture(scaled, "Figure 6: radii and pitch grow with the diameter."),
         "helix_curves": Picture(
-            lambda: helix_plots.radius_and_pitch(PAPER_ANGLES, PAPER_DIAMETER),
+            lambda: helices.radius_and_pitch(PAPER_ANGLES, PAPER_DIAMETER),
             "Figure 7: outer radius and pitch against contraction. The measured points are not published.",
             "helix_shapes.png",
         ),
         "helix_grasp": Picture(
-            lambda: helix_plots.grasp(helix.PAPER_CYLINDER, 10e3),
+            lambda: helices.grasp(helix.PAPER_CYLINDER, 10e3),
             "Figure 9: grasp force of our model; the paper's are measured.",
         ),
     },

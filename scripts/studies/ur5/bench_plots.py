@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots import inflated_beam
-from softrobots.view.figures.plots import COLOURS, MARKERS, new_figure
+from softrobots.view.figures.canvas import COLOURS, MARKERS, new_figure
 from studies.ur5.bench_run import BenchRun, Measurement
 
 Push = tuple[inflated_beam.CharacterisationRow, BenchRun, Measurement]

@@ -35,7 +35,7 @@ def check_plot(arguments: argparse.Namespace) -> None:
     """
     if arguments.plot is None:
         return
-    from softrobots.view.figures.plots import require_matplotlib
+    from softrobots.view.figures.canvas import require_matplotlib
 
     if arguments.plot.suffix.lower() != ".png":
         raise ParameterError("--plot", str(arguments.plot), "a file name that ends in .png")
@@ -56,17 +56,17 @@ def write_plot(arguments: argparse.Namespace, draw: Callable[[], Any]) -> list[P
     """
     if arguments.plot is None:
         return []
-    from softrobots.view.figures.plots import write_png
+    from softrobots.view.figures.canvas import write_png
 
     return [write_png(draw(), arguments.plot, overwrite=arguments.overwrite)]
 
 
 def shape_figure(equilibrium: Equilibrium) -> Any:
-    """The loaded robot, as `arm_plots.loaded_shape` draws it; plots are imported when one is asked for.
+    """The loaded robot, as `loaded_robot.loaded_shape` draws it; plots are imported when one is asked for.
 
     Raises:
         MissingDependency: If matplotlib is not installed.
     """
-    from softrobots.view.figures.arm_plots import loaded_shape
+    from softrobots.view.figures.loaded_robot import loaded_shape
 
     return loaded_shape(equilibrium)

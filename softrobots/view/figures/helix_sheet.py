@@ -16,7 +16,7 @@ from softrobots import helix
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.view.body import tube
-from softrobots.view.figures.plots import new_figure
+from softrobots.view.figures.canvas import new_figure
 
 _SIDES = 24
 WALL, WALL_IN_CONTACT = (0.86, 0.87, 0.89), (0.94, 0.72, 0.28)

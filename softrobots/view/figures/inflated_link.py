@@ -12,7 +12,7 @@ from softrobots import inflated_beam
 from softrobots.core.checks import finite_number, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam import CharacterisationRow
-from softrobots.view.figures.plots import COLOURS, LINES, MARKERS, line_style, new_figure
+from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, line_style, new_figure
 
 _FAINT = "#7f7f7f"
 

@@ -13,8 +13,8 @@ import numpy as np
 from softrobots import helix
 from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.errors import ParameterError
+from softrobots.view.figures.canvas import COLOURS, MARKERS, new_figure
 from softrobots.view.figures.helix_sheet import draw, sheet
-from softrobots.view.figures.plots import COLOURS, MARKERS, new_figure
 
 MOST_HELICES = 60
 """Helices that `grid` draws at most."""

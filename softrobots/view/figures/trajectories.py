@@ -1,66 +1,20 @@
 """Figures of trajectories, after Figures 10 and 11 of [Troise 2021]. Needs matplotlib (extra `plot`).
 
-The functions return a `matplotlib.figure.Figure`; save it with `figure.savefig(path)` or `write_png`. Lines differ in style as
-well as in colour, so that they can be told apart in grey.
+The functions return a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Lines differ in style as well as in
+colour, so that they can be distinguished in grey.
 """
 
 from __future__ import annotations
 
-import io
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer
-from softrobots.core.errors import MissingDependency, ParameterError
-from softrobots.core.files import write_bytes
-from softrobots.statics.equilibrium import Equilibrium
+from softrobots.core.errors import ParameterError
 from softrobots.statics.kinematics import backbone
 from softrobots.statics.trajectory import Trajectory
-
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito
-"""Line colours that colour-blind people can tell apart."""
-MARKERS = ("o", "s", "^", "D", "v", "P")
-"""Markers that tell lines apart in grey."""
-LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
-"""Styles of lines that tell them apart where they cross."""
-
-
-def plain_words(name: str) -> str:
-    """A name of a robot or a joint as a figure writes it: on one line, and without formulas, which begin with a dollar.
-
-    Args:
-        name: The name, out of somebody's file.
-    """
-    return (name if name.isprintable() else name.encode("unicode_escape").decode()).replace("$", r"\$")
-
-
-def line_style(number: int) -> dict[str, Any]:
-    """Colour, style and marker of a line among others, for matplotlib; they repeat after six lines.
-
-    Args:
-        number: Number of the line, from 0.
-    """
-    return {
-        "color": COLOURS[number % len(COLOURS)],
-        "ls": LINES[number % len(LINES)],
-        "marker": MARKERS[number % len(MARKERS)],
-        "ms": 5,
-    }
-
-
-def require_matplotlib() -> Any:
-    """Return matplotlib's `Figure` class; call it early to learn whether plots can be made.
-
-    Raises:
-        MissingDependency: If matplotlib is not installed.
-    """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingDependency("matplotlib", "plot") from error
-    return Figure
+from softrobots.view.figures.canvas import COLOURS, MARKERS, equal_box, force_arrow, line_style, new_figure, plain_words
 
 
 def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
@@ -209,31 +163,6 @@ def link_moments(trajectory: Trajectory) -> Any:
     return figure
 
 
-def equal_box(axes: Any, points: FloatArray) -> None:
-    """Give 3D axes equal scales around points, shape (n, 3) [m]."""
-    centre, half = (points.max(0) + points.min(0)) / 2.0, max(float(np.ptp(points, axis=0).max()) / 2.0, 1e-3)
-    for name, middle in zip("xyz", centre, strict=True):
-        getattr(axes, f"set_{name}lim")(middle - half, middle + half)
-    axes.set_box_aspect((1, 1, 1))
-    axes.view_init(elev=22, azim=-62)
-
-
-def force_arrow(axes: Any, equilibrium: Equilibrium) -> FloatArray:
-    """Draw the force at the tip, if there is one, as an arrow a fifth of the reach long.
-
-    Returns:
-        Where the arrow ends, or nothing, shape (0 or 1, 3) [m]; for `equal_box`.
-    """
-    tip = equilibrium.tip_position
-    wrench = equilibrium.load.wrenches.get(equilibrium.model.tip)
-    if wrench is None or not wrench[:3].any():
-        return np.zeros((0, 3))
-    size = float(np.linalg.norm(wrench[:3]))
-    arrow = 0.2 * equilibrium.model.reach * wrench[:3] / size
-    axes.quiver(*tip, *arrow, color=COLOURS[2], lw=2.0, label=f"force, {size:.1f} N")
-    return np.asarray(tip + arrow)[None]
-
-
 def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:
     _check(trajectory)
     return new_figure(size)
@@ -242,25 +171,3 @@ def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:
 def _check(trajectory: Trajectory) -> None:
     if not isinstance(trajectory, Trajectory):
         raise ParameterError("trajectory", trajectory, "a Trajectory")
-
-
-def write_png(figure: Any, path: str | Path, *, overwrite: bool) -> Path:
-    """Write a figure as PNG, whole or not at all, and return its path.
-
-    Raises:
-        ParameterError: If the path is none.
-        OutputExists: If the file exists and `overwrite` is false, or is a folder.
-        OutputError: If the file cannot be written.
-    """
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png")
-    return write_bytes(path, picture.getvalue(), overwrite=overwrite)
-
-
-def new_figure(size: tuple[float, float]) -> Any:
-    """Make an empty figure of a size in inches.
-
-    Raises:
-        MissingDependency: If matplotlib is not installed.
-    """
-    return require_matplotlib()(figsize=size, layout="constrained", dpi=120)

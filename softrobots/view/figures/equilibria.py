@@ -12,7 +12,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.statics.post_buckling import EquilibriumBranch
-from softrobots.view.figures.plots import line_style, new_figure
+from softrobots.view.figures.canvas import line_style, new_figure
 
 
 def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, *, critical: float | None = None) -> Any:

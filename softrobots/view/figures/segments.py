@@ -12,7 +12,7 @@ from softrobots.constant_curvature.arcs import stack_arcs
 from softrobots.constant_curvature.poses import chain_frames
 from softrobots.core.checks import finite_array, positive_array
 from softrobots.core.errors import ParameterError
-from softrobots.view.figures.plots import COLOURS, LINES, equal_box, new_figure
+from softrobots.view.figures.canvas import COLOURS, LINES, equal_box, new_figure
 
 _POINTS = 41  # of a segment
 

@@ -1,4 +1,4 @@
-"""Pictures of workspace maps: reach, payload and required pressure beside each other. Needs matplotlib (extra `plot`)."""
+"""Figures of workspaces: sampled tip positions, and maps of reach, payload and pressure. Needs matplotlib (extra `plot`)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_number
 from softrobots.core.errors import ParameterError
+from softrobots.statics.workspace import Workspace
 from softrobots.statics.workspace_map import WorkspaceMap
-from softrobots.view.figures.plots import new_figure, plain_words
+from softrobots.view.figures.canvas import new_figure, plain_words
 
 NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
 """What becomes of a target under a load: never reached, lost under the load, reached with a wrinkled link, carried."""
@@ -17,6 +18,43 @@ NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
 SHADES = ("#ffffff", "#7f7f7f", "#f3cc6b", "#17375e")
 """Colour of each; apart in grey, too."""
 _LABELS = ("not reached", "reached with smaller loads only", "reached, a link wrinkles", "reached, no link wrinkles")
+
+
+def workspace(samples: Workspace) -> Any:
+    """Reached tip positions in three views, coloured by manipulability.
+
+    Args:
+        samples: The workspace.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If it is no workspace.
+        MissingDependency: If matplotlib is not installed.
+    """
+    if not isinstance(samples, Workspace):
+        raise ParameterError("samples", samples, "a Workspace")
+    figure = new_figure((13.0, 4.4))
+    tips, order = samples.tip_positions, np.argsort(samples.manipulability)
+    scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 7, "rasterized": True}
+    scale |= {"linewidths": 0.2, "edgecolors": "0.35"}  # or the lightest are lost on white
+    all_axes = figure.subplots(1, 3)
+    centre, half = 0.5 * (tips.max(0) + tips.min(0)), 0.55 * max(float(np.ptp(tips, axis=0).max()), 1e-3)
+    for axes, (one, two) in zip(all_axes, ((0, 2), (1, 2), (0, 1)), strict=True):
+        dots = axes.scatter(tips[order, one], tips[order, two], **scale)
+        axes.plot(0.0, 0.0, marker="+", color="k", ms=10, ls="none", label="base")
+        axes.set(xlabel=f"{'xyz'[one]} [m]", ylabel=f"{'xyz'[two]} [m]", aspect="equal")
+        axes.set_xlim(centre[one] - half, centre[one] + half)
+        axes.set_ylim(centre[two] - half, centre[two] + half)
+        axes.grid(alpha=0.3)
+    all_axes[0].legend(loc="lower left", fontsize=9)
+    figure.colorbar(dots, ax=all_axes, label="manipulability of the tip [m³/rad³]", pad=0.01)
+    force = sum((float(np.linalg.norm(wrench[:3])) for wrench in samples.load.wrenches.values()), 0.0)
+    load = ([f"{force:.3g} N"] if force > 0.0 else []) + (["gravity"] if samples.load.gravity is not None else [])
+    under = f" under {' and '.join(load)}" if load else ", no load"
+    figure.suptitle(f"{len(tips)} tip position{'s' * (len(tips) != 1)} within the limits of the actuators{under}")
+    return figure
 
 
 def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:

@@ -1,7 +1,4 @@
-"""Figures of continuum robots: their shape with muscles, and what they reach. Needs matplotlib (extra `plot`).
-
-Every function returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`.
-"""
+"""Figures of one loaded robot: the body of its sections, or the line through its joints. Needs matplotlib (extra `plot`)."""
 
 from __future__ import annotations
 
@@ -12,11 +9,43 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.statics.equilibrium import Equilibrium
-from softrobots.statics.workspace import Workspace
+from softrobots.statics.kinematics import backbone
 from softrobots.view.body import body, body_at
-from softrobots.view.figures.plots import COLOURS, equal_box, force_arrow, new_figure
+from softrobots.view.figures.canvas import COLOURS, equal_box, force_arrow, new_figure, plain_words
 
 _PULL, _PUSH = COLOURS[0], COLOURS[1]
+_LOADED = "#303030"
+_RELAXED = "#7f7f7f"
+
+
+def loaded_shape(equilibrium: Equilibrium) -> Any:
+    """A loaded robot beside itself with relaxed springs: of sections their smooth body, of others the line through the joints.
+
+    Args:
+        equilibrium: The loaded robot.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If it is no equilibrium.
+        MissingDependency: If matplotlib is not installed.
+    """
+    if not isinstance(equilibrium, Equilibrium):
+        raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
+    model = equilibrium.model
+    if model.structure.section_table:
+        return shape(equilibrium)
+    figure = new_figure((7.0, 6.4))
+    axes = figure.add_subplot(projection="3d")
+    loaded, relaxed = backbone(model, equilibrium.q), backbone(model, model.configuration(equilibrium.q_motors))
+    axes.plot(*relaxed.T, color=_RELAXED, lw=1.2, ls=":", label="relaxed springs, same motors")
+    axes.plot(*loaded.T, color=_LOADED, lw=2.5, marker="o", ms=4.0, label="loaded")
+    arrow = force_arrow(axes, equilibrium)
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title=f"{plain_words(model.pinocchio.name)} under load")
+    equal_box(axes, np.vstack([loaded, relaxed, arrow]))
+    axes.legend(loc="upper left", fontsize=9)
+    return figure
 
 
 def shape(equilibrium: Equilibrium) -> Any:
@@ -65,43 +94,6 @@ def shape(equilibrium: Equilibrium) -> Any:
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Shape under load")
     equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
     axes.legend(loc="upper left", fontsize=9)
-    return figure
-
-
-def workspace(samples: Workspace) -> Any:
-    """Reached tip positions in three views, coloured by manipulability.
-
-    Args:
-        samples: The workspace.
-
-    Returns:
-        The figure.
-
-    Raises:
-        ParameterError: If it is no workspace.
-        MissingDependency: If matplotlib is not installed.
-    """
-    if not isinstance(samples, Workspace):
-        raise ParameterError("samples", samples, "a Workspace")
-    figure = new_figure((13.0, 4.4))
-    tips, order = samples.tip_positions, np.argsort(samples.manipulability)
-    scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 7, "rasterized": True}
-    scale |= {"linewidths": 0.2, "edgecolors": "0.35"}  # or the lightest are lost on white
-    all_axes = figure.subplots(1, 3)
-    centre, half = 0.5 * (tips.max(0) + tips.min(0)), 0.55 * max(float(np.ptp(tips, axis=0).max()), 1e-3)
-    for axes, (one, two) in zip(all_axes, ((0, 2), (1, 2), (0, 1)), strict=True):
-        dots = axes.scatter(tips[order, one], tips[order, two], **scale)
-        axes.plot(0.0, 0.0, marker="+", color="k", ms=10, ls="none", label="base")
-        axes.set(xlabel=f"{'xyz'[one]} [m]", ylabel=f"{'xyz'[two]} [m]", aspect="equal")
-        axes.set_xlim(centre[one] - half, centre[one] + half)
-        axes.set_ylim(centre[two] - half, centre[two] + half)
-        axes.grid(alpha=0.3)
-    all_axes[0].legend(loc="lower left", fontsize=9)
-    figure.colorbar(dots, ax=all_axes, label="manipulability of the tip [m³/rad³]", pad=0.01)
-    force = sum((float(np.linalg.norm(wrench[:3])) for wrench in samples.load.wrenches.values()), 0.0)
-    load = ([f"{force:.3g} N"] if force > 0.0 else []) + (["gravity"] if samples.load.gravity is not None else [])
-    under = f" under {' and '.join(load)}" if load else ", no load"
-    figure.suptitle(f"{len(tips)} tip position{'s' * (len(tips) != 1)} within the limits of the actuators{under}")
     return figure
 
 
