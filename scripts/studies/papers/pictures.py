@@ -1,7 +1,6 @@
 """The figures of the three papers that can be drawn again. Needs matplotlib (extra `plot`).
 
-Figures of trajectories and of helices are those of `softrobots.view.figures.trajectories` and `softrobots.view.figures.helices`;
-here are the others.
+Figures of trajectories, links and helices are those of `softrobots.view.figures`; here are the others.
 """
 
 from __future__ import annotations
