@@ -58,10 +58,12 @@ HELIX = (
     *("laws_helix", "argument_errors", "hostile_numbers"),
 )
 PARTS = {
-    "elastostatics": Part(("elastostatics.py",), STATICS),
-    "sensitivity": Part(("sensitivity.py",), ("sensitivity", "laws_statics_loading")),
-    "springs": Part(("springs.py",), ("saturation", "laws_other")),
-    "sections": Part(("stumpff.py", "screws.py", "strain_chain.py"), ("strain_chain", "laws_other")),
+    "elastostatics": Part(("statics/elastostatics.py",), STATICS),
+    "sensitivity": Part(("statics/sensitivity.py",), ("sensitivity", "laws_statics_loading")),
+    "springs": Part(("model/springs.py",), ("saturation", "laws_other")),
+    "sections": Part(
+        tuple(f"constant_curvature/{name}.py" for name in ("stumpff", "screws", "strain_chain")), ("strain_chain", "laws_other")
+    ),
     "inflated_beam": Part(
         tuple(f"inflated_beam/{name}.py" for name in ("beam", "bending_test", "characterisation", "inflation")),
         ("inflated_beam", "laws_inflated_beam", "characterisation_fit", "argument_errors", "hostile_numbers"),
@@ -98,7 +100,7 @@ def parser() -> argparse.ArgumentParser:
 def settings(parts: list[Part]) -> str:
     """What mutmut is told, as the text of setup.cfg."""
     tests = dict.fromkeys(f"tests/test_{name}.py" for part in parts for name in part.tests)
-    options = ["-p", "tests.mutation_profile", "--hypothesis-profile=mutation", "-p", "no:cacheprovider", "--tb=no"]
+    options = ["-p", "tests.support.mutation_profile", "--hypothesis-profile=mutation", "-p", "no:cacheprovider", "--tb=no"]
     options += ["-p", "no:unraisableexception"]  # it collects garbage at every end: half of the time of a change
     told = configparser.ConfigParser()
     told["mutmut"] = {
@@ -180,7 +182,7 @@ def _mutmut(copy: Path, processes: int, names: list[str], output: IO[str]) -> No
             else:
                 output.write(line)
     if running.returncode:
-        failed = copy / "mutants" / "failed.txt"  # tests/mutation_profile.py writes it
+        failed = copy / "mutants" / "failed.txt"  # tests/support/mutation_profile.py writes it
         told = failed.read_text(encoding="utf-8") if failed.is_file() else f"see {output.name}"
         raise sr.OutputError(f"mutmut ended with status {running.returncode}; tests that fail without a change: {told}")
 
