@@ -22,7 +22,7 @@ from studies.benchmark.jobs import JOBS, measure
 from studies.benchmark.pictures import PICTURES, picture
 from studies.benchmark.race import Settings, quick_settings
 from studies.benchmark.results import Results, as_json, machine_text, read_results, require_whole, table
-from studies.marked_text import marked
+from studies.shared.markdown import marked
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"

@@ -30,8 +30,8 @@ from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.core.json_text import read_json
 from softrobots.core.progress import with_progress
-from studies.clean_checkout import copy_checkout, find_uv, make_environment
-from studies.recorded_run import FOLDER, check_page, write_record
+from studies.shared.clean_checkout import copy_checkout, find_uv, make_environment
+from studies.shared.recorded_run import FOLDER, check_page, write_record
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PYTHONS = ("3.10", "3.11", "3.12", "3.13")

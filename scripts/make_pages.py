@@ -11,7 +11,7 @@ from pathlib import Path
 
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import new_file
-from studies.gallery import EXHIBITS
+from studies.gallery.scenes import EXHIBITS
 
 PAGES = {
     "helix_growth": "helix_growth",

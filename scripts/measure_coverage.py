@@ -23,7 +23,7 @@ import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import non_negative_number
 from softrobots.core.files import new_file, write_text
-from studies.recorded_run import check_page, write_record
+from studies.shared.recorded_run import check_page, write_record
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 # As coverage.py itself has it: with or without the colon, in small letters or capitals.

@@ -17,7 +17,7 @@ from pathlib import Path
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file, write_text
-from studies.recorded_run import check_page, command_of, write_record
+from studies.shared.recorded_run import check_page, command_of, write_record
 from studies.soak.families import FAMILIES
 from studies.soak.running import again, as_json, family_of, soak, table
 

@@ -17,6 +17,9 @@ import softrobots as sr
 from softrobots.cli.tools.kinematics import pose_error
 from softrobots.constant_curvature import chain_transform
 from softrobots.export.mjcf import to_mjcf
+from studies.agreement.comparison import compare
+from studies.agreement.robots import AT_THE_START, COUNTS, STUDIES, pose
+from studies.agreement.tables import table
 from studies.interop.mujoco_statics import tip_pose
 from studies.interop.outcomes import Question
 from tests.conftest import CHECKOUT, load_script
@@ -54,7 +57,7 @@ def assert_orders(name: str, form: str, rows: list[dict[str, Any]], near: float)
     """Order two in place and angle, within `near`; of lumped chains at least that. With the hinge at the start, one."""
     for key in ("error_m", "error_rad"):
         found = order(rows, key)
-        if form == script().AT_THE_START:
+        if form == AT_THE_START:
             assert abs(found - 1.0) < near, (name, form, key, found)
         else:
             assert found > 2.0 - near, (name, form, key, found)
@@ -93,7 +96,7 @@ def test_muscles_act_as_a_rest_curvature() -> None:
     position, rotation, _ = solve_helix_rod(
         HelixRod(0.6, float(np.hypot(a, b)) / bend, 0.0, bend, 1.1), (*(turn.T @ force), 0, 0, 0), tol=1e-7
     )
-    exact = script().pose(turn @ position, turn @ rotation @ turn.T)
+    exact = pose(turn @ position, turn @ rotation @ turn.T)
     assert max(pose_error(found.pose, exact)) < 1e-7
     assert abs(a / bend - 0.5) > 0.05  # not what it is without load: 0.3 / 0.6
 
@@ -102,18 +105,12 @@ def test_muscles_act_as_a_rest_curvature() -> None:
 
 
 @cache
-def oracles() -> Any:
-    return script().tests_oracles()
-
-
-@cache
 def fresh(name: str) -> dict[str, Any]:
-    module = script()
     counts, forms = FRESH[name]
-    robot = next(robot for robot in module.STUDIES if name.startswith(robot))
-    study = module.STUDIES[robot](oracles(), 1, 0)[name]
+    robot = next(robot for robot in STUDIES if name.startswith(robot))
+    study = STUDIES[robot](1, 0)[name]
     chosen = study._replace(counts=counts, forms={form: study.forms[form] for form in forms})
-    return module.compare(chosen, partial(iter), mujoco=True)
+    return compare(chosen, partial(iter), mujoco=True)
 
 
 @pytest.mark.parametrize("name", FRESH)
@@ -127,7 +124,7 @@ def test_chains_converge_to_the_rod(name: str, tool: Callable[[str], ModuleType]
     for form, column in result["forms"].items():
         assert [row["n"] for row in column["rows"]] == list(FRESH[name][0])
         assert all(row["stable"] == 1 for row in column["rows"])
-        near = 0.2 if form != script().AT_THE_START else 0.4
+        near = 0.2 if form != AT_THE_START else 0.4
         assert_orders(name, form, column["rows"], near)
         assert column["order"] == order(column["rows"])
         assert 100.0 * result["rod"]["largest_m"] < min(row["error_m"] for row in column["rows"])
@@ -152,7 +149,7 @@ def test_the_record_says_the_same(name: str, tool: Callable[[str], ModuleType]) 
 
 def test_the_page_shows_the_record() -> None:
     page = (CHECKOUT / "docs" / "agreement.md").read_text(encoding="utf-8")
-    assert script().table(recorded()["studies"]) in page
+    assert table(recorded()["studies"]) in page
     assert (CHECKOUT / "docs" / "images" / "agreement.png").stat().st_size > 50_000
 
 
@@ -203,15 +200,15 @@ def test_it_writes_tables_numbers_and_a_picture(
     tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = script()
-    monkeypatch.setitem(module.COUNTS, "steel_rod", (4, 8))
+    monkeypatch.setitem(COUNTS, "steel_rod", (4, 8))
     arguments = ["--robot", "steel_rod", "--cases", "2", "--no-mujoco"]
     assert module.main([*arguments, "--output", str(tmp_path / "out")]) == 0
     out, err = capsys.readouterr()
     result = json.loads((tmp_path / "out" / "agreement.json").read_text(encoding="utf-8"))
-    table = (tmp_path / "out" / "agreement.md").read_text(encoding="utf-8")
-    assert module.table(result["studies"]) + "\n" == table
-    assert table in out
-    assert "| model | 4 | 8 | order | order of the angle |" in table
+    tables = (tmp_path / "out" / "agreement.md").read_text(encoding="utf-8")
+    assert table(result["studies"]) + "\n" == tables
+    assert tables in out
+    assert "| model | 4 | 8 | order | order of the angle |" in tables
     assert "6/6" in err  # a progress bar
     assert set(result["studies"]["steel_rod"]["forms"]) == {"sections", "lumped", "lumped, midpoint"}
     assert order(result["studies"]["steel_rod"]["forms"]["sections"]["rows"]) == pytest.approx(2.0, abs=0.2)

@@ -14,6 +14,9 @@ import pytest
 import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.description.composition import fix_joints
+from studies.beam_validity import arm as arm_study
+from studies.beam_validity.arm import arm_rod, cases_of, solved
+from studies.beam_validity.link import link_at, lumped, reached
 from tests.conftest import CHECKOUT, load_script
 from tests.support import rods
 from tests.support.inflated_rods import InflatedRod, product, solve_inflated_chain, turned
@@ -179,7 +182,7 @@ def script() -> Any:
     return load_script("beam_validity")
 
 
-def test_the_record_is_what_a_fresh_run_says(script: Any) -> None:
+def test_the_record_is_what_a_fresh_run_says() -> None:
     """One pressure and two loads of the link, two cases of the arm; recorded with six digits, solved to 1e-6."""
     from tests.support import inflated_rods
 
@@ -187,19 +190,19 @@ def test_the_record_is_what_a_fresh_run_says(script: Any) -> None:
     link, arm = record["link"], record["arm"]
     (row,) = [one for one in link["rows"] if one["pressure_Pa"] == 50e3]
     chosen = [link["loads_N"].index(load) for load in (20.0, 60.0)]
-    fresh = script.link_at(inflated_rods, 50e3, [20.0, 60.0])
+    fresh = link_at(inflated_rods, 50e3, [20.0, 60.0])
     assert fresh["deflection_m"] == pytest.approx([row["deflection_m"][i] for i in chosen], rel=2e-5)
     for name, both in fresh["percent"].items():
         for ours, recorded in zip(both, row["percent"][name], strict=True):
             assert ours == pytest.approx([recorded[i] for i in chosen], abs=2e-3)  # percent: 2e-5 of the deflection
-    rod = script.arm_rod(inflated_rods)
-    drawn = list(script.cases_of(inflated_rods, rod, 2, arm["seed"]))
+    rod = arm_rod(inflated_rods)
+    drawn = list(cases_of(inflated_rods, rod, 2, arm["seed"]))
     first = arm["first"]["also twist and stretch"]
     for name in ("as in the paper", "two hinges by (1)"):
-        model = sr.load_model(script.lumped(rod)[name].robot(2))
+        model = sr.load_model(lumped(rod)[name].robot(2))
         for (case, found), recorded in zip(drawn, first[name], strict=False):
-            (pose,) = script.solved(model, [case])
-            assert np.linalg.norm(pose[:3, 3] - found.position) == pytest.approx(recorded[0], abs=1e-5)  # of up to 0.2 m
+            (tip,) = solved(model, [case])
+            assert np.linalg.norm(tip[:3, 3] - found.position) == pytest.approx(recorded[0], abs=1e-5)  # of up to 0.2 m
 
 
 def told_of(errors: dict[str, list[float]]) -> str:
@@ -249,7 +252,7 @@ def test_a_small_run_writes_tables_numbers_and_pictures(
     tool("matplotlib")
     monkeypatch.setattr(script, "PRESSURES", (10_000, 50_000))
     monkeypatch.setattr(script, "LOADS", (1, 30, 60))
-    monkeypatch.setattr(script, "EVALUATIONS", 3)
+    monkeypatch.setattr(arm_study, "EVALUATIONS", 3)
     folder = tmp_path / "out"
     assert script.main(["--cases", "2", "--seed", "5", "--output", str(folder), "--json"]) == 0
     out, err = capsys.readouterr()
@@ -283,6 +286,6 @@ def test_bad_arguments_are_refused_before_work_starts(
     [([1, 4, 8], [0.0, 1.0, -3.0], 2.0, 6.0), ([1, 4], [-9.0, -8.0], 5.0, 0.0), ([1, 4], [0.1, 0.2], 1.0, None)],
 )
 def test_the_load_at_which_a_model_leaves_the_beam(
-    script: Any, loads: list[float], percent: list[float], limit: float, expected: float | None
+    loads: list[float], percent: list[float], limit: float, expected: float | None
 ) -> None:
-    assert script.reached(loads, percent, limit) == expected
+    assert reached(loads, percent, limit) == expected

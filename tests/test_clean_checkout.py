@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from studies.clean_checkout import copy_checkout, find_uv, make_environment
+from studies.shared.clean_checkout import copy_checkout, find_uv, make_environment
 
 
 @pytest.fixture

@@ -353,10 +353,10 @@ PLAIN_WRITES = {
     "softrobots/description/composition.py": "a temporary folder",
     "softrobots/cli/tools/kinematics.py": "a temporary folder",
     "scripts/studies/interop/springs_read.py": "a temporary folder, and the null device",
-    "scripts/studies/clean_checkout.py": "a copy of the checkout, made for one run",
+    "scripts/studies/shared/clean_checkout.py": "a copy of the checkout, made for one run",
     "scripts/environments.py": "the log of a program while it runs",
     "scripts/mutation.py": "the log of a program while it runs",
-    "scripts/fuzz_readers.py": "a temporary folder, a switch of the kernel, and a pipe",
+    "scripts/studies/fuzzing/worker.py": "a temporary folder, a switch of the kernel, and a pipe",
     "scripts/build_docs.py": "a temporary folder, which then becomes the site",
     "docs/site/made_pages.py": "the folder in which the site is built",
 }

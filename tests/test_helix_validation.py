@@ -6,20 +6,16 @@ import csv
 import json
 import re
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 import softrobots as sr
-from tests.conftest import load_script
+from studies.helix_validation import comparison
+from studies.helix_validation.tubes import committed, grid
 from tests.support.helix_rods import actuator_frames
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
-
-
-def script() -> ModuleType:
-    return load_script("helix_validation")
 
 
 def test_it_validates_the_shipped_files_and_random_tubes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
@@ -62,8 +58,7 @@ def test_it_fails_where_an_error_exceeds_the_tolerance(tmp_path: Path, capsys: p
 
 @pytest.mark.parametrize(("moved", "turned"), [((3e-9, 0.0, 0.0), 0.0), ((0.0, 0.0, 0.0), 2e-9)])
 def test_it_sees_a_frame_that_is_off(moved: tuple, turned: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = script()
-    (case, _), exact = module.committed(), module.chain_frames
+    (case, _), exact = committed(), comparison.chain_frames
 
     def bent(model: sr.SoftModel, names: list) -> np.ndarray:
         frames = exact(model, names)
@@ -72,15 +67,15 @@ def test_it_sees_a_frame_that_is_off(moved: tuple, turned: float, monkeypatch: p
         frames[5, :3, :3] = frames[5, :3, :3] @ turn
         return frames
 
-    monkeypatch.setattr(module, "chain_frames", bent)
-    row = module.measure(case)
+    monkeypatch.setattr(comparison, "chain_frames", bent)
+    row = comparison.measure(case)
     assert row.distance == pytest.approx(3e-9 if turned == 0.0 else 0.0, rel=1e-5, abs=1e-14)
     assert row.angle == pytest.approx(turned, rel=1e-5, abs=1e-13)
 
 
 def test_its_closed_form_is_the_helix_and_its_grid_is_the_papers() -> None:
     """docs/theory.md 3.1 in 50 digits; 2.5, 5, 10 degrees, contractions 0.5 to 0.9, the paper's diameter, 2.5 times it."""
-    cases = list(script().grid())
+    cases = list(grid())
     assert len(cases) == 2 * 120
     assert {round(np.degrees(case.tube.angle), 9) for case in cases} == {2.5, 5.0, 10.0}
     assert {case.tube.contraction for case in cases} == {0.5, 0.6, 0.7, 0.8, 0.9}
@@ -89,11 +84,11 @@ def test_its_closed_form_is_the_helix_and_its_grid_is_the_papers() -> None:
         ("right", 1.0, "tube"), ("left", 4.0, "axis"),
     }  # fmt: skip
     for case in cases[::37]:
-        tube, places = case.tube, np.array(list(script().boundaries(case.tube).values()))
+        tube, places = case.tube, np.array(list(comparison.boundaries(case.tube).values()))
         sign = 1 if tube.handedness == "right" else -1
         given = (tube.contraction, tube.angle, tube.diameter, sign)
         exact = actuator_frames(*given, places, from_base=tube.upright == "tube")
-        assert np.allclose(script().analytic(tube, places), exact, atol=1e-13, rtol=0)
+        assert np.allclose(comparison.analytic(tube, places), exact, atol=1e-13, rtol=0)
 
 
 @each_row(

@@ -37,7 +37,7 @@ from softrobots.model.springs import SpringGroup, Springs
 from softrobots.statics.loads import cross_matrix
 from softrobots.statics.probes import Probe, face_normal, touch
 from softrobots.statics.workspace_map import required_pressures
-from studies.marked_text import marked
+from studies.shared.markdown import marked
 from tests.support.laws import law
 
 numbers_ = st.floats(-1e3, 1e3)

@@ -10,7 +10,17 @@ from typing import Any
 import pytest
 
 import softrobots as sr
-from studies.mutants import KILLED, NOT_TESTED, SURVIVED, TIMED_OUT, Explanation, Mutant, judge, read_explanations, read_mutants
+from studies.mutation.mutants import (
+    KILLED,
+    NOT_TESTED,
+    SURVIVED,
+    TIMED_OUT,
+    Explanation,
+    Mutant,
+    judge,
+    read_explanations,
+    read_mutants,
+)
 from tests.conftest import CHECKOUT, load_script
 from tests.support.tables import each_row
 

@@ -21,7 +21,7 @@ from softrobots.view.meshcat_page.page_commands import RESOLUTION, packed, read_
 from softrobots.view.meshcat_page.page_text import page_text, scene_of
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.viewer import view
-from studies.gallery import EXHIBITS
+from studies.gallery.scenes import EXHIBITS
 from tests.conftest import CHECKOUT
 from tests.support.scripts import run_script
 from tests.support.tables import each_row

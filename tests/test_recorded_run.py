@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from studies.recorded_run import check_page, write_record
+from studies.shared.recorded_run import check_page, write_record
 
 
 @pytest.fixture

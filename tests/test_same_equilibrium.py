@@ -19,8 +19,10 @@ from softrobots.core.errors import NotConverged
 from softrobots.export import to_mjcf, to_sdf
 from studies.interop import drake_statics, mujoco_statics
 from studies.interop.cases import FORCES, MUSCLE_POSES, WELDED, EquilibriumCase, equilibrium_cases
+from studies.interop.measurement import agreed
 from studies.interop.newton import balance_point
 from studies.interop.outcomes import Question
+from studies.interop.results import BEGIN, END, PAGE, page_with, read_results
 from studies.interop.simulators import SIMULATORS, EquilibriumRow, compare_equilibrium
 from studies.interop.springs_read import springs_read
 from tests.conftest import CHECKOUT, load_script
@@ -290,11 +292,10 @@ RECORDED = CHECKOUT / "docs" / "interoperability.json"
 
 
 def test_the_tables_of_the_page_are_those_of_the_recorded_run() -> None:
-    script = load_script("interoperability")
-    results = script.read_results(RECORDED)
-    page = (CHECKOUT / script.PAGE).read_text(encoding="utf-8")
-    assert script.page_with(page, results) == page
-    assert script.agreed(results)
+    results = read_results(RECORDED)
+    page = (CHECKOUT / PAGE).read_text(encoding="utf-8")
+    assert page_with(page, results) == page
+    assert agreed(results)
     assert {row["tool"] for row in results["equilibrium"]} == {"MuJoCo", "Drake", "PyBullet"}
     for robot in ROBOTS:
         for name in SIMULATORS:
@@ -326,19 +327,18 @@ def test_the_script_compares_what_it_is_told_to(tool: Tool, tmp_path: Path, caps
 
 
 def test_docs_are_made_of_the_recorded_run(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    script = load_script("interoperability")
     (tmp_path / "docs" / "images").mkdir(parents=True)
     before, after = "# softrobots\n\n", "\n\nThe end.\n"
-    (tmp_path / script.PAGE).write_text(f"{before}{script.BEGIN}\nold\n{script.END}\n{after}", encoding="utf-8")
+    (tmp_path / PAGE).write_text(f"{before}{BEGIN}\nold\n{END}\n{after}", encoding="utf-8")
     assert run_script(["--from", str(RECORDED), "--docs", str(tmp_path)]) == 0
-    made = (tmp_path / script.PAGE).read_text(encoding="utf-8")
+    made = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert made.startswith(before)
     assert made.endswith(after)
     assert "| helical tube |" in made
     assert "old" not in made
     assert (tmp_path / "docs/interoperability.json").read_text() == RECORDED.read_text()
     assert (tmp_path / "docs/images/interoperability.png").read_bytes()[:4] == b"\x89PNG"
-    (tmp_path / script.PAGE).write_text("no marks\n", encoding="utf-8")
+    (tmp_path / PAGE).write_text("no marks\n", encoding="utf-8")
     assert run_script(["--from", str(RECORDED), "--docs", str(tmp_path)]) == 2
     assert "interoperability:begin" in capsys.readouterr().err
 

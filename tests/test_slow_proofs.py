@@ -15,9 +15,9 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 import softrobots as sr
-from studies.clean_checkout import copy_checkout
-from studies.mutants import read_explanations
-from studies.recorded_run import command_of
+from studies.mutation.mutants import read_explanations
+from studies.shared.clean_checkout import copy_checkout
+from studies.shared.recorded_run import command_of
 from tests.conftest import CHECKOUT, load_script
 from tests.support.scripts import run_script
 from tests.support.tables import each_row

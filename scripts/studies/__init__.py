@@ -1,1 +1,1 @@
-"""Studies of the project itself: benchmark, soak, papers, interoperability, mutants; used by the scripts beside this folder."""
+"""Studies of the project itself, a folder each: proofs, measurements and pictures, run by the scripts beside this folder."""

@@ -1,1 +1,1 @@
-"""What the compiled solvers are measured against: baselines, the measurement, and its report; see scripts/benchmark.py."""
+"""Solvers of the package timed against baselines; see scripts/benchmark.py."""

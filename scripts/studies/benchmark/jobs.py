@@ -11,10 +11,10 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
 from softrobots.core.progress import with_progress
 from studies.benchmark import arm_jobs, motor_jobs, rod_jobs
-from studies.benchmark.machine import machine
 from studies.benchmark.processes import bytes_per_case, first_answer
 from studies.benchmark.race import Settings, figure
 from studies.benchmark.results import AT_MOST, Curve, Results, Row
+from studies.shared.machine import machine
 
 Outcome = tuple[list[Row], list[Curve], list[str]]
 """Rows, curves and notes of a job."""

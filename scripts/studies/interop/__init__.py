@@ -1,4 +1,1 @@
-"""Other robotics tools, run from here: what they make of our files, compared with Pinocchio.
-
-Only the command line and the scripts need these modules; each tool is imported when it is asked for.
-"""
+"""The same robots in other tools, against Pinocchio; see scripts/interoperability.py."""

@@ -1,1 +1,1 @@
-"""The characterisation bench of [Troise 2021] in simulation: a UR5 pushes a clamped inflated link."""
+"""A UR5 with a soft arm on its flange, and a UR5 that pushes a clamped inflated link; see scripts/ur5_*.py."""

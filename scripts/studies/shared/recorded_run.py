@@ -15,8 +15,8 @@ from typing import Any
 
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import make_folder, write_text
-from studies.benchmark.machine import machine
-from studies.marked_text import marked
+from studies.shared.machine import machine
+from studies.shared.markdown import marked
 
 FOLDER = Path("docs") / "validation"
 """Where the results of all runs are, in a checkout."""
