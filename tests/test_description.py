@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
+import math
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -21,12 +22,15 @@ from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube, PccArm
+from softrobots.robots.fields import facts_of
+from softrobots.robots.xacro_robot import default_text
 from tests.support.laws import law
 from tests.support.oracles import tube_points
 from tests.support.tables import each_row
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO
 KINDS = (sr.InflatableArm, PccArm, HelixTube)
+SOURCES = {"Troise", "PCC", "Blumenschein", "assumed", "chosen"}
 ODD = {
     "link_lengths": (0.5, 0.4, 0.3),
     "hinge_offset": (0.03, 0.05, 0.02),
@@ -96,41 +100,34 @@ def test_xacro_command_alone_gives_the_same_urdf(kind: type, parameters: dict) -
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_defaults_of_dataclass_and_xacro_agree(kind: type) -> None:
-    """Numbers and lists are read as Python reads them, truth values are true and false, words stand for themselves.
-
-    None is empty. What is allowed of a design is no part of its description.
-    """
-    declared = declared_arguments(xacro_folder() / kind.XACRO)
-    fields = {field.name: field.default for field in dataclasses.fields(kind)}
-    fields.pop("allow_self_contact", None)
-    assert list(declared) == list(fields) == list(kind().xacro_arguments())
-    for name, default in fields.items():
-        text = declared[name]
-        if name == "rgba":
-            assert np.array_equal([float(n) for n in text.split()], default)
-        elif isinstance(default, bool):
-            assert text == {True: "true", False: "false"}[default], name
-        elif isinstance(default, str):
-            assert text == default, name
-        elif default is None:
-            assert text == "", name
-        else:
-            value = ast.literal_eval(text)
-            assert np.array_equal(value, default), name
-            assert isinstance(value, int) == isinstance(default, int), name
+def test_the_arguments_of_the_xacro_file_are_the_fields_of_the_dataclass(kind: type) -> None:
+    """Name, order, default and comment: meaning, unit, source. What is allowed of a design is no part of its description."""
+    expected = []
+    for field in dataclasses.fields(kind):
+        facts = field.metadata["facts"]
+        if facts.in_xacro:
+            expected.append(f"  <!-- {facts.what} [{facts.unit or '-'}]. Source: {facts.source}. -->")
+            expected.append(f'  <xacro:arg name="{field.name}" default="{default_text(field)}"/>')
+    lines = (xacro_folder() / kind.XACRO).read_text(encoding="utf-8").splitlines()
+    first = next(number for number, line in enumerate(lines) if "<xacro:arg " in line) - 1
+    assert lines[first : first + len(expected)] == expected
+    assert sum("<xacro:arg " in line for line in lines) == len(expected) // 2
+    assert list(kind().xacro_arguments()) == list(declared_arguments(xacro_folder() / kind.XACRO))
+    assert {facts.source.split()[0].strip(",;") for facts in facts_of(kind).values()} <= SOURCES
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_argument_says_meaning_unit_and_source(kind: type) -> None:
-    lines = (xacro_folder() / kind.XACRO).read_text(encoding="utf-8").splitlines()
-    assert sum("<xacro:arg " in line for line in lines) == len(kind().xacro_arguments())
-    for number, line in enumerate(lines):
-        if "<xacro:arg " in line:
-            comment = lines[number - 1]
-            assert comment.strip().startswith("<!--"), line
-            assert "[" in comment, line
-            assert "Source:" in comment, line
+def test_the_xacro_files_check_the_bounds_of_the_dataclass(kind: type) -> None:
+    """Lower bounds, and upper ones where the macros state them; the xacro files are used alone, too."""
+    macros = Path(str(xacro_folder() / kind.XACRO).replace(".urdf.xacro", "_macro.xacro")).read_text(encoding="utf-8")
+    bounded = {name for name, facts in facts_of(kind).items() if facts.unit and facts.bounds}
+    assert {name for name in bounded if re.search(rf'<xacro:number(?:_list|_or)? name="{name}"', macros)} == bounded
+    for name, facts in facts_of(kind).items():
+        for attributes in re.findall(rf'<xacro:number(?:_list)? name="{name}"(.*?)/>', macros):
+            texts = dict(re.findall(r'(\w+)="(?:\$\{)?([^"}]*)\}?"', attributes))
+            low, high = (eval(texts.get(key, "None"), {"pi": math.pi}) for key in ("low", "high"))
+            assert (None, low)[:: 1 if "strict" in texts else -1] == (facts.at_least, facts.above), name
+            assert high in (None, facts.at_most), name
 
 
 def test_mass_centre_and_inertia_are_those_of_two_capped_tubes() -> None:

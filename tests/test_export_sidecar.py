@@ -19,14 +19,14 @@ from softrobots.description.argument_notes import argument_notes
 from softrobots.description.expansion import declared_arguments
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.export import export_model, to_json
-from softrobots.export.number_sources import PackagedRobot
 from softrobots.inflated_beam import wrinkling_moment
+from softrobots.robots import XacroRobot
 from tests.support.foreign import BRANCHED, SPRINGS
 
 NAMES = {name: getattr(math, name) for name in ("pi", "sqrt", "sin", "cos")} | {"__builtins__": {}}
 PARTS = ("joints", "inflated_links", "sections", "lumped_sections", "muscles", "lines")
 
-ROBOTS: dict[str, PackagedRobot] = {
+ROBOTS: dict[str, XacroRobot] = {
     "arm": sr.InflatableArm(),
     "odd arm": sr.InflatableArm(
         link_lengths=(0.5, 0.4, 0.3), radius=(0.06, 0.05, 0.04), rest_up=(-0.1, 0.03, 0.06), pressure=6e4, max_moment=20.0
@@ -67,7 +67,7 @@ def numbers(content: Any) -> Iterator[dict[str, Any]]:
             yield from numbers(part)
 
 
-def assert_sources_lead_to_numbers(robot: PackagedRobot) -> int:
+def assert_sources_lead_to_numbers(robot: XacroRobot) -> int:
     """Evaluate every source in terms of the parameters. 1e-12: the xacro macros do the same sums in another order."""
     content = read(to_json(sr.load_model(robot), robot))
     names = NAMES | {name: entry["value"] for kind in ("parameters", "derived") for name, entry in content[kind].items()}

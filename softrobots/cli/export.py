@@ -12,7 +12,7 @@ from softrobots.cli.reports.answers import add_json, tell
 from softrobots.core.files import new_file
 from softrobots.export.damping import DAMPING
 from softrobots.export.formats import FORMATS, export_model, guess_format
-from softrobots.export.number_sources import PackagedRobot
+from softrobots.robots import XacroRobot
 
 _EXAMPLES = """examples:
   softrobots export inflatable_arm -o arm.xml --gravity
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> None:
     options = {option: value for option, value in given.items() if value is not None}
     new_file(arguments.output, overwrite=arguments.overwrite)  # tells at once
     source = source_of(arguments)
-    if "robot" in FORMATS[name].options and isinstance(source, PackagedRobot):
+    if "robot" in FORMATS[name].options and isinstance(source, XacroRobot):
         options["robot"] = source  # for the sources of its numbers
     model = model_of(arguments, source)
     if arguments.motors is not None:

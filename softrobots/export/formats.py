@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import as_path, new_file, write_text
 from softrobots.export.mjcf import to_mjcf
-from softrobots.export.number_sources import PackagedRobot
 from softrobots.export.sdf import to_sdf
 from softrobots.export.sidecar import to_json
 from softrobots.export.snippets import to_pinocchio, to_pybullet
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
+from softrobots.robots import XacroRobot
 
 
 class Format(NamedTuple):
@@ -78,7 +78,7 @@ def export_model(
             raise ParameterError(option, value, f"left out for {name}; formats that have it: {having or 'none'}")
     new_file(path, overwrite=overwrite)  # tells at once
     model = source if isinstance(source, SoftModel) else load_model(source)
-    if "robot" in chosen.options and isinstance(source, PackagedRobot):
+    if "robot" in chosen.options and isinstance(source, XacroRobot):
         options = {"robot": source} | options
     return write_text(path, chosen.write(model, **options), overwrite=overwrite)
 

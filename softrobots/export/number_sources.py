@@ -13,10 +13,7 @@ from typing import Any, NamedTuple
 
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
 from softrobots.core.errors import ParameterError
-from softrobots.robots import HelixTube, InflatableArm, PccArm
-
-PackagedRobot = InflatableArm | PccArm | HelixTube
-"""The robots that have parameters."""
+from softrobots.robots import HelixTube, InflatableArm, PccArm, XacroRobot
 
 Rules = dict[tuple[str, str], str]
 """Expression by the name of a part (joint, section, muscle, link) and of one of its numbers."""
@@ -38,18 +35,18 @@ class DerivedNumber(NamedTuple):
     """The expression; of the first segment, where there is one a segment."""
 
 
-def check_robot(robot: Any) -> PackagedRobot:
+def check_robot(robot: Any) -> XacroRobot:
     """Return `robot` if it is one of this package.
 
     Raises:
         ParameterError: If it is something else.
     """
-    if not isinstance(robot, PackagedRobot):
+    if not isinstance(robot, XacroRobot):
         raise ParameterError("robot", robot, "an InflatableArm, a PccArm or a HelixTube, or left out")
     return robot
 
 
-def number_rules(robot: PackagedRobot) -> Rules:
+def number_rules(robot: XacroRobot) -> Rules:
     """Expression of every number in the description of a robot."""
     for kind, rules in _RULES:
         if isinstance(robot, kind):
@@ -57,7 +54,7 @@ def number_rules(robot: PackagedRobot) -> Rules:
     return {}
 
 
-def derived_numbers(robot: PackagedRobot) -> dict[str, DerivedNumber]:
+def derived_numbers(robot: XacroRobot) -> dict[str, DerivedNumber]:
     """The numbers that expressions name besides the parameters."""
     if isinstance(robot, PccArm):
         count = robot.elastic_sections if robot.chain == "sections" else robot.hinges

@@ -11,16 +11,14 @@ import math
 from typing import Any
 
 from softrobots.core.errors import ParameterError, SoftRobotsError
-from softrobots.description.argument_notes import argument_notes
-from softrobots.description.expansion import declared_arguments
-from softrobots.description.paths import xacro_folder
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag, SpringTag
-from softrobots.export.number_sources import PackagedRobot, Rules, check_robot, derived_numbers, number_rules
+from softrobots.export.number_sources import Rules, check_robot, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.robots.xacro_robot import XacroRobot, default_text
 from softrobots.version import __version__
 
 FORMAT = "softrobots sidecar"
@@ -56,7 +54,7 @@ _CONVENTIONS = {
 }
 
 
-def to_json(model: SoftModel, robot: PackagedRobot | None = None) -> str:
+def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
     """Write what a URDF reader misses of a robot as JSON.
 
     The sources of numbers are the tags of the URDF that they were read from, or what the caller of `load_model` said; given the
@@ -181,18 +179,20 @@ class _Parts:
         ]
 
 
-def _parameters(robot: PackagedRobot) -> dict[str, Any]:
-    file = xacro_folder() / robot.XACRO
-    defaults, made = declared_arguments(file), {}
-    for name, note in argument_notes(file).items():
-        source = note.source
-        if not _is_default(robot, name):
-            source = f"{_CALLER} (default {defaults[name] or 'none'}: {source})"
-        made[name] = {"value": getattr(robot, name), "unit": note.unit, "meaning": note.text, "source": source}
-    return made
+def _parameters(robot: XacroRobot) -> dict[str, Any]:
+    entries = {}
+    for field in dataclasses.fields(robot):
+        facts = field.metadata["facts"]
+        if facts.in_xacro:
+            source = facts.source
+            if not _is_default(robot, field.name):
+                source = f"{_CALLER} (default {default_text(field) or 'none'}: {source})"
+            unit = facts.unit.replace("^", "") or "-"
+            entries[field.name] = {"value": getattr(robot, field.name), "unit": unit, "meaning": facts.what, "source": source}
+    return entries
 
 
-def _derived(robot: PackagedRobot) -> dict[str, Any]:
+def _derived(robot: XacroRobot) -> dict[str, Any]:
     return {name: number._asdict() for name, number in derived_numbers(robot).items()}
 
 

@@ -1,23 +1,36 @@
-"""The robots: frozen, checked parameters that become xacro arguments and URDF text.
-
-A robot is a dataclass here, a xacro file, and a line in `ROBOTS`.
-"""
+"""The robots as frozen, checked parameters; a new one is a dataclass, a xacro file, and a line in `ROBOTS`."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
+from softrobots.core.errors import NameNotFound
 from softrobots.description.sources import Robot
 from softrobots.robots.helix_tube import HelixTube
 from softrobots.robots.inflatable_arm import InflatableArm
 from softrobots.robots.pcc_arm import PccArm
+from softrobots.robots.xacro_robot import XacroRobot
 
-ROBOTS: Mapping[str, Callable[[], Robot]] = {
+ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
     "inflatable_arm": InflatableArm,
     "pcc_arm": PccArm,
     "pcc_arm_lumped": partial(PccArm, chain="lumped"),
     "helix_tube": HelixTube,
     "helix_tube_lumped": partial(HelixTube, chain="lumped"),
 }
-"""What makes each robot with its default parameters, by the name of its URDF file."""
+"""Constructor of each robot, by the name of its URDF file."""
 
-__all__ = ["ROBOTS", "HelixTube", "InflatableArm", "PccArm", "Robot"]
+
+def robot_class(name: str) -> tuple[Any, Mapping[str, Any]]:
+    """Return the class of a robot of `ROBOTS`, and the fields that its entry presets.
+
+    Raises:
+        NameNotFound: If there is no such robot.
+    """
+    if name not in ROBOTS:
+        raise NameNotFound("robot", name, ROBOTS)
+    constructor = ROBOTS[name]
+    return (constructor.func, constructor.keywords) if isinstance(constructor, partial) else (constructor, {})
+
+
+__all__ = ["ROBOTS", "HelixTube", "InflatableArm", "PccArm", "Robot", "XacroRobot", "robot_class"]

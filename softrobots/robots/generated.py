@@ -1,4 +1,4 @@
-"""The generated URDF files of the project: whether they are what xacro makes of the robots today."""
+"""Comparison of the generated URDF files of the project with what xacro generates from the robots."""
 
 from __future__ import annotations
 
@@ -10,21 +10,18 @@ from softrobots.robots import ROBOTS
 
 
 class GeneratedFile(NamedTuple):
-    """A file, and what it should hold."""
+    """A file and its required content."""
 
     path: Path
-    """Where it is, or would be."""
+    """Path of the file, which may not exist."""
     content: bytes
     """What xacro generates."""
     up_to_date: bool
-    """Whether it is there and holds that, byte for byte."""
+    """Whether the file exists with this content, byte for byte."""
 
 
 def generated_files(folder: Path) -> Iterator[GeneratedFile]:
-    """Compare the file of every robot of `ROBOTS` in a folder with what xacro generates, one after the other.
-
-    Args:
-        folder: The folder of the files `<robot>.urdf`.
+    """Compare the file `<robot>.urdf` of every robot of `ROBOTS` in a folder with what xacro generates.
 
     Raises:
         DescriptionError: If xacro refuses a robot.

@@ -1,4 +1,4 @@
-"""The helical tube of [Blumenschein 2018]: its parameters, checked, as xacro arguments and URDF text."""
+"""The helical tube of [Blumenschein 2018]."""
 
 from __future__ import annotations
 
@@ -12,36 +12,34 @@ import numpy as np
 
 from softrobots import helix
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING, in_range
-from softrobots.core.checks import FloatArray, choice, positive_integer, positive_number
+from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import ParameterError, StraightTube
-from softrobots.helix.shapes import checked_actuator
-from softrobots.robots.parameters import Bounds, check_fields, colours, expanded, xacro_arguments
-from softrobots.robots.pcc_arm import CHAINS, HINGE_RULES
+from softrobots.robots.fields import check_parameters, parameter
+from softrobots.robots.pcc_arm import CHAINS, HINGE_RULES, MOST_SECTIONS
+from softrobots.robots.xacro_robot import XacroRobot
 
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""
 
 MAX_JOINTS = 300
-"""Joints of a designed tube; Pinocchio's workspace is refused above."""
-
-MOST_SECTIONS = 1000
-"""Sections or hinges that a chain may have."""
+"""Most joints of a tube from a design; Pinocchio's workspace is refused above."""
 
 _LARGEST_RADIUS = 1e6  # of a helix whose axis stands in the origin, over the length of the tube
-_SECTION_TURN = math.radians(40.0)  # of a section of a designed tube
+_SECTION_TURN = math.radians(40.0)  # of a section of a tube from a design
 
 
 @dataclass(frozen=True, kw_only=True)
-class HelixTube:
+class HelixTube(XacroRobot):
     """An inflated tube that an actuator around it bends into a helix: [Blumenschein 2018].
 
     Its chain is at zero in the actuated shape. As a rigid chain it has one of two forms, as `PccArm` has; at zero the frames of
     either stand on the helix:
 
-    - "sections": `elastic_sections` sections of constant strain, each six joints that follow four section coordinates.
+    - "sections": `elastic_sections` sections of constant strain, each six joints that follow four section coordinates. They are
+      too stiff by up to a twelfth of the squared angle that one of them turns, 6 % by default: use hinges for sag.
     - "lumped": `hinges` pairs of orthogonal spring joints. Keeps its springs in every tool that knows joint springs.
 
-    The frames follow the actuator around the tube (`helix.material_twist` tells how the wall turns against them).
+    The frames follow the actuator around the tube (`helix.material_twist` is the turn of the wall against them).
 
     Raises:
         ParameterError: If a value is out of range, or there are too few sections; the message names the field. Sections are too
@@ -49,83 +47,99 @@ class HelixTube:
         SelfIntersection: If the tube would run into itself and `allow_self_contact` is false.
     """
 
-    length: float = 1.5
-    """Length of the uninflated tube [m]. Assumed; about 2.7 turns."""
-    diameter: float = 0.0331
-    """Diameter of the tube [m]. Blumenschein 2018, section III-B."""
-    contraction: float = 0.66
-    """Contracted over original length of the actuator, `lambda` in (0, 1] [-]. Blumenschein 2018, section III-B."""
-    angle: float = math.radians(5.0)
-    """Angle of the actuator to the axis of the tube, `theta` in [0, pi/2) [rad]. Blumenschein 2018, section III-B."""
-    handedness: str = "right"
-    """Which way the helix winds, "right" or "left"."""
-    upright: str = "tube"
-    """What stands along world z: the "tube" where it leaves the base, or the "axis" of the helix, through the world origin."""
-    pressure: float = 10e3
-    """Gauge pressure; stiffens the tube in bending and sets the wrinkling moment [Pa]. Assumed."""
-    wall_thickness: float = 1e-4
-    """Wall thickness [m], at most a tenth of the radius. Assumed (thin polyethylene)."""
-    young_modulus: float = 200e6
-    """Modulus of the wall [Pa]. Assumed (polyethylene of low density)."""
-    poisson_ratio: float = 0.4
-    """Poisson ratio of the wall, in (-1, 0.5] [-]. Assumed."""
-    density: float = 920.0
-    """Density of the wall [kg/m^3]. Assumed (polyethylene of low density)."""
-    actuator_density: float = 0.0
-    """Mass of actuator, tape or stoppers per length of the uninflated tube [kg/m]. Assumed (a bare tube)."""
-    bending_stiffness: float | None = None
-    """Bending stiffness EI as measured [N m^2]; None: of the inflated wall, `(E + P/S) pi r^3 t` as in [Troise 2021] (1)."""
-    torsional_stiffness: float | None = None
-    """Torsional stiffness GJ as measured [N m^2]; None: of the wall, `E / (2 (1 + nu)) 2 pi r^3 t`."""
-    axial_stiffness: float | None = None
-    """Axial stiffness EA as measured [N]; None: of the wall, `E 2 pi r t`."""
-    chain: str = "sections"
-    """Form of the equivalent rigid chain: "sections" or "lumped"."""
-    elastic_sections: int = 20
-    """Sections of constant strain, for chain="sections"; more than 20 make too many joints for PyBullet. They are too stiff by
-    up to a twelfth of the squared angle that one of them turns, 6 % here: for sag take hinges, which err far less."""
-    hinges: int = 24
-    """Pairs of orthogonal springs, for chain="lumped"."""
-    hinge_rule: str = "corrected"
-    """Where the hinges stand, as in `PccArm`: in the middle of their sections ("midpoint"), or the first and the last 1/24 of a
-    section nearer to the ends ("corrected")."""
-    torsion: bool = True
-    """Whether a lumped tube can twist: a torsional spring a hinge."""
-    extension: bool = True
-    """Whether a lumped tube can stretch: a sliding spring a hinge."""
-    rgba: Sequence[float] | Sequence[Sequence[float]] = (0.30, 0.55, 0.75, 1.0)
-    """Colour: red, green, blue, opacity in [0, 1]."""
-    damping_time: float = 0.05
-    """Damping of each spring joint over its stiffness, for simulators only [s]. Assumed."""
-    base_mass: float = 0.5
-    """Mass of the base, fixed to the world [kg]. Assumed; no effect on the statics."""
-    allow_self_contact: bool = False
-    """Whether a tube that runs into itself is accepted; `contact` tells where."""
+    length: float = parameter(1.5, "m", "Length of the uninflated tube", "assumed; about 2.7 turns", above=0.0)
+    diameter: float = parameter(0.0331, "m", "Diameter of the tube", "Blumenschein 2018, section III-B (3.31 cm)", above=0.0)
+    contraction: float = parameter(
+        0.66,
+        "-",
+        "Contracted over original length of the actuator, lambda",
+        "Blumenschein 2018, section III-B",
+        above=0.0,
+        at_most=1.0,
+    )
+    angle: float = parameter(
+        math.radians(5.0),
+        "rad",
+        "Angle of the actuator to the axis of the tube, theta",
+        "Blumenschein 2018, section III-B (5 degrees)",
+        at_least=0.0,
+        below=math.pi / 2,
+    )
+    handedness: str = parameter("right", "", "Which way the helix winds: right or left", options=helix.HANDEDNESS)
+    upright: str = parameter(
+        "tube",
+        "",
+        "What stands along world z: tube (where it leaves the base) or axis (of the helix, through the world origin)",
+        options=UPRIGHT,
+    )
+    pressure: float = parameter(
+        10e3, "Pa", "Gauge pressure; stiffens the tube in bending and sets the wrinkling moment", "assumed", at_least=0.0
+    )
+    wall_thickness: float = parameter(
+        1e-4, "m", "Wall thickness, at most a tenth of the radius", "assumed (thin polyethylene)", above=0.0
+    )
+    young_modulus: float = parameter(200e6, "Pa", "Modulus of the wall", "assumed (polyethylene of low density)", above=0.0)
+    poisson_ratio: float = parameter(0.4, "-", "Poisson ratio of the wall", "assumed", above=-1.0, at_most=0.5)
+    density: float = parameter(920.0, "kg/m^3", "Density of the wall", "assumed (polyethylene of low density)", above=0.0)
+    actuator_density: float = parameter(
+        0.0,
+        "kg/m",
+        "Mass of actuator, tape or stoppers per length of the uninflated tube",
+        "assumed (a bare tube)",
+        at_least=0.0,
+    )
+    bending_stiffness: float | None = parameter(
+        None,
+        "N m^2",
+        "Measured bending stiffness EI; without it, of the inflated wall, (E + P/S) pi r^3 t as in Troise 2021, equation 1",
+        above=0.0,
+    )
+    torsional_stiffness: float | None = parameter(
+        None, "N m^2", "Measured torsional stiffness GJ; without it, of the wall, E / (2 (1 + nu)) 2 pi r^3 t", above=0.0
+    )
+    axial_stiffness: float | None = parameter(
+        None, "N", "Measured axial stiffness EA; without it, of the wall, E 2 pi r t", above=0.0
+    )
+    chain: str = parameter("sections", "", "Form of the equivalent rigid chain: sections or lumped", options=CHAINS)
+    elastic_sections: int = parameter(
+        20,
+        "",
+        "Sections of constant strain, for chain = sections",
+        "chosen; PyBullet takes fewer than 128 joints, fixed ones counted",
+        at_least=1,
+        at_most=MOST_SECTIONS,
+    )
+    hinges: int = parameter(24, "", "Pairs of orthogonal springs, for chain = lumped", at_least=1, at_most=MOST_SECTIONS)
+    hinge_rule: str = parameter(
+        "corrected",
+        "",
+        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the first and "
+        "the last 1/24 section nearer to the ends)",
+        options=HINGE_RULES,
+    )
+    torsion: bool = parameter(True, "", "Whether a lumped tube can twist: a torsional spring a hinge")
+    extension: bool = parameter(True, "", "Whether a lumped tube can stretch: a sliding spring a hinge")
+    rgba: Sequence[float] | Sequence[Sequence[float]] = parameter(
+        (0.30, 0.55, 0.75, 1.0), "", "Colour: red, green, blue, opacity in 0 to 1", form="colour"
+    )
+    damping_time: float = parameter(
+        0.05, "s", "Damping of each joint over its stiffness, for simulators only", "assumed", at_least=0.0
+    )
+    base_mass: float = parameter(
+        0.5, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
+    )
+    allow_self_contact: bool = parameter(
+        False, "", "Whether a tube that runs into itself is accepted; the property contact says where", in_xacro=False
+    )
 
     XACRO: ClassVar[str] = "helix_tube.urdf.xacro"
     """File in xacro/ that describes this robot."""
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_fields(self, {}, _SINGLE, 1, "tubes")
-        checked_actuator(self.contraction, self.angle, self.diameter)
+        check_parameters(self, 1, "tubes")
         if self.wall_thickness > 0.05 * self.diameter:
             raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius, {self.radius} m")
-        if not -1.0 < self.poisson_ratio <= 0.5:
-            raise ParameterError("poisson_ratio", self.poisson_ratio, "in (-1, 0.5]")
-        for name in ("bending_stiffness", "torsional_stiffness", "axial_stiffness"):
-            if getattr(self, name) is not None:
-                unit = "N" if name.startswith("axial") else "N m^2"
-                object.__setattr__(self, name, positive_number(name, getattr(self, name), unit))
-        choices = (("handedness", helix.HANDEDNESS), ("upright", UPRIGHT), ("chain", CHAINS), ("hinge_rule", HINGE_RULES))
-        for name, options in choices:
-            choice(name, getattr(self, name), options)
-        for name in ("elastic_sections", "hinges"):
-            object.__setattr__(self, name, positive_integer(name, getattr(self, name), MOST_SECTIONS))
-        for name in ("torsion", "extension", "allow_self_contact"):
-            if not isinstance(getattr(self, name), bool):
-                raise ParameterError(name, getattr(self, name), "True or False")
-        object.__setattr__(self, "rgba", colours(self.rgba, 1, "tubes"))
         if self.upright == "axis" and self.shape is not None and self.shape.centre_radius > _LARGEST_RADIUS * self.length:
             raise ParameterError("upright", self.upright, '"tube" for a helix so wide that the tube hardly bends')
         self._check_sections()
@@ -134,31 +148,28 @@ class HelixTube:
 
     @classmethod
     def from_design(cls, design: helix.HelixDesign, **fields: Any) -> HelixTube:
-        """The tube of a design, with sections (and hinges) of about 40 degrees unless said otherwise, but at most 300 joints.
+        """Return the tube of a design, with sections (and hinges) of about 40 degrees by default, but at most 300 joints.
 
         Args:
-            design: What `helix.design_grasp` or `helix.design_antenna` returns, or a `HelixDesign` of one's own.
+            design: Result of `helix.design_grasp` or `helix.design_antenna`, or any `HelixDesign`.
             fields: The other fields.
 
-        Returns:
-            The tube.
-
         Raises:
-            ParameterError: If `design` is something else, gives a field that is given too, or a value is out of range.
+            ParameterError: If `design` is no `HelixDesign`, `fields` has a field that it fixes, or a value is out of range.
             SelfIntersection: If the tube would run into itself and `allow_self_contact` is not given.
         """
         if not isinstance(design, helix.HelixDesign):
             raise ParameterError("design", design, "a HelixDesign")
-        given: dict[str, Any] = {name: getattr(design, name) for name in ("contraction", "angle", "diameter", "handedness")}
-        given["length"] = design.tube_length
-        twice = sorted(given.keys() & fields.keys())
+        designed: dict[str, Any] = {name: getattr(design, name) for name in ("contraction", "angle", "diameter", "handedness")}
+        designed["length"] = design.tube_length
+        twice = sorted(designed.keys() & fields.keys())
         if twice:
             raise ParameterError(twice[0], fields[twice[0]], "left out: the design gives it")
         curvature, torsion = helix.actuator_curvature_torsion(design.contraction, design.angle, design.diameter)
         turning = math.hypot(curvature, torsion) * design.centre_length
         count = max(4, math.ceil(turning / _SECTION_TURN))
         counts = {"elastic_sections": min(count, MAX_JOINTS // 6), "hinges": min(count, MAX_JOINTS // 4)}
-        return cls(**(counts | given | fields))
+        return cls(**(counts | designed | fields))
 
     @property
     def radius(self) -> float:
@@ -211,20 +222,17 @@ class HelixTube:
 
     @property
     def n_joints(self) -> int:
-        """Number of movable joints of the chain; above 300 Pinocchio's workspace is refused."""
+        """Number of movable joints of the chain."""
         return self.n_sections * (6 if self.chain == "sections" else 2 + self.torsion + self.extension)
 
     def grown(self, length: float) -> HelixTube:
-        """The same tube grown to another length, with sections as long as before or a little shorter.
+        """Return the same tube grown to another length, with sections as long as before or a little shorter.
 
         Args:
-            length: Length of the uninflated tube that has come out [m], positive.
-
-        Returns:
-            The tube; its `urdf()` is the robot of that length.
+            length: Length of the uninflated tube that has everted [m], positive.
 
         Raises:
-            ParameterError: If the length is not positive, or asks for more than 1000 sections.
+            ParameterError: If the length is not positive, or needs more than 1000 sections.
             SelfIntersection: If the longer tube would run into itself.
         """
         share = positive_number("length", length, "m") / self.length
@@ -235,22 +243,8 @@ class HelixTube:
         each = {name: min(count, MOST_SECTIONS) for name, count in each.items()}
         return dataclasses.replace(self, length=length, **each)
 
-    def xacro_arguments(self) -> dict[str, str]:
-        """Return the parameters as arguments of the xacro file: text by name, full precision."""
-        arguments = xacro_arguments(self)
-        del arguments["allow_self_contact"]  # the description of such a tube is like any other
-        return arguments
-
-    def urdf(self) -> str:
-        """Return the robot as URDF text, with its sections or springs inside.
-
-        Raises:
-            DescriptionError: If xacro refuses the parameters, e.g. sections too light to cut their tiny links from.
-        """
-        return expanded(self.XACRO, tuple(self.xacro_arguments().items()))
-
     def _check_sections(self) -> None:
-        """Refuse sections of constant strain that the chain cannot carry."""
+        """Refuse too few sections of constant strain for the range of their coordinates."""
         if self.chain != "sections":
             return
         whole = (self.strains - [0.0, 0.0, 0.0, 1.0]) * self.centre_length
@@ -261,20 +255,4 @@ class HelixTube:
         if fewest > MOST_SECTIONS:
             raise ParameterError("length", self.length, f"so short that {MOST_SECTIONS} sections are enough for its turns")
         if count < fewest:
-            raise ParameterError("elastic_sections", count, f"at least {fewest} for this helix, rather more")
-
-
-_SINGLE: Bounds = {
-    "length": ("m", 0.0, True),
-    "diameter": ("m", 0.0, True),
-    "contraction": ("-", 0.0, True),
-    "angle": ("rad", 0.0, False),
-    "pressure": ("Pa", 0.0, False),
-    "wall_thickness": ("m", 0.0, True),
-    "young_modulus": ("Pa", 0.0, True),
-    "poisson_ratio": ("-", -1.0, True),
-    "density": ("kg/m^3", 0.0, True),
-    "actuator_density": ("kg/m", 0.0, False),
-    "damping_time": ("s", 0.0, False),
-    "base_mass": ("kg", 1e-6, True),
-}
+            raise ParameterError("elastic_sections", count, f"at least {fewest} for this helix; more are advisable")

@@ -14,7 +14,6 @@ are a word, eight and a truth value. Nothing of a file is run: there are no tags
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import math
 import os
@@ -27,7 +26,7 @@ from softrobots.core.bounded_reading import read_text
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
 from softrobots.core.files import as_path, write_text
 from softrobots.core.json_text import parse_json
-from softrobots.robots import ROBOTS, Robot
+from softrobots.robots import ROBOTS, XacroRobot, robot_class
 
 LARGEST_FILE = 100_000
 """Bytes of a file."""
@@ -84,7 +83,7 @@ def read_parameters(path: str | os.PathLike[str]) -> ParameterFile:
     return ParameterFile(robot, values)
 
 
-def read_robot(path: str | os.PathLike[str], robot: str | None = None) -> Robot:
+def read_robot(path: str | os.PathLike[str], robot: str | None = None) -> XacroRobot:
     """Make a robot with the parameters of a file.
 
     Args:
@@ -103,16 +102,11 @@ def read_robot(path: str | os.PathLike[str], robot: str | None = None) -> Robot:
     """
     said = read_parameters(path)
     name = robot_of(said, robot)
-    if name not in ROBOTS:
-        raise NameNotFound("robot", name, ROBOTS)
-    maker: Any = ROBOTS[name]
-    kind: Any = maker.func if isinstance(maker, functools.partial) else maker
-    names = [field.name for field in dataclasses.fields(kind)]
+    names = [field.name for field in dataclasses.fields(robot_class(name)[0])]
     unknown = next((parameter for parameter in said.values if parameter not in names), None)
     if unknown is not None:
         raise NameNotFound(f"parameter of {name}", unknown, names)
-    made: Robot = maker(**said.values)
-    return made
+    return ROBOTS[name](**said.values)
 
 
 def robot_of(said: ParameterFile, robot: str | None) -> str:

@@ -1,4 +1,4 @@
-"""The arm of [PCC paper]: segments with pneumatic muscles, its parameters, checked, as xacro arguments and URDF text."""
+"""The continuum arm of [PCC paper]: segments with pneumatic muscles."""
 
 from __future__ import annotations
 
@@ -10,19 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softrobots.constant_curvature import AZIMUTHS, muscle_residual
-from softrobots.core.checks import choice, finite_array, finite_number, positive_integer
+from softrobots.core.checks import finite_array, finite_number, positive_array
 from softrobots.core.errors import ParameterError
-from softrobots.robots.parameters import (
-    Bounds,
-    PerPart,
-    at_least,
-    check_fields,
-    check_lengths,
-    colours,
-    expanded,
-    numbers,
-    xacro_arguments,
-)
+from softrobots.robots.fields import PerPart, check_lengths, check_parameters, numbers, parameter, per_part
+from softrobots.robots.xacro_robot import XacroRobot
 
 CHAINS = ("sections", "lumped")
 """Forms of the equivalent rigid chain."""
@@ -30,17 +21,20 @@ CHAINS = ("sections", "lumped")
 HINGE_RULES = ("corrected", "midpoint")
 """Where the hinges of the lumped chain stand."""
 
+MOST_SECTIONS = 1000
+"""Sections or hinges that a segment may have; an arm has at most twice as many."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class PccArm:
+class PccArm(XacroRobot):
     """A continuum arm of bending segments, each held by muscles: [PCC paper] has two segments of three muscles.
 
     It stands straight along +z at rest. As a rigid chain it has one of two forms:
 
     - "sections": `elastic_sections` sections of constant strain a segment, each six joints that follow four section
-      coordinates. Exact arcs. Other tools load the geometry; only this package knows how the joints hang together.
+      coordinates. Exact arcs. Other tools load the geometry; only this package knows how the joints are coupled.
     - "lumped": `hinges` pairs of orthogonal spring joints a segment. An approximation of second order that keeps its springs in
-      every tool that knows joint springs.
+      every tool that knows joint springs; `hinge_rule="corrected"` removes the boundary term of the midpoint rule's error.
 
     Every per-segment field accepts one number for all segments or one for each, and is stored as a tuple.
 
@@ -48,73 +42,99 @@ class PccArm:
         ParameterError: If a value is out of range or a list has the wrong length; the message names the field.
     """
 
-    segment_lengths: Sequence[float] = (0.524, 0.524)
-    """Rest lengths of the segments, base to tip; their number is the number of segments [m]. PCC paper, section 3."""
-    offset: PerPart = math.pi / 3
-    """Turn about the backbone before each segment but the first, or one for each and the first [rad]. PCC paper, section 3."""
-    muscle_azimuths: Sequence[float] = AZIMUTHS
-    """Where the muscles of a segment run, from its x axis towards y; none: a passive rod [rad]. PCC paper, section 3."""
-    muscle_distance: PerPart = 0.04
-    """Distance of the muscles from the backbone [m]. Assumed; not published."""
-    muscle_contraction: PerPart = 0.15
-    """Largest contraction of a muscle, relative to its rest length [-], below 1. Assumed."""
-    muscle_extension: PerPart = 0.15
-    """Largest extension of a muscle, relative to its rest length [-]. Assumed."""
-    muscle_force: PerPart = 400.0
-    """Largest pull or push of a muscle [N]. Assumed."""
-    bending_stiffness: PerPart = 1.92
-    """Bending stiffness EI [N m^2]. Assumed, as of three muscles of 800 N a unit strain: 3/2 800 d^2."""
-    torsional_stiffness: PerPart = 1.28
-    """Torsional stiffness GJ [N m^2]. Assumed, as of an incompressible round rod: EI / 1.5."""
-    axial_stiffness: PerPart = 2400.0
-    """Axial stiffness EA [N]. Assumed, as of three muscles of 800 N a unit strain."""
-    linear_density: PerPart = 0.6
-    """Mass per rest length [kg/m]. Assumed."""
-    radius: PerPart = 0.05
-    """Radius of the body [m]; for inertia and pictures. Assumed."""
-    chain: str = "sections"
-    """Form of the equivalent rigid chain: "sections" or "lumped"."""
-    elastic_sections: int = 4
-    """Sections of constant strain a segment, for chain="sections"; 1 is pure constant curvature."""
-    hinges: int = 12
-    """Pairs of orthogonal springs a segment, for chain="lumped"."""
-    hinge_rule: str = "corrected"
-    """Where the hinges stand: in the middle of their sections ("midpoint"), or the first and the last of a segment 1/24 section
-    nearer to its ends, which removes the boundary term of the midpoint rule's error ("corrected"). Both are of second order."""
-    torsion: bool = True
-    """Whether a lumped segment can twist: a torsional spring a hinge."""
-    extension: bool = True
-    """Whether a lumped segment can stretch: a sliding spring a hinge."""
-    rgba: Sequence[float] | Sequence[Sequence[float]] = (0.55, 0.60, 0.65, 1.0)
-    """Colour: red, green, blue, opacity in [0, 1]; one for all segments or one for each."""
-    damping_time: float = 0.05
-    """Damping of each spring joint over its stiffness, for simulators only [s]. Assumed."""
-    base_mass: float = 2.0
-    """Mass of the base, fixed to the world [kg]. Assumed; no effect on the statics."""
+    segment_lengths: Sequence[float] = per_part(
+        (0.524, 0.524),
+        "m",
+        "Rest lengths of the segments, base to tip; their number is the number of segments",
+        "PCC paper, section 3 (52.4 cm)",
+        above=0.0,
+    )
+    offset: PerPart = parameter(
+        math.pi / 3,
+        "rad",
+        "Turn about the backbone before each segment but the first, or a list with one for each and the first",
+        "PCC paper, section 3 (60 degrees)",
+        form="special",
+    )
+    muscle_azimuths: Sequence[float] = parameter(
+        AZIMUTHS,
+        "rad",
+        "Where the muscles of a segment run, from its x axis towards y; an empty list for none (a passive rod)",
+        "PCC paper, section 3 (120 degrees apart)",
+        form="special",
+    )
+    muscle_distance: PerPart = per_part(
+        0.04, "m", "Distance of the muscles from the backbone", "assumed; not published", above=0.0
+    )
+    muscle_contraction: PerPart = per_part(
+        0.15, "-", "Largest contraction of a muscle, relative to its rest length", "assumed", above=0.0, below=1.0
+    )
+    muscle_extension: PerPart = per_part(
+        0.15, "-", "Largest extension of a muscle, relative to its rest length", "assumed", above=0.0
+    )
+    muscle_force: PerPart = per_part(400.0, "N", "Largest pull or push of a muscle", "assumed", above=0.0)
+    bending_stiffness: PerPart = per_part(
+        1.92,
+        "N m^2",
+        "Bending stiffness EI",
+        "assumed, as of three muscles of 800 N a unit strain at 0.04 m (3/2 800 d^2)",
+        above=0.0,
+    )
+    torsional_stiffness: PerPart = per_part(
+        1.28, "N m^2", "Torsional stiffness GJ", "assumed, as of an incompressible round rod, EI / 1.5", above=0.0
+    )
+    axial_stiffness: PerPart = per_part(
+        2400.0, "N", "Axial stiffness EA", "assumed, as of three muscles of 800 N a unit strain", above=0.0
+    )
+    linear_density: PerPart = per_part(0.6, "kg/m", "Mass per rest length", "assumed", above=0.0)
+    radius: PerPart = per_part(0.05, "m", "Radius of the body; for inertia and pictures", "assumed", above=0.0)
+    chain: str = parameter("sections", "", "Form of the equivalent rigid chain: sections or lumped", options=CHAINS)
+    elastic_sections: int = parameter(
+        4,
+        "",
+        "Sections of constant strain a segment, for chain = sections; 1 is pure constant curvature",
+        at_least=1,
+        at_most=MOST_SECTIONS,
+    )
+    hinges: int = parameter(
+        12, "", "Pairs of orthogonal springs a segment, for chain = lumped", at_least=1, at_most=MOST_SECTIONS
+    )
+    hinge_rule: str = parameter(
+        "corrected",
+        "",
+        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the first and "
+        "the last of a segment 1/24 section nearer to its ends)",
+        options=HINGE_RULES,
+    )
+    torsion: bool = parameter(True, "", "Whether a lumped segment can twist: a torsional spring a hinge")
+    extension: bool = parameter(True, "", "Whether a lumped segment can stretch: a sliding spring a hinge")
+    rgba: Sequence[float] | Sequence[Sequence[float]] = parameter(
+        (0.55, 0.60, 0.65, 1.0), "", "Colour of a segment: red, green, blue, opacity in 0 to 1", form="colour"
+    )
+    damping_time: float = parameter(
+        0.05, "s", "Damping of each joint over its stiffness, for simulators only", "assumed", at_least=0.0
+    )
+    base_mass: float = parameter(
+        2.0, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
+    )
 
     XACRO: ClassVar[str] = "pcc_arm.urdf.xacro"
     """File in xacro/ that describes this robot."""
 
     def __post_init__(self) -> None:
-        """Check every field and spread single numbers over the segments."""
+        """Check every field and repeat single numbers for all segments."""
         count = check_lengths(self, "segment_lengths", "segment")
-        check_fields(self, _PER_SEGMENT, _SINGLE, count, "segments")
-        if max(self._each("muscle_contraction")) >= 1.0:
-            raise ParameterError("muscle_contraction", self.muscle_contraction, "below 1")
-        object.__setattr__(self, "offset", self._offsets(count))
-        object.__setattr__(self, "muscle_azimuths", self._azimuths())
-        choice("chain", self.chain, CHAINS)
-        choice("hinge_rule", self.hinge_rule, HINGE_RULES)
+        check_parameters(self, count, "segments")
+        object.__setattr__(self, "offset", self._checked_offset(count))
+        object.__setattr__(self, "muscle_azimuths", self._checked_azimuths())
+        most = max(1, 2 * MOST_SECTIONS // count)
         for name in ("elastic_sections", "hinges"):
-            object.__setattr__(self, name, positive_integer(name, getattr(self, name), max(1, min(1000, 2000 // count))))
-        for name in ("torsion", "extension"):
-            if not isinstance(getattr(self, name), bool):
-                raise ParameterError(name, getattr(self, name), "True or False")
-        object.__setattr__(self, "rgba", colours(self.rgba, count, "segments"))
+            if getattr(self, name) > most:
+                raise ParameterError(name, getattr(self, name), f"a positive integer, at most {most} for {count} segments")
 
     @classmethod
     def measured(cls, *, bending: PerPart, torsion: PerPart, axial: PerPart, **fields: Any) -> PccArm:
-        """Make an arm from the stiffness of whole segments, as a bench measures it.
+        """Return an arm with the stiffness of whole segments as measured on a bench.
 
         A moment at the end of a segment bends it by `moment / bending`, so `EI = bending l`; `GJ` and `EA` likewise.
 
@@ -141,9 +161,9 @@ class PccArm:
         ):
             if field in fields:
                 raise ParameterError(field, fields[field], f"left out: {name} gives it")
-            given = numbers(name, value, len(lengths), unit, "segments")
-            at_least(name, given, 0.0, True, unit)
-            stiffness[field] = tuple(k * length for k, length in zip(given, lengths, strict=True))
+            measured = numbers(name, value, len(lengths), unit, "segments")
+            positive_array(name, measured, unit)
+            stiffness[field] = tuple(k * length for k, length in zip(measured, lengths, strict=True))
         return cls(**(stiffness | fields))
 
     @property
@@ -153,7 +173,7 @@ class PccArm:
 
     @property
     def n_joints(self) -> int:
-        """Number of movable joints of the chain; above 300 Pinocchio's workspace is refused."""
+        """Number of movable joints of the chain."""
         each = 6 * self.elastic_sections if self.chain == "sections" else self.hinges * (2 + self.torsion + self.extension)
         return self.n_segments * each
 
@@ -162,29 +182,13 @@ class PccArm:
         """Number of muscles of the whole arm."""
         return self.n_segments * len(self.muscle_azimuths)
 
-    def xacro_arguments(self) -> dict[str, str]:
-        """Return the parameters as arguments of the xacro file: text by name, full precision."""
-        return xacro_arguments(self)
-
-    def urdf(self) -> str:
-        """Return the robot as URDF text, with its sections or springs and its muscles inside.
-
-        Raises:
-            DescriptionError: If xacro refuses the parameters, e.g. sections too light to cut their tiny links from.
-        """
-        return expanded(self.XACRO, tuple(self.xacro_arguments().items()))
-
-    def _each(self, name: str) -> tuple[Any, ...]:
-        values: tuple[Any, ...] = getattr(self, name)
-        return values
-
-    def _offsets(self, count: int) -> tuple[float, ...]:
+    def _checked_offset(self, count: int) -> tuple[float, ...]:
         if isinstance(self.offset, Sequence | np.ndarray) and np.ndim(self.offset) == 1:
             return numbers("offset", self.offset, count, "rad", "segments")
         turn = finite_number("offset", self.offset, "rad")
         return (0.0, *(turn,) * (count - 1))
 
-    def _azimuths(self) -> tuple[float, ...]:
+    def _checked_azimuths(self) -> tuple[float, ...]:
         if len(np.atleast_1d(self.muscle_azimuths)) == 0:
             return ()
         azimuths = finite_array("muscle_azimuths", self.muscle_azimuths, (None,), "rad")
@@ -194,21 +198,3 @@ class PccArm:
             requirement = "none, or three or more that differ (modulo a turn) and do not all lie close together [rad]"
             raise ParameterError("muscle_azimuths", self.muscle_azimuths, requirement) from error
         return tuple(azimuths.tolist())
-
-
-_PER_SEGMENT: Bounds = {
-    "muscle_distance": ("m", 0.0, True),
-    "muscle_contraction": ("-", 0.0, True),
-    "muscle_extension": ("-", 0.0, True),
-    "muscle_force": ("N", 0.0, True),
-    "bending_stiffness": ("N m^2", 0.0, True),
-    "torsional_stiffness": ("N m^2", 0.0, True),
-    "axial_stiffness": ("N", 0.0, True),
-    "linear_density": ("kg/m", 0.0, True),
-    "radius": ("m", 0.0, True),
-}
-
-_SINGLE: Bounds = {
-    "damping_time": ("s", 0.0, False),
-    "base_mass": ("kg", 1e-6, True),
-}

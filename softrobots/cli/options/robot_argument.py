@@ -1,4 +1,4 @@
-"""Which robot a command is about: `ROBOT`, `--set NAME=VALUE`, and what must be said about other people's files."""
+"""Options that name the robot of a command: `ROBOT`, `--set`, `--parameters`, and springs, tip and muscles of its model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from softrobots.cli.options.command_line import refuse_too_large
-from softrobots.cli.options.robot_parameters import NOTHING, check_names, make_robot, parse_parameters, xacro_parameters
+from softrobots.cli.options.robot_parameters import check_names, make_robot, parse_parameters, xacro_parameters
 from softrobots.cli.reports.coordinate_units import motor_units
 from softrobots.cli.tools.kinematics import is_urdf_file
 from softrobots.core.checks import FloatArray
@@ -19,20 +19,20 @@ from softrobots.description.sources import read_source
 from softrobots.model.loader import load_model
 from softrobots.model.muscles import MUSCLE_INPUTS
 from softrobots.model.soft_model import SoftModel
-from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm, Robot
+from softrobots.robots import ROBOTS, Robot, XacroRobot
 from softrobots.robots.parameter_file import read_parameters
-from softrobots.robots.parameters import argument_text
+from softrobots.robots.xacro_robot import argument_text
 
 
 def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Give a parser `ROBOT`, `--set` and `--parameters`; see `source_of`.
+    """Add `ROBOT`, `--set` and `--parameters` to a parser; see `source_of`.
 
     Args:
         parser: The parser.
         optional: Whether `ROBOT` may be left out.
     """
-    told = f"{', '.join(ROBOTS)}; or a URDF, xacro, MJCF or SDF file"
-    parser.add_argument("robot", nargs="?" if optional else None, metavar="ROBOT", help=told)
+    help_text = f"{', '.join(ROBOTS)}; or a URDF, xacro, MJCF or SDF file"
+    parser.add_argument("robot", nargs="?" if optional else None, metavar="ROBOT", help=help_text)
     parser.add_argument(
         "--set",
         dest="parameters",
@@ -41,30 +41,30 @@ def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
         type=assignment,
         default=[],
         metavar="NAME=VALUE",
-        help="parameters of the robot, or arguments of the xacro file; `softrobots urdf ROBOT --list` tells names, units and "
+        help="parameters of the robot, or arguments of the xacro file; `softrobots urdf ROBOT --list` shows names, units and "
         "defaults",
     )
-    told = "read such parameters from a file, YAML or JSON; --set wins (none)"
-    parser.add_argument("--parameters", dest="parameter_file", type=Path, metavar="FILE", help=told)
+    help_text = "read parameters from a YAML or JSON file; those of --set win (none)"
+    parser.add_argument("--parameters", dest="parameter_file", type=Path, metavar="FILE", help=help_text)
 
 
 def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Give a parser `ROBOT`, `--set`, `--parameters`, `--spring`, `--tip` and `--muscles`; see `model_of`.
+    """Add `ROBOT`, `--set`, `--parameters`, `--spring`, `--tip` and `--muscles` to a parser; see `model_of`.
 
     Args:
         parser: The parser.
         optional: Whether `ROBOT` may be left out.
     """
     add_robot(parser, optional=optional)
-    told = "a spring of a joint of somebody's file, K [N m/rad or N/m], relaxed at REST [rad or m] (0); once for each joint"
-    parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=told)
-    parser.add_argument("--tip", metavar="LINK", help="the link that is the tip (as the file says, or its only end)")
-    told = "what is given of muscles, lengths [m] or tensions [N] (%(default)s)"
-    parser.add_argument("--muscles", choices=MUSCLE_INPUTS, default="lengths", help=told)
+    help_text = "spring of a joint of a file: stiffness K [N m/rad or N/m], relaxed at REST [rad or m] (0); once for each joint"
+    parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=help_text)
+    parser.add_argument("--tip", metavar="LINK", help="link that is the tip (the one that the file names, or its only end)")
+    help_text = "input of muscles: lengths [m] or tensions [N] (%(default)s)"
+    parser.add_argument("--muscles", choices=MUSCLE_INPUTS, default="lengths", help=help_text)
 
 
 def assignment(word: str) -> str:
-    """A word behind `--set`; argparse gives it all the words up to the next option."""
+    """Check a word behind `--set` and return it; argparse passes all words up to the next option."""
     name, equals, _ = word.partition("=")
     if not equals or not name.strip():
         raise argparse.ArgumentTypeError(f"{word!r}: NAME=VALUE is required, and ROBOT before --set")
@@ -72,23 +72,23 @@ def assignment(word: str) -> str:
 
 
 def spring(word: str) -> tuple[str, tuple[float, float]]:
-    """A spring as it is typed, JOINT=K or JOINT=K,REST: the joint, and stiffness and rest."""
+    """Parse JOINT=K or JOINT=K,REST into the joint and its stiffness and rest."""
     joint, equals, numbers = word.rpartition("=")
     stiffness, _, rest = numbers.partition(",")
     try:
-        typed = float(stiffness), float(rest or 0.0)
+        values = float(stiffness), float(rest or 0.0)
     except ValueError:
         equals = ""
     if not joint or not equals:
         raise argparse.ArgumentTypeError(f"{word!r}: JOINT=K or JOINT=K,REST is required")
-    return joint, typed
+    return joint, values
 
 
 def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
-    """What the arguments of `add_robot` name: a robot, the path of a URDF file, or the URDF text that another file becomes.
+    """Return what the arguments of `add_robot` name: a robot, the path of a URDF file, or URDF text made from another file.
 
     Args:
-        arguments: The arguments.
+        arguments: The parsed arguments.
 
     Raises:
         NameNotFound: If there is no such robot, file or parameter.
@@ -97,18 +97,18 @@ def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
         DescriptionError: If xacro refuses the file, or it is of no kind that can be read.
         MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
     """
-    robot, parameters, said = arguments.robot, arguments.parameters, NOTHING
+    robot, parameters, values = arguments.robot, arguments.parameters, {}
     if arguments.parameter_file is not None:
-        said = read_parameters(arguments.parameter_file)
-        if said.robot not in (None, robot, Path(robot).name):
-            raise ParameterError("ROBOT", robot, f"{said.robot}, for which {arguments.parameter_file} is")
+        owner, values = read_parameters(arguments.parameter_file)
+        if owner not in (None, robot, Path(robot).name):
+            raise ParameterError("ROBOT", robot, f"{owner}, for which {arguments.parameter_file} is")
     if robot in ROBOTS:
-        return make_robot(robot, parameters, said)
+        return make_robot(robot, parameters, values)
     file = robot_file(robot)
     if file.suffix == ".xacro":
         known = xacro_parameters(file)
-        check_names(said, known, file.name)
-        texts = {name: argument_text(value) for name, value in said.values.items()}
+        check_names(values, known, file.name)
+        texts = {name: argument_text(value) for name, value in values.items()}
         return expand(file, texts | parse_parameters(parameters, known, file.name))
     if arguments.parameter_file is not None:
         raise ParameterError("--parameters", str(arguments.parameter_file), f"left out: {file} is no xacro file")
@@ -118,11 +118,11 @@ def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
 
 
 def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = None) -> SoftModel:
-    """The model of the robot that the arguments of `add_model` name.
+    """Return the model of the robot that the arguments of `add_model` name.
 
     Args:
-        arguments: The arguments.
-        source: What `source_of` made of them, if that is known.
+        arguments: The parsed arguments.
+        source: The result of `source_of`, if that is known.
 
     Raises:
         SoftRobotsError: Whatever `source_of` and `load_model` raise.
@@ -138,32 +138,32 @@ def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = 
 
 
 def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
-    """The same model for a command that solves: a robot that is too large for that is refused before it is made.
+    """Return the same model for a command that solves; robots too large for Pinocchio's workspace are refused beforehand.
 
     Raises:
         SoftRobotsError: Whatever `source_of` and `load_model` raise.
         ParameterError: If the robot has too many joints, or a joint is given two springs.
     """
     source = source_of(arguments)
-    if isinstance(source, InflatableArm | PccArm | HelixTube):
+    if isinstance(source, XacroRobot):
         option = "--set" if arguments.parameters else "--parameters"
         refuse_too_large(source, option, " ".join(arguments.parameters) or str(arguments.parameter_file))
     return model_of(arguments, source)
 
 
 def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--motors") -> FloatArray:
-    """Actuator coordinates that an option gives, relaxed without it; the error names the actuators.
+    """Return the actuator coordinates given by an option, or the relaxed ones without it.
 
     Args:
         model: The robot.
-        words: What was typed, or None.
+        words: The numbers of the option, or None.
         option: The option, for the error.
 
     Returns:
         Shape (n_motors,) [rad, m or N].
 
     Raises:
-        ParameterError: If there are more or fewer numbers than actuators, or the robot cannot take them.
+        ParameterError: If there are more or fewer numbers than actuators (which are named), or they are out of range.
     """
     if words is None:
         return np.array(model.relaxed_motors)
@@ -176,7 +176,7 @@ def check_one_each(option: str, words: Sequence[float], names: Sequence[str], un
 
     Args:
         option: The option, for the error.
-        words: What was typed.
+        words: The numbers of the option.
         names: Names of the actuators.
         units: Unit of each number.
 
@@ -185,19 +185,21 @@ def check_one_each(option: str, words: Sequence[float], names: Sequence[str], un
     """
     if len(words) != len(names):
         named = ", ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
-        raise ParameterError(option, list(words), f"{len(names)} numbers: {named}" if named else "left out: it has no motors")
+        raise ParameterError(
+            option, list(words), f"{len(names)} numbers: {named}" if named else "left out: the robot has no motors"
+        )
 
 
 def robot_file(name: str) -> Path:
-    """The file of a robot.
+    """Return the path of a robot's file.
 
     Raises:
-        NameNotFound: If there is none; lists the robots.
+        NameNotFound: If it does not exist; lists the robots.
     """
     try:
-        found = Path(name).is_file()
-    except OSError:  # a name too long for a file, or a folder that may not be looked into
-        found = False
-    if not found:
+        exists = Path(name).is_file()
+    except OSError:  # a name too long for a file, or a folder without permission
+        exists = False
+    if not exists:
         raise NameNotFound("robot or file", name, ROBOTS)
     return Path(name)

@@ -1,0 +1,181 @@
+"""Parameters of a robot as dataclass fields that carry their meaning, unit, bounds and source.
+
+The facts are stated only there. The checks of a robot, the command line, the API reference and the JSON beside a URDF read
+them, and a test compares the xacro files with them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple, TypeVar
+
+import numpy as np
+
+from softrobots.core.checks import choice, finite_array, finite_number, positive_integer
+from softrobots.core.errors import ParameterError
+
+MOST_PARTS = 1000
+"""Largest number of links or segments; xacro takes minutes for that many."""
+
+PerPart = float | Sequence[float]
+"""One number for all links or segments, or one for each, base to tip."""
+
+Form = Literal["single", "per_part", "colour", "special"]
+"""One value; one for all parts or one for each; likewise a colour; checked by the robot itself."""
+
+Value = TypeVar("Value")
+
+
+class Facts(NamedTuple):
+    """What is known of a parameter besides its name and default."""
+
+    what: str
+    """Meaning."""
+    unit: str
+    """Unit, "-" for ratios, empty for words, truth values and counts."""
+    source: str
+    """Where the default comes from."""
+    above: float | None
+    """Lower bound, excluded."""
+    at_least: float | None
+    """Lower bound, included."""
+    below: float | None
+    """Upper bound, excluded."""
+    at_most: float | None
+    """Upper bound, included."""
+    options: tuple[str, ...]
+    """Words to choose from."""
+    form: Form
+    """How many values there are."""
+    in_xacro: bool
+    """Whether the xacro file has an argument of this name."""
+
+    @property
+    def bounds(self) -> str:
+        """The bounds in words, e.g. "above 0, at most 1"; empty without bounds."""
+        limits = (("above", self.above), ("at least", self.at_least), ("below", self.below), ("at most", self.at_most))
+        return ", ".join(f"{words} {limit:g}" for words, limit in limits if limit is not None)
+
+    @property
+    def description(self) -> str:
+        """Meaning, unit, bounds and source in one or two sentences."""
+        head = self.what + (f" [{self.unit}]" if self.unit else "") + (f", {self.bounds}" if self.bounds else "")
+        return f"{head}." if self.source == "chosen" else f"{head}. {self.source[0].upper()}{self.source[1:]}."
+
+    def allow(self, numbers: Sequence[float]) -> bool:
+        """Return whether all numbers are within the bounds."""
+        low, high = min(numbers), max(numbers)
+        return (
+            (self.above is None or low > self.above)
+            and (self.at_least is None or low >= self.at_least)
+            and (self.below is None or high < self.below)
+            and (self.at_most is None or high <= self.at_most)
+        )
+
+
+def parameter(
+    default: Value,
+    unit: str,
+    what: str,
+    source: str = "chosen",
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+    options: tuple[str, ...] = (),
+    form: Form = "single",
+    in_xacro: bool = True,
+) -> Value:
+    """Return a dataclass field with a default and facts; see `Facts`."""
+    facts = Facts(what, unit, source, above, at_least, below, at_most, options, form, in_xacro)
+    field: Value = dataclasses.field(default=default, metadata={"facts": facts})
+    return field
+
+
+def per_part(default: Value, unit: str, what: str, source: str = "chosen", **bounds: float) -> Value:
+    """Return such a field with one number for all parts or one for each."""
+    return parameter(default, unit, what, source, form="per_part", **bounds)  # type: ignore[arg-type]
+
+
+def facts_of(robot: Any) -> dict[str, Facts]:
+    """Return the facts of the parameters of a robot, or of its class, by name."""
+    return {field.name: field.metadata["facts"] for field in dataclasses.fields(robot)}
+
+
+def check_parameters(robot: Any, count: int = 1, parts: str = "parts") -> None:
+    """Check every field of a robot against its facts and store it in its final type; values per part become tuples.
+
+    Args:
+        robot: A frozen dataclass whose fields are made by `parameter`.
+        count: Number of links or segments.
+        parts: What these are called, for errors.
+
+    Raises:
+        ParameterError: If a value has another type or is out of bounds, or a list has the wrong length; names the field.
+    """
+    for field in dataclasses.fields(robot):
+        value, facts = getattr(robot, field.name), field.metadata["facts"]
+        if facts.form != "special" and not (value is None and field.default is None):
+            object.__setattr__(robot, field.name, _checked(field, facts, value, count, parts))
+
+
+def check_lengths(robot: Any, name: str, part: str) -> int:
+    """Return the number of parts of a robot: how many lengths its field `name` holds.
+
+    Raises:
+        ParameterError: If there are none, or more than `MOST_PARTS`, or one is no number.
+    """
+    value = getattr(robot, name)
+    count = len(numbers(name, value, None, "m"))
+    if not 0 < count <= MOST_PARTS:
+        raise ParameterError(name, value, f"at least one {part} length [m], at most {MOST_PARTS}")
+    return count
+
+
+def numbers(name: str, value: Any, count: int | None, unit: str, parts: str = "parts") -> tuple[float, ...]:
+    """Return `value` as a tuple of `count` floats, a single number repeated; of any length if `count` is None.
+
+    Raises:
+        ParameterError: If it is no number or list of numbers, or a list of another length.
+    """
+    if isinstance(value, str | bytes):
+        raise ParameterError(name, value, f"a number or a list of numbers [{unit}]")
+    if count is not None and not isinstance(value, Sequence) and getattr(value, "ndim", 0) == 0:
+        return (finite_number(name, value, unit),) * count
+    values = tuple(finite_array(name, value, (None,), unit).tolist())
+    if count is not None and len(values) != count:
+        raise ParameterError(name, value, f"one number, or one for each of the {count} {parts} [{unit}]")
+    return values
+
+
+def _checked(field: dataclasses.Field[Any], facts: Facts, value: Any, count: int, parts: str) -> Any:
+    name = field.name
+    if facts.options:
+        return choice(name, value, facts.options)
+    if isinstance(field.default, bool):
+        if not isinstance(value, bool):
+            raise ParameterError(name, value, "True or False")
+        return value
+    if isinstance(field.default, int):
+        return positive_integer(name, value, None if facts.at_most is None else int(facts.at_most))
+    if facts.form == "colour":
+        return _colours(name, value, count, parts)
+    each = facts.form == "per_part"
+    values = numbers(name, value, count, facts.unit, parts) if each else (finite_number(name, value, facts.unit),)
+    if not facts.allow(values):
+        raise ParameterError(name, values if len(values) > 1 else values[0], f"{facts.bounds} [{facts.unit}]")
+    return values if each else values[0]
+
+
+def _colours(name: str, value: Any, count: int, parts: str) -> tuple[tuple[float, ...], ...]:
+    requirement = f"red, green, blue, opacity in [0, 1]: one colour, or one for each of the {count} {parts}"
+    try:
+        single = np.ndim(value) == 1
+        checked = finite_array(name, np.tile(value, (count, 1)) if single else value, (count, 4))
+    except (ParameterError, ValueError) as error:
+        raise ParameterError(name, value, requirement) from error
+    if checked.min() < 0.0 or checked.max() > 1.0:
+        raise ParameterError(name, value, requirement)
+    return tuple(tuple(colour) for colour in checked.tolist())
