@@ -21,6 +21,7 @@ import pytest
 import softrobots as sr
 from softrobots.cli.main import parser
 from softrobots.compiled import Status
+from softrobots.robots.fields import facts_of
 from tests.conftest import CHECKOUT, missing
 from tests.support.documentation import PageError, PageRunner, blocks, differences, missing_package
 from tests.support.tables import each_row
@@ -274,6 +275,20 @@ def test_mathematics_in_docstrings_becomes_markdown(site: Callable[[str], Module
     assert "With $x^2$." in made
     assert "    ```math\n    e\n    ```" in made
     assert "math::" not in made
+
+
+def test_fields_of_robots_are_described_by_their_facts(site: Callable[[str], ModuleType]) -> None:
+    docstrings = site("docstrings")
+    extensions = docstrings.griffe.load_extensions(docstrings.SiteDocstrings)
+    robot = docstrings.griffe.load("softrobots", extensions=extensions)["robots.helix_tube.HelixTube"]
+    for name, facts in facts_of(sr.HelixTube).items():
+        assert robot.members[name].docstring.value == facts.description
+        assert facts.what in facts.description
+        assert f"[{facts.unit}]" in facts.description or not facts.unit
+    assert robot.members["angle"].docstring.value.endswith(
+        " [rad], at least 0, below 1.5708. Blumenschein 2018, section III-B (5 degrees)."
+    )
+    assert robot.members["diameter"].value == "0.0331"
 
 
 def nav_pages() -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -16,11 +15,11 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.description.argument_notes import argument_notes
-from softrobots.description.expansion import declared_arguments
-from softrobots.description.paths import urdf_folder, xacro_folder
+from softrobots.description.paths import urdf_folder
 from softrobots.export import export_model, to_json
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.robots import XacroRobot
+from softrobots.robots.fields import facts_of
 from tests.support.foreign import BRANCHED, SPRINGS
 
 NAMES = {name: getattr(math, name) for name in ("pi", "sqrt", "sin", "cos")} | {"__builtins__": {}}
@@ -195,10 +194,10 @@ def test_inflated_links() -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_parameters_and_their_sources(name: str) -> None:
-    """One a field; a value that would be the same without being given has the source that the xacro file names."""
+    """One a field; a value that would be the same without being given has the source of its default."""
     robot = ROBOTS[name]
     entries = read(to_json(sr.load_model(robot), robot))["parameters"]
-    notes = argument_notes(xacro_folder() / robot.XACRO)
+    notes = facts_of(robot)
     given = {
         "odd arm": {"link_lengths", "radius", "rest_up", "pressure", "max_moment"},
         "arm": set(),
@@ -222,19 +221,6 @@ def test_a_default_that_does_not_go_with_the_rest_was_not_given() -> None:
     robot = sr.InflatableArm(link_lengths=(0.025,), hinge_offset=0.01, wall_thickness=1e-3)
     entry = read(to_json(sr.load_model(robot), robot))["parameters"]["hinge_offset"]
     assert entry["source"] == "given by the caller (default 0.03: Troise 2021, section 4 (first wrinkle at 0.030))"
-
-
-@pytest.mark.parametrize("kind", [sr.InflatableArm, sr.PccArm, sr.HelixTube])
-def test_every_argument_of_a_robot_has_a_note(kind: type) -> None:
-    notes = argument_notes(xacro_folder() / kind.XACRO)
-    assert list(notes) == list(declared_arguments(xacro_folder() / kind.XACRO))
-    for field in dataclasses.fields(kind):
-        if field.name in notes:
-            note = notes[field.name]
-            assert note.text
-            assert not {"[", "]"} & set(note.unit)
-            assert note.source.startswith(("Troise", "PCC paper", "helical actuation paper", "assumed", "chosen"))
-    assert notes["radius" if kind is not sr.HelixTube else "diameter"].unit == "m"
 
 
 def test_notes_of_other_files(tmp_path: Path) -> None:

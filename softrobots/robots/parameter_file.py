@@ -1,24 +1,25 @@
-"""Parameters of a robot in a file: YAML, or JSON if its name ends with `.json`.
+"""Files of robot parameters: YAML, or JSON if the name ends with `.json`.
 
-One mapping from the names of parameters to numbers, words, truth values, nothing (`null`), or lists of those; `robot:` may say
-which robot they are for:
+One mapping from the names of parameters to numbers, words, truth values, `null`, or lists of those; `robot:` may name the robot
+that they are for:
 
     robot: inflatable_arm
     link_lengths: [0.5, 0.4]  # m
     stiffness: 1.5e2          # N m/rad
 
-Words that are not quoted mean what they mean in YAML 1.2: `1e3` is a number, `010` is ten and `no` is a word; in YAML 1.1 they
-are a word, eight and a truth value. Nothing of a file is run: there are no tags, and no anchors that repeat things.
+Unquoted words have their meaning in YAML 1.2: `1e3` is a number, `010` is ten and `no` is a word (in YAML 1.1: a word, eight,
+a truth value). Tags, anchors and aliases are refused, so that a file can neither construct objects nor grow when read.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,10 +30,10 @@ from softrobots.core.json_text import parse_json
 from softrobots.robots import ROBOTS, XacroRobot, robot_class
 
 LARGEST_FILE = 100_000
-"""Bytes of a file."""
+"""Largest size of a file [bytes]."""
 
 MOST_VALUES = 5000
-"""Names and values in a file."""
+"""Most names and values in a file."""
 
 _DEEPEST = 3  # the mapping, a list with a value for each part, a list that is the value of a part
 _LARGEST_NUMBER = 1e300
@@ -45,36 +46,33 @@ _WORDS_1_1 = {"y", "n", "yes", "no", "on", "off"}  # truth values in YAML 1.1
 
 
 class ParameterFile(NamedTuple):
-    """What a file says."""
+    """Content of a file."""
 
     robot: str | None
-    """Which robot it is for; None if it does not say."""
+    """The robot that it is for; None if the file does not name one."""
     values: dict[str, Any]
     """Parameters by name; lists are tuples."""
 
 
 def read_parameters(path: str | os.PathLike[str]) -> ParameterFile:
-    """Read parameters from a file; whether there is such a robot, and whether it takes them, is not looked at.
+    """Read parameters from a file, without checking that the robot exists and accepts them.
 
     Args:
         path: The file, in UTF-8; JSON if its name ends with `.json`, else YAML.
 
-    Returns:
-        What it says.
-
     Raises:
-        ParameterError: If the path is none.
-        FileFormatError: If the file cannot be read, is too large, or (naming the line, for YAML) is no mapping of names to
-            numbers, words, truth values, nothing and lists of those; has a name twice, a tag, an anchor, or a number that is
+        ParameterError: If `path` is no path.
+        FileFormatError: If the file cannot be read, is too large, or (with the line, for YAML) is no mapping of names to
+            numbers, words, truth values, null and lists of those; has a name twice, a tag, an anchor, or a number that is
             not finite.
     """
     file = as_path("path", path)
     text = read_text(file, LARGEST_FILE)
     try:
-        said = parse_json(text) if file.suffix.lower() == ".json" else _parse_yaml(text)
-        if not isinstance(said, dict) or not said:
+        content = parse_json(text) if file.suffix.lower() == ".json" else _parse_yaml(text)
+        if not isinstance(content, dict) or not content:
             raise FileFormatError("a mapping with a line NAME: VALUE for each parameter is required")
-        values = {name: _checked(name, value) for name, value in said.items()}
+        values = {name: _checked(name, value) for name, value in content.items()}
         robot = values.pop("robot", None)
         if robot is not None and not isinstance(robot, str):
             raise FileFormatError("robot: the name of a robot is required")
@@ -84,42 +82,29 @@ def read_parameters(path: str | os.PathLike[str]) -> ParameterFile:
 
 
 def read_robot(path: str | os.PathLike[str], robot: str | None = None) -> XacroRobot:
-    """Make a robot with the parameters of a file.
+    """Return a robot with the parameters of a file.
 
     Args:
         path: The file.
-        robot: Which robot of `ROBOTS`; the one that the file says by default.
-
-    Returns:
-        The robot.
+        robot: Name of the robot in `ROBOTS`; by default the one that the file names.
 
     Raises:
-        ParameterError: If the path is none, the file is for another robot or does not say for which, or a value is not what the
-            robot accepts.
+        ParameterError: If `path` is no path, the file is for another robot or names none, or the robot refuses a value.
         FileFormatError: If the file cannot be read or holds something else.
         NameNotFound: If there is no such robot or parameter.
         SelfIntersection: If a helical tube would run into itself.
     """
-    said = read_parameters(path)
-    name = robot_of(said, robot)
+    owner, values = read_parameters(path)
+    name = robot if robot is not None else owner
+    if name is None:
+        raise ParameterError("robot", robot, f"given here or in the file: {', '.join(ROBOTS)}")
+    if owner not in (None, name):
+        raise ParameterError("robot", robot, f"{owner}, for which the file is")
     names = [field.name for field in dataclasses.fields(robot_class(name)[0])]
-    unknown = next((parameter for parameter in said.values if parameter not in names), None)
+    unknown = next((parameter for parameter in values if parameter not in names), None)
     if unknown is not None:
         raise NameNotFound(f"parameter of {name}", unknown, names)
-    return ROBOTS[name](**said.values)
-
-
-def robot_of(said: ParameterFile, robot: str | None) -> str:
-    """Which robot a file is for, where one may be asked for.
-
-    Raises:
-        ParameterError: If that is another one, or neither says.
-    """
-    if robot is None and said.robot is None:
-        raise ParameterError("robot", robot, f"given here or in the file: {', '.join(ROBOTS)}")
-    if robot is not None and said.robot not in (None, robot):
-        raise ParameterError("robot", robot, f"{said.robot}, for which the file is")
-    return str(robot or said.robot)
+    return ROBOTS[name](**values)
 
 
 def write_parameters(
@@ -130,26 +115,26 @@ def write_parameters(
     units: Mapping[str, str] | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write parameters that `read_parameters` reads as they are, digit by digit; every reader of YAML understands them so.
+    """Write parameters to a file that `read_parameters`, and any reader of YAML 1.1 or 1.2, reads without loss of digits.
 
     Args:
         path: File to write; JSON if its name ends with `.json`, else YAML.
-        robot: Which robot they are for.
+        robot: The robot that they are for.
         values: Parameters by name: finite numbers, texts, truth values, None, and lists or tuples of those.
-        units: Units of some of them, for comments behind the values; JSON has none.
+        units: Units for comments behind the values (YAML only).
         overwrite: Replace an existing file.
 
     Returns:
         The path of the file.
 
     Raises:
-        ParameterError: If the path is none, or a name or a value is something else.
+        ParameterError: If `path` is no path, or a name or value cannot stand in such a file.
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
     file = as_path("path", path)
-    said = {"robot": robot, **values}
-    for name, value in said.items():
+    content = {"robot": robot, **values}
+    for name, value in content.items():
         try:
             if not _PLAIN.fullmatch(name):
                 raise FileFormatError("a name of letters, digits and underscores is required")
@@ -157,110 +142,90 @@ def write_parameters(
         except FileFormatError as error:
             raise ParameterError(name, value, f"what a file of parameters can hold: {error}") from error
     if file.suffix.lower() == ".json":
-        return write_text(file, json.dumps(said, indent=2, allow_nan=False) + "\n", overwrite=overwrite)
+        return write_text(file, json.dumps(content, indent=2, allow_nan=False) + "\n", overwrite=overwrite)
     notes = {name: f"  # {' '.join(unit.split())}" for name, unit in (units or {}).items() if unit}
-    lines = [f"{name}: {_spelled(value)}{notes.get(name, '')}\n" for name, value in said.items()]
+    lines = [f"{name}: {_yaml(value)}{notes.get(name, '')}\n" for name, value in content.items()]
     return write_text(file, "".join(lines), overwrite=overwrite)
 
 
 def _checked(name: str, value: Any, depth: int = 1) -> Any:
-    """A value with tuples for lists, if it is one that a parameter may have."""
+    """The value with tuples for lists, if a parameter may have it."""
     if isinstance(value, list | tuple) and depth < _DEEPEST:
         return tuple(_checked(name, item, depth + 1) for item in value)
     if isinstance(value, int | float) and not abs(value) < _LARGEST_NUMBER:
         raise FileFormatError(f"{name}: finite numbers below {_LARGEST_NUMBER:g} in size are required")
     if value is not None and not isinstance(value, bool | int | float | str):
-        raise FileFormatError(f"{name}: a number, a word, a truth value, nothing, or a list of those is required")
+        raise FileFormatError(f"{name}: a number, a word, a truth value, null, or a list of those is required")
     return value
 
 
-def _spelled(value: Any) -> str:
-    """A value as YAML of any version reads it."""
+def _yaml(value: Any) -> str:
+    """The value as text that YAML 1.1 and 1.2 read alike."""
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_spelled, value)) + "]"
+        return "[" + ", ".join(map(_yaml, value)) + "]"
     if isinstance(value, float):
         text = repr(float(value))
-        return text if "." in text else text.replace("e", ".0e")  # YAML 1.1 takes 1e-05 for a word
+        return text if "." in text else text.replace("e", ".0e")  # 1e-05 is a word in YAML 1.1
     if value is None or isinstance(value, bool | int):
         return json.dumps(value)
-    plain = _PLAIN.fullmatch(value) and value.lower() not in _WORDS_1_1 | {word.lower() for word in _MEANINGS}
-    if plain:
+    if _PLAIN.fullmatch(value) and value.lower() not in _WORDS_1_1 | {word.lower() for word in _MEANINGS}:
         return str(value)
     return '"' + "".join(c if " " <= c <= "~" and c not in '"\\' else f"\\U{ord(c):08x}" for c in value) + '"'
 
 
 def _parse_yaml(text: str) -> Any:
-    """The value of a YAML text, made of the events of PyYAML's parser, which reads no further than it is asked to."""
+    """Value of a YAML text, from the events of PyYAML's parser; reading ends at the first event that is refused."""
     import yaml
 
     try:
-        return _value_of(yaml.parse(text, Loader=yaml.SafeLoader))
+        events = yaml.parse(text, Loader=yaml.SafeLoader)
+        document = (event for event in events if not isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent))
+        first = next(document)
+        value = None if isinstance(first, yaml.StreamEndEvent) else _value(first, document, itertools.count(1), 0)
+        more = next((event for event in events if isinstance(event, yaml.DocumentStartEvent)), None)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         raise FileFormatError(f"{'' if mark is None else f'line {mark.line + 1}: '}{error.problem}") from error
     except yaml.YAMLError as error:
         raise FileFormatError(f"it is no YAML: {' '.join(str(error).split())}") from error
+    if more is not None:
+        raise FileFormatError(f"line {more.start_mark.line + 1}: one document is required")
+    return value
 
 
-class _Open(NamedTuple):
-    """A mapping or a list that has not ended."""
-
-    made: Any
-    """What it holds so far."""
-    names: list[str]
-    """Of a mapping, the name whose value comes next, if one does."""
-
-
-def _value_of(events: Any) -> Any:
+def _value(event: Any, events: Iterator[Any], counter: Iterator[int], depth: int) -> Any:
+    """Value of the node that begins with an event; takes the other events of the node."""
     import yaml
 
-    values, count, documents = [], 0, 0
-    inside: list[_Open] = []
-    for event in events:
-        where = f"line {event.start_mark.line + 1}: "
-        documents += isinstance(event, yaml.DocumentStartEvent)
-        count += isinstance(event, yaml.NodeEvent)
-        if documents > 1 or count > MOST_VALUES:
-            raise FileFormatError(f"{where}one document with at most {MOST_VALUES} names and values is required")
-        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
-            raise FileFormatError(f"{where}no anchors (&) and aliases (*) are read")
-        if isinstance(event, yaml.NodeEvent) and getattr(event, "tag", None) is not None:
-            raise FileFormatError(f"{where}no tags (!) are read")
-        if isinstance(event, yaml.CollectionStartEvent):
-            if len(inside) == _DEEPEST:
-                raise FileFormatError(f"{where}lists or mappings are inside each other more than {_DEEPEST} deep")
-            inside.append(_Open({} if isinstance(event, yaml.MappingStartEvent) else [], []))
-            continue
-        if isinstance(event, yaml.CollectionEndEvent):
-            value = inside.pop().made
-        elif isinstance(event, yaml.ScalarEvent):
-            value = event.value if event.style else _meaning(event.value, where)
-        else:
-            continue
-        if not inside:
-            values.append(value)
-        elif isinstance(inside[-1].made, list):
-            inside[-1].made.append(value)
-        else:
-            _put(inside[-1], event, value, where)
-    return values[0] if values else None
-
-
-def _put(mapping: _Open, event: Any, value: Any, where: str) -> None:
-    """The next name of a mapping, or the value of the last one."""
-    if mapping.names:
-        mapping.made[mapping.names.pop()] = value
-        return
-    name = getattr(event, "value", None)
-    if not isinstance(name, str) or not name:
-        raise FileFormatError(f"{where}the name of a parameter is required before the colon")
-    if name in mapping.made:
-        raise FileFormatError(f"{where}{name[:60]} is there twice")
-    mapping.names.append(name)
+    where = f"line {event.start_mark.line + 1}: "
+    if next(counter) > MOST_VALUES:
+        raise FileFormatError(f"{where}at most {MOST_VALUES} names and values are read")
+    if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+        raise FileFormatError(f"{where}no anchors (&) and aliases (*) are read")
+    if event.tag is not None:
+        raise FileFormatError(f"{where}no tags (!) are read")
+    if isinstance(event, yaml.ScalarEvent):
+        return event.value if event.style else _meaning(event.value, where)
+    if depth == _DEEPEST:
+        raise FileFormatError(f"{where}lists or mappings are nested more than {_DEEPEST} deep")
+    if isinstance(event, yaml.SequenceStartEvent):
+        items = itertools.takewhile(lambda item: not isinstance(item, yaml.SequenceEndEvent), events)
+        return [_value(item, events, counter, depth + 1) for item in items]
+    mapping: dict[str, Any] = {}
+    while not isinstance(key := next(events), yaml.MappingEndEvent):
+        where = f"line {key.start_mark.line + 1}: "
+        _value(key, events, counter, depth + 1)  # refuses tags and anchors
+        name = getattr(key, "value", None)
+        if not name:
+            raise FileFormatError(f"{where}the name of a parameter is required before the colon")
+        if name in mapping:
+            raise FileFormatError(f"{where}{name[:60]} is there twice")
+        mapping[name] = _value(next(events), events, counter, depth + 1)
+    return mapping
 
 
 def _meaning(word: str, where: str) -> Any:
-    """What a word without quotes stands for."""
+    """Value of a word without quotes."""
     if word in _MEANINGS:
         return _MEANINGS[word]
     if _INTEGER.fullmatch(word):
