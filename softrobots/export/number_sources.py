@@ -1,15 +1,15 @@
-"""How each number in the description of a robot of this package follows from the parameters, as an expression in them.
+"""Expressions by which the numbers in the description of a robot follow from its parameters.
 
-`stiffness[0]` is the stiffness of the first link, `bending_stiffness[0] / section_lengths[0]` that of a lumped hinge. Lists
-count from 0; pi, sqrt, sin, cos and the usual operators are those of Python. A few lengths and stiffnesses that come in between
-have names of their own, `derived_numbers`.
+`stiffness[0]` is the stiffness of the first link, `bending_stiffness[0] / section_lengths[0]` that of a lumped hinge. Lists are
+counted from 0; pi, sqrt, sin, cos and the operators are those of Python. Names that are no parameters are in `derived_numbers`.
+The xacro macros evaluate the same formulas; a test compares every expression with the number in the URDF.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
 from softrobots.core.errors import ParameterError
@@ -18,21 +18,7 @@ from softrobots.robots import HelixTube, InflatableArm, PccArm, XacroRobot
 Rules = dict[tuple[str, str], str]
 """Expression by the name of a part (joint, section, muscle, link) and of one of its numbers."""
 
-_STIFFNESS = {"bend_x": "EI", "bend_y": "EI", "twist": "GJ", "stretch": "EA"}
 _BEND = ("-pi / 2", "pi / 2")
-
-
-class DerivedNumber(NamedTuple):
-    """A number that lies between the parameters and the description."""
-
-    value: float | list[float]
-    """Its value, or one a segment."""
-    unit: str
-    """Its unit."""
-    meaning: str
-    """What it is."""
-    source: str
-    """The expression; of the first segment, where there is one a segment."""
 
 
 def check_robot(robot: Any) -> XacroRobot:
@@ -47,75 +33,87 @@ def check_robot(robot: Any) -> XacroRobot:
 
 
 def number_rules(robot: XacroRobot) -> Rules:
-    """Expression of every number in the description of a robot."""
-    for kind, rules in _RULES:
-        if isinstance(robot, kind):
-            return rules(robot)
-    return {}
-
-
-def derived_numbers(robot: XacroRobot) -> dict[str, DerivedNumber]:
-    """The numbers that expressions name besides the parameters."""
+    """Return the expression of every number in the description of a robot."""
+    if isinstance(robot, InflatableArm):
+        return _inflatable_arm(robot)
     if isinstance(robot, PccArm):
-        count = robot.elastic_sections if robot.chain == "sections" else robot.hinges
-        lengths = [length / count for length in robot.segment_lengths]
+        return _pcc_arm(robot)
+    return _helix_tube(robot) if isinstance(robot, HelixTube) else {}
+
+
+def derived_numbers(robot: XacroRobot) -> dict[str, dict[str, Any]]:
+    """Return value, unit, meaning and source of the numbers that expressions name besides the parameters."""
+    rows: list[tuple[str, float | list[float], str, str, str]] = []
+    if isinstance(robot, PccArm):
         name = "elastic_sections" if robot.chain == "sections" else "hinges"
-        made = DerivedNumber(lengths, "m", "Rest length of a section, by segment", f"segment_lengths[0] / {name}")
-        return {"section_lengths": made}
-    return _helix_numbers(robot) if isinstance(robot, HelixTube) else {}
+        lengths = [length / getattr(robot, name) for length in robot.segment_lengths]
+        rows = [("section_lengths", lengths, "m", "Rest length of a section, by segment", f"segment_lengths[0] / {name}")]
+    elif isinstance(robot, HelixTube):
+        rows = [*_tube_stiffness(robot), *_tube_shape(robot)]
+    keys = ("value", "unit", "meaning", "source")
+    return {name: dict(zip(keys, facts, strict=True)) for name, *facts in rows}
 
 
-def _helix_numbers(robot: HelixTube) -> dict[str, DerivedNumber]:
-    radius, wall = robot.radius, robot.wall_thickness
+def _tube_stiffness(robot: HelixTube) -> list[tuple[str, float | list[float], str, str, str]]:
+    radius, wall, modulus = robot.radius, robot.wall_thickness, robot.young_modulus
+    rows: list[tuple[str, float | list[float], str, str, str]] = [("radius", radius, "m", "Radius of the tube", "diameter / 2")]
+    for name, kind, unit, value, rule in (
+        (
+            "EI",
+            "bending",
+            "N m2",
+            (modulus + robot.pressure * radius / (2.0 * wall)) * math.pi * radius**3 * wall,
+            "(young_modulus + pressure * radius / (2 * wall_thickness)) * pi * radius**3 * wall_thickness",
+        ),
+        (
+            "GJ",
+            "torsional",
+            "N m2",
+            modulus / (2.0 * (1.0 + robot.poisson_ratio)) * 2.0 * math.pi * radius**3 * wall,
+            "young_modulus / (2 * (1 + poisson_ratio)) * 2 * pi * radius**3 * wall_thickness",
+        ),
+        (
+            "EA",
+            "axial",
+            "N",
+            modulus * 2.0 * math.pi * radius * wall,
+            "young_modulus * 2 * pi * radius * wall_thickness",
+        ),
+    ):
+        measured = getattr(robot, f"{kind}_stiffness")
+        source = (value, unit, f"{kind.capitalize()} stiffness", rule)
+        rows.append((name, *source) if measured is None else (name, measured, *source[1:3], f"{kind}_stiffness"))
+    return rows
+
+
+def _tube_shape(robot: HelixTube) -> list[tuple[str, float | list[float], str, str, str]]:
     _, curvature, torsion, _ = robot.strains.tolist()
-    length = robot.centre_length / robot.n_sections
+    length, rate = robot.centre_length / robot.n_sections, math.hypot(curvature, torsion)
     count = "elastic_sections" if robot.chain == "sections" else "hinges"
     square = "((1 - contraction)**2 + 4 * contraction * cos(angle)**2)"
     sign = "" if robot.handedness == "right" else "-"
-    walls = {
-        "EI": (
-            (robot.young_modulus + robot.pressure * radius / (2.0 * wall)) * math.pi * radius**3 * wall,
-            "(young_modulus + pressure * radius / (2 * wall_thickness)) * pi * radius**3 * wall_thickness",
-        ),
-        "GJ": (
-            robot.young_modulus / (2.0 * (1.0 + robot.poisson_ratio)) * 2.0 * math.pi * radius**3 * wall,
-            "young_modulus / (2 * (1 + poisson_ratio)) * 2 * pi * radius**3 * wall_thickness",
-        ),
-        "EA": (robot.young_modulus * 2.0 * math.pi * radius * wall, "young_modulus * 2 * pi * radius * wall_thickness"),
-    }
-    made = {"radius": DerivedNumber(radius, "m", "Radius of the tube", "diameter / 2")}
-    for name, kind in (("EI", "bending"), ("GJ", "torsional"), ("EA", "axial")):
-        measured = getattr(robot, f"{kind}_stiffness")
-        value, rule = walls[name] if measured is None else (measured, f"{kind}_stiffness")
-        unit = "N" if name == "EA" else "N m2"
-        made[name] = DerivedNumber(value, unit, f"{kind.capitalize()} stiffness", rule)
-    made |= {
-        "section_length": DerivedNumber(
-            length, "m", "Rest length of a section", f"length * sqrt({square}) / (2 * cos(angle)) / {count}"
-        ),
-        "curvature": DerivedNumber(
-            curvature, "rad/m", "Curvature of the centre line", f"2 * (1 - contraction**2) / (diameter * {square})"
-        ),
-        "torsion_rate": DerivedNumber(
-            torsion, "rad/m", "Torsion of the centre line", f"{sign}4 * contraction * sin(2 * angle) / (diameter * {square})"
-        ),
-    }
-    rate = math.hypot(curvature, torsion)
+    bend, twist = "2 * (1 - contraction**2)", f"{sign}4 * contraction * sin(2 * angle)"
+    rows: list[tuple[str, float | list[float], str, str, str]] = [
+        ("section_length", length, "m", "Rest length of a section", f"length * sqrt({square}) / (2 * cos(angle)) / {count}"),
+        ("curvature", curvature, "rad/m", "Curvature of the centre line", f"{bend} / (diameter * {square})"),
+        ("torsion_rate", torsion, "rad/m", "Torsion of the centre line", f"{twist} / (diameter * {square})"),
+    ]
     if rate == 0.0:
-        return made | {"chord": DerivedNumber(length, "m", "Chord of a section", "section_length")}
+        return [*rows, ("chord", length, "m", "Chord of a section", "section_length")]
     chord = math.hypot(2.0 * curvature / rate**2 * math.sin(0.5 * rate * length), torsion * length / rate)
     rule = "sqrt((2 * curvature / rate**2 * sin(rate * section_length / 2))**2 + (torsion_rate * section_length / rate)**2)"
-    return made | {
-        "rate": DerivedNumber(rate, "rad/m", "Turning rate of the centre line", "sqrt(curvature**2 + torsion_rate**2)"),
-        "chord": DerivedNumber(chord, "m", "Chord of a section", rule),
-    }
+    return [
+        *rows,
+        ("rate", rate, "rad/m", "Turning rate of the centre line", "sqrt(curvature**2 + torsion_rate**2)"),
+        ("chord", chord, "m", "Chord of a section", rule),
+    ]
 
 
 def _inflatable_arm(robot: InflatableArm) -> Rules:
     rules: Rules = {}
     for motor in range(1, robot.n_links + 2):
-        rules |= {(f"motor_{motor}", "lower"): "-motor_limit", (f"motor_{motor}", "upper"): "motor_limit"}
-        rules[f"motor_{motor}", "damping"] = "0.0"
+        for name, rule in (("lower", "-motor_limit"), ("upper", "motor_limit"), ("damping", "0.0")):
+            rules[f"motor_{motor}", name] = rule
     for i in range(robot.n_links):
         for side in ("side", "up"):
             joint = f"spring_{i + 1}_{side}"
@@ -133,8 +131,7 @@ def _pcc_arm(robot: PccArm) -> Rules:
     for s in range(robot.n_segments):
         names = {"EI": f"bending_stiffness[{s}]", "GJ": f"torsional_stiffness[{s}]", "EA": f"axial_stiffness[{s}]"}
         names |= {"length": f"section_lengths[{s}]", "radius": f"radius[{s}]", "chord": f"section_lengths[{s}]"}
-        names["rest"] = "[0.0, 0.0, 0.0, 1.0]"
-        rules |= _chain(robot, s + 1, names)
+        rules |= _chain(robot, s + 1, names | {"rest": "[0.0, 0.0, 0.0, 1.0]"})
         for m in range(len(robot.muscle_azimuths)):
             muscle, rest = f"muscle_{s + 1}_{m + 1}", f"segment_lengths[{s}]"
             rules[muscle, "azimuth"], rules[muscle, "distance"] = f"muscle_azimuths[{m}]", f"muscle_distance[{s}]"
@@ -147,8 +144,7 @@ def _pcc_arm(robot: PccArm) -> Rules:
 
 def _helix_tube(robot: HelixTube) -> Rules:
     names = {name: name for name in ("EI", "GJ", "EA", "radius", "chord")}
-    names |= {"length": "section_length", "rest": "[0.0, curvature, torsion_rate, 1.0]"}
-    rules = _chain(robot, 1, names)
+    rules = _chain(robot, 1, names | {"length": "section_length", "rest": "[0.0, curvature, torsion_rate, 1.0]"})
     for j in range(1, robot.n_sections + 1):
         link = f"section_1_{j}_bend_x section_1_{j}_bend_y"
         rules |= {(link, "radius"): "radius", (link, "pressure"): "pressure"}
@@ -157,48 +153,23 @@ def _helix_tube(robot: HelixTube) -> Rules:
 
 
 def _chain(robot: PccArm | HelixTube, segment: int, names: Mapping[str, str]) -> Rules:
-    """Rules of the sections of a segment and of their joints; `names` are the expressions for what a section has."""
+    """Rules of the sections of a segment and of their joints; `names` are the expressions of the properties of a section."""
     rules: Rules = {}
-    lumped = robot.chain == "lumped"
-    count = robot.hinges if lumped else robot.elastic_sections
+    lumped, length, chord = robot.chain == "lumped", names["length"], names["chord"]
+    if lumped:
+        count, travel = robot.hinges, {"stretch": (f"-0.9 * {length}", f"0.9 * {length}")}
+        kinds = dict(zip(STRAINS, ("EI", "EI", "GJ", "EA"), strict=True))
+    else:
+        count, travel = robot.elastic_sections, {"c": (f"-0.9 * {chord}", chord), "r3": ("-pi", "pi")}
+        kinds = {kind: {"c": "EA", "r3": "GJ"}.get(kind, "EI") for kind in JOINTS}
     for j in range(1, count + 1):
         section = f"section_{segment}_{j}"
-        rules |= {(section, name): names[name] for name in ("length", "rest", "radius")}
-        if lumped:
-            shift = 0 if robot.hinge_rule == "midpoint" or count == 1 else (j == count) - (j == 1)
-            rules[section, "hinge"] = f"{names['length']} * (1 / 2{('', ' + 1 / 24', ' - 1 / 24')[shift]})"
-            rules |= _hinge(section, names)
-        else:
-            rules |= {(section, name): names[name] for name in ("EI", "GJ", "EA")}
-            rules |= _section_joints(section, names)
+        rules |= {(section, name): names[name] for name in ("length", "rest", "radius", "EI", "GJ", "EA")}
+        shift = 0 if robot.hinge_rule == "midpoint" or count == 1 else (j == count) - (j == 1)
+        rules[section, "hinge"] = f"{length} * (1 / 2{('', ' + 1 / 24', ' - 1 / 24')[shift]})"
+        for kind, tag in kinds.items():
+            joint, stiffness = f"{section}_{kind}", f"{names[tag]} / {length}"
+            rules[joint, "stiffness"], rules[joint, "rest"] = stiffness, "0.0"
+            rules[joint, "lower"], rules[joint, "upper"] = travel.get(kind, _BEND)
+            rules[joint, "damping"] = f"damping_time * {stiffness}"
     return rules
-
-
-def _hinge(section: str, names: Mapping[str, str]) -> Rules:
-    rules: Rules = {}
-    for strain in STRAINS:
-        joint = f"{section}_{strain}"
-        stiffness = f"{names[_STIFFNESS[strain]]} / {names['length']}"
-        travel = f"0.9 * {names['length']}"
-        rules[joint, "stiffness"], rules[joint, "rest"] = stiffness, "0.0"
-        rules[joint, "lower"], rules[joint, "upper"] = (f"-{travel}", travel) if strain == "stretch" else _BEND
-        rules[joint, "damping"] = f"damping_time * {stiffness}"
-    return rules
-
-
-def _section_joints(section: str, names: Mapping[str, str]) -> Rules:
-    rules: Rules = {}
-    for kind in JOINTS:
-        joint = f"{section}_{kind}"
-        tag = {"c": "EA", "r3": "GJ"}.get(kind, "EI")
-        limits = {"c": (f"-0.9 * {names['chord']}", names["chord"]), "r3": ("-pi", "pi")}.get(kind, _BEND)
-        rules[joint, "lower"], rules[joint, "upper"] = limits
-        rules[joint, "damping"] = f"damping_time * {names[tag]} / {names['length']}"
-    return rules
-
-
-_RULES: tuple[tuple[type, Callable[[Any], Rules]], ...] = (
-    (InflatableArm, _inflatable_arm),
-    (PccArm, _pcc_arm),
-    (HelixTube, _helix_tube),
-)

@@ -85,7 +85,7 @@ def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
         content |= {"made_by": type(robot).__name__, "xacro": robot.XACRO}
     content["conventions"] = _CONVENTIONS
     if robot is not None:
-        content |= {"parameters": _parameters(robot), "derived": _derived(robot)}
+        content |= {"parameters": _parameters(robot), "derived": derived_numbers(robot)}
     content |= {"tip": checked.tip, "muscle_input": checked.muscle_input}
     content |= _Parts(checked, rules).all()
     return _text(content, "") + "\n"
@@ -190,10 +190,6 @@ def _parameters(robot: XacroRobot) -> dict[str, Any]:
             unit = facts.unit.replace("^", "") or "-"
             entries[field.name] = {"value": getattr(robot, field.name), "unit": unit, "meaning": facts.what, "source": source}
     return entries
-
-
-def _derived(robot: XacroRobot) -> dict[str, Any]:
-    return {name: number._asdict() for name, number in derived_numbers(robot).items()}
 
 
 def _is_default(robot: Any, name: str) -> bool:
