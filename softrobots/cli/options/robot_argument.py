@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -97,7 +98,8 @@ def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
         DescriptionError: If xacro refuses the file, or it is of no kind that can be read.
         MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
     """
-    robot, parameters, values = arguments.robot, arguments.parameters, {}
+    robot, parameters = arguments.robot, arguments.parameters
+    values: dict[str, Any] = {}
     if arguments.parameter_file is not None:
         owner, values = read_parameters(arguments.parameter_file)
         if owner not in (None, robot, Path(robot).name):
