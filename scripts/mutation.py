@@ -58,7 +58,7 @@ HELIX = (
     *("laws_helix", "argument_errors", "hostile_numbers"),
 )
 PARTS = {
-    "elastostatics": Part(("statics/elastostatics.py",), STATICS),
+    "elastostatics": Part(("statics/elastic_state.py", "statics/elastostatics.py"), STATICS),
     "sensitivity": Part(("statics/sensitivity.py",), ("sensitivity", "laws_statics_loading")),
     "springs": Part(("model/springs.py",), ("saturation", "laws_other")),
     "sections": Part(

@@ -13,23 +13,17 @@ from scipy.linalg import eigh
 
 import softrobots as sr
 from softrobots.statics import elastostatics
-from softrobots.statics.elastostatics import (
-    LARGEST_STEP,
+from softrobots.statics.elastic_state import (
+    ElasticProblem,
     ElasticState,
-    _Case,
-    _descend,
-    _escape,
-    _stiff_step,
     elastic_state,
     is_stable,
     largest_residual,
-    newton,
     norm,
     positive,
     scaled,
-    settle,
-    settled,
 )
+from softrobots.statics.elastostatics import LARGEST_STEP, _descend, _escape, _stiff_step, balanced_state, newton, solve_springs
 from softrobots.statics.loads import Load
 from tests.support.oracles import arm_energy, central_difference, flexible_jacobian
 
@@ -86,7 +80,7 @@ def test_the_largest_residual_is_relative_with_a_floor(arm: sr.SoftModel, odd_ar
 
 def stepped(arm: sr.SoftModel, force: np.ndarray, start: np.ndarray, motors: np.ndarray = MOTORS) -> np.ndarray:
     """Where one evaluation of the descent leads."""
-    state, spent, _ = settle(arm, motors, Load.of(arm, force), start, max_iterations=1)
+    state, spent, _ = solve_springs(arm, motors, Load.of(arm, force), start, max_iterations=1)
     assert spent == 1
     return state.q_springs - start
 
@@ -146,7 +140,7 @@ def test_a_step_that_raises_the_energy_is_halved(arm: sr.SoftModel) -> None:
     load, k = Load.of(arm, force), arm.stiffness[0]
     state = elastic_state(arm, MOTORS, start, load)
     for most in range(1, 12):
-        after, spent, _ = settle(arm, MOTORS, load, start, max_iterations=most)
+        after, spent, _ = solve_springs(arm, MOTORS, load, start, max_iterations=most)
         assert spent <= most
         moved = after.q_springs - start
         if not moved.any():  # the step is not done: it stays where it is
@@ -174,15 +168,15 @@ def test_no_solver_spends_more_than_it_may_and_none_less_than_it_needs(arm: sr.S
     """What a full run needs is enough, to the last digit; with less there is no equilibrium, and all of it is spent."""
     force, wrench = CASES[name]
     load = Load.of(arm, force, wrench=wrench)
-    full, needed, stable = settle(arm, MOTORS, load, REST)
+    full, needed, stable = solve_springs(arm, MOTORS, load, REST)
     assert stable
     assert 1 < needed < 60
     assert full.error <= largest_residual(arm, full.scale, 1e-10)
-    again, spent, stable = settle(arm, MOTORS, load, REST, max_iterations=needed)
+    again, spent, stable = solve_springs(arm, MOTORS, load, REST, max_iterations=needed)
     assert np.array_equal(again.q_springs, full.q_springs)
     assert (spent, stable) == (needed, True)
     for most in range(1, needed):
-        less, spent, _ = settle(arm, MOTORS, load, REST, max_iterations=most)
+        less, spent, _ = solve_springs(arm, MOTORS, load, REST, max_iterations=most)
         assert spent <= most
         assert math.isfinite(less.error)
         if name != "moment":
@@ -194,8 +188,8 @@ def test_no_solver_spends_more_than_it_may_and_none_less_than_it_needs(arm: sr.S
 def evaluations(monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
     """The springs at which a state was evaluated."""
     made: list[np.ndarray] = []
-    state = _Case.state
-    monkeypatch.setattr(_Case, "state", lambda case, springs: (made.append(springs), state(case, springs))[1])
+    state = ElasticProblem.state
+    monkeypatch.setattr(ElasticProblem, "state", lambda case, springs: (made.append(springs), state(case, springs))[1])
     return made
 
 
@@ -222,7 +216,7 @@ def test_loads_without_a_potential(arm: sr.SoftModel, evaluations: list[np.ndarr
     shares, answers = [], []
     for most in (1, 2, 3, 4, 5, 8, 13, 21, 34, 40, 55, 89, 144, 200):
         evaluations.clear()
-        state, spent, _ = settle(arm, motors, load, REST, max_iterations=most)
+        state, spent, _ = solve_springs(arm, motors, load, REST, max_iterations=most)
         assert spent <= most
         # Where Newton ends at its limit, and where the descent begins, one is not counted.
         assert spent <= len(evaluations) <= spent + 4
@@ -252,11 +246,11 @@ def test_the_fixed_point_is_the_papers_recursion(arm: sr.SoftModel) -> None:
         count += 1
         iterates.append(y)
     assert count > 5
-    state, spent, stable = settle(arm, MOTORS, load, BENT, method="fixed_point")
+    state, spent, stable = solve_springs(arm, MOTORS, load, BENT, method="fixed_point")
     assert (spent, stable) == (count, True)
     assert state.q_springs == pytest.approx(y, abs=1e-12)
     for most in (1, 3):
-        state, spent, stable = settle(arm, MOTORS, load, BENT, method="fixed_point", max_iterations=most)
+        state, spent, stable = solve_springs(arm, MOTORS, load, BENT, method="fixed_point", max_iterations=most)
         assert spent == most
         assert state.q_springs == pytest.approx(iterates[most], abs=1e-12)
 
@@ -269,7 +263,7 @@ def test_of_a_recursion_that_leads_nowhere_the_best_state_is_given(arm: sr.SoftM
         errors.append(np.linalg.norm(residual_of(arm, y, force)))
         y = y - residual_of(arm, y, force) / arm.stiffness
     best = int(np.argmin(errors))
-    state, spent, _ = settle(arm, MOTORS, Load.of(arm, force), BENT, method="fixed_point", max_iterations=8)
+    state, spent, _ = solve_springs(arm, MOTORS, Load.of(arm, force), BENT, method="fixed_point", max_iterations=8)
     assert spent == 8
     assert state.q_springs == pytest.approx(iterates[best], abs=1e-9)
     assert state.error == pytest.approx(errors[best], rel=1e-9)
@@ -316,7 +310,7 @@ ONE_SPRING = """<robot name="one"><link name="base"/>
 # --- The descent on landscapes that no robot need have
 
 
-class Landscape(_Case):
+class Landscape(ElasticProblem):
     """An energy with its derivatives, by springs of stiffness 1, in place of a robot under a load of a given scale."""
 
     def __init__(self, heights: Callable[..., tuple[float, Any, Any]], count: int, *, scale: float, tolerance: float) -> None:
@@ -363,7 +357,7 @@ def test_a_wall_and_a_plain_end_the_descent() -> None:
     assert 0.999 < y[0] < 1.0
     assert 40 < spent < 500
     assert stable
-    assert not wall.settled(wall.state(y))
+    assert not wall.balanced(wall.state(y))
     assert Landscape(lambda x: (0.0, 0.0, 0.0), 1, scale=1.0, tolerance=1e-10).descend(0.3) == (0.3, 0, False)
 
 
@@ -390,13 +384,13 @@ def test_along_a_curved_valley_the_descent_goes_to_its_bottom_where_energies_can
     valley = Landscape(bend, 2, scale=1e10, tolerance=1e-15)
     start = np.array([0.3, 0.09 - 2e-5])
     state = valley.state(start)
-    assert not valley.settled(state)
+    assert not valley.balanced(state)
     assert valley.state(start - np.linalg.solve(state.tangent, state.residual)).error > state.error
     y, spent, stable = valley.descend(*start)
     assert spent == 2  # the whole step, and the part of it against stiffness
     assert np.linalg.norm(y - start) < 3e-5
     assert abs(y[1] - y[0] ** 2) < 2e-6
-    assert valley.settled(valley.state(y))
+    assert valley.balanced(valley.state(y))
     assert stable
     # Where that is not enough, it ends somewhere there.
     again, spent, stable = Landscape(bend, 2, scale=1e10, tolerance=1e-18).descend(*y)
@@ -419,27 +413,27 @@ def test_where_steps_are_lost_in_rounding_the_descent_ends() -> None:
 def test_settled_answers_where_the_springs_settle_and_nowhere_else(arm: sr.SoftModel) -> None:
     light, heavy = Load.of(arm, np.array([0.0, 10.0, -15.0])), Load.of(arm, np.array([150.0, 0.0, -100.0]))
     for method in ("newton", "fixed_point"):
-        state = settled(arm, MOTORS, light, REST, method=method)
+        state = balanced_state(arm, MOTORS, light, REST, method=method)
         assert state is not None
         assert state.error <= largest_residual(arm, state.scale, 1e-10)
-        rough = settled(arm, MOTORS, light, BENT, method=method, tolerance=1e-2)
+        rough = balanced_state(arm, MOTORS, light, BENT, method=method, tolerance=1e-2)
         assert rough is not None
         assert largest_residual(arm, state.scale, 1e-6) < rough.error <= largest_residual(arm, state.scale, 1e-2)
-        fine = settled(arm, MOTORS, light, REST, method=method, tolerance=1e-13)
+        fine = balanced_state(arm, MOTORS, light, REST, method=method, tolerance=1e-13)
         assert fine is not None
-    assert settled(arm, MOTORS, heavy, REST) is not None
-    assert settled(arm, MOTORS, heavy, REST, method="fixed_point") is None
+    assert balanced_state(arm, MOTORS, heavy, REST) is not None
+    assert balanced_state(arm, MOTORS, heavy, REST, method="fixed_point") is None
 
 
 def test_the_limits_of_the_descent(arm: sr.SoftModel) -> None:
     """What settles has at most the largest residual; what is too high is above rounding, too: 1e-14 of all energies."""
-    case, k = _Case(arm, MOTORS, Load.of(arm, PUSH)), arm.stiffness[0]
+    case, k = ElasticProblem(arm, MOTORS, Load.of(arm, PUSH)), arm.stiffness[0]
     state = case.state(BENT)
     rounding = 1e-14 * (np.linalg.norm(PUSH) * arm.reach + k * BENT @ BENT + abs(state.energy))
     assert case.rounding(state) == pytest.approx(rounding, rel=1e-12, abs=0.0)
     most = largest_residual(arm, state.scale, 1e-10)
-    assert case.settled(state._replace(error=most))
-    assert not case.settled(state._replace(error=np.nextafter(most, 1.0)))
+    assert case.balanced(state._replace(error=most))
+    assert not case.balanced(state._replace(error=np.nextafter(most, 1.0)))
     for energy, change in ((0.0, -1e-15), (0.5, -0.25), (-3.0, -0.25)):
         level = state._replace(energy=energy)
         highest, rounding = energy + change, case.rounding(level)
@@ -452,8 +446,8 @@ def test_settled_takes_the_largest_residual_itself(arm: sr.SoftModel, monkeypatc
     state = elastic_state(arm, MOTORS, BENT, load)
     most = largest_residual(arm, state.scale, 1e-10)
     for error, taken in ((most, True), (np.nextafter(most, 1.0), False)):
-        monkeypatch.setattr(elastostatics, "settle", lambda *_, e=error, **__: (state._replace(error=e), 1, True))
-        assert (settled(arm, MOTORS, load, REST) is not None) == taken
+        monkeypatch.setattr(elastostatics, "solve_springs", lambda *_, e=error, **__: (state._replace(error=e), 1, True))
+        assert (balanced_state(arm, MOTORS, load, REST) is not None) == taken
 
 
 def test_forces_of_muscles_have_a_potential_and_a_size(rng: np.random.Generator) -> None:
@@ -538,14 +532,16 @@ def test_the_evaluations_that_are_spent_unless_others_are_asked_for(
 ) -> None:
     """200, also where no equilibrium is found; 1000 of the recursion where only an equilibrium is of use."""
     heavy = Load.of(arm, np.array([150.0, 0.0, -100.0]))
-    assert settle(arm, MOTORS, heavy, REST, method="fixed_point")[1] == 200
+    assert solve_springs(arm, MOTORS, heavy, REST, method="fixed_point")[1] == 200
     evaluations.clear()
-    assert settled(arm, MOTORS, heavy, REST, method="fixed_point") is None
+    assert balanced_state(arm, MOTORS, heavy, REST, method="fixed_point") is None
     assert len(evaluations) == 1 + 1000
     asked = []
-    monkeypatch.setattr(elastostatics, "settle", lambda *given, **options: (asked.append(options), settle(*given))[1])
-    settled(arm, MOTORS, heavy, REST)
-    settled(arm, MOTORS, heavy, REST, method="newton", tolerance=1e-8)
+    monkeypatch.setattr(
+        elastostatics, "solve_springs", lambda *given, **options: (asked.append(options), solve_springs(*given))[1]
+    )
+    balanced_state(arm, MOTORS, heavy, REST)
+    balanced_state(arm, MOTORS, heavy, REST, method="newton", tolerance=1e-8)
     assert asked == [{"method": "newton", "tolerance": tolerance, "max_iterations": 200} for tolerance in (1e-10, 1e-8)]
 
 

@@ -94,7 +94,7 @@ def test_plain_torques_and_tips_are_those_of_pinocchio(kind: str, rng: np.random
 
 @pytest.mark.parametrize("kind", ROBOTS)
 def test_the_solvers_see_the_same_residual_and_tangent(kind: str, rng: np.random.Generator) -> None:
-    from softrobots.statics.elastostatics import elastic_state
+    from softrobots.statics.elastic_state import elastic_state
     from softrobots.statics.loads import Load
 
     robot, case, springs = drawn(kind, rng)

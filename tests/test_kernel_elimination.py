@@ -27,7 +27,7 @@ from softrobots.compiled.run.machines import Run
 from softrobots.compiled.settings import LEAST_GUARD as FLOOR
 from softrobots.compiled.trace.blocks import Block
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import elastic_state
+from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from tests.support.serial_chains import ROBOTS, drawn

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.statics.elastostatics import elastic_state
+from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.loads import Load
 from tests.support.oracles import central_difference
 

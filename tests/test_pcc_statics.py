@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 import softrobots as sr
 from softrobots.constant_curvature import arc_from_muscles, chain_transform
-from softrobots.statics.elastostatics import elastic_state
+from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 from tests.support.oracles import central_difference

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.statics.elastostatics import is_stable
+from softrobots.statics.elastic_state import is_stable
 from tests.support.tables import each_row
 
 

@@ -15,7 +15,8 @@ from softrobots.cli.reports.facts import spoken
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import NeutralEquilibrium, NoCriticalLoad
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import METHODS, TOLERANCE
+from softrobots.statics.elastic_state import TOLERANCE
+from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.sensitivity import compliance
 from softrobots.statics.stability import critical_load

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from softrobots.core import checks
 from softrobots.model import springs
-from softrobots.statics import elastostatics, force_search
+from softrobots.statics import elastic_state, elastostatics, force_search
 
-TOLERANCE = elastostatics.TOLERANCE
+TOLERANCE = elastic_state.TOLERANCE
 """Largest residual of an answer, relative to the size of the load."""
 
 TIGHT = 1e-12
 """Residual at which Newton stops; reached from one below `TOLERANCE` in one step."""
 
-LEAST_SIZE = elastostatics.MOMENT_FLOOR
+LEAST_SIZE = elastic_state.MOMENT_FLOOR
 """Least size of a load [N m]."""
 
 LARGEST_NUMBER = checks.LARGEST
@@ -42,7 +42,7 @@ SHORT_STEP = 0.1 * LARGEST_STEP
 ARMIJO = elastostatics.ARMIJO
 """Share of the predicted fall of the energy that a step must reach."""
 
-ROUNDING = elastostatics.ENERGY_ROUNDING
+ROUNDING = elastic_state.ENERGY_ROUNDING
 """Energies this close, relative to their terms, cannot be told apart."""
 
 LANES = 16

@@ -22,7 +22,7 @@ import numpy as np
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import ElasticState, elastic_state, largest_residual, scaled
+from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual, scaled
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.probes import Contact, Probe, touch

@@ -15,7 +15,8 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastostatics import METHODS, TOLERANCE, ElasticState, is_stable, largest_residual, settle
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, is_stable, largest_residual
+from softrobots.statics.elastostatics import METHODS, solve_springs
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 
@@ -199,7 +200,9 @@ def solve_equilibrium(
     most = (
         (200 if method == "newton" else 1000) if max_iterations is None else positive_integer("max_iterations", max_iterations)
     )
-    state, iterations, stable = settle(model, motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
+    state, iterations, stable = solve_springs(
+        model, motors, load, start, method=method, tolerance=tolerance, max_iterations=most
+    )
     result = equilibrium_from_state(
         model, motors, load, state, method=method, iterations=iterations, tolerance=tolerance, stable=stable
     )

@@ -15,7 +15,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import ElasticState, elastic_state, largest_residual
+from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
 

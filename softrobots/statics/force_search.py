@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.statics.elastostatics import MOMENT_FLOOR, TOLERANCE
+from softrobots.statics.elastic_state import MOMENT_FLOOR, TOLERANCE
 
 OBSERVABLE = 1e-3
 """A direction counts as unobservable when its singular value is below this share of the reach."""

@@ -15,7 +15,7 @@ from softrobots.core.checks import FloatArray, finite_array, finite_number, posi
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.displacement_control import GAP, DisplacementControl, HeldState, follow, stable_while_held
-from softrobots.statics.elastostatics import TOLERANCE
+from softrobots.statics.elastic_state import TOLERANCE
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state, solve_equilibrium
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load

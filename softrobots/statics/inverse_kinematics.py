@@ -13,7 +13,8 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastostatics import METHODS, ElasticState, settle
+from softrobots.statics.elastic_state import ElasticState
+from softrobots.statics.elastostatics import METHODS, solve_springs
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
@@ -234,7 +235,7 @@ def _same_pose(model: SoftModel, one: LocalSolution[ElasticState], other: LocalS
 
 
 def _raise_unsettled(model: SoftModel, motors: FloatArray, load: Load, method: str, starts: int) -> NoReturn:
-    state, spent, _ = settle(model, motors, load, model.rest, method=method)
+    state, spent, _ = solve_springs(model, motors, load, model.rest, method=method)
     best = equilibrium_from_state(model, motors, load, state, method=method, iterations=spent)
     hint = "; method='newton' settles larger loads" if method == "fixed_point" else ""
     raise EquilibriumNotFound(

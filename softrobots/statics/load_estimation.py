@@ -17,7 +17,8 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
 from softrobots.core.errors import LoadNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, settled
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
+from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.force_search import HIDDEN, OBSERVABLE, Directions, search_force, torque_tolerance
 from softrobots.statics.kinematics import frame_jacobian
@@ -174,11 +175,11 @@ class _Problem:
 
     def equilibrium(self, force: FloatArray, near: ElasticState) -> ElasticState | None:
         """Springs in equilibrium under a force; None if there is none to be found."""
-        return self.settled(force, near.q_springs)
+        return self.balanced(force, near.q_springs)
 
-    def settled(self, force: FloatArray, start: FloatArray) -> ElasticState | None:
+    def balanced(self, force: FloatArray, start: FloatArray) -> ElasticState | None:
         """The same from given springs."""
-        return settled(self.model, self.motors, self.load(force), start, tolerance=_INNER)
+        return balanced_state(self.model, self.motors, self.load(force), start, tolerance=_INNER)
 
     def unexplained(self, state: ElasticState) -> FloatArray:
         """Motor torques minus those of a state."""
@@ -209,7 +210,7 @@ def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None)
 def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
     """Damped Newton, see `softrobots.statics.force_search`."""
     model, none = problem.model, np.zeros(3)
-    state = problem.settled(none, model.rest) or elastic_state(model, problem.motors, model.rest, problem.load(none))
+    state = problem.balanced(none, model.rest) or elastic_state(model, problem.motors, model.rest, problem.load(none))
     return search_force(problem, state, most)
 
 

@@ -29,7 +29,7 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, positive_number, read_only, unit_vector
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import scaled
+from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.force_path import ForcePath, PathPoint
 from softrobots.statics.loads import Load

@@ -18,7 +18,8 @@ from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import METHODS, elastic_state, largest_residual
+from softrobots.statics.elastic_state import elastic_state, largest_residual
+from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_at
 from softrobots.statics.inverse_kinematics import IkSolution, checked_orientation

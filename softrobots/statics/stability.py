@@ -11,7 +11,8 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, positive_number, unit_vector
 from softrobots.core.errors import NoCriticalLoad, ParameterError
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastostatics import ElasticState, newton, scaled, settled
+from softrobots.statics.elastic_state import ElasticState, scaled
+from softrobots.statics.elastostatics import balanced_state, newton
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
 
@@ -128,7 +129,7 @@ def critical_point(
         return None if state is None else _point(model, state, magnitude, push, at)
 
     with one_blas_thread(model.n_springs):
-        first_state = settled(model, motors, constant, model.rest)
+        first_state = balanced_state(model, motors, constant, model.rest)
         here = None if first_state is None else _point(model, first_state, 0.0, push, at)
         if first_state is None or here is None or here.softest <= 0.0:
             raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")

@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import ElasticState, settled
+from softrobots.statics.elastic_state import ElasticState
+from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import tip_motion
@@ -85,7 +86,7 @@ class LoadedTip:
         """Elastic coordinates in equilibrium and the distance of the tip; None if they do not settle."""
         if not self.model.actuators.admit(q_motors):
             return None
-        state = settled(self.model, q_motors, self.load, start, method=self.method)
+        state = balanced_state(self.model, q_motors, self.load, start, method=self.method)
         if state is None:
             return None
         translation, turn = self.goal.missing(self.model, state.q)

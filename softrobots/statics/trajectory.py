@@ -16,7 +16,8 @@ from softrobots.core.checks import FloatArray, choice, finite_array, increasing,
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastostatics import TOLERANCE, ElasticState, elastic_state, largest_residual, settle
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
+from softrobots.statics.elastostatics import solve_springs
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik, start_motors
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
@@ -272,7 +273,7 @@ def _paper_steps(
             inverse = np.linalg.pinv(np.concatenate([by_motors, by_springs], axis=1))
             motors = motors + interval / parts * (inverse[: model.n_motors] @ (velocity + gain * error))
             motors = np.clip(motors, *model.motor_limits.T)
-            state, used, _ = settle(model, motors, load, springs, method="fixed_point", max_iterations=1000)
+            state, used, _ = solve_springs(model, motors, load, springs, method="fixed_point", max_iterations=1000)
             spent += used
             if state.error > largest_residual(model, state.scale, TOLERANCE):
                 best = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)

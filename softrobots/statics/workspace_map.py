@@ -13,7 +13,7 @@ from softrobots.core.checks import FloatArray, finite_array, finite_number, incr
 from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam import required_pressure
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import elastic_state, largest_residual
+from softrobots.statics.elastic_state import elastic_state, largest_residual
 from softrobots.statics.equilibrium import equilibrium_from_state
 from softrobots.statics.loads import Load
 from softrobots.statics.target_grid import TargetGrid

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import MOMENT_FLOOR, TOLERANCE
+from softrobots.statics.elastic_state import MOMENT_FLOOR, TOLERANCE
 from studies.soak.families import Family, draw_cases
 from studies.soak.jobs import JOBS, STABLE, Answer
 from studies.soak.plain_statics import Case, PlainStatics

@@ -1,0 +1,185 @@
+r"""Elastic coordinates of a robot under a load: residual, tangent stiffness, energy and stability.
+
+The elastic coordinates `y` (springs, sections) are in equilibrium when the residual `r(y) = tau_spring(y) - J_k^T w + g_k`
+vanishes; actuators are constrained exactly. Where joints follow sections, `J_k` is Pinocchio's Jacobian times `dm/dz`
+(`softrobots.model.coordinates`). The equilibrium is stable if the tangent stiffness `K_t = dr/dy` is positive definite
+([Troise 2021] (5-7) give the weightless, first-order form of this).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from eigenpy import LDLT, ComputationInfo
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray
+from softrobots.model.coordinates import Point, ReducedLoad
+from softrobots.model.soft_model import SoftModel
+from softrobots.model.springs import POSITIVE
+from softrobots.statics.loads import AppliedLoad, Load
+
+TOLERANCE = 1e-10
+"""Default residual tolerance, relative to the scale of the load."""
+
+MOMENT_FLOOR = 1e-3
+"""Least scale of the residual, for vanishing loads [N m]."""
+
+ENERGY_ROUNDING = 1e-14
+"""Energies this close, relative to their terms, cannot be told apart."""
+
+
+class ElasticState(NamedTuple):
+    """Elastic coordinates, in equilibrium or not, and what statics needs there."""
+
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n_springs,) [rad or m]."""
+    q: FloatArray
+    """Pinocchio's configuration, shape (nq,)."""
+    point: Point
+    """Joint positions and their derivatives."""
+    load: ReducedLoad
+    """The load in actuator and elastic coordinates."""
+    spring_torques: FloatArray
+    """Load that the springs carry, shape (n_springs,) [N m or N]."""
+    scale: float
+    """Size of the load [N m]."""
+    residual: FloatArray
+    """Out-of-balance load on the elastic coordinates, shape (n_springs,) [N m or N]."""
+    tangent: FloatArray
+    """Tangent stiffness, shape (n_springs, n_springs)."""
+    energy: float
+    """Elastic energy plus potential of the load [J]; infinite where a section is beyond its range."""
+    error: float
+    """Norm of the residual; infinite where a section is beyond its range."""
+
+
+class ElasticProblem:
+    """The residual of the springs of one robot under one load, as a function of the elastic coordinates."""
+
+    def __init__(self, model: SoftModel, q_motors: FloatArray, load: Load, tolerance: float = TOLERANCE) -> None:
+        """Take the robot, its actuators, shape (n_motors,), and the load."""
+        self.model, self.q_motors, self.load, self.tolerance = model, q_motors, load, tolerance
+        self._coordinates, self._springs, self._reach = model.coordinates, model.springs, model.reach
+        self._applied = AppliedLoad(model, load)
+
+    def state(self, q_springs: FloatArray) -> ElasticState:
+        """Evaluate residual, tangent stiffness and energy at elastic coordinates, shape (n_springs,) [rad or m]."""
+        point = self._coordinates.at(self.q_motors, q_springs)
+        q = self.model.embed(point.joints)
+        if not point.valid:
+            return _out_of_range(self.model, q_springs, q, point)
+        joints = self._applied.at(q)
+        reduced = point.reduce(joints)
+        stored, torques, stiffness = self._springs.at(q_springs)
+        residual = torques - reduced.elastic
+        tangent = stiffness - reduced.derivative
+        energy = stored + joints.potential + reduced.potential
+        scale = joints.scale + reduced.scale * self._reach
+        return ElasticState(q_springs, q, point, reduced, torques, scale, residual, tangent, energy, norm(residual))
+
+    def balanced(self, state: ElasticState) -> bool:
+        """Whether the residual meets the tolerance."""
+        return state.error <= largest_residual(self.model, state.scale, self.tolerance)
+
+    def stable(self, state: ElasticState, factors: Any = None) -> bool:
+        """Whether the tangent stiffness is positive; see `is_stable`."""
+        return is_stable(self.model, state.tangent, symmetric=self.load.conservative, factors=factors)
+
+    def too_high(self, trial: ElasticState, state: ElasticState, change: float) -> bool:
+        """Whether the energy of a trial is above that of a state by more than a change and rounding."""
+        highest = state.energy + change
+        return trial.energy > highest and trial.energy > highest + self.rounding(state)
+
+    def rounding(self, state: ElasticState) -> float:
+        """Rounding of the energy [J]: that of its terms, which may cancel (a tip folded back to the base).
+
+        The energy itself counts, too: where weight loads no spring (an upright robot), it is still mass times height.
+        """
+        elastic = float(self.model.stiffness.dot(state.q_springs * state.q_springs))
+        return ENERGY_ROUNDING * (state.scale + elastic + abs(state.energy))
+
+
+def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
+    """Evaluate residual, tangent stiffness and energy at given coordinates.
+
+    Args:
+        model: The robot.
+        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        q_springs: Spring coordinates, shape (n_springs,) [rad or m].
+        load: The load.
+
+    Returns:
+        The state.
+    """
+    with one_blas_thread(model.n_springs):
+        return ElasticProblem(model, q_motors, load).state(q_springs)
+
+
+def _out_of_range(model: SoftModel, q_springs: FloatArray, q: FloatArray, point: Point) -> ElasticState:
+    """State of infinite energy, which no solver accepts: a section is beyond its range."""
+    n, m = model.n_springs, model.n_motors
+    load = ReducedLoad(np.zeros(m), np.zeros(n), np.zeros((n, n)), np.zeros((n, m)), 0.0, 0.0)
+    _, torques, _ = model.springs.at(q_springs)
+    return ElasticState(q_springs, q, point, load, torques, 0.0, np.zeros(n), np.zeros((n, n)), math.inf, math.inf)
+
+
+def largest_residual(model: SoftModel, scale: float, tolerance: float) -> float:
+    """Largest residual that counts as equilibrium: `tolerance * max(|f| reach + |moment| + |g|, 1e-3 N m)` [N m].
+
+    Never below the rounding of the spring torques, which matters for stiff springs with rest angles only.
+
+    Args:
+        model: The robot.
+        scale: Size of the load, `ElasticState.scale` [N m].
+        tolerance: Relative tolerance.
+    """
+    return max(tolerance * max(scale, MOMENT_FLOOR), model.rounding)
+
+
+def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool, factors: Any = None) -> bool:
+    """Whether every eigenvalue of a tangent stiffness has a real part above rounding.
+
+    Eigenvalues are taken in coordinates scaled by the springs' own stiffness, independent of units and of the ratio of stiff to
+    soft springs; rounding is 1e-9 there. Positive pivots of the symmetric part are the certificate (no eigenvalue has a real
+    part below its smallest); for a tangent that is not symmetric and lacks it, the eigenvalues decide.
+
+    The factorisation `L D L^T` is Eigen's: for four rows it takes a ninth of the time of NumPy's Cholesky, and one thread.
+
+    Args:
+        model: The robot.
+        tangent: Tangent stiffness, shape (n_springs, n_springs); one that is not finite is not stable.
+        symmetric: Whether it is symmetric.
+        factors: An `eigenpy.LDLT` of its size to reuse; None: a new one.
+    """
+    part = tangent if symmetric else 0.5 * (tangent + tangent.T)
+    if not math.isfinite(np.vdot(part, part)):  # Eigen takes a NaN for positive
+        return False
+    factors = LDLT(len(part)) if factors is None else factors
+    if positive(factors, part - model.springs.least_tangent):
+        return True
+    if symmetric:
+        return False
+    with one_blas_thread(len(tangent)):
+        return bool(np.all(np.linalg.eigvals(scaled(tangent, model.stiffness)).real > POSITIVE))
+
+
+def positive(factors: Any, matrix: FloatArray) -> bool:
+    """Factorise a symmetric matrix; whether no pivot is negative.
+
+    Eigen also calls a matrix positive whose diagonal vanishes during the factorisation, but then reports a numerical issue.
+    """
+    return bool(factors.compute(matrix).isPositive() and factors.info() == ComputationInfo.Success)
+
+
+def norm(vector: FloatArray) -> float:
+    """Euclidean norm."""
+    return math.hypot(*vector.tolist())
+
+
+def scaled(tangent: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Tangent stiffness in coordinates scaled by the springs' own stiffness: 1 on the diagonal without load."""
+    softness = 1.0 / np.sqrt(stiffness)
+    return np.asarray(softness[:, None] * tangent * softness)
