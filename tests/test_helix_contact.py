@@ -613,4 +613,4 @@ def test_the_tightest_of_several_is_told() -> None:
 
 
 def test_no_tube_at_all_is_told() -> None:
-    assert str(helix.self_contact(helix.HelixShape([], [], []))) == "there is no tube"
+    assert str(helix.self_contact(helix.HelixShape([], [], []))) == "there are no tubes"

@@ -609,7 +609,7 @@ def refused(call: Callable[[], Any]) -> ParameterError:
     [
         ({"actuator": (1.0, 0.1, D, 1.0)}, "contraction", "below 1: at 1 there is nothing to pinch"),
         ({"actuator": (0.0, 0.1, D, 1.0)}, "contraction", "positive [-]"),
-        ({"actuator": (0.5, -0.1, D, 1.0)}, "angle", "in [0, pi/2) rad; say handedness where it matters"),
+        ({"actuator": (0.5, -0.1, D, 1.0)}, "angle", "in [0, pi/2) rad; handedness is an argument of its own"),
         ({"actuator": (0.5, 1.56, D, 1.0)}, "angle", "at most 1.5533 rad (89 degrees) for a sheet that can be drawn"),
         ({"actuator": (0.5, math.nan, D, 1.0)}, "angle", "a finite number [rad]"),
         ({"actuator": (0.5, 0.1, 0.0, 1.0)}, "diameter", POSITIVE),

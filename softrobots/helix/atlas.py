@@ -1,4 +1,4 @@
-"""Tables of helices and whether they can be built; the test grid of the paper. Data only, no pictures.
+"""Tables of helices with their realisability, and the test grid of the paper.
 
 [Blumenschein 2018] builds helices of a tube of 3.31 cm at actuator angles of 2.5, 5 and 10 degrees and contractions from 0.5 to
 0.9 (section III-B and Figure 7; the steps of 0.1 are ours), and one at 5 degrees and 0.66 a second time, 2.5 times as large.
@@ -35,7 +35,7 @@ PAPER_SCALED = Actuator(
 
 @dataclass(frozen=True)
 class ShapeRow:
-    """One helix of a table."""
+    """Row of a table: one helix."""
 
     angle: float
     """Angle `theta` of the actuator to the axis of the tube [rad]."""
@@ -50,26 +50,26 @@ class ShapeRow:
     pitch: float
     """Normalised pitch `b` [m/rad]."""
     turn_distance: float | None
-    """Distance of the centre lines of neighbouring turns [m]; None where the helix is too steep to have any."""
+    """Distance of the centre lines of neighbouring turns [m]; None for a helix so steep that it has none."""
     realisable: bool
-    """Whether an endless tube does not run into itself; exact."""
+    """Whether an endless tube is free of self-contact; exact."""
     realisable_by_simple_rule: bool
     """Whether a turn rises by at least a diameter, `2 pi b >= D`."""
 
 
 @dataclass(frozen=True)
 class ShapeTable:
-    """Helices, one a row."""
+    """Table of helices, one per row."""
 
     rows: tuple[ShapeRow, ...]
     """The rows, in the order of the arguments."""
 
     def as_rows(self) -> list[dict[str, float | bool | None]]:
-        """One dictionary a helix, from column to value, SI units."""
+        """Return one dictionary per helix, from column to value, in SI units."""
         return [{name: getattr(row, name) for name in _COLUMNS} for row in self.rows]
 
     def to_markdown(self) -> str:
-        """The table in Markdown, rounded, angles in degrees."""
+        """Return the table in Markdown, rounded, angles in degrees."""
         names = "angle [deg] | contraction | D [m] | Ro [m] | Ri [m] | b [m/rad] | turn distance [m] | realisable | 2 pi b >= D"
         lines = [f"| {names} |", "|" + "---|" * len(_COLUMNS)]
         for row in self.rows:
@@ -80,7 +80,7 @@ class ShapeTable:
         return "\n".join(lines) + "\n"
 
     def write_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the table as CSV, full precision: the fields of `ShapeRow` with their units, `true` or `false`, empty for None.
+        """Write the table as CSV in full precision: the fields of `ShapeRow` with units, `true` or `false`, empty for None.
 
         Args:
             path: File to write.
@@ -90,12 +90,12 @@ class ShapeTable:
             The path of the file.
 
         Raises:
-            ParameterError: If it is no path.
+            ParameterError: If `path` is not a path.
             OutputExists: If the file exists and `overwrite` is false.
-            OutputError: If it cannot be written.
+            OutputError: If the file cannot be written.
         """
         names = [f"{name} [{unit}]" if unit else name for name, unit in _COLUMNS.items()]
-        rows = ([_cell(value) for value in row.values()] for row in self.as_rows())
+        rows = (["" if value is None else repr(value).lower() for value in row.values()] for row in self.as_rows())
         return write_text(path, csv_text(names, rows), overwrite=overwrite)
 
 
@@ -104,7 +104,7 @@ _COLUMNS = {field.name: unit for field, unit in zip(fields(ShapeRow), _UNITS, st
 
 
 def shape_table(contraction: Any, angle: Any, diameter: Any) -> ShapeTable:
-    """Helices and whether they can be built, for any actuators.
+    """Return the helices of actuators with their realisability.
 
     Args:
         contraction: Contracted over original length of the actuator `lambda`, in (0, 1] [-].
@@ -112,7 +112,7 @@ def shape_table(contraction: Any, angle: Any, diameter: Any) -> ShapeTable:
         diameter: Diameter `D` of the tube, positive [m].
 
     Returns:
-        A row for each entry of the common shape of the arguments, the last axis fastest.
+        One row for each element of the broadcast arguments, the last axis fastest.
 
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
@@ -123,28 +123,12 @@ def shape_table(contraction: Any, angle: Any, diameter: Any) -> ShapeTable:
     contact = self_contact(shape)
     apart = contact.turn_distance.astype(object)
     apart[~contact.has_neighbours] = None
-    columns = (
-        angles,
-        shares,
-        sizes,
-        shape.outer_radius,
-        shape.inner_radius,
-        shape.pitch,
-        apart,
-        ~contact.touches,
-        shape.turn_height >= sizes,
-    )
+    radii, by_rule = (shape.outer_radius, shape.inner_radius), shape.turn_height >= sizes
+    columns = (angles, shares, sizes, *radii, shape.pitch, apart, ~contact.touches, by_rule)
     return ShapeTable(tuple(ShapeRow(*values) for values in zip(*(column.ravel().tolist() for column in columns), strict=True)))
 
 
 def paper_grid() -> ShapeTable:
-    """The helices of the paper: three angles by five contractions, then one helix in two sizes, `PAPER_SCALED`."""
+    """Return the helices of the paper: three angles by five contractions, then one helix in two sizes, `PAPER_SCALED`."""
     grid = shape_table(PAPER_CONTRACTIONS, np.array(PAPER_ANGLES)[:, None], PAPER_DIAMETER)
     return ShapeTable(grid.rows + shape_table(*PAPER_SCALED).rows)
-
-
-def _cell(value: float | bool | None) -> str:
-    """One cell of the CSV file."""
-    if value is None:
-        return ""
-    return repr(value).lower()

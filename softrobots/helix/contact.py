@@ -1,11 +1,11 @@
-r"""Whether a helical tube runs into itself: its turns lie on each other, or it bends more sharply than it is thick.
+r"""Self-contact of a helical tube: neighbouring turns overlap, or the tube bends more sharply than it is thick.
 
 Two points of the centre line, a turn angle `s` apart, have the distance
 
 .. math:: d(s) = \sqrt{2 R_c^2 (1 - \cos s) + b^2 s^2}
 
-Neighbouring turns are nearest at its local minimum, a little below `s = 2 pi`. Minimum, and the maximum before it, exist only
-while :math:`b^2 < 0.2172 R_c^2`: steeper helices have no neighbouring turns, so none that touch. An endless tube of circular
+Neighbouring turns are closest at its local minimum, a little below `s = 2 pi`. This minimum, and the maximum before it, exist
+only if :math:`b^2 < 0.2172 R_c^2`: steeper helices have no neighbouring turns that could touch. An endless tube of circular
 sections is in contact if :math:`d < D` at the minimum, or if its centre line bends with a radius below `D/2`; there are no
 other critical pairs of points. The ends of a shorter tube count as hemispheres, as its everted tip is one.
 
@@ -31,9 +31,9 @@ from softrobots.helix.shapes import HelixShape, checked_angle, checked_shape
 BoolArray = NDArray[np.bool_]
 
 ON_CONTACT = ("error", "warn", "ignore")
-"""What `check_self_contact` does about a tube that runs into itself."""
+"""What `check_self_contact` does if a tube runs into itself."""
 
-_ROUNDING = 1e-9  # of the diameter: a tube that just touches is not in contact, whatever rounding makes of it
+_ROUNDING = 1e-9  # of the diameter: a tube that just touches is not in contact
 _MERGED = 1.789775849272223  # 2 pi minus the first root of tan s = s above pi, where minimum and maximum of d(s) merge
 _STEEPEST = 0.21723362821122166  # (b/Rc)^2 there
 _STEEPEST_ANGLE = 0.9760110449  # actuator angle where turns that just touch are that steep: 55.92 degrees [rad]
@@ -41,30 +41,30 @@ _HALVINGS = 64  # from any bracket here to the last digit
 
 
 class SelfContactWarning(UserWarning):
-    """A tube runs into itself, and the caller asked to go on.
+    """A tube runs into itself, reported because of `on_contact="warn"`.
 
     Attributes:
-        contact: The `SelfContact` that tells where and by how much.
+        contact: The `SelfContact` with place and amount.
     """
 
     def __init__(self, message: str, *, contact: SelfContact) -> None:
-        """Say what touches what, and keep the finding."""
+        """Create the warning with the contact."""
         super().__init__(message)
         self.contact = contact
 
 
 @dataclass(frozen=True, eq=False)
 class SelfContact:
-    """Where a tube, or any number of them in an array, comes nearest to itself: read-only arrays of one shape."""
+    """Clearance of a tube from itself, or of several tubes: read-only arrays of one shape."""
 
     diameter: FloatArray
     """Diameter of the tube [m]."""
     has_neighbours: BoolArray
-    """Whether the tube has neighbouring turns: its helix is flat enough, and it is long enough to come round."""
+    """Whether the tube has neighbouring turns: its helix is flat enough and the tube long enough."""
     turn_angle: FloatArray
-    """Turn angle between the nearest points of neighbouring turns [rad]; 2 pi where there are none."""
+    """Turn angle between the closest points of neighbouring turns [rad]; 2 pi where there are none."""
     turn_distance: FloatArray
-    """Distance of the centre lines there [m]; the rise of a whole turn where there are no neighbours, which says nothing."""
+    """Distance of the centre lines there [m]; without neighbouring turns the rise of a turn, which has no meaning then."""
     curvature: FloatArray
     """Curvature of the centre line [1/m]."""
 
@@ -75,7 +75,7 @@ class SelfContact:
 
     @property
     def fold_margin(self) -> FloatArray:
-        """Innermost line of the wall over the centre line, in length: `1 - curvature D/2` [-]; negative in a fold."""
+        """Ratio of innermost wall line to centre line in length, `1 - curvature D/2` [-]; negative in a fold."""
         return np.asarray(1.0 - 0.5 * self.diameter * self.curvature)
 
     @property
@@ -90,17 +90,17 @@ class SelfContact:
 
     @property
     def touches(self) -> BoolArray:
-        """Whether the tube runs into itself, in either way: it cannot be built."""
+        """Whether the tube runs into itself in either way, so that it cannot be built."""
         return np.asarray(self.touching_turns | self.folding)
 
     def describe(self) -> str:
-        """What touches what, and by how much; of several tubes, how many and the worst one."""
+        """Return a sentence with place and amount; for several tubes, their number and the worst one."""
         margin = np.where(self.has_neighbours, self.turn_clearance / self.diameter, self.fold_margin)
         margin = np.minimum(margin, self.fold_margin)
         if margin.ndim == 0:
             return self._sentence(())
         if margin.size == 0:
-            return "there is no tube"
+            return "there are no tubes"
         worst = tuple(int(index) for index in np.unravel_index(int(np.argmin(margin)), margin.shape))
         count = f"{np.count_nonzero(self.touches)} of {margin.size} tubes run into themselves"
         return f"{count}; the tightest, at index {worst}: {self._sentence(worst)}"
@@ -110,31 +110,31 @@ class SelfContact:
         return self.describe()
 
     def _sentence(self, index: tuple[int, ...]) -> str:
-        """The sentence on one tube."""
+        """Sentence about one tube."""
         diameter, gap = f"{self.diameter[index]:.4g} m", float(self.turn_clearance[index])
         turns = f"the centre lines of neighbouring turns are {self.turn_distance[index]:.4g} m apart"
-        found = []
+        faults = []
         if self.touching_turns[index]:
-            found.append(f"{turns}, {-gap:.3g} m less than the diameter of {diameter}")
+            faults.append(f"{turns}, {-gap:.3g} m less than the diameter of {diameter}")
         if self.folding[index]:
             radius = f"{1.0 / self.curvature[index]:.4g} m"
-            found.append(f"its centre line bends with a radius of {radius}, less than half the diameter of {diameter}")
-        if found:
-            return "the tube runs into itself: " + ", and ".join(found)
+            faults.append(f"its centre line bends with a radius of {radius}, less than half the diameter of {diameter}")
+        if faults:
+            return "the tube runs into itself: " + ", and ".join(faults)
         if not self.has_neighbours[index]:
             return "the tube does not touch itself: it has no neighbouring turns"
         return f"the tube does not touch itself: {turns}, {abs(gap):.3g} m more than the diameter of {diameter}"
 
 
 def self_contact(shape: HelixShape, turns: Any = math.inf) -> SelfContact:
-    """Where a tube comes nearest to itself; see the module.
+    """Return the clearance of a tube from itself; see the module.
 
     Args:
         shape: The helix, shape (...).
-        turns: Turns of the tube, positive, a shape that broadcasts with that of the helix; infinite for an endless tube [-].
+        turns: Turns of the tube, positive, of a shape that broadcasts with that of the helix; infinite for an endless tube [-].
 
     Returns:
-        The finding, of the common shape.
+        The clearances, of the common shape.
 
     Raises:
         ParameterError: If `shape` is not a `HelixShape`, the turns are not positive, or the shapes do not broadcast.
@@ -172,32 +172,32 @@ def self_contact(shape: HelixShape, turns: Any = math.inf) -> SelfContact:
 
 
 def check_self_contact(shape: HelixShape, turns: Any = math.inf, *, on_contact: str = "error") -> SelfContact:
-    """Refuse a tube that runs into itself, or say that it does.
+    """Raise or warn if a tube runs into itself.
 
     Args:
         shape: The helix, shape (...).
         turns: Turns of the tube, as in `self_contact` [-].
-        on_contact: "error" to raise, "warn" to issue a `SelfContactWarning`, "ignore" to return the finding without a word.
+        on_contact: "error" to raise, "warn" to issue a `SelfContactWarning`, "ignore" for neither.
 
     Returns:
-        The finding; `touches` tells whether a tube runs into itself.
+        As `self_contact`.
 
     Raises:
-        ParameterError: If `shape` is not a `HelixShape`, the turns are not positive, the shapes do not broadcast, or there is
-            no such choice for `on_contact`.
+        ParameterError: If `shape` is not a `HelixShape`, the turns are not positive, the shapes do not broadcast, or
+            `on_contact` is not one of `ON_CONTACT`.
         SelfIntersection: If any of the tubes runs into itself and `on_contact` is "error".
     """
     choice("on_contact", on_contact, ON_CONTACT)
     contact = self_contact(shape, turns)
     if on_contact != "ignore" and np.any(contact.touches):
         if on_contact == "error":
-            raise SelfIntersection(f"{contact}; contraction_limit tells the contraction that is possible", contact=contact)
+            raise SelfIntersection(f"{contact}; contraction_limit gives the smallest possible contraction", contact=contact)
         warnings.warn(SelfContactWarning(str(contact), contact=contact), stacklevel=2)
     return contact
 
 
 def contraction_limit(angle: Any, diameter: Any = 1.0) -> FloatArray:
-    r"""Smallest contraction at which an endless tube does not run into itself; exact.
+    r"""Return the smallest contraction at which an endless tube does not run into itself; exact.
 
     Turns just touch where, with :math:`\epsilon = 2\pi - s` at the minimum of `d(s)`,
 
@@ -206,8 +206,8 @@ def contraction_limit(angle: Any, diameter: Any = 1.0) -> FloatArray:
        \lambda e^{2i\theta} = \frac{1 + i\sqrt g - u}{1 + i\sqrt g + u}
 
     a curve with one contraction at every angle up to 55.9 degrees. The tube folds where :math:`\lambda < -\cos 2\theta`, which
-    is the stricter demand from 50.65 degrees on. Every contraction above the limit is free of contact and every one below it
-    is not, at every angle.
+    is the stricter condition from 50.65 degrees on. At every angle, contractions above the limit are free of contact and those
+    below it are not.
 
     Args:
         angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
@@ -223,7 +223,7 @@ def contraction_limit(angle: Any, diameter: Any = 1.0) -> FloatArray:
     shape = common_shape("diameter", angles.shape, sizes.shape)
 
     def beyond(short: FloatArray) -> FloatArray:
-        """Angle of the actuator on the curve, less the one that is sought."""
+        """Angle of the actuator on the curve minus the given one."""
         steep, width = _just_touching(short)
         return np.asarray(0.5 * np.arctan2(2.0 * width * steep, 1.0 + steep**2 - width**2) - angles)
 
@@ -236,18 +236,18 @@ def contraction_limit(angle: Any, diameter: Any = 1.0) -> FloatArray:
 
 
 def simple_contraction_limit(angle: Any) -> FloatArray:
-    r"""Smallest contraction at which a turn rises by a diameter: the rule :math:`2\pi b \ge D`.
+    r"""Return the smallest contraction at which a turn rises by a diameter: the rule :math:`2\pi b \ge D`.
 
     .. math:: \lambda \ge q - \sqrt{q^2 - 1} = \frac{1}{q + \sqrt{q^2 - 1}}, \qquad q = \cos 2\theta + \pi\sin 2\theta
 
-    Turns are nearer to each other than they rise, so the rule allows a little too much: 0.0011 at 2.5 degrees, 0.0020 at 5,
-    0.0032 at 10 and 0.0115 at 45. It knows nothing of folds, which decide from 50.65 degrees on.
+    Turns are closer to each other than they rise, so the limit of the rule is a little too low: by 0.0011 at 2.5 degrees,
+    0.0020 at 5, 0.0032 at 10 and 0.0115 at 45. It ignores folds, which decide from 50.65 degrees on.
 
     Args:
         angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
 
     Returns:
-        Contraction, the shape of `angle` [-]; 1 where every contraction below 1 breaks the rule: at angle 0, and from
+        Contraction, the shape of `angle` [-]; 1 where every contraction below 1 violates the rule: at angle 0, and from
         `tan(theta) = pi` on (72.3 degrees), where the actuator of the straight tube rises by less than a diameter a turn.
 
     Raises:
@@ -266,7 +266,7 @@ def _just_touching(short: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _bisect(function: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
-    """Root of a function that rises from `low` to `high`, to the last digit."""
+    """Root of a function that increases from `low` to `high`, by bisection to the last digit."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         above = function(middle) > 0.0
@@ -281,5 +281,5 @@ def _checked_turns(turns: Any) -> FloatArray:
         if not np.any(endless):
             return positive_array("turns", turns, "-")
         return positive_array("turns", np.where(endless, 2.0, turns), "-")  # a second turn is all that neighbours need
-    except Exception as error:  # ParameterError too: of what came, not of what is made of it; objects may raise anything
+    except Exception as error:  # an object of the caller may raise anything; ParameterError shall show the original value
         raise ParameterError("turns", turns, "positive numbers, or infinite for an endless tube [-]") from error

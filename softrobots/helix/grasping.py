@@ -1,26 +1,27 @@
-r"""Grasp force of a pressurised helix around a cylinder that is thicker than its natural inner radius.
+r"""Grasp force of a pressurised helix around a cylinder of larger radius than its natural inner one.
 
 [Blumenschein 2018] measures the force that closes a cylinder cut along its axis, and explains by virtual work why it is
 linear in the pressure, `F = P dV/dL` (18); `L` is the gap between the two halves. It gives no volume. The two bounds here are
-ours, not the paper's; the force is the smaller one, because the tube yields in the way that is easier:
+ours, not the paper's; the force is the smaller one, because the tube yields in the easier way:
 
-(a) *Unwrapping*. Opening by `dL` makes the way around both halves longer by `2 dL`, as a radius larger by `dR = dL/pi` would.
+(a) *Unwrapping*. Opening by `dL` makes the path around both halves longer by `2 dL`, like a radius larger by `dR = dL/pi`.
 The inner line keeps its length and the helix its pitch, so the tube unwinds a little and loses volume:
 
 .. math:: V(R) = \frac{\pi D^2}{4} L_i \sqrt{\frac{(R + D/2)^2 + b^2}{R^2 + b^2}}, \qquad
    L_i = 2\pi N\sqrt{R_0^2 + b^2}, \qquad F_a = -\frac{P}{\pi}\frac{dV}{dR}\Big|_{R_0}
 
-(b) *Contact*. The object, of radius `R0`, presses the wall flat by `delta`, its radius less the natural inner one. The pressure
-acts on a strip as wide as the chord that cuts `delta` from the circular section, along the inner line:
+(b) *Contact*. The object of radius `R0` flattens the wall by `delta`, the difference of `R0` and the natural inner radius. The
+pressure acts on a strip along the inner line, as wide as the chord at depth `delta` of the circular section:
 
 .. math:: F_b = 2 N P\,w \sqrt{R_0^2 + b^2}, \qquad w = 2\sqrt{\delta(D - \delta)}
 
-Assumptions: the wall is inextensible, wrinkles for nothing and has no stiffness; sections are circles normal to the centre
-line (in (b) but for the strip); pressure is constant; the object is a rigid circular cylinder along the axis of the helix,
-without friction; the helix touches it all along the inner line, at its natural pitch; the ends do nothing; the force is the
-mean over where the cut lies, so that turns need not be whole. What follows: no force at `delta = 0`, as the paper argues (it
-measures some, and blames an object that is not quite round); force linear in the pressure, as measured; force rising with
-`delta` up to (a) and constant from there, where the paper finds only that it rises. Its measured forces are not compared.
+Assumptions: the wall is inextensible, wrinkles without resistance and has no stiffness; sections are circles normal to the
+centre line (in (b) except for the strip); pressure is constant; the object is a rigid circular cylinder along the axis of the
+helix, without friction; the helix touches it along the whole inner line, at its natural pitch; ends have no effect; the force
+is the mean over the position of the cut, so that turns need not be whole. Consequences: no force at `delta = 0`, as the paper
+argues (it measures some, and attributes it to an object that is not quite round); force linear in the pressure, as measured;
+force increasing with `delta` up to (a) and constant from there, where the paper reports only the increase. Its measured forces
+are not compared.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from softrobots.core.errors import ParameterError
 
 
 class GraspTest(NamedTuple):
-    """What was grasped in a test, and by what helix."""
+    """A grasp test: object and helices."""
 
     object_radius: float
     """Radius of the object [m]."""
@@ -44,16 +45,16 @@ class GraspTest(NamedTuple):
     turns: float
     """Turns around the object [-]."""
     deflections: tuple[float, ...]
-    """Radius of the object less the natural inner radius of each helix tested [m]."""
+    """Radius of the object minus the natural inner radius, of each helix tested [m]."""
     diameter: float
     """Diameter of the tube [m]."""
 
     def force(self, pressure: Any, deflection: Any = None) -> GraspForce:
-        """`grasp_force` of this test.
+        """Return `grasp_force` of this test.
 
         Args:
             pressure: Gauge pressure [Pa].
-            deflection: Radius of the object less the natural inner radius [m]; by default `deflections`.
+            deflection: Radius of the object minus the natural inner radius [m]; by default `deflections`.
 
         Returns:
             The force and its bounds.
@@ -72,20 +73,20 @@ class GraspTest(NamedTuple):
 
 
 PAPER_CYLINDER = GraspTest(object_radius=0.020, turn_height=0.080, turns=1.5, deflections=(0.0, 0.002, 0.004), diameter=0.0331)
-"""[Blumenschein 2018] section III-C: a cylinder 4.0 cm thick. The text lets the helix radius go up to that number, where half
-of it must be meant. The diameter of the tube is not told there; 3.31 cm, that of the shape tests, is our assumption."""
+"""[Blumenschein 2018] section III-C: a cylinder of 4.0 cm diameter. The text has helix radii up to that number, but must mean
+half of it. It does not state the diameter of the tube; 3.31 cm, that of the shape tests, is our assumption."""
 
 
 @dataclass(frozen=True, eq=False)
 class GraspForce:
-    """What `grasp_force` finds: read-only arrays of the common shape of its arguments, which are kept too."""
+    """Result of `grasp_force`, with its arguments: read-only arrays of their common shape."""
 
     pressure: FloatArray
     """Gauge pressure of the tube [Pa]."""
     object_radius: FloatArray
     """Radius of the cylinder [m]."""
     deflection: FloatArray
-    """Radius of the cylinder less the natural inner radius of the helix [m]."""
+    """Radius of the cylinder minus the natural inner radius of the helix [m]."""
     turn_height: FloatArray
     """Rise of the helix per turn [m]."""
     turns: FloatArray
@@ -95,15 +96,15 @@ class GraspForce:
     volume: FloatArray
     """Volume of the tube around the object [m^3]."""
     volume_slope: FloatArray
-    """Its derivative `dV/dL` by the gap between the halves [m^2]; negative where the tube grips."""
+    """Derivative `dV/dL` of the volume with respect to the gap between the halves [m^2]; negative where the tube grips."""
     contact_width: FloatArray
     """Width of the flattened strip [m]."""
     unwrapping: FloatArray
-    """Bound (a) [N]; zero on a helix so steep, `b^2 >= R0 (R0 + D/2)`, that opening gains volume: nothing holds it closed."""
+    """Bound (a) [N]; zero on a helix so steep, `b^2 >= R0 (R0 + D/2)`, that opening increases the volume."""
     contact: FloatArray
     """Bound (b) [N]."""
     force: FloatArray
-    """Grasp force, the smaller bound [N]: what one half presses on the other."""
+    """Grasp force, the smaller bound [N]: force of one half on the other."""
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -114,13 +115,13 @@ class GraspForce:
 def grasp_force(
     pressure: Any, *, object_radius: Any, deflection: Any, turn_height: Any, turns: Any, diameter: Any
 ) -> GraspForce:
-    """Force with which a pressurised helix closes a cylinder cut along its axis; see the module for the model, which is ours.
+    """Return the force with which a pressurised helix closes a cylinder cut along its axis; see the module for the model.
 
     Args:
         pressure: Gauge pressure of the tube, zero or positive [Pa].
         object_radius: Radius of the cylinder, positive [m].
-        deflection: Radius of the cylinder less the natural inner radius of the helix [m]; from 0 to the radius of the tube and
-            that of the cylinder.
+        deflection: Radius of the cylinder minus the natural inner radius of the helix [m], from 0 to the smaller of the radii
+            of tube and cylinder.
         turn_height: Rise of the helix per turn, `2 pi b`, zero or positive [m]; beyond one turn at least the diameter of the
             tube (the simple rule; `self_contact` is exact).
         turns: Turns around the cylinder, positive [-].

@@ -1,4 +1,4 @@
-r"""The curves of a helix: points, moving frames, curvature and torsion of the inner, centre and outer path.
+r"""Curves of a helix: points, Frenet frames, curvature and torsion of the inner, centre and outer path.
 
 In the frame of the helix, z along its axis, a path of radius `R` is
 
@@ -22,7 +22,7 @@ from softrobots.helix.shapes import PATHS, HelixShape, checked_actuator, checked
 
 
 def curvature_torsion(shape: HelixShape, path: str = "centre", handedness: str = "right") -> tuple[FloatArray, FloatArray]:
-    r"""Curvature and torsion of a path: [Blumenschein 2018] (13), with signs (see the module).
+    r"""Return curvature and torsion of a path: [Blumenschein 2018] (13), with signs (see the module).
 
     .. math:: \kappa = R/(R^2 + b^2), \qquad \tau = \sigma\,b/(R^2 + b^2)
 
@@ -35,7 +35,7 @@ def curvature_torsion(shape: HelixShape, path: str = "centre", handedness: str =
         Curvature and torsion, each shape (...) [1/m].
 
     Raises:
-        ParameterError: If `shape` is not a `HelixShape`, or there is no such path or handedness.
+        ParameterError: If `shape` is not a `HelixShape`, or path or handedness is unknown.
     """
     shape = checked_shape(shape)
     radius, sign = shape.radius(path), turning_sign(handedness)
@@ -46,13 +46,13 @@ def curvature_torsion(shape: HelixShape, path: str = "centre", handedness: str =
 def actuator_curvature_torsion(
     contraction: Any, angle: Any, diameter: Any, path: str = "centre", handedness: str = "right"
 ) -> tuple[FloatArray, FloatArray]:
-    r"""Curvature and torsion of a path from the actuator: [Blumenschein 2018] (15), and the same for the centre line.
+    r"""Return curvature and torsion of a path from the actuator: [Blumenschein 2018] (15), extended to the centre line.
 
     .. math:: \kappa_o = \frac{1 - \lambda\cos 2\theta}{D}, \; \tau_o = \frac{\lambda\sin 2\theta}{D}, \quad
        \kappa_i = \frac{\cos 2\theta - \lambda}{D\lambda}, \; \tau_i = \frac{\sin 2\theta}{D\lambda}, \quad
        \kappa_c = \frac{2(1 - \lambda^2)}{D|1 + \zeta|^2}, \; \tau_c = \frac{4\lambda\sin 2\theta}{D|1 + \zeta|^2}
 
-    It holds for the straight tube too, where there is no radius: (0, 0) at contraction 1 and angle 0.
+    They hold for the straight tube too, which has no helix radius: (0, 0) at contraction 1 and angle 0.
 
     Args:
         contraction: Contracted over original length `lambda`, in (0, 1] [-].
@@ -80,11 +80,11 @@ def actuator_curvature_torsion(
 
 
 def points(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "right") -> FloatArray:
-    """Points of a path in the frame of the helix, z along its axis; see the module.
+    """Return points of a path in the frame of the helix, z along its axis; see the module.
 
     Args:
         shape: The helix, shape (...).
-        s: Turn angle, a shape that broadcasts with that of the helix, e.g. (n,) for one helix [rad].
+        s: Turn angle, of a shape that broadcasts with that of the helix, e.g. (n,) for one helix [rad].
         path: "inner", "centre" or "outer".
         handedness: "right" or "left".
 
@@ -100,29 +100,29 @@ def points(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "r
 
 
 def tangents(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "right") -> FloatArray:
-    """Unit tangents of a path, rising; arguments, shapes and errors as in `points`."""
+    """Return unit tangents of a path, rising; arguments, shapes and errors as in `points`."""
     return np.asarray(frames(shape, s, path, handedness)[..., :3, 2])
 
 
 def normals(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "right") -> FloatArray:
-    """Unit normals of a path, towards the axis as seen from the outer path; arguments, shapes and errors as in `points`."""
+    """Return unit normals of a path, from the outer path towards the axis; arguments, shapes and errors as in `points`."""
     return np.asarray(frames(shape, s, path, handedness)[..., :3, 0])
 
 
 def binormals(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "right") -> FloatArray:
-    """Unit binormals of a path, tangent x normal; arguments, shapes and errors as in `points`."""
+    """Return unit binormals of a path, tangent x normal; arguments, shapes and errors as in `points`."""
     return np.asarray(frames(shape, s, path, handedness)[..., :3, 1])
 
 
 def frames(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "right") -> FloatArray:
-    """Moving frames of a path in the frame of the helix: x normal, y binormal, z tangent.
+    """Return the Frenet frames of a path in the frame of the helix: x normal, y binormal, z tangent.
 
     The frames of the centre line are those of the sections of the equivalent chain. They follow the actuator, not the wall of
     the tube: see `material_twist`.
 
     Args:
         shape: The helix, shape (...).
-        s: Turn angle, a shape that broadcasts with that of the helix [rad].
+        s: Turn angle, of a shape that broadcasts with that of the helix [rad].
         path: "inner", "centre" or "outer".
         handedness: "right" or "left".
 
@@ -142,16 +142,16 @@ def frames(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "r
         (-across * sine, sign * across * cosine, along),
         (radius * cosine, sign * radius * sine, shape.pitch * angles),
     )
-    made = np.zeros((*np.broadcast_shapes(angles.shape, shape.shape), 4, 4))
+    poses = np.zeros((*np.broadcast_shapes(angles.shape, shape.shape), 4, 4))
     for column, entries in enumerate(columns):
         for row, entry in enumerate(entries):
-            made[..., row, column] = entry
-    made[..., 3, 3] = 1.0
-    return made
+            poses[..., row, column] = entry
+    poses[..., 3, 3] = 1.0
+    return poses
 
 
 def transform_base_to_axis(shape: HelixShape, handedness: str = "right") -> FloatArray:
-    """Pose of the base of the tube in the frame of the helix: the frame of the centre line at turn angle 0.
+    """Return the pose of the base of the tube in the frame of the helix: the frame of the centre line at turn angle 0.
 
     Args:
         shape: The helix, shape (...).
@@ -161,17 +161,17 @@ def transform_base_to_axis(shape: HelixShape, handedness: str = "right") -> Floa
         Pose, shape (..., 4, 4) [m]: z along the tube, x towards the axis of the helix.
 
     Raises:
-        ParameterError: If `shape` is not a `HelixShape`, or there is no such handedness.
+        ParameterError: If `shape` is not a `HelixShape`, or the handedness is unknown.
     """
     return frames(shape, 0.0, "centre", handedness)
 
 
 def turn_angle(shape: HelixShape, arc_length: Any, path: str = "centre") -> FloatArray:
-    """Turn angle after a length along a path, `s = length / sqrt(R^2 + b^2)`.
+    """Return the turn angle at an arc length of a path, `s = length / sqrt(R^2 + b^2)`.
 
     Args:
         shape: The helix, shape (...).
-        arc_length: Length along the path, a shape that broadcasts with that of the helix [m].
+        arc_length: Length along the path, of a shape that broadcasts with that of the helix [m].
         path: "inner", "centre" or "outer".
 
     Returns:

@@ -1,4 +1,4 @@
-r"""How far a tube that is pinched at some places is from the smooth helix.
+r"""Deviation of a tube that is pinched at discrete places from the smooth helix.
 
 Between the pinches the tube is straight, contraction 1; at a pinch the contraction is 0, in the limit. The line opposite the
 actuator is not wrinkled: it keeps its length and has no kink. So the pieces are joined by the frames of this *outer* path, x
@@ -13,11 +13,11 @@ straight between, an arc of the radius `D/2` in a pinch. All of this is ours.
 
 Joined by the frames of the centre line instead, the same pieces would tend to another helix, whose rise is an eighth too small
 at contraction 0.66 and 5 degrees: a pinch folds square to the actuator, not to the tube, so the tangent of the centre line
-turns by `theta` about the normal where a pinch begins, and back where it ends.
+rotates by `theta` about the normal where a pinch begins, and back where it ends.
 
-Radius and rise of the helix that the periods make are wrong by an amount that falls with the square of the spacing; so are the
-ends of the periods, if the tube starts with half a straight piece. Within a period the centre line swings to the side of the
-smooth one by an amount proportional to the spacing, small with `theta` and 0 at angle 0.
+The errors of radius and rise of the helix through the periods fall with the square of the spacing; so do those of the ends of
+the periods, if the tube starts with half a straight piece. Within a period the centre line deviates to the side of the smooth
+one by an amount proportional to the spacing, small with `theta` and 0 at angle 0.
 """
 
 from __future__ import annotations
@@ -44,87 +44,87 @@ class DiscreteCentreLine(NamedTuple):
     centre_arc: FloatArray
     """Length of this centre line up to each point, shape (m,) [m]."""
     line_arc: FloatArray
-    """Arc length along the actuator line, before inflation, of the point of the smooth helix that is compared, shape (m,) [m].
+    """Arc length along the uninflated actuator line of the corresponding point of the smooth helix, shape (m,) [m].
 
-    The ends of periods and plain pieces correspond by material; between them, equal shares of the centre line do.
+    Ends of periods and plain pieces correspond as material points, the points between them by equal shares of the centre line.
     """
 
 
 @dataclass(frozen=True)
 class ShapeError:
-    """How far a pinched tube is from the smooth helix that is wanted."""
+    """Deviation of a pinched tube from the smooth helix."""
 
     largest: float
-    """Largest distance of corresponding points of the centre lines, if the outer lines start in the same frame [m]."""
+    """Largest distance of corresponding points of the centre lines, with the outer lines starting in the same frame [m]."""
     rms: float
-    """Root of the mean square of these distances, over the length [m]."""
+    """Root mean square of these distances over the length [m]."""
     tip: float
-    """That distance at the tip [m]."""
+    """Distance at the tip [m]."""
     largest_aligned: float
-    """Largest distance after the turn and shift that make `rms_aligned` smallest (Kabsch) [m]."""
+    """Largest distance after the rigid motion that minimises `rms_aligned` (Kabsch) [m]."""
     rms_aligned: float
-    """Root of the mean square after it [m]."""
+    """Root mean square distance after that motion [m]."""
     centre_radius: float
-    """Mean distance of the centre line from the axis of the helix that the periods make [m]; plain ends do not count."""
+    """Mean distance of the centre line from the axis of the helix through the periods [m], without plain ends."""
     pitch: float
     """Rise per turn angle of that helix, exact [m/rad]."""
     centre_radius_error: float
-    """`centre_radius` less that of the smooth helix [m]."""
+    """`centre_radius` minus that of the smooth helix [m]."""
     turn_height_error: float
-    """Rise of a turn less that of the smooth helix [m]."""
+    """Rise of a turn minus that of the smooth helix [m]."""
 
 
 def discrete_centre_line(pattern: Pattern, samples: int = 8) -> DiscreteCentreLine:
-    """Centre line of the pinched tube, composed of exact screw motions; see the module.
+    """Return the centre line of the pinched tube, composed of exact screw motions; see the module.
 
     Args:
         pattern: The plan.
-        samples: Points on each straight piece and in each pinch; a period has three pieces.
+        samples: Number of points on each straight piece and in each pinch; a period has three such pieces.
 
     Returns:
         The centre line.
 
     Raises:
-        ParameterError: If `pattern` is not a `Pattern`, or `samples` is not a positive integer or so large that there would be
-            more than 500000 points.
+        ParameterError: If `pattern` is not a `Pattern`, or `samples` is not a positive integer or gives more than 500000
+            points.
     """
     plan = checked_pattern(pattern)
     most = max(_MOST_POINTS // (3 * plan.count), 1)
     share = np.arange(1, positive_integer("samples", samples, most) + 1) / samples
     start, period, end = _pieces(plan, share)
     pose, arc, middle = _outer_in_base(plan), 0.0, np.array([0.5 * plan.diameter, 0.0, 0.0, 1.0])
-    found, arcs, matched = [(pose @ middle)[None]], [np.zeros(1)], [np.zeros(1)]
+    points, arcs, matched = [(pose @ middle)[None]], [np.zeros(1)], [np.zeros(1)]
     for poses, lengths, outer in (
         *([start] if plan.plain_start else []),
         *[period] * plan.count,
         *([end] if plan.plain_end else []),
     ):
-        found.append((pose @ poses) @ middle)
+        points.append((pose @ poses) @ middle)
         arcs.append(arcs[-1][-1] + lengths)
         matched.append(arc + outer * lengths / lengths[-1])
         pose, arc = pose @ poses[-1], arc + outer
-    return DiscreteCentreLine(*(read_only(np.concatenate(values)) for values in ([p[:, :3] for p in found], arcs, matched)))
+    return DiscreteCentreLine(*(read_only(np.concatenate(values)) for values in ([p[:, :3] for p in points], arcs, matched)))
 
 
 def shape_error(pattern: Pattern, samples: int = 8) -> ShapeError:
-    """How far the pinched tube is from the smooth helix; see the module.
+    """Compare the pinched tube with the smooth helix; see the module.
 
     Args:
         pattern: The plan.
-        samples: Points on each straight piece and in each pinch.
+        samples: Number of points on each straight piece and in each pinch.
 
     Returns:
-        The distances and the errors of radius and rise.
+        Distances of the centre lines, and errors of radius and rise.
 
     Raises:
         ParameterError: As in `discrete_centre_line`.
     """
     plan, shape, line = checked_pattern(pattern), pattern.shape, discrete_centre_line(pattern, samples)
-    wanted = _smooth(plan, line.line_arc)
+    smooth = _smooth(plan, line.line_arc)
     steps = np.diff(line.centre_arc)
     weights = 0.5 * (np.append(0.0, steps) + np.append(steps, 0.0)) / line.centre_arc[-1]
-    apart = np.linalg.norm(line.points - wanted, axis=-1)
-    aligned = np.linalg.norm(_aligned(line.points, wanted, weights) - wanted, axis=-1)
+    apart = np.linalg.norm(line.points - smooth, axis=-1)
+    aligned = np.linalg.norm(_aligned(line.points, smooth, weights) - smooth, axis=-1)
     radius, pitch = _helix_of_periods(plan, samples)
     return ShapeError(
         largest=float(apart.max()),
@@ -140,7 +140,7 @@ def shape_error(pattern: Pattern, samples: int = 8) -> ShapeError:
 
 
 def _pieces(plan: Pattern, share: FloatArray) -> list[tuple[FloatArray, FloatArray, float]]:
-    """Plain start, period and plain end: poses along the outer path, lengths of the centre line to them, and of the path."""
+    """Plain start, period and plain end: poses along the outer path, lengths of the centre line there, length of the path."""
     curvature, torsion = (
         float(value) for value in actuator_curvature_torsion(1.0, plan.angle, plan.diameter, "outer", plan.handedness)
     )
@@ -167,19 +167,19 @@ def _motions(curvature: float, torsion: float, lengths: FloatArray) -> FloatArra
     """Poses along a path of constant curvature and torsion, shape (m, 4, 4)."""
     zero = np.zeros_like(lengths)
     screw = Screw(np.stack([zero, curvature * lengths, torsion * lengths, zero], axis=-1), lengths)
-    made = np.zeros((len(lengths), 4, 4))
-    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = screw.rotation, screw.position, 1.0
-    return made
+    poses = np.zeros((len(lengths), 4, 4))
+    poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = screw.rotation, screw.position, 1.0
+    return poses
 
 
 def _outer_in_base(plan: Pattern) -> FloatArray:
-    """Frame of the outer path at the base, in that of the centre line of the smooth helix: `arg(1 + zeta)` about x."""
+    """Pose of the outer path at the base in the frame of the smooth centre line: rotation by `arg(1 + zeta)` about x."""
     share, twice = plan.contraction, 2.0 * plan.angle
-    turned = turning_sign(plan.handedness) * np.arctan2(share * np.sin(twice), 1.0 + share * np.cos(twice))
-    made = np.eye(4)
-    made[1:3, 1:3] = [[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]]
-    made[0, 3] = -0.5 * plan.diameter
-    return made
+    turn = turning_sign(plan.handedness) * np.arctan2(share * np.sin(twice), 1.0 + share * np.cos(twice))
+    pose = np.eye(4)
+    pose[1:3, 1:3] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    pose[0, 3] = -0.5 * plan.diameter
+    return pose
 
 
 def _smooth(plan: Pattern, arc: FloatArray) -> FloatArray:
@@ -189,16 +189,16 @@ def _smooth(plan: Pattern, arc: FloatArray) -> FloatArray:
     return _motions(float(curvature), float(torsion), 0.5 * length_ratio(contraction, angle) * arc)[:, :3, 3]
 
 
-def _aligned(moved: FloatArray, wanted: FloatArray, weights: FloatArray) -> FloatArray:
-    """Points turned and shifted onto others, with the least mean square distance (Kabsch)."""
-    centre, target = weights @ moved, weights @ wanted
-    u, _, vt = np.linalg.svd((weights[:, None] * (moved - centre)).T @ (wanted - target))
+def _aligned(moved: FloatArray, reference: FloatArray, weights: FloatArray) -> FloatArray:
+    """Points after the rigid motion onto others with the least mean square distance (Kabsch)."""
+    centre, target = weights @ moved, weights @ reference
+    u, _, vt = np.linalg.svd((weights[:, None] * (moved - centre)).T @ (reference - target))
     u[:, 2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))
     return np.asarray((moved - centre) @ (u @ vt) + target)
 
 
 def _helix_of_periods(plan: Pattern, samples: int) -> tuple[float, float]:
-    """Mean centre radius and pitch of the helix that the screw motion of a period makes."""
+    """Mean centre radius and pitch of the helix generated by the screw motion of a period."""
     poses, lengths, _ = _pieces(plan, np.arange(1, samples + 1) / samples)[1]
     turn, shift = poses[-1, :3, :3], poses[-1, :3, 3]
     axis = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

@@ -1,4 +1,4 @@
-"""A quantity of the actuator along the tube: a number, a function of the position, or a table; checked, and cut into pieces."""
+"""Contraction or angle as a function of the position on the tube: a number, a function, or a table with jumps."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ _RANGES = {
 }
 _UNITS = {"contraction": "-", "angle": "rad"}
 _MOST_SAMPLES = 1_000_000
-_ROUNDING = 1e-12  # of the length: by how much a table may end too early
+_ROUNDING = 1e-12  # of the length: how much too early a table may end
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """One quantity along the tube, as `checked_profile` makes it."""
+    """Contraction or angle along the tube, as returned by `checked_profile`."""
 
     name: str
-    """What it is: "contraction" or "angle"."""
+    """"contraction" or "angle"."""
     length: float
     """Length of the tube, from 0 [m]."""
     function: Callable[[float], Any] | None
-    """A function of the position; None for a table."""
+    """Function of the position; None for a table."""
     positions: FloatArray
-    """Positions of the table, not decreasing; a position that comes twice is a jump [m]. Empty for a function."""
+    """Positions of the table, not decreasing; a repeated position is a jump [m]. Empty for a function."""
     values: FloatArray
     """Values of the table."""
 
     @property
     def knots(self) -> list[float]:
-        """Positions inside the tube between which it is smooth, as far as known [m]."""
+        """Positions inside the tube between which the profile is smooth, as far as known [m]."""
         return [knot for knot in self.positions.tolist() if 0.0 < knot < self.length]
 
     def on_piece(self, start: float, end: float) -> Callable[[float], float]:
-        """The quantity between two neighbouring breakpoints, with the values inside the piece at its ends.
+        """Return the profile between two neighbouring breakpoints, at both ends with the limits from inside.
 
         Args:
-            start: Where the piece starts [m].
-            end: Where it ends [m].
+            start: Start of the piece [m].
+            end: End of the piece [m].
 
         Returns:
-            A function of the position in [start, end], which raises ParameterError where it has no acceptable value.
+            Function of the position in [start, end], which raises ParameterError where the value is invalid.
         """
         if self.function is not None:
             first = start if start == 0.0 else math.nextafter(start, math.inf)  # a function may jump at a breakpoint
@@ -63,7 +63,7 @@ class Profile:
         return lambda position: min(max(value + rate * (position - left), low), high)
 
     def _call(self, position: float) -> float:
-        """The value of the function, checked."""
+        """Value of the function, checked."""
         low, high, requirement = _RANGES[self.name]
         where = f" at the position {position!r} m"
         try:
@@ -81,7 +81,7 @@ class Profile:
 
 
 def checked_profile(name: str, given: Any, length: float) -> Profile:
-    """Return a quantity along the tube.
+    """Return contraction or angle along the tube.
 
     Args:
         name: "contraction" or "angle".
@@ -89,8 +89,8 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         length: Length of the tube [m].
 
     Raises:
-        ParameterError: If it is none of these, a value is out of range, or the positions do not reach from 0 to the length, or
-            decrease, or come more than twice, or twice at an end.
+        ParameterError: If it is none of these, a value is out of range, or the positions do not extend from 0 to the length,
+            decrease, or occur more than twice, or twice at an end.
     """
     low, high, requirement = _RANGES[name]
     if callable(given):
@@ -105,9 +105,9 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         steps = np.diff(positions)
         twice = steps == 0.0
         if np.any(steps < 0.0) or twice[0] or twice[-1] or np.any(twice[1:] & twice[:-1]):
-            raise ParameterError(f"{name} positions", given[0], "increasing; one inside that comes twice is a jump")
+            raise ParameterError(f"{name} positions", given[0], "increasing; a position repeated inside the tube is a jump")
         if np.any((steps < 1.0 / LARGEST) & ~twice):
-            raise ParameterError(f"{name} positions", given[0], f"apart by at least {1.0 / LARGEST:g} m, or equal")
+            raise ParameterError(f"{name} positions", given[0], f"different by at least {1.0 / LARGEST:g} m, or equal")
     else:
         number = finite_number(name, given, _UNITS[name])
         positions, values = np.array([0.0, length]), np.array([number, number])
@@ -122,7 +122,7 @@ def sample_positions(samples: Any, length: float) -> FloatArray:
     """Return the positions of samples along the tube, shape (n,) [m].
 
     Args:
-        samples: How many, equally spaced with both ends, or the positions [m].
+        samples: Number of equally spaced samples including both ends, or their positions [m].
         length: Length of the tube [m].
 
     Raises:
@@ -135,7 +135,7 @@ def sample_positions(samples: Any, length: float) -> FloatArray:
         return np.linspace(0.0, length, count)
     positions = finite_array("samples", samples, (None,), "m")
     if not 0 < len(positions) <= _MOST_SAMPLES or np.any(np.diff(positions) <= 0.0):
-        raise ParameterError("samples", samples, f"increasing positions, from 1 to {_MOST_SAMPLES} of them [m]")
+        raise ParameterError("samples", samples, f"1 to {_MOST_SAMPLES} increasing positions [m]")
     if positions[0] < 0.0 or positions[-1] > length:
         raise ParameterError("samples", samples, f"positions from 0 to the length {length!r} m")
     return positions

@@ -30,28 +30,28 @@ PATHS = ("inner", "centre", "outer")
 """The actuator, the centre line of the tube, and the line opposite the actuator."""
 
 HANDEDNESS = ("right", "left")
-"""Which way the helix winds; a right-handed one goes up as it turns anticlockwise seen from above."""
+"""Handedness of the helix; a right-handed one rises as it turns anticlockwise seen from above."""
 
 CONTRACTION_RANGE = "in (0, 1]: contracted over original length"
-"""What a contraction must be, for errors."""
+"""Requirement on a contraction, for errors."""
 
 ANGLE_RANGE = "in [0, pi/2) rad (5 degrees are 0.0873 rad)"
-"""What the angle of an actuator must be, for errors."""
+"""Requirement on the angle of an actuator, for errors."""
 
-_ROUNDING = 1e-12  # of the diameter: what rounding may take from a radius
-_SMALLEST = LARGEST**-3  # [m]: forward gives no path below it, and its curvatures stay finite
+_ROUNDING = 1e-12  # of a radius, as a share of the diameter
+_SMALLEST = LARGEST**-3  # radius or pitch [m]: `forward` returns none below it, and curvatures stay finite
 
 
 @dataclass(frozen=True, eq=False)
 class HelixShape:
-    """The shape of a tube bent into a helix, or any number of them in an array: three read-only arrays of one shape.
+    """Shape of a tube bent into a helix, or of several of them: three read-only arrays of one shape.
 
     Numbers and arrays are accepted; they are broadcast to their common shape.
 
     Raises:
-        ParameterError: If a number is not finite or no actuator makes the shape: the outer radius must exceed the inner one,
-            which must not be below minus the outer one; the pitch must not be negative, and be positive if the inner radius is
-            not; nothing that must be positive may be below 1e-90 m.
+        ParameterError: If a number is not finite or no actuator produces the shape: the outer radius must exceed the inner one,
+            which must be at least minus the outer one; the pitch must not be negative, and must be positive if the inner radius
+            is not; no positive length may be below 1e-90 m.
     """
 
     outer_radius: FloatArray
@@ -73,7 +73,7 @@ class HelixShape:
         if np.any(outer + inner < -_ROUNDING * (outer - inner)):
             raise ParameterError("inner_radius", self.inner_radius, f"at least minus the outer radius {outer} m")
         if np.any(pitch < 0.0):
-            raise ParameterError("pitch", self.pitch, "zero or positive; handedness is said where it matters")
+            raise ParameterError("pitch", self.pitch, "zero or positive; handedness is an argument of its own")
         if np.any((pitch < _SMALLEST) & (inner < _SMALLEST)):
             raise ParameterError("pitch", self.pitch, f"positive where the inner radius {inner} m is not")
         for name, values in (("outer_radius", outer), ("inner_radius", inner), ("pitch", pitch)):
@@ -110,7 +110,7 @@ class HelixShape:
 
 
 def forward(contraction: Any, angle: Any, diameter: Any) -> HelixShape:
-    r"""Helix that an actuator makes: [Blumenschein 2018] (12).
+    r"""Return the helix of an actuator: [Blumenschein 2018] (12).
 
     .. math:: R_o = D (1 - \lambda\cos 2\theta)/d, \quad R_i = D\lambda(\cos 2\theta - \lambda)/d, \quad
        b = D\lambda\sin 2\theta/d, \quad d = 1 + \lambda^2 - 2\lambda\cos 2\theta
@@ -158,7 +158,7 @@ class Actuator(NamedTuple):
 
 
 def inverse(shape: HelixShape) -> Actuator:
-    r"""Actuator that makes a helix: [Blumenschein 2018] (6, 7, 11), with an arctangent instead of the arccosine.
+    r"""Return the actuator of a helix: [Blumenschein 2018] (6, 7, 11), with an arctangent instead of the arccosine.
 
     .. math:: \lambda = \frac{|R_i + i b|}{|R_o + i b|}, \qquad D = R_o - R_i, \qquad
        \theta = \tfrac12 \operatorname{atan2}(b\,D,\; R_i R_o + b^2)
@@ -167,10 +167,10 @@ def inverse(shape: HelixShape) -> Actuator:
         shape: The helix.
 
     Returns:
-        Contraction [-], angle [rad] and diameter [m]; contraction 0 cannot come out.
+        Contraction (positive) [-], angle [rad] and diameter [m].
 
     Raises:
-        ParameterError: If `shape` is not a `HelixShape`, or its actuator runs across the tube to rounding (angle pi/2).
+        ParameterError: If `shape` is not a `HelixShape`, or the angle of its actuator is pi/2 up to rounding.
     """
     shape = checked_shape(shape)
     diameter, pitch = shape.diameter, shape.pitch
@@ -178,12 +178,12 @@ def inverse(shape: HelixShape) -> Actuator:
     angle = 0.5 * np.arctan2(pitch / diameter, scaled)
     contraction = np.hypot(pitch, shape.inner_radius) / np.hypot(pitch, shape.outer_radius)
     if np.any(angle >= 0.5 * np.pi):
-        raise ParameterError("shape", shape, "a helix whose pitch can be told from zero")
+        raise ParameterError("shape", shape, "a helix with a pitch above rounding")
     return Actuator(np.minimum(contraction, 1.0), angle, diameter)
 
 
 def measure(outer_arc: Any, inner_arc: Any, diameter: Any, turns: Any = 1.0) -> HelixShape:
-    r"""Helix from the lengths of its outer and inner path: [Blumenschein 2018] (16), corrected.
+    r"""Return the helix from measured lengths of its outer and inner path: [Blumenschein 2018] (16), corrected.
 
     .. math:: R_o = m + D/2, \quad R_i = m - D/2, \quad b = \sqrt{L_o^2/4\pi^2 - R_o^2}, \quad
        m = \frac{L_o^2 - L_i^2}{8\pi^2 D}
@@ -194,7 +194,7 @@ def measure(outer_arc: Any, inner_arc: Any, diameter: Any, turns: Any = 1.0) -> 
         outer_arc: Length `Lo` of the outer path over `turns` turns [m].
         inner_arc: Length `Li` of the inner path over the same turns [m].
         diameter: Diameter `D` of the tube, positive [m].
-        turns: How many turns were measured, positive; e.g. 0.5 where a tube does not make a whole one [-].
+        turns: Number of measured turns, positive; e.g. 0.5 for a tube shorter than one turn [-].
 
     Returns:
         The shape.
@@ -213,11 +213,8 @@ def measure(outer_arc: Any, inner_arc: Any, diameter: Any, turns: Any = 1.0) -> 
     rest = outer - outer_radius
     flat = np.abs(rest) <= _ROUNDING * outer  # a planar arc, up to rounding
     if np.any((rest < 0.0) & ~flat):
-        raise ParameterError(
-            "outer_arc",
-            outer_arc,
-            f"at least a circle of the outer radius {outer_radius} m, which these arcs and diameter give",
-        )
+        requirement = f"at least a circle of the outer radius {outer_radius} m, which these arcs and diameter give"
+        raise ParameterError("outer_arc", outer_arc, requirement)
     pitch = np.sqrt(np.where(flat, 0.0, np.maximum(rest, 0.0) * (outer + outer_radius)))
     if np.any((pitch == 0.0) & (middle <= 0.5 * tube)):
         raise ParameterError("inner_arc", inner_arc, "such that a helix explains both arcs at this diameter")
@@ -256,14 +253,14 @@ def checked_angle(angle: Any) -> FloatArray:
     """
     angles = finite_array("angle", angle, None, "rad")
     if np.any(angles < 0.0):
-        raise ParameterError("angle", angle, "in [0, pi/2) rad; say handedness where it matters")
+        raise ParameterError("angle", angle, "in [0, pi/2) rad; handedness is an argument of its own")
     if np.any(angles >= 0.5 * np.pi):
         raise ParameterError("angle", angle, ANGLE_RANGE)
     return angles
 
 
 def turning_sign(handedness: str) -> float:
-    """+1 for a right-handed helix, -1 for a left-handed one.
+    """Return +1 for a right-handed helix, -1 for a left-handed one.
 
     Raises:
         ParameterError: If it is neither "right" nor "left".
@@ -272,17 +269,7 @@ def turning_sign(handedness: str) -> float:
 
 
 def length_ratio(contraction: FloatArray, angle: FloatArray) -> FloatArray:
-    """`|1 + zeta|` with `zeta = lambda e^(2i theta)`, without cancellation.
-
-    It is twice the length of the centre line over that of the outer path.
-
-    Args:
-        contraction: Contracted over original length [-].
-        angle: Angle of the actuator to the axis of the tube [rad].
-
-    Returns:
-        The modulus, of the common shape [-].
-    """
+    """Return `|1 + zeta|`, twice the length of the centre line over that of the outer path [-], without cancellation."""
     return np.asarray(np.hypot(1.0 - contraction, 2.0 * np.sqrt(contraction) * np.cos(angle)))
 
 
@@ -293,7 +280,7 @@ def checked_shape(shape: Any) -> HelixShape:
         ParameterError: If it is something else.
     """
     if not isinstance(shape, HelixShape):
-        raise ParameterError("shape", shape, "a HelixShape (made by helix.forward, or from its two radii and pitch)")
+        raise ParameterError("shape", shape, "a HelixShape (returned by helix.forward, or from its two radii and pitch)")
     return shape
 
 

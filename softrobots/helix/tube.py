@@ -1,6 +1,6 @@
-r"""The tube that is bent into a helix: its turns, lengths, volume, twist, and the tension of the actuator.
+r"""Tube bent into a helix: turns, lengths, volume, material twist, and the tension of the actuator.
 
-A tube of length `Lt` (uninflated, along its axis) has an outer path of length :math:`L_o = L_t/\cos\theta`, which is kept; the
+A tube of length `Lt` (uninflated, along its axis) has an outer path of constant length :math:`L_o = L_t/\cos\theta`; the
 actuator contracts to :math:`\lambda L_o`, and the centre line becomes
 
 .. math:: L_c = L_t\,\frac{|1 + \zeta|}{2\cos\theta}, \qquad \zeta = \lambda e^{2 i\theta}
@@ -19,7 +19,7 @@ from softrobots.helix.shapes import HelixShape, checked_actuator, checked_angle,
 
 
 def turns(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
-    r"""Turns that a tube makes: :math:`L_t / (2\pi\cos\theta\sqrt{R_o^2 + b^2})`, as the outer path keeps its length.
+    r"""Return the turns of a tube, :math:`L_t / (2\pi\cos\theta\sqrt{R_o^2 + b^2})`, as the outer path keeps its length.
 
     Args:
         shape: The helix, shape (...).
@@ -38,12 +38,12 @@ def turns(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
 
 
 def height(shape: HelixShape, angle: Any, length: Any) -> FloatArray:
-    """Rise of a tube along the axis of its helix, `turns 2 pi b` [m]; arguments, shapes and errors as in `turns`."""
+    """Return the rise of a tube along the axis of its helix, `turns 2 pi b` [m]; arguments, shapes and errors as in `turns`."""
     return np.asarray(turns(shape, angle, length) * shape.turn_height)
 
 
 def length_for_turns(shape: HelixShape, angle: Any, turns: Any) -> FloatArray:
-    """Length of the uninflated tube that makes so many turns [m]: the inverse of `turns`.
+    """Return the length of the uninflated tube for a number of turns: the inverse of `turns`.
 
     Args:
         shape: The helix, shape (...).
@@ -62,14 +62,14 @@ def length_for_turns(shape: HelixShape, angle: Any, turns: Any) -> FloatArray:
 
 
 def _length_of_turn(shape: Any, angle: Any) -> FloatArray:
-    """Length of uninflated tube that makes one turn [m]."""
+    """Length of uninflated tube for one turn [m]."""
     shape, angles = checked_shape(shape), checked_angle(angle)
     common_shape("angle", shape.shape, angles.shape)
     return np.asarray(2.0 * np.pi * np.cos(angles) * np.hypot(shape.outer_radius, shape.pitch))
 
 
 def centre_length(contraction: Any, angle: Any, length: Any) -> FloatArray:
-    """Length `Lc` of the centre line of the actuated tube [m]; see the module.
+    """Return the length `Lc` of the centre line of the actuated tube; see the module.
 
     Args:
         contraction: Contracted over original length `lambda`, in (0, 1] [-].
@@ -89,7 +89,7 @@ def centre_length(contraction: Any, angle: Any, length: Any) -> FloatArray:
 
 
 def volume(contraction: Any, angle: Any, diameter: Any, length: Any) -> FloatArray:
-    r"""Volume of the actuated tube, :math:`V = (\pi D^2/4) L_c` [m^3].
+    r"""Return the volume of the actuated tube, :math:`V = (\pi D^2/4) L_c`.
 
     By Pappus: circular cross-sections normal to the centre line, through their centre.
 
@@ -111,12 +111,12 @@ def volume(contraction: Any, angle: Any, diameter: Any, length: Any) -> FloatArr
 
 
 def material_twist(contraction: Any, angle: Any, diameter: Any, handedness: str = "right") -> FloatArray:
-    r"""Twist of the wall of the tube per length of the uninflated tube [rad/m].
+    r"""Return the twist of the wall of the tube per length of the uninflated tube.
 
     .. math:: \sigma\,\frac{2}{D}\left(\frac{2\lambda\sin\theta}{|1 + \zeta|} - \tan\theta\right)
 
-    The frames of the centre line follow the actuator, which winds around the tube by `2 tan(theta)/D` before it contracts; what
-    they turn more or less than that is twist of the wall: zero at contraction 1.
+    The frames of the centre line follow the actuator, which winds around the tube by `2 tan(theta)/D` before it contracts; the
+    difference of their twist from that is the twist of the wall, zero at contraction 1.
 
     Args:
         contraction: Contracted over original length `lambda`, in (0, 1] [-].
@@ -139,13 +139,13 @@ def material_twist(contraction: Any, angle: Any, diameter: Any, handedness: str 
 
 
 def actuator_tension(contraction: Any, angle: Any, diameter: Any, pressure: Any) -> FloatArray:
-    r"""Tension with which the actuator holds the inflated tube in its shape [N].
+    r"""Return the tension of the actuator that holds the inflated tube in its shape.
 
     .. math:: T = P\,\frac{dV}{dL_a} = P\,\frac{\pi D^2}{4}\,\frac{\lambda + \cos 2\theta}{2\,|1 + \zeta|}, \qquad
        L_a = \lambda L_t/\cos\theta
 
-    Only the work of the pressure counts: the wall is inextensible and wrinkles for nothing. At angle 0 it is half the cap force
-    whatever the contraction, and `T D` is the collapse moment `pi P r^3` of an inflated beam.
+    Only the pressure does work: the wall is inextensible and wrinkles without resistance. At angle 0 the tension is half the
+    cap force at any contraction, and `T D` is the collapse moment `pi P r^3` of an inflated beam.
 
     Args:
         contraction: Contracted over original length `lambda`, in (0, 1] [-].
@@ -154,7 +154,7 @@ def actuator_tension(contraction: Any, angle: Any, diameter: Any, pressure: Any)
         pressure: Gauge pressure `P`, zero or positive [Pa].
 
     Returns:
-        Tension, the common shape [N]; negative beyond 45 degrees where `lambda + cos 2theta` is: there the pressure pulls.
+        Tension, the common shape [N]; negative (compression) beyond 45 degrees where `lambda + cos 2theta` is.
 
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.

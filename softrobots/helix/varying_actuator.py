@@ -1,17 +1,16 @@
-r"""A tube whose actuator changes along it: contraction `lambda(s)` and angle `theta(s)`; future work of [Blumenschein 2018].
+r"""Tube with an actuator that varies along it: contraction `lambda(s)`, angle `theta(s)`; future work of [Blumenschein 2018].
 
-`s` is the position on the axis of the uninflated tube. The frames have z along the centre line and x towards the actuator, as
-those of a helix (`frames`). Per length of the uninflated tube they move along z by `v` and turn by `omega`:
+`s` is the position on the axis of the uninflated tube. The frames have z along the centre line and x towards the actuator, like
+those of a helix (`frames`). Per length of the uninflated tube they move along z by `v` and rotate by `omega`:
 
 .. math:: v = \frac{|1 + \zeta|}{2\cos\theta}, \qquad
    \omega = \left(0,\; v\,\kappa_c,\; \sigma\,\frac{4\lambda\sin\theta}{D\,|1 + \zeta|}\right), \qquad
    \zeta = \lambda e^{2 i\theta}
 
-which are the formulas of the constant actuator, taken at each place (ours). With them the outer line keeps its length, the
-actuator contracts to `lambda` and the two lines enclose the angle `2 theta` at each place, exactly, for any `lambda(s)` and
-`theta(s)`: the constraints (6), (7) and (11) of the paper. The assumption is that nothing else acts between neighbouring
-places: sections stay circles normal to the centre line, as where the actuator changes slowly, i.e. little over one diameter
-of the tube.
+which are the formulas of the constant actuator, applied locally (ours). With them the outer line keeps its length, the
+actuator contracts to `lambda` and the two lines enclose the angle `2 theta` at each position, exactly, for any `lambda(s)` and
+`theta(s)`: the constraints (6), (7) and (11) of the paper. Assumption: sections remain circles normal to the centre line, as
+for an actuator that changes little over one diameter of the tube.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ from softrobots.helix.paths import actuator_curvature_torsion
 from softrobots.helix.profiles import Profile, checked_profile, sample_positions
 from softrobots.helix.shapes import PATHS, turning_sign
 
-_MOST_ROTATION = 1e5  # rad along the tube, some 16000 turns: half a minute of integration
+_MOST_ROTATION = 1e5  # rad along the tube, about 16000 turns: half a minute of integration
 _EVALUATIONS, _EVALUATIONS_PER_RAD = 500_000, 50  # several times what smooth tubes need
 _TIGHTEST, _LOOSEST = 1e-13, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class BentTube:
-    """A bent tube, sampled from base to tip, as `bent_tube` makes it; the arrays are read-only."""
+    """Bent tube sampled from base to tip, as returned by `bent_tube`; the arrays are read-only."""
 
     rest_positions: FloatArray
     """Positions `s` of the samples on the axis of the uninflated tube, shape (n,) [m]."""
@@ -46,20 +45,20 @@ class BentTube:
     arc_length: FloatArray
     """Length of the centre line from the base, shape (n,) [m]."""
     contraction: FloatArray
-    """Contraction `lambda` there, shape (n,) [-]; where it jumps, the value after the jump."""
+    """Contraction `lambda`, shape (n,) [-]; at a jump the value after it."""
     angle: FloatArray
-    """Angle `theta` there, shape (n,) [rad]; where it jumps, the value after the jump."""
+    """Angle `theta`, shape (n,) [rad]; at a jump the value after it."""
     curvature: FloatArray
     """Rotation about y per centre length, `kappa_c`, shape (n,) [1/m]."""
     torsion: FloatArray
-    """Rotation about z per centre length, `tau_c`, signed by handedness, shape (n,) [1/m]. It is the torsion of the centre line
-    where that is curved; the frame of a straight piece turns with the actuator too."""
+    """Rotation about z per centre length, `tau_c`, signed by handedness, shape (n,) [1/m]: the torsion of the centre line where
+    that is curved; on a straight piece the rotation of the actuator around the tube."""
     diameter: float
     """Diameter `D` of the tube [m]."""
     length: float
     """Length of the uninflated tube [m]."""
     handedness: str
-    """Which way the actuator winds: "right" or "left"."""
+    """Winding of the actuator: "right" or "left"."""
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -82,10 +81,10 @@ class BentTube:
         return self.points("outer")
 
     def points(self, path: str = "centre") -> FloatArray:
-        """Points of one of `PATHS`, shape (n, 3) [m].
+        """Return points of one of `PATHS`, shape (n, 3) [m].
 
         Raises:
-            ParameterError: If there is no such path.
+            ParameterError: If the path is unknown.
         """
         offset = {"inner": 0.5, "centre": 0.0, "outer": -0.5}[choice("path", path, PATHS)] * self.diameter
         return read_only(self.poses[:, :3, 3] + offset * self.poses[:, :3, 0])
@@ -102,13 +101,13 @@ def bent_tube(
     tolerance: float = 1e-12,
     breakpoints: Any = (),
 ) -> BentTube:
-    """Shape of a tube whose actuator changes along it: the frames of the module, integrated by SciPy's DOP853.
+    """Integrate the shape of a tube with an actuator that varies along it; frames of the module, SciPy's DOP853.
 
     Contraction and angle are each a number, a function that takes a position [m] and returns a number, or a pair
-    (positions, values): straight between them, and a jump where a position comes twice. The integrator starts anew at the
-    positions of tables and at breakpoints. Through functions its steps are at most the diameter, or 1/10000 of the tube if that
-    is more, so that it does not step over what they do. The tube starts at the origin along z, with the actuator on the side
-    of x. A straight tube (contraction 1, angle 0) or piece is as good as any. That turns do not collide is not checked.
+    (positions, values): linear between them, with a jump where a position occurs twice. The integration restarts at the
+    positions of tables and at breakpoints. With functions its steps are at most the diameter, or 1/10000 of the tube if that is
+    longer, so that it does not miss their changes. The tube starts at the origin along z, with the actuator on the side of x.
+    It may be straight (contraction 1, angle 0) or have straight pieces. Self-contact is not checked.
 
     Args:
         contraction: Contracted over original length of the actuator `lambda`, in (0, 1] [-].
@@ -116,18 +115,18 @@ def bent_tube(
         diameter: Diameter `D` of the tube, positive [m].
         length: Length of the uninflated tube, positive [m].
         handedness: "right" or "left".
-        samples: How many samples, equally spaced with both ends, at least 2; or their increasing positions [m], in [0, length].
-        tolerance: Error of one step of the integrator, in lengths as a share of the tube's and in rotations [rad], from 1e-13
-            to 1e-3.
-        breakpoints: Positions where a function jumps or has a kink, increasing, within the tube [m].
+        samples: Number of equally spaced samples including both ends, at least 2; or increasing positions in [0, length] [m].
+        tolerance: Error of one step of the integrator, of lengths relative to the tube's and of rotations in rad, from 1e-13 to
+            1e-3.
+        breakpoints: Positions where a function jumps or has a kink, increasing, inside the tube [m].
 
     Returns:
-        The samples.
+        The sampled tube.
 
     Raises:
-        ParameterError: If an argument is out of range; a function returns anything but one number in range somewhere, or raises
-            (the position is named); a table does not reach from 0 to the length; the tube turns by more than 1e5 rad; or the
-            integrator gets stuck, for a function that is not smooth between breakpoints.
+        ParameterError: If an argument is out of range; a function raises or does not return one number in range (the error
+            names the position); a table does not extend from 0 to the length; the tube turns by more than 1e5 rad; or the
+            integrator does not converge, for a function that is not smooth between breakpoints.
         MissingDependency: If SciPy is not installed.
     """
     size, extent = positive_number("diameter", diameter, "m"), positive_number("length", length, "m")
@@ -216,7 +215,7 @@ class _Piece:
 
 
 def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter: float) -> tuple[float, float]:
-    """Size of the bent tube [m] and its rotation [rad], by a coarse look that refuses more than can be integrated."""
+    """Estimate length [m] and rotation [rad] of the bent tube; raise ParameterError if it turns too much to be integrated."""
     total, rotation = 0.0, 0.0
     for piece in pieces:
         inside = positions[(positions > piece.start) & (positions < piece.end)].tolist()
@@ -246,8 +245,8 @@ def _integrate(
     spent = 0
 
     def stuck(place: float, why: str) -> ParameterError:
-        what = f"such that contraction and angle are smooth between them (stuck at the position {place!r} m: {why})"
-        return ParameterError("breakpoints", cuts, what)
+        requirement = f"such that contraction and angle are smooth between them (stuck at the position {place!r} m: {why})"
+        return ParameterError("breakpoints", cuts, requirement)
 
     state = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     states = [np.zeros((0, 8))]
@@ -263,11 +262,11 @@ def _integrate(
 
         times = here if len(here) and here[-1] == piece.end else np.append(here, piece.end)
         span = (piece.start, piece.end)
-        found = solve_ivp(counted, span, state, "DOP853", times, max_step=longest, rtol=accuracy, atol=accuracy)
-        if not found.success:
-            raise stuck(piece.start, str(found.message))
-        states.append(found.y.T[: len(here)])
-        state = found.y[:, -1]
+        solution = solve_ivp(counted, span, state, "DOP853", times, max_step=longest, rtol=accuracy, atol=accuracy)
+        if not solution.success:
+            raise stuck(piece.start, str(solution.message))
+        states.append(solution.y.T[: len(here)])
+        state = solution.y[:, -1]
         state[:4] /= np.linalg.norm(state[:4])
     return np.vstack(states)
 
@@ -276,8 +275,8 @@ def _poses(states: FloatArray, scale: float) -> FloatArray:
     """Frames from states, shape (n, 4, 4)."""
     from scipy.spatial.transform import Rotation
 
-    made = np.zeros((len(states), 4, 4))
-    made[:, :3, :3] = Rotation.from_quat(np.roll(states[:, :4], -1, axis=1)).as_matrix()  # the real part last
-    made[:, :3, 3] = scale * states[:, 4:7]
-    made[:, 3, 3] = 1.0
-    return made
+    poses = np.zeros((len(states), 4, 4))
+    poses[:, :3, :3] = Rotation.from_quat(np.roll(states[:, :4], -1, axis=1)).as_matrix()  # the real part last
+    poses[:, :3, 3] = scale * states[:, 4:7]
+    poses[:, 3, 3] = 1.0
+    return poses
