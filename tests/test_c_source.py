@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.compiled.c.c_source import to_c
+from softrobots.compiled.c.source import to_c
 from softrobots.compiled.drivers import intrinsics, trigonometry
 from tests.conftest import missing
 from tests.support.c_libraries import build_library

@@ -12,7 +12,7 @@ import softrobots as sr
 from softrobots.cli.tools import packages
 from softrobots.cli.tools.known_tools import TOOLS
 from softrobots.cli.tools.packages import EXTRAS, Package, missing_of_extras, required_packages
-from softrobots.compiled.run.machines import available_backend, cache_folder, cache_is_kept
+from softrobots.compiled.run.backends import available_backend, cache_folder, cache_is_kept
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.view.meshcat_page.server import end_server, start_server
 from tests.conftest import CHECKOUT

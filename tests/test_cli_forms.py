@@ -18,7 +18,7 @@ import softrobots as sr
 from softrobots import constant_curvature, helix
 from softrobots.cli import bench
 from softrobots.cli.main import main
-from softrobots.compiled.run.machines import available_backend
+from softrobots.compiled.run.backends import available_backend
 from softrobots.view.figures import segments
 from tests.support.tables import each_row
 

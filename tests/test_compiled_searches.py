@@ -11,8 +11,8 @@ import pytest
 
 import softrobots as sr
 from softrobots.compiled import Status
-from softrobots.compiled.run.chain_search import ChainSearch
 from softrobots.compiled.run.compiled_model import CompiledModel
+from softrobots.compiled.run.looped_search import ChainSearch
 from tests.support.oracles import central_difference
 
 GRAVITY = (0.4, -1.0, -9.7)  # [m/s^2]

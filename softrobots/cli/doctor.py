@@ -14,7 +14,7 @@ from softrobots.cli.tools.checks import row_problems
 from softrobots.cli.tools.kinematics import KinematicsRow, compare_kinematics
 from softrobots.cli.tools.known_tools import installed_tools
 from softrobots.cli.tools.packages import EXTRAS, missing_of_extras, required_packages
-from softrobots.compiled.run.machines import available_backend, cache_folder, cache_is_kept
+from softrobots.compiled.run.backends import available_backend, cache_folder, cache_is_kept
 from softrobots.core.errors import SoftRobotsError, ViewerError
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.robots import ROBOTS

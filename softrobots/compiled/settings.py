@@ -9,7 +9,7 @@ from softrobots.statics import elastic_state, elastostatics, force_search
 TOLERANCE = elastic_state.TOLERANCE
 """Largest residual of an answer, relative to the size of the load."""
 
-TIGHT = 1e-12
+NEWTON_TOLERANCE = 1e-12
 """Residual at which Newton stops; reached from one below `TOLERANCE` in one step."""
 
 LEAST_SIZE = elastic_state.MOMENT_FLOOR
@@ -24,13 +24,13 @@ LARGEST_POSITION = 1e9
 LARGEST_SIZE = 1e31
 """Largest size of motor torques [N m]; above it squares would soon overflow."""
 
-LEAST_SOFTNESS = springs.POSITIVE
+POSITIVE_PIVOT = springs.POSITIVE
 """Smallest pivot that counts as positive, relative to the springs' own stiffness."""
 
-LEAST_GUARD = 1e-3
+SMALL_PIVOT_SHIFT = 1e-3
 """Least pivot of a guarded step, relative to the spring's own stiffness; every second guarded step has the larger one."""
 
-LARGEST_GUARD = 3.0
+LARGE_PIVOT_SHIFT = 3.0
 """The larger one."""
 
 LARGEST_STEP = elastostatics.LARGEST_STEP
@@ -57,7 +57,7 @@ LANE_MEMORY = 65_536
 OBSERVABLE = force_search.OBSERVABLE
 """Smallest singular value of the elastostatic Jacobian at which the motors feel every force, relative to the reach."""
 
-BLUR = 1e-6
+RANK_TOLERANCE = 1e-6
 """Singular value of the elastostatic Jacobian that counts as none, relative to the reach."""
 
 HIDDEN = force_search.HIDDEN
@@ -76,7 +76,7 @@ DESCENT_STEPS = 200
 SEARCH_STEPS = 100
 """Most steps of a search for a force or for motors."""
 
-LONGEST_LINE = 16
+MAX_UNROLLED_JOINTS = 16
 """Most joints of a robot that is traced in one straight line; longer ones and those with muscles get loops.
 
 A straight line is a quarter faster than loops, and with twenty joints takes twice as long to compile."""

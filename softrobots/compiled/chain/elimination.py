@@ -28,20 +28,20 @@ from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, lar
 
 
 @dataclass
-class Beyond:
+class Outboard:
     """What the elements beyond hand on: `n` is three, and the multipliers of the segment."""
 
     matrix: Any
     """`P`, shape (n, n), symmetric."""
     columns: list[Any]
     """`s` of each right-hand side, shape (n,)."""
-    softest: Scalar
+    min_pivot: Scalar
     """Smallest pivot in size, relative to the springs' own stiffness."""
-    negatives: Scalar
+    n_negative_pivots: Scalar
     """How many pivots are not positive."""
 
     @classmethod
-    def tip(cls, right_hand_sides: int) -> Beyond:
+    def tip(cls, right_hand_sides: int) -> Outboard:
         """Nothing beyond the tip."""
         return cls(constants(np.zeros((3, 3))), [constants(np.zeros(3)) for _ in range(right_hand_sides)], 1.0, 0.0)
 
@@ -83,16 +83,16 @@ class Eliminated:
 
 
 def eliminate(
-    beyond: Beyond,
+    beyond: Outboard,
     twists: Any,
     bends: Any,
     stiffness: Any,
     right_hand_sides: Sequence[Sequence[Scalar]],
     scales: Sequence[Scalar],
     *,
-    guard: Scalar = 0.0,
+    pivot_shift: Scalar = 0.0,
     multipliers: bool = False,
-) -> tuple[Eliminated, Beyond]:
+) -> tuple[Eliminated, Outboard]:
     """Eliminate the coordinates of one element.
 
     Args:
@@ -102,7 +102,7 @@ def eliminate(
         stiffness: Second derivatives of the energy within the element, shape (k, k).
         right_hand_sides: Gradient of each right-hand side (k).
         scales: The coordinates' own stiffness (k), to compare pivots with.
-        guard: Where positive, pivots are made so, and at least this in terms of the spring's own stiffness.
+        pivot_shift: Where positive, pivots are made so, and at least this in terms of the spring's own stiffness.
         multipliers: Whether the coordinates are multipliers, whose pivots are negative and never guarded.
 
     Returns:
@@ -118,14 +118,14 @@ def eliminate(
     ]
     lower = constants(np.eye(k))
     inverse: list[Scalar] = []
-    softest, negatives = beyond.softest, beyond.negatives
+    min_pivot, n_negative_pivots = beyond.min_pivot, beyond.n_negative_pivots
     for j in range(k):
         pivot = block[j, j]
         relative = pivot / scales[j]
-        softest = smaller(absolute(relative), softest)
-        negatives = negatives + if_less(0.0, relative, 0.0, 1.0)
+        min_pivot = smaller(absolute(relative), min_pivot)
+        n_negative_pivots = n_negative_pivots + if_less(0.0, relative, 0.0, 1.0)
         if not multipliers:
-            pivot = if_less(0.0, guard, larger(absolute(pivot), guard * scales[j]), pivot)
+            pivot = if_less(0.0, pivot_shift, larger(absolute(pivot), pivot_shift * scales[j]), pivot)
         inverse.append(1.0 / pivot)
         for i in range(j + 1, k):
             lower[i, j] = block[j, i] * inverse[j]
@@ -140,7 +140,7 @@ def eliminate(
         scaled = coupling[j] * inverse[j]
         matrix = matrix + _symmetric_outer(coupling[j], scaled)
         sums = [one + scaled * values[j] for one, values in zip(sums, columns, strict=True)]
-    return Eliminated(lower, inverse, coupling, columns), Beyond(matrix, sums, softest, negatives)
+    return Eliminated(lower, inverse, coupling, columns), Outboard(matrix, sums, min_pivot, n_negative_pivots)
 
 
 def _symmetric_outer(one: Any, scaled: Any) -> Any:
@@ -153,7 +153,7 @@ def _symmetric_outer(one: Any, scaled: Any) -> Any:
     return made
 
 
-def release(beyond: Beyond, gaps: Sequence[Scalar], scales: Sequence[Scalar]) -> tuple[Eliminated, Beyond]:
+def eliminate_multipliers(beyond: Outboard, gaps: Sequence[Scalar], scales: Sequence[Scalar]) -> tuple[Eliminated, Outboard]:
     """Eliminate the multipliers at the base of their segment: the last components, one for each gap.
 
     Args:
@@ -170,5 +170,5 @@ def release(beyond: Beyond, gaps: Sequence[Scalar], scales: Sequence[Scalar]) ->
     zeros = constants(np.zeros((n + count, count)))
     values: list[Sequence[Scalar]] = [gaps, *([0.0] * count for _ in beyond.columns[1:])]
     made, rest = eliminate(beyond, unit, zeros, constants(np.zeros((count, count))), values, scales, multipliers=True)
-    rest = Beyond(rest.matrix[:n, :n], [one[:n] for one in rest.columns], rest.softest, rest.negatives)
+    rest = Outboard(rest.matrix[:n, :n], [one[:n] for one in rest.columns], rest.min_pivot, rest.n_negative_pivots)
     return Eliminated(made.lower, made.inverse_pivots, made.coupling[:, :n], made.columns), rest

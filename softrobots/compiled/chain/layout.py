@@ -1,8 +1,9 @@
-"""Where the numbers of one case stand in the workspace of generated code."""
+"""Places of the numbers of one case in the workspace of generated code."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 SINGLES = (
     "energy",
@@ -10,26 +11,33 @@ SINGLES = (
     "error",
     "length",
     "size",
-    "softest",
-    "negatives",
-    "room",
+    "min_pivot",
+    "n_negative_pivots",
+    "range_margin",
     "mode",
     "bound",
-    "guard",
+    "pivot_shift",
     "rounding",
     "missing",
     "unexplained",
     "observed",
     "damping",
     "tolerated",
-    "spent",
+    "iterations",
 )
 """Single numbers of a case: energy [J]; derivative of the energy along the step; squared residual; squared length of the step;
-squared size of the load; smallest pivot in size; number of pivots that are not positive; room of the sections in their range;
-what is to become of the case (`softrobots.compiled.drivers.equilibrium_drivers`); largest energy that the next point may have;
-whether pivots are guarded; rounding of the energy [J]; squared distance from the target [m^2] or squared motor torque that
-another force would explain; squared motor torque that the force does not explain; squared smallest singular value of the
-elastostatic Jacobian [m^2]; damping of a search [m]; largest distance from a target [m]; steps spent."""
+squared size of the load; smallest pivot in size; number of pivots that are not positive; margin of the sections to the end of
+their range; state of the case (`softrobots.compiled.program.passes`); largest energy allowed at the next point; least relative
+pivot of a step with shifted pivots, or 0; rounding of the energy [J]; squared distance from the target [m^2] or squared motor
+torque that another force would explain; squared motor torque that the force does not explain; squared smallest singular value
+of the elastostatic Jacobian [m^2]; damping of a search [m]; largest distance from a target [m]; number of steps."""
+
+
+def assign_places(layout: Any, first: int, **sizes: int) -> None:
+    """Set attributes of a frozen layout to consecutive places from `first` on, one for each size."""
+    for name, size in sizes.items():
+        object.__setattr__(layout, name, first)
+        first += size
 
 
 @dataclass(frozen=True)
@@ -40,116 +48,59 @@ class Layout:
     """Number of motor joints, whose positions come first [rad or m]."""
     unknowns: int
     """Number of unknown strains."""
+    force: int = field(init=False)
+    """Force on the tip, world axes [N] (3)."""
+    gravity: int = field(init=False)
+    """Gravity, world axes [m/s^2] (3)."""
+    pull: int = field(init=False)
+    """Constant load of muscle tensions on each unknown [N m or N]."""
+    start: int = field(init=False)
+    """Start of the search where muscle lengths constrain sums of the unknowns [rad or m]; others start at rest."""
+    unknown: int = field(init=False)
+    """The unknown strains [rad or m]."""
+    step: int = field(init=False)
+    """The Newton step of each."""
+    line_origin: int = field(init=False)
+    """Start of a line search, of each."""
+    line_direction: int = field(init=False)
+    """Direction of a line search, of each."""
+    tip: int = field(init=False)
+    """Tip in the world [m] (3)."""
+    torques: int = field(init=False)
+    """Measured load on each motor [N m or N]."""
+    target: int = field(init=False)
+    """Target of the tip [m] (3)."""
+    next_target: int = field(init=False)
+    """The target after it (3)."""
+    next_point: int = field(init=False)
+    """End of a step: motors or force, then unknowns."""
+    previous: int = field(init=False)
+    """Point before the step of a search: motors or force, then unknowns."""
+    predicted: int = field(init=False)
+    """End of the last step along a path: motors, then unknowns."""
+    correction: int = field(init=False)
+    """Difference of the waypoint's solution from that: motors, then unknowns."""
+    singles: int = field(init=False)
+    """The numbers of `SINGLES`."""
+    prepared: int = field(init=False)
+    """Values that depend on motors and load only; as many places as the code needs."""
 
-    @property
-    def force(self) -> int:
-        """Force on the tip, world axes [N] (3)."""
-        return self.motors
-
-    @property
-    def gravity(self) -> int:
-        """Gravity, world axes [m/s^2] (3)."""
-        return self.force + 3
-
-    @property
-    def pull(self) -> int:
-        """Constant load on each unknown, of muscles with a given tension [N m or N]."""
-        return self.gravity + 3
-
-    @property
-    def start(self) -> int:
-        """Where to start from, if muscle lengths hold sums of the unknowns [rad or m]; others start at rest."""
-        return self.pull + self.unknowns
-
-    @property
-    def unknown(self) -> int:
-        """The unknown strains [rad or m]."""
-        return self.start + self.unknowns
-
-    @property
-    def step(self) -> int:
-        """The Newton step of each."""
-        return self.unknown + self.unknowns
-
-    @property
-    def kept(self) -> int:
-        """Where a line search started, of each."""
-        return self.step + self.unknowns
-
-    @property
-    def way(self) -> int:
-        """The direction of a line search, of each."""
-        return self.kept + self.unknowns
-
-    @property
-    def tip(self) -> int:
-        """The tip in the world [m] (3)."""
-        return self.way + self.unknowns
-
-    @property
-    def torques(self) -> int:
-        """Measured load on each motor [N m or N]."""
-        return self.tip + 3
-
-    @property
-    def target(self) -> int:
-        """Target of the tip [m] (3)."""
-        return self.torques + self.motors
-
-    @property
-    def following(self) -> int:
-        """The target after it (3)."""
-        return self.target + 3
-
-    @property
-    def ahead(self) -> int:
-        """Where a step leads: motors or force, then unknowns."""
-        return self.following + 3
-
-    @property
-    def before(self) -> int:
-        """Where a search was before its step: motors or force, then unknowns."""
-        return self.ahead + max(self.motors, 3) + self.unknowns
-
-    @property
-    def foreseen(self) -> int:
-        """Where the last step along a path led: motors, then unknowns."""
-        return self.before + max(self.motors, 3) + self.unknowns
-
-    @property
-    def correction(self) -> int:
-        """How far that was from the waypoint's solution: motors, then unknowns."""
-        return self.foreseen + max(self.motors, 3) + self.unknowns
+    def __post_init__(self) -> None:
+        """Compute the places."""
+        motors, n = self.motors, self.unknowns
+        point = max(motors, 3) + n
+        before_tip = dict(pull=n, start=n, unknown=n, step=n, line_origin=n, line_direction=n)
+        points = dict(next_point=point, previous=point, predicted=point, correction=point)
+        searches = dict(tip=3, torques=motors, target=3, next_target=3)
+        rest = dict(singles=len(SINGLES), prepared=0)
+        assign_places(self, motors, force=3, gravity=3, **before_tip, **searches, **points, **rest)
 
     def single(self, name: str) -> int:
-        """One of `SINGLES`."""
-        return self.correction + max(self.motors, 3) + self.unknowns + SINGLES.index(name)
-
-    @property
-    def prepared(self) -> int:
-        """What depends on motors and load only; as many places as the code needs."""
-        return self.single(SINGLES[0]) + len(SINGLES)
+        """Return the place of one of `SINGLES`."""
+        return self.singles + SINGLES.index(name)
 
     def constants(self) -> dict[str, int]:
-        """Names of the places for generated code."""
-        made = {
-            "MOTORS": 0,
-            "FORCE": self.force,
-            "GRAVITY": self.gravity,
-            "PULL": self.pull,
-            "START": self.start,
-            "UNKNOWN": self.unknown,
-            "STEP": self.step,
-            "KEPT": self.kept,
-            "WAY": self.way,
-            "TIP": self.tip,
-            "TORQUES": self.torques,
-            "TARGET": self.target,
-            "FOLLOWING": self.following,
-            "AHEAD": self.ahead,
-            "BEFORE": self.before,
-            "FORESEEN": self.foreseen,
-            "CORRECTION": self.correction,
-        }
-        made |= {name.upper(): self.single(name) for name in SINGLES}
-        return made | {"N_MOTORS": self.motors, "N": self.unknowns}
+        """Return the places by their names in generated code."""
+        places = {name.upper(): place for name, place in vars(self).items() if name not in ("unknowns", "singles", "prepared")}
+        places |= {name.upper(): self.single(name) for name in SINGLES}
+        return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}

@@ -1,8 +1,8 @@
 """From base to tip and back along a chain, traced element by element.
 
-`enter` carries the axes outwards. `leave` comes back with the loads beyond the element, eliminates its coordinates and hands
-on. Short chains are traced as a whole (`softrobots.compiled.chain.short_chain`), long ones a body for each kind of element
-(`softrobots.compiled.chain.long_chain`); the mathematics here is the same for both.
+`outward` carries the axes outwards. `inward` comes back with the loads beyond the element, eliminates its coordinates and hands
+on. Short chains are traced as a whole (`softrobots.compiled.chain.unrolled_chain`), long ones a body for each kind of element
+(`softrobots.compiled.chain.looped_chain`); the mathematics here is the same for both.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint
-from softrobots.compiled.chain.elimination import Beyond, Eliminated, eliminate
+from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate
 from softrobots.compiled.trace.expressions import Scalar, if_less, smaller
 from softrobots.compiled.trace.stumpff_series import LARGEST
 
@@ -43,14 +43,14 @@ class TracedElement:
     """Where they are relaxed [rad or m]."""
     pull: list[Scalar]
     """Constant load on them, of muscles with a given tension [N m or N]."""
-    held: tuple[int | None, ...]
-    """By which multiplier of the segment each unknown coordinate is held, if by one."""
+    constraints: tuple[int | None, ...]
+    """Number of the multiplier of the segment that constrains each unknown coordinate, or None."""
     length: Scalar = 0.0
     """Rest length of a section [m]."""
 
 
 @dataclass
-class Entered:
+class OutwardPass:
     """An element on the way out."""
 
     start: Any
@@ -71,12 +71,12 @@ class Balance:
     """Elastic energy [J]."""
     weight: Scalar = 0.0
     """Squared torque of the weight on all unknown coordinates."""
-    room: Scalar = 1.0
+    range_margin: Scalar = 1.0
     """Negative where a section is beyond its range."""
 
 
 @dataclass
-class Left:
+class InwardPass:
     """An element on the way back."""
 
     motion: Motion
@@ -87,47 +87,47 @@ class Left:
     """Its part of the factorisation; None for a motor."""
     loads: list[Load]
     """The loads with levers from the origin of the element before."""
-    beyond: Beyond
+    beyond: Outboard
     """What it hands on."""
     twists: Any = None
     """Turn per unknown coordinate, with zeros for multipliers, shape (n, k)."""
 
 
-def enter(element: TracedElement, axes: Any) -> Entered:
+def outward(element: TracedElement, axes: Any) -> OutwardPass:
     """Go through an element outwards; `axes` are those behind the element before."""
     start, shift = axes @ element.rotation, axes @ element.translation
     if element.kind == "section":
         screw = Screw(element.coordinates, element.length)
-        return Entered(start, shift, start @ screw.rotation, screw)
+        return OutwardPass(start, shift, start @ screw.rotation, screw)
     end = turned(start, element.coordinates[0]) if element.kind == "turn" else start
-    return Entered(start, shift, end, None)
+    return OutwardPass(start, shift, end, None)
 
 
-def leave(
+def inward(
     element: TracedElement,
-    entered: Entered,
+    outward_pass: OutwardPass,
     loads: Sequence[Load],
-    beyond: Beyond,
+    beyond: Outboard,
     balance: Balance,
     *,
     tip_columns: bool = False,
-    guard: Scalar = 0.0,
-) -> Left:
+    pivot_shift: Scalar = 0.0,
+) -> InwardPass:
     """Go through an element inwards.
 
     Args:
         element: The element.
-        entered: What the way out left.
+        outward_pass: What the way out left.
         loads: The force on the tip, and the weight if there is gravity, with levers from the element's end.
         beyond: What the elements beyond hand on.
         balance: Sums, which are added to.
         tip_columns: Whether the motion of the tip is solved for, too: three right-hand sides after that of the balance.
-        guard: See `elimination.eliminate`.
+        pivot_shift: See `elimination.eliminate`.
 
     Returns:
         The element left behind.
     """
-    motion, at_start = _motion(element, entered, loads)
+    motion, at_start = _motion(element, outward_pass, loads)
     moving = list(element.moving)
     for place, row in enumerate(moving):
         stretch = element.coordinates[row] - element.rest[place]
@@ -135,11 +135,11 @@ def leave(
         balance.energy = balance.energy - element.pull[place] * element.coordinates[row]
         if len(loads) > 1:
             balance.weight = balance.weight + motion.weight[row] * motion.weight[row]
-    if entered.screw is not None:
-        balance.room = smaller(balance.room, _room(element, entered.screw))
-    shifted = [Load(load.force, load.lever + entered.shift * load.share, load.share) for load in at_start]
+    if outward_pass.screw is not None:
+        balance.range_margin = smaller(balance.range_margin, _range_margin(element, outward_pass.screw))
+    shifted = [Load(load.force, load.lever + outward_pass.shift * load.share, load.share) for load in at_start]
     if not moving:
-        return Left(motion, [], None, shifted, beyond)
+        return InwardPass(motion, [], None, shifted, beyond)
     motion = Motion(
         motion.twists[:, moving],
         motion.bends[:, moving],
@@ -152,25 +152,25 @@ def leave(
         (element.coordinates[row] - element.rest[place]) * element.stiffness[place] - motion.torque[place] - element.pull[place]
         for place, row in enumerate(moving)
     ]
-    held = constants(np.zeros((len(beyond.matrix) - 3, len(moving))))
-    for place, multiplier in enumerate(element.held):
+    incidence = constants(np.zeros((len(beyond.matrix) - 3, len(moving))))
+    for place, multiplier in enumerate(element.constraints):
         if multiplier is not None:
-            held[multiplier, place] = -1.0
-    twists = np.concatenate([motion.twists, held * 0.0])
+            incidence[multiplier, place] = -1.0
+    twists = np.concatenate([motion.twists, incidence * 0.0])
     stiffness = -motion.curvature
     for place, own in enumerate(element.stiffness):
         stiffness[place, place] = stiffness[place, place] + own
     sides = [gradient, *((-motion.moves[axis]).tolist() for axis in range(3))] if tip_columns else [gradient]
     eliminated, handed_on = eliminate(
-        beyond, twists, np.concatenate([motion.bends, held]), stiffness, sides, element.stiffness, guard=guard
+        beyond, twists, np.concatenate([motion.bends, incidence]), stiffness, sides, element.stiffness, pivot_shift=pivot_shift
     )
-    return Left(motion, gradient, eliminated, shifted, handed_on, twists)
+    return InwardPass(motion, gradient, eliminated, shifted, handed_on, twists)
 
 
-def _motion(element: TracedElement, entered: Entered, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:
+def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:
     """Motion of an element, and the loads with levers from its origin at zero."""
-    if entered.screw is not None:
-        motion, levers = entered.screw.motion(loads, element.bodies, entered.start)
+    if outward_pass.screw is not None:
+        motion, levers = outward_pass.screw.motion(loads, element.bodies, outward_pass.start)
         own = sum((mass for mass, _ in element.bodies), 0.0)
         shares = [1.0, element.mass_beyond + own]
         return motion, [
@@ -179,21 +179,21 @@ def _motion(element: TracedElement, entered: Entered, loads: Sequence[Load]) -> 
     ((mass, first_moment),) = element.bodies
     here = [loads[0]]
     if len(loads) > 1:
-        lever = loads[1].lever + entered.end @ first_moment
+        lever = loads[1].lever + outward_pass.end @ first_moment
         here.append(Load(loads[1].force, lever, element.mass_beyond + mass))
-    axis = entered.start[:, 2]
+    axis = outward_pass.start[:, 2]
     if element.kind == "turn":
         return turning_joint(axis, here), here
     slid = [Load(load.force, load.lever + axis * (load.share * element.coordinates[0]), load.share) for load in here]
     return sliding_joint(axis, here), slid
 
 
-def _room(element: TracedElement, screw: Screw) -> Scalar:
+def _range_margin(element: TracedElement, screw: Screw) -> Scalar:
     """Positive while a section is in range: less than half a turn of bending and of twist, and some length left."""
     direction = screw.position
     at_end = screw.rotation[:, 2] @ direction
     size = (direction @ direction) * 1e-6
-    rooms: list[Scalar] = [
+    margins: list[Scalar] = [
         LARGEST
         - (element.coordinates[0] * element.coordinates[0] + element.coordinates[1] * element.coordinates[1])
         - element.coordinates[2] * element.coordinates[2],
@@ -202,7 +202,7 @@ def _room(element: TracedElement, screw: Screw) -> Scalar:
         np.pi**2 - element.coordinates[2] * element.coordinates[2],
         element.coordinates[3] + 0.999 * element.length,
     ]
-    room: Scalar = rooms[0]
-    for one in rooms[1:]:
-        room = smaller(room, one)
-    return room
+    range_margin: Scalar = margins[0]
+    for one in margins[1:]:
+        range_margin = smaller(range_margin, one)
+    return range_margin

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants
-from softrobots.compiled.chain.short_chain import Evaluation, solve_again
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.unrolled_chain import Evaluation, solve_again
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.model.serial_chain import ChainJoint
 
@@ -51,8 +51,8 @@ def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
     jacobian = constants(np.zeros((3, count)))
     torques, changes, tip = constants(np.zeros(count)), constants(np.zeros(count)), constants(np.zeros(3))
     beyond = [constants(np.zeros(3)) for _ in range(4)]  # sums of c x over the strains beyond, per right-hand side
-    for row in reversed(range(len(point.left))):
-        one, motor = point.left[row], motor_of(unknowns, row)
+    for row in reversed(range(len(point.inward_passes))):
+        one, motor = point.inward_passes[row], motor_of(unknowns, row)
         if motor is None:
             beyond = [total + one.motion.bends @ step for total, step in zip(beyond, point.steps[row], strict=True)]
             tip = tip + one.motion.moves @ point.steps[row][0]
@@ -77,13 +77,13 @@ def step_with_motors(unknowns: Unknowns, point: Evaluation, motors: Vector) -> l
         Step of each unknown.
     """
     bends = constants(np.zeros(3))  # of the motors beyond
-    for row in range(len(point.left)):
+    for row in range(len(point.inward_passes)):
         motor = motor_of(unknowns, row)
         if motor is not None:
-            bends = bends + point.left[row].motion.bends[:, 0] * motors[motor]
+            bends = bends + point.inward_passes[row].motion.bends[:, 0] * motors[motor]
     turn = constants(np.zeros(3))  # of the motors nearer to the base
     sides: list[list[Scalar]] = []
-    for row, one in enumerate(point.left):
+    for row, one in enumerate(point.inward_passes):
         motor = motor_of(unknowns, row)
         if motor is not None:
             turn = turn + one.motion.twists[:, 0] * motors[motor]

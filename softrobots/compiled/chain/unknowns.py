@@ -10,7 +10,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.recursion import TracedElement
-from softrobots.compiled.settings import LARGEST_POSITION, LONGEST_LINE
+from softrobots.compiled.settings import LARGEST_POSITION, MAX_UNROLLED_JOINTS
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.errors import NameNotFound, ParameterError
@@ -33,8 +33,8 @@ class Unknowns:
                 raise NameNotFound("section strain", name, STRAINS)
         if set(self.locked) == set(STRAINS):
             raise ParameterError("locked_strains", self.locked, "three strains at most: with all four a section is rigid")
-        held = {strain for group in self.chain.held for strain in group}
-        clash = sorted({STRAINS[(strain - self._first_section) % 4] for strain in held & self._locked_strains})
+        constrained = {strain for group in self.chain.held for strain in group}
+        clash = sorted({STRAINS[(strain - self._first_section) % 4] for strain in constrained & self._locked_strains})
         if clash:
             raise ParameterError("locked_strains", self.locked, f"free of {', '.join(clash)}: given muscle lengths hold it")
         if self.chain.rest.size and float(np.abs(self.chain.rest).max()) > LARGEST_POSITION:
@@ -124,7 +124,7 @@ class Unknowns:
             coordinates = [
                 unknown(self.place[strain]) if strain in self.place else float(chain.rest[strain]) for strain in strains
             ]
-        held = tuple(self.multiplier[strains[one]][1] if strains[one] in self.multiplier else None for one in moving)
+        constraints = tuple(self.multiplier[strains[one]][1] if strains[one] in self.multiplier else None for one in moving)
         return TracedElement(
             kind=kind,
             rotation=constants(element.rotation),
@@ -136,7 +136,7 @@ class Unknowns:
             stiffness=[float(chain.stiffness[strains[one]]) for one in moving],
             rest=[float(chain.rest[strains[one]]) for one in moving],
             pull=[pull(place) for place in places],
-            held=held,
+            constraints=constraints,
             length=element.length if isinstance(element, ChainSection) else 0.0,
         )
 
@@ -146,15 +146,15 @@ class Unknowns:
         return self.chain.muscle_input == "forces" and len(self.chain.muscle_rest) > 0
 
     @property
-    def is_short(self) -> bool:
+    def is_unrolled(self) -> bool:
         """Whether the whole chain is traced in one straight line: few joints, no sections and no muscles."""
         sections = any(isinstance(element, ChainSection) for element in self.chain.elements)
-        return not sections and len(self.chain.muscle_rest) == 0 and len(self.chain.elements) <= LONGEST_LINE
+        return not sections and len(self.chain.muscle_rest) == 0 and len(self.chain.elements) <= MAX_UNROLLED_JOINTS
 
     @property
     def moved_by_motors(self) -> bool:
         """Whether the actuators are motor joints of a short chain, and there is at least one."""
-        return self.is_short and self.chain.n_motors > 0
+        return self.is_unrolled and self.chain.n_motors > 0
 
     @property
     def spring_rounding(self) -> float:

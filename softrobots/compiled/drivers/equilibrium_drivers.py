@@ -12,15 +12,15 @@ from softrobots.compiled.drivers.intrinsics import Array, fabs, sqrt
 from softrobots.compiled.settings import (
     ARMIJO,
     DESCENT_STEPS,
-    LARGEST_GUARD,
+    LARGE_PIVOT_SHIFT,
     LARGEST_NUMBER,
     LARGEST_POSITION,
     LARGEST_STEP,
-    LEAST_GUARD,
-    LEAST_SOFTNESS,
+    NEWTON_TOLERANCE,
     PASSES,
+    POSITIVE_PIVOT,
     SHORT_STEP,
-    TIGHT,
+    SMALL_PIVOT_SHIFT,
     TOLERANCE,
 )
 
@@ -33,8 +33,8 @@ NOT_A_NUMBER: int
 START: int
 UNKNOWN: int
 STEP: int
-KEPT: int
-WAY: int
+LINE_ORIGIN: int
+LINE_DIRECTION: int
 ENERGY: int
 SLOPE: int
 ERROR: int
@@ -42,16 +42,16 @@ LENGTH: int
 SIZE: int
 FORCE: int
 GRAVITY: int
-SOFTEST: int
-NEGATIVES: int
-ROOM: int
+MIN_PIVOT: int
+N_NEGATIVE_PIVOTS: int
+RANGE_MARGIN: int
 MODE: int
 ROUNDING: int
-GUARD: int
-SPENT: int
+PIVOT_SHIFT: int
+ITERATIONS: int
 N: int
 N_MOTORS: int
-HELD: int
+N_CONSTRAINTS: int
 SPRING_ROUNDING: float
 SOFTNESS: tuple[float, ...]
 GROUP: tuple[int, ...]
@@ -82,37 +82,41 @@ def is_settled(w: Array, tolerance: float) -> bool:
 
 def is_stable(w: Array) -> bool:
     """Tell whether all pivots of springs are clearly positive, and those of the multipliers negative: one for each."""
-    return w[SOFTEST] > LEAST_SOFTNESS and w[NEGATIVES] - HELD < 0.5 and HELD - w[NEGATIVES] < 0.5
+    return (
+        w[MIN_PIVOT] > POSITIVE_PIVOT
+        and w[N_NEGATIVE_PIVOTS] - N_CONSTRAINTS < 0.5
+        and N_CONSTRAINTS - w[N_NEGATIVE_PIVOTS] < 0.5
+    )
 
 
 def move(w: Array, share: float) -> None:
     """Go a share of the way from where a line search started."""
     for i in range(N):
-        w[UNKNOWN + i] = w[KEPT + i] + share * w[WAY + i]
+        w[UNKNOWN + i] = w[LINE_ORIGIN + i] + share * w[LINE_DIRECTION + i]
 
 
 def keep(w: Array) -> None:
     """Remember the unknowns and their step, for a line search."""
     for i in range(N):
-        w[KEPT + i] = w[UNKNOWN + i]
-        w[WAY + i] = w[STEP + i]
+        w[LINE_ORIGIN + i] = w[UNKNOWN + i]
+        w[LINE_DIRECTION + i] = w[STEP + i]
 
 
 def leave_saddle(w: Array) -> None:
     """Go away from an unstable equilibrium in a direction of no symmetry, soft springs more, without changing held sums."""
     keep(w)
     for i in range(N):
-        w[WAY + i] = 0.1 * SOFTNESS[i] * (1.0 + 0.3 * i / N)
-    for group in range(HELD):
+        w[LINE_DIRECTION + i] = 0.1 * SOFTNESS[i] * (1.0 + 0.3 * i / N)
+    for group in range(N_CONSTRAINTS):
         total = 0.0
         count = 0
         for i in range(N):
             if GROUP[i] == group:
-                total += w[WAY + i]
+                total += w[LINE_DIRECTION + i]
                 count += 1
         for i in range(N):
             if GROUP[i] == group:
-                w[WAY + i] -= total / count
+                w[LINE_DIRECTION + i] -= total / count
     move(w, 1.0)
 
 
@@ -120,7 +124,7 @@ def outcome(w: Array) -> int:
     """Return the status of the point that was evaluated last."""
     if w[ENERGY] - w[ENERGY] != 0.0 or not w[SIZE] < 1e300:
         return NOT_A_NUMBER  # infinite, too: of a load whose square is infinite every residual is a small part
-    if w[ROOM] < 0.0:
+    if w[RANGE_MARGIN] < 0.0:
         return OUT_OF_RANGE
     if not is_settled(w, TOLERANCE):
         return UNSETTLED
@@ -171,9 +175,9 @@ def search_line(w: Array, longest: float) -> bool:
 def cross_valley(w: Array) -> bool:
     """Take a guarded step for the residual alone: at the bottom of a curved valley a whole one leads out of it again."""
     error = w[ERROR]
-    w[GUARD] = LEAST_GUARD
+    w[PIVOT_SHIFT] = SMALL_PIVOT_SHIFT
     evaluate(w)
-    w[GUARD] = 0.0
+    w[PIVOT_SHIFT] = 0.0
     keep(w)
     move(w, 1.0)
     evaluate(w)
@@ -195,13 +199,13 @@ def descend(w: Array) -> int:
     """
     saddles = 0
     strong = 0
-    w[GUARD] = 0.0
-    w[SPENT] = 0.0
+    w[PIVOT_SHIFT] = 0.0
+    w[ITERATIONS] = 0.0
     evaluate(w)
     for _ in range(DESCENT_STEPS):
-        w[SPENT] += 1.0
+        w[ITERATIONS] += 1.0
         stable = is_stable(w)
-        if is_settled(w, TIGHT):
+        if is_settled(w, NEWTON_TOLERANCE):
             if stable or saddles == 3:
                 break
             saddles += 1
@@ -210,12 +214,12 @@ def descend(w: Array) -> int:
         else:
             longest = 0.0
             if not stable:
-                w[GUARD] = LEAST_GUARD
+                w[PIVOT_SHIFT] = SMALL_PIVOT_SHIFT
                 if strong > 0:
-                    w[GUARD] = LARGEST_GUARD
+                    w[PIVOT_SHIFT] = LARGE_PIVOT_SHIFT
                 strong = 1 - strong
                 evaluate(w)
-                w[GUARD] = 0.0
+                w[PIVOT_SHIFT] = 0.0
                 if w[LENGTH] < SHORT_STEP * SHORT_STEP:
                     longest = LARGEST_STEP
             if not search_line(w, longest):
@@ -234,7 +238,7 @@ def descend(w: Array) -> int:
 def go_to_start(w: Array) -> None:
     """Put the unknowns where the springs are relaxed, or as given where muscle lengths hold sums of them."""
     for i in range(N):
-        if HELD > 0:
+        if N_CONSTRAINTS > 0:
             w[UNKNOWN + i] = w[START + i]
         else:
             w[UNKNOWN + i] = REST[i]
@@ -252,7 +256,7 @@ def settle(w: Array) -> int:
     """Find the equilibrium from rest: Newton passes while they go well, else descent from rest; return the status."""
     if not is_usable(w):
         return NOT_A_NUMBER
-    if HELD > 0:
+    if N_CONSTRAINTS > 0:
         go_to_start(w)
     first_pass(w)
     for _ in range(PASSES):

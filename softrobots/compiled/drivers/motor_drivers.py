@@ -38,9 +38,9 @@ DAMPING: int
 TOLERATED: int
 TORQUES: int
 TARGET: int
-FOLLOWING: int
-AHEAD: int
-BEFORE: int
+NEXT_TARGET: int
+NEXT_POINT: int
+PREVIOUS: int
 N: int
 N_MOTORS: int
 N_VARIED: int
@@ -64,7 +64,7 @@ def look(w: Array, varied: int) -> None:
         look_for_force(w)
 
 
-def goal(w: Array, varied: int) -> float:
+def squared_tolerance(w: Array, varied: int) -> float:
     """Return the squared distance or torque at which a search is done."""
     if varied == 0:
         return w[TOLERATED] * w[TOLERATED]
@@ -79,43 +79,43 @@ def goal(w: Array, varied: int) -> float:
     return TOLERANCE * TOLERANCE * size
 
 
-def go_ahead(w: Array, varied: int, count: int) -> None:
+def step_within_limits(w: Array, varied: int, count: int) -> None:
     """Remember the point and go where the last look led; motors no further than their limits."""
     for i in range(count):
-        w[BEFORE + i] = w[varied + i]
-        w[varied + i] = w[AHEAD + i]
+        w[PREVIOUS + i] = w[varied + i]
+        w[varied + i] = w[NEXT_POINT + i]
         if varied == 0:
             if w[i] < LOWER[i]:
                 w[i] = LOWER[i]
             if w[i] > UPPER[i]:
                 w[i] = UPPER[i]
     for i in range(N):
-        w[BEFORE + N_VARIED + i] = w[UNKNOWN + i]
-        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i]
+        w[PREVIOUS + N_VARIED + i] = w[UNKNOWN + i]
+        w[UNKNOWN + i] = w[NEXT_POINT + N_VARIED + i]
 
 
-def remember(w: Array) -> None:
+def keep_point(w: Array) -> None:
     """Keep motors and unknowns as the point before."""
     for i in range(N_MOTORS):
-        w[BEFORE + i] = w[i]
+        w[PREVIOUS + i] = w[i]
     for i in range(N):
-        w[BEFORE + N_VARIED + i] = w[UNKNOWN + i]
+        w[PREVIOUS + N_VARIED + i] = w[UNKNOWN + i]
 
 
-def leap(w: Array) -> None:
+def take_step(w: Array) -> None:
     """Go where the last step to a target leads."""
     for i in range(N_MOTORS):
-        w[i] = w[AHEAD + i]
+        w[i] = w[NEXT_POINT + i]
     for i in range(N):
-        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i]
+        w[UNKNOWN + i] = w[NEXT_POINT + N_VARIED + i]
 
 
 def go_back(w: Array, varied: int, count: int) -> None:
     """Go back to the point before."""
     for i in range(count):
-        w[varied + i] = w[BEFORE + i]
+        w[varied + i] = w[PREVIOUS + i]
     for i in range(N):
-        w[UNKNOWN + i] = w[BEFORE + N_VARIED + i]
+        w[UNKNOWN + i] = w[PREVIOUS + N_VARIED + i]
 
 
 def estimated(w: Array) -> int:
@@ -136,12 +136,12 @@ def search(w: Array, varied: int, count: int) -> int:
     for _ in range(SEARCH_STEPS):
         w[DAMPING] = damping
         look(w, varied)
-        if status > UNSTABLE or w[MISSING] <= goal(w, varied) or damping > 1e3 * REACH:
+        if status > UNSTABLE or w[MISSING] <= squared_tolerance(w, varied) or damping > 1e3 * REACH:
             break
         if w[OBSERVED] < OBSERVABLE * OBSERVABLE * REACH * REACH:
             least = OBSERVABLE * REACH
         missing = w[MISSING]
-        go_ahead(w, varied, count)
+        step_within_limits(w, varied, count)
         prepare(w)
         status = descend(w)
         look(w, varied)
@@ -160,9 +160,13 @@ def search(w: Array, varied: int, count: int) -> int:
                 damping = 1e-6 * REACH
     if status != CERTIFIED:
         return status
-    if varied > 0 and estimated(w) != CERTIFIED and w[MISSING] * TOLERANCE * TOLERANCE <= HIDDEN * HIDDEN * goal(w, varied):
+    if (
+        varied > 0
+        and estimated(w) != CERTIFIED
+        and w[MISSING] * TOLERANCE * TOLERANCE <= HIDDEN * HIDDEN * squared_tolerance(w, varied)
+    ):
         return UNOBSERVABLE
-    if not w[MISSING] <= goal(w, varied):
+    if not w[MISSING] <= squared_tolerance(w, varied):
         return NOT_REACHED
     return within_limits(w, varied)
 
@@ -202,7 +206,7 @@ def step_to_target(w: Array) -> bool:
         target_step(w)
         if w[MODE] > 0.5:
             break
-        leap(w)
+        take_step(w)
     return w[MODE] > 0.5 and w[MODE] < 1.5 and within_limits(w, 0) == CERTIFIED
 
 
@@ -210,9 +214,9 @@ def reach(w: Array) -> int:
     """Find motors that put the tip at the target in the workspace, from those there; return the status."""
     if not is_usable(w):
         return NOT_A_NUMBER
-    remember(w)
+    keep_point(w)
     for i in range(3):
-        w[FOLLOWING + i] = w[TARGET + i]
+        w[NEXT_TARGET + i] = w[TARGET + i]
     if step_to_target(w):
         return CERTIFIED
     go_back(w, 0, N_MOTORS)
@@ -221,10 +225,10 @@ def reach(w: Array) -> int:
 
 FUNCTIONS: tuple[Callable[..., object], ...] = (
     look,
-    goal,
-    go_ahead,
-    remember,
-    leap,
+    squared_tolerance,
+    step_within_limits,
+    keep_point,
+    take_step,
     go_back,
     within_limits,
     estimated,

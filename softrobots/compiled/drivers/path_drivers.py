@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from softrobots.compiled.drivers.intrinsics import Array, fabs, where
-from softrobots.compiled.drivers.motor_drivers import go_back, reach, remember, step_to_target
+from softrobots.compiled.drivers.motor_drivers import go_back, keep_point, reach, step_to_target
 
 # Made for each robot.
 CERTIFIED: int
@@ -15,10 +15,10 @@ ERROR: int
 MODE: int
 MISSING: int
 TARGET: int
-FOLLOWING: int
-AHEAD: int
-BEFORE: int
-FORESEEN: int
+NEXT_TARGET: int
+NEXT_POINT: int
+PREVIOUS: int
+PREDICTED: int
 CORRECTION: int
 N: int
 N_MOTORS: int
@@ -26,7 +26,7 @@ N_VARIED: int
 target_step: Callable[[Array], None]
 
 
-def near(w: Array, place: int) -> bool:
+def is_near(w: Array, place: int) -> bool:
     """Tell whether no motor has gone further than a radian from those kept at a place: another elbow or turn would be."""
     furthest = 0.0
     for i in range(N_MOTORS):
@@ -35,28 +35,28 @@ def near(w: Array, place: int) -> bool:
     return furthest <= 1.0
 
 
-def foresee(w: Array) -> None:
+def predict(w: Array) -> None:
     """Go where the last step leads, corrected by what the step before it was short of: then it is right to third order."""
     for i in range(N_MOTORS):
-        w[FORESEEN + i] = w[AHEAD + i]
-        w[i] = w[AHEAD + i] + w[CORRECTION + i]
+        w[PREDICTED + i] = w[NEXT_POINT + i]
+        w[i] = w[NEXT_POINT + i] + w[CORRECTION + i]
     for i in range(N):
-        w[FORESEEN + N_VARIED + i] = w[AHEAD + N_VARIED + i]
-        w[UNKNOWN + i] = w[AHEAD + N_VARIED + i] + w[CORRECTION + N_VARIED + i]
+        w[PREDICTED + N_VARIED + i] = w[NEXT_POINT + N_VARIED + i]
+        w[UNKNOWN + i] = w[NEXT_POINT + N_VARIED + i] + w[CORRECTION + N_VARIED + i]
 
 
 def correct(w: Array, share: float) -> None:
     """Remember what the last step was short of, or nothing."""
     for i in range(N_MOTORS):
-        w[CORRECTION + i] = share * (w[i] - w[FORESEEN + i])
+        w[CORRECTION + i] = share * (w[i] - w[PREDICTED + i])
     for i in range(N):
-        w[CORRECTION + N_VARIED + i] = share * (w[UNKNOWN + i] - w[FORESEEN + N_VARIED + i])
+        w[CORRECTION + N_VARIED + i] = share * (w[UNKNOWN + i] - w[PREDICTED + N_VARIED + i])
 
 
 def step_in_parts(w: Array, targets: Array, last: int, row: int) -> bool:
     """Go from the last waypoint that was reached to this one through points between; tell whether it arrived.
 
-    `FORESEEN` keeps the motors at the last point between.
+    `PREDICTED` keeps the motors at the last point between.
     """
     for doubling in range(1, 7):
         parts = 1
@@ -64,18 +64,18 @@ def step_in_parts(w: Array, targets: Array, last: int, row: int) -> bool:
             parts *= 2
         go_back(w, 0, N_MOTORS)
         for i in range(N_MOTORS):
-            w[FORESEEN + i] = w[i]
+            w[PREDICTED + i] = w[i]
         arrived = True
         for part in range(1, parts + 1):
             for i in range(3):
                 begin = targets[3 * last + i]
                 w[TARGET + i] = begin + (targets[3 * row + i] - begin) * part / parts
-                w[FOLLOWING + i] = w[TARGET + i]
-            if not step_to_target(w) or not near(w, FORESEEN):
+                w[NEXT_TARGET + i] = w[TARGET + i]
+            if not step_to_target(w) or not is_near(w, PREDICTED):
                 arrived = False
                 break
             for i in range(N_MOTORS):
-                w[FORESEEN + i] = w[i]
+                w[PREDICTED + i] = w[i]
         if arrived:
             return True
     return False
@@ -92,31 +92,31 @@ def follow(
     """
     reached = 0
     last = 0
-    foreseen = 0
+    predicted = 0
     for row in range(count):
         following = row + 1
         if following == count:
             following = row
         for i in range(3):
             w[TARGET + i] = targets[3 * row + i]
-            w[FOLLOWING + i] = targets[3 * following + i]
+            w[NEXT_TARGET + i] = targets[3 * following + i]
         if row == 0:
             status = reach(w)
             target_step(w)
             correct(w, 0.0)
         else:
             status = CERTIFIED
-            if step_to_target(w) and near(w, BEFORE):
-                correct(w, where(foreseen > 1, 1.0, 0.0))
+            if step_to_target(w) and is_near(w, PREVIOUS):
+                correct(w, where(predicted > 1, 1.0, 0.0))
             else:
                 correct(w, 0.0)
                 if not step_in_parts(w, targets, last, row):
-                    foreseen = 0
+                    predicted = 0
                     status = NOT_REACHED
                     go_back(w, 0, N_MOTORS)
                 for i in range(3):
                     w[TARGET + i] = targets[3 * row + i]
-                    w[FOLLOWING + i] = targets[3 * following + i]
+                    w[NEXT_TARGET + i] = targets[3 * following + i]
                 w[MODE] = 0.0
                 target_step(w)
         for i in range(N_MOTORS):
@@ -128,12 +128,12 @@ def follow(
         statuses[row] = status
         if status == CERTIFIED:
             reached += 1
-            foreseen += 1
+            predicted += 1
             last = row
-            remember(w)
-            foresee(w)
+            keep_point(w)
+            predict(w)
     return reached
 
 
-FUNCTIONS: tuple[Callable[..., object], ...] = (near, foresee, correct, step_in_parts, follow)
+FUNCTIONS: tuple[Callable[..., object], ...] = (is_near, predict, correct, step_in_parts, follow)
 """All of them, each behind those that it uses."""

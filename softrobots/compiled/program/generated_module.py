@@ -11,14 +11,14 @@ import numpy as np
 
 from softrobots.compiled import settings
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.passing import TipPlaces
+from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
 from softrobots.compiled.drivers import lane_drivers, motor_drivers, muscle_drivers, path_drivers, trigonometry
-from softrobots.compiled.program.long_program import long_program
+from softrobots.compiled.program.looped_program import looped_program
 from softrobots.compiled.program.manual import manual, public_names
 from softrobots.compiled.program.motor_program import force_blocks, target_blocks
-from softrobots.compiled.program.short_program import equilibrium_blocks
+from softrobots.compiled.program.unrolled_program import equilibrium_blocks
 from softrobots.compiled.statuses import Status
 from softrobots.compiled.trace.blocks import Block
 
@@ -35,7 +35,7 @@ class Program:
     """Places in the workspace."""
     size: int
     """Size of the workspace of one case."""
-    tip: TipPlaces | None
+    tip: TipLayout | None
     """Places of what a look at the tip finds; None for short chains, which have no such look."""
     entry_points: tuple[str, ...]
     """Functions that solve a case, and the places in the workspace that a caller needs."""
@@ -60,11 +60,11 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         tables |= _muscle_tables(unknowns, layout)
         functions += muscle_drivers.FUNCTIONS
         entries, names = [*entries, "put_muscles"], [*names, "N_MUSCLES"]
-    if unknowns.is_short:
+    if unknowns.is_unrolled:
         blocks, size = equilibrium_blocks(unknowns, layout, weight=weight)
         lanes, lane_size = blocks[1:3], size
     else:
-        parts = long_program(unknowns, layout, weight=weight)
+        parts = looped_program(unknowns, layout, weight=weight)
         blocks, size, lanes, lane_size = parts.blocks + parts.look, parts.size, parts.blocks, parts.lane_size
         tables |= {**parts.places, **parts.tables}
         tip, entries = parts.tip, [*entries, "look_at_tip"]
@@ -109,20 +109,20 @@ def lane_block(block: Block) -> Block:
 
 def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, tables: dict[str, object]) -> str:
     chain, strains = unknowns.chain, unknowns.strains
-    softest = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
+    min_pivot = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
     group = {strain: row for row, one in enumerate(chain.held) for strain in one}
     made: dict[str, object] = dict(layout.constants())
     made |= {
         "WORKSPACE_SIZE": size,
         "LANE_SIZE": lane_size,
         "LANES": _lanes(lane_size),
-        "HELD": len(chain.held),
+        "N_CONSTRAINTS": len(chain.held),
         **{status.name: status.value for status in Status},
         "TOLERANCE": settings.TOLERANCE,
-        "TIGHT": settings.TIGHT,
-        "LEAST_SOFTNESS": settings.LEAST_SOFTNESS,
-        "LEAST_GUARD": settings.LEAST_GUARD,
-        "LARGEST_GUARD": settings.LARGEST_GUARD,
+        "NEWTON_TOLERANCE": settings.NEWTON_TOLERANCE,
+        "POSITIVE_PIVOT": settings.POSITIVE_PIVOT,
+        "SMALL_PIVOT_SHIFT": settings.SMALL_PIVOT_SHIFT,
+        "LARGE_PIVOT_SHIFT": settings.LARGE_PIVOT_SHIFT,
         "LARGEST_STEP": settings.LARGEST_STEP,
         "SHORT_STEP": settings.SHORT_STEP,
         "ARMIJO": settings.ARMIJO,
@@ -142,7 +142,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "UPPER": tuple(np.minimum(chain.limits[: layout.motors, 1], 1e300).tolist()),
         "SPRING_ROUNDING": unknowns.spring_rounding,
         "REST": tuple(float(chain.rest[strain]) for strain in strains),
-        "SOFTNESS": tuple((softest / float(chain.stiffness[strain])) ** 0.5 for strain in strains),
+        "SOFTNESS": tuple((min_pivot / float(chain.stiffness[strain])) ** 0.5 for strain in strains),
         "GROUP": tuple(group.get(strain, -1) for strain in strains),
     }
     # A table has at least one number, also where nothing reads it: without motor joints, or without springs.

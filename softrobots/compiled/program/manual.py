@@ -9,7 +9,7 @@ import textwrap
 from typing import NamedTuple
 
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.passing import TipPlaces
+from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns, strains_of
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
@@ -56,7 +56,7 @@ def given(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
     return made
 
 
-def found(unknowns: Unknowns, layout: Layout, tip: TipPlaces | None) -> list[Place]:
+def found(unknowns: Unknowns, layout: Layout, tip: TipLayout | None) -> list[Place]:
     """What comes out.
 
     Args:
@@ -84,14 +84,16 @@ def found(unknowns: Unknowns, layout: Layout, tip: TipPlaces | None) -> list[Pla
         if m:
             made.append(Place("JACOBIAN", 3 * m, f"elastostatic Jacobian of the motor joints, (3, N_MOTORS) {rows} [m/rad]"))
             made.append(Place("MOTOR_TORQUES", m, "load on each motor joint [N m or N]; of look_at_tip"))
-        if tip.held:
-            held = tip.held
-            made.append(Place("HELD_LOADS", held, "load on each sum that muscle lengths hold [N m or N]; of look_at_tip"))
-            made.append(Place("HELD_COLUMNS", 3 * held, f"how the tip follows those sums, (3, {held}) {rows} [m/rad or -]"))
+        if tip.n_constraints:
+            held = tip.n_constraints
+            made.append(Place("CONSTRAINT_LOADS", held, "load on each sum that muscle lengths hold [N m or N]; of look_at_tip"))
+            made.append(
+                Place("CONSTRAINT_COLUMNS", 3 * held, f"how the tip follows those sums, (3, {held}) {rows} [m/rad or -]")
+            )
     return made
 
 
-def manual(unknowns: Unknowns, layout: Layout, tip: TipPlaces | None, *, weight: bool) -> str:
+def manual(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> str:
     """The docstring.
 
     Args:
@@ -117,7 +119,7 @@ def manual(unknowns: Unknowns, layout: Layout, tip: TipPlaces | None, *, weight:
     return "\n".join(lines)
 
 
-def public_names(unknowns: Unknowns, layout: Layout, tip: TipPlaces | None, *, weight: bool) -> list[str]:
+def public_names(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> list[str]:
     """Names of all places that the manual explains, each once.
 
     Args:

@@ -15,13 +15,20 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.short_chain import Evaluation, evaluate
 from softrobots.compiled.chain.small_systems import smallest_square, solve_small
 from softrobots.compiled.chain.tip_motion import TipMotion, step_with_motors, tip_motion
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.unrolled_chain import Evaluation, evaluate
 from softrobots.compiled.program.passes import go_on
-from softrobots.compiled.program.short_program import numbers, store_tip
-from softrobots.compiled.settings import BLUR, LARGEST_SIZE, LARGEST_STEP, LEAST_SIZE, LEAST_SOFTNESS, TIGHT
+from softrobots.compiled.program.unrolled_program import numbers, store_tip
+from softrobots.compiled.settings import (
+    LARGEST_SIZE,
+    LARGEST_STEP,
+    LEAST_SIZE,
+    NEWTON_TOLERANCE,
+    POSITIVE_PIVOT,
+    RANK_TOLERANCE,
+)
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
 
@@ -87,7 +94,7 @@ def _force_step(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluat
     step = _with_columns(unknowns, point, change)
     values = numbers(unknowns, layout, block, point)
     size = measured @ measured
-    settled_to = if_less(size, LARGEST_SIZE**2, larger(size, LEAST_SIZE**2) * TIGHT**2, -1.0)
+    settled_to = if_less(size, LARGEST_SIZE**2, larger(size, LEAST_SIZE**2) * NEWTON_TOLERANCE**2, -1.0)
     settled = if_less(missing @ missing, settled_to, _balanced(values, unknowns), 0.0)
     mode, share = _mode(block, layout, values, settled, step, starts=starts)
     rest = [float(unknowns.chain.rest[strain]) for strain in unknowns.strains]
@@ -104,12 +111,12 @@ def _look_for_force(block: Block, layout: Layout, unknowns: Unknowns, point: Eva
     left = vector(block.loads(layout.torques, layout.motors)) - motion.motor_torques
     felt = motion.jacobian.T
     damped = _damped(felt, block.load(layout.single("damping")), left)
-    block.store_all(layout.ahead, (vector(block.loads(layout.force, 3)) + point.base_axes @ damped).tolist())
+    block.store_all(layout.next_point, (vector(block.loads(layout.force, 3)) + point.base_axes @ damped).tolist())
     ahead = [
         one + by
         for one, by in zip(block.loads(layout.unknown, layout.unknowns), _with_columns(unknowns, point, damped), strict=True)
     ]
-    block.store_all(layout.ahead + max(layout.motors, 3), ahead)
+    block.store_all(layout.next_point + max(layout.motors, 3), ahead)
     _store_torques(block, layout, motion, left, _explicable(felt, left, unknowns))
 
 
@@ -117,7 +124,7 @@ def _explicable(felt: Any, torques: Vector, unknowns: Unknowns) -> Vector:
     """What a force can do about torques: of more than three motors, the part that a force can give."""
     if len(torques) <= 3:
         return torques
-    return felt @ _damped(felt, BLUR * float(unknowns.chain.reach), torques)
+    return felt @ _damped(felt, RANK_TOLERANCE * float(unknowns.chain.reach), torques)
 
 
 def _store_torques(block: Block, layout: Layout, motion: TipMotion, left: Vector, missing: Vector) -> None:
@@ -129,7 +136,7 @@ def _store_torques(block: Block, layout: Layout, motion: TipMotion, left: Vector
 
 def _target_step(step: Block, lane: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
     motion = tip_motion(unknowns, point)
-    missing, next_missing = (_missing(step, place, point) for place in (layout.target, layout.following))
+    missing, next_missing = (_missing(step, place, point) for place in (layout.target, layout.next_target))
     values = numbers(unknowns, layout, step, point)
     distance = missing @ missing
     tolerated = step.load(layout.single("tolerated"))
@@ -149,8 +156,8 @@ def _target_step(step: Block, lane: Block, layout: Layout, unknowns: Unknowns, p
             _go(block, 0, here[0], motors, mode, share)
             _go(block, layout.unknown, here[1], strains, mode, share)
         else:
-            block.store_all(layout.ahead, (here[0] + motors * share).tolist())
-            block.store_all(layout.ahead + max(layout.motors, 3), (here[1] + vector(strains) * share).tolist())
+            block.store_all(layout.next_point, (here[0] + motors * share).tolist())
+            block.store_all(layout.next_point + max(layout.motors, 3), (here[1] + vector(strains) * share).tolist())
         block.store(layout.single("missing"), distance)
         store_tip(block, layout, point)
 
@@ -160,9 +167,9 @@ def _look_for_target(block: Block, layout: Layout, unknowns: Unknowns, point: Ev
     missing = _missing(block, layout.target, point)
     motors = _damped(motion.jacobian, block.load(layout.single("damping")), missing)
     strains = step_with_motors(unknowns, point, motors)
-    block.store_all(layout.ahead, (vector(block.loads(0, layout.motors)) + motors).tolist())
+    block.store_all(layout.next_point, (vector(block.loads(0, layout.motors)) + motors).tolist())
     ahead = vector(block.loads(layout.unknown, layout.unknowns)) + vector(strains)
-    block.store_all(layout.ahead + max(layout.motors, 3), ahead.tolist())
+    block.store_all(layout.next_point + max(layout.motors, 3), ahead.tolist())
     block.store(layout.single("missing"), missing @ missing)
     block.store(layout.single("observed"), smallest_square(motion.jacobian))
 
@@ -193,15 +200,15 @@ def _with_columns(unknowns: Unknowns, point: Evaluation, force: Vector) -> list[
 
 def _balanced(values: dict[str, Scalar], unknowns: Unknowns) -> Scalar:
     """1 where the springs are in balance, else 0."""
-    return if_less(values["error"], larger(values["size"] * TIGHT**2, unknowns.spring_rounding**2), 1.0, 0.0)
+    return if_less(values["error"], larger(values["size"] * NEWTON_TOLERANCE**2, unknowns.spring_rounding**2), 1.0, 0.0)
 
 
 def _mode(
     block: Block, layout: Layout, values: dict[str, Scalar], settled: Scalar, step: Sequence[Scalar], *, starts: bool
 ) -> tuple[Scalar, Scalar]:
     """Write what becomes of a case; return that and the share of the step to go. See `softrobots.compiled.program.passes`."""
-    signs = if_less(absolute(values["negatives"]), 0.5, 1.0, 0.0)
-    stable = if_less(LEAST_SOFTNESS, values["softest"], signs, 0.0)
+    signs = if_less(absolute(values["n_negative_pivots"]), 0.5, 1.0, 0.0)
+    stable = if_less(POSITIVE_PIVOT, values["min_pivot"], signs, 0.0)
     length = sum((one * one for one in step), 0.0)
     going = if_less(length, 1e6, 2.0 - 2.0 * stable, 2.0)
     mode: Scalar = if_less(0.5, settled, 2.0 - stable, going)

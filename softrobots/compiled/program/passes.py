@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.settings import ARMIJO, LARGEST_STEP, LEAST_SOFTNESS, ROUNDING, TIGHT
+from softrobots.compiled.settings import ARMIJO, LARGEST_STEP, NEWTON_TOLERANCE, POSITIVE_PIVOT, ROUNDING
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
 
@@ -18,9 +18,9 @@ def point_numbers(
     energy: Scalar,
     elastic: Scalar,
     load: Scalar,
-    room: Scalar,
-    softest: Scalar,
-    negatives: Scalar,
+    range_margin: Scalar,
+    min_pivot: Scalar,
+    n_negative_pivots: Scalar,
 ) -> dict[str, Scalar]:
     """The single numbers of a point from sums over the chain.
 
@@ -31,20 +31,20 @@ def point_numbers(
         energy: Elastic energy plus potential [J].
         elastic: Elastic energy [J].
         load: Squared size of the load [N^2 m^2].
-        room: Room of the sections in their range.
-        softest: Smallest pivot.
-        negatives: Number of pivots that are not positive.
+        range_margin: Room of the sections in their range.
+        min_pivot: Smallest pivot.
+        n_negative_pivots: Number of pivots that are not positive.
     """
     return {
-        "energy": if_less(room, 0.0, 1e300, energy),
+        "energy": if_less(range_margin, 0.0, 1e300, energy),
         "slope": slope,
         "error": error,
         "length": length,
         "size": load,
         "rounding": (square_root(load) + absolute(elastic) * 2.0 + absolute(energy)) * ROUNDING,
-        "softest": softest,
-        "negatives": negatives,
-        "room": room,
+        "min_pivot": min_pivot,
+        "n_negative_pivots": n_negative_pivots,
+        "range_margin": range_margin,
     }
 
 
@@ -53,7 +53,7 @@ def decide(
     layout: Layout,
     point: dict[str, Scalar],
     *,
-    held: int,
+    n_constraints: int,
     spring_rounding: float,
     mode: Scalar,
     bound: Scalar,
@@ -67,7 +67,7 @@ def decide(
         block: The block that the pass is traced in.
         layout: The places in the workspace.
         point: The numbers of the point, see `point_numbers`.
-        held: Number of multipliers.
+        n_constraints: Number of multipliers.
         spring_rounding: Rounding of the spring torques [N m].
         mode: Mode before.
         bound: Largest energy that the point may have [J].
@@ -76,10 +76,10 @@ def decide(
         The mode, and the share of the step to go if it is 0.
     """
     error, length, energy = point["error"], point["length"], point["energy"]
-    settled_to = larger(point["size"] * TIGHT**2, spring_rounding**2)
-    all_signs = if_less(absolute(point["negatives"] - float(held)), 0.5, 1.0, 0.0)
-    sound = if_less(point["size"], 1e300, if_less(point["room"], 0.0, 0.0, all_signs), 0.0)
-    stable = if_less(LEAST_SOFTNESS, point["softest"], sound, 0.0)
+    settled_to = larger(point["size"] * NEWTON_TOLERANCE**2, spring_rounding**2)
+    all_signs = if_less(absolute(point["n_negative_pivots"] - float(n_constraints)), 0.5, 1.0, 0.0)
+    sound = if_less(point["size"], 1e300, if_less(point["range_margin"], 0.0, 0.0, all_signs), 0.0)
+    stable = if_less(POSITIVE_PIVOT, point["min_pivot"], sound, 0.0)
     going = if_less(energy, bound, 2.0 - 2.0 * stable, 2.0)
     new_mode = if_less(1.5, mode, 2.0, if_less(error, settled_to, 2.0 - stable, going))
     share = LARGEST_STEP / square_root(larger(length, LARGEST_STEP**2))

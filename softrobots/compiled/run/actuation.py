@@ -40,9 +40,9 @@ class Actuation:
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.jacobian, self._count)
         if self._lengths:
-            return np.concatenate([joints, _rows(w, tip.held_columns, tip.held) @ chain.held_slope], axis=1)
+            return np.concatenate([joints, _rows(w, tip.constraint_columns, tip.n_constraints) @ chain.held_slope], axis=1)
         if self._tensions:  # a tension adds the energy t A s
-            by_force = _rows(w, tip.columns, tip.unknowns)
+            by_force = _rows(w, tip.tip_columns, tip.unknowns)
             return np.concatenate([joints, -by_force @ chain.muscle_matrix[:, self._strains].T], axis=1)
         return joints
 
@@ -56,7 +56,7 @@ class Actuation:
         if self._lengths:
             first = [self._strains.index(group[0]) for group in chain.held]
             spread = _rows(w, run.layout.start, len(self._strains), 1)[0] - chain.rest[self._strains]
-            held = _rows(w, tip.held_loads, tip.held, 1)[0] - (chain.stiffness[self._strains] * spread)[first]
+            held = _rows(w, tip.constraint_loads, tip.n_constraints, 1)[0] - (chain.stiffness[self._strains] * spread)[first]
             return np.concatenate([joints, held @ chain.held_slope])
         return np.asarray(joints)
 

@@ -15,11 +15,11 @@ import numpy as np
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import make_program
 from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.backends import BACKENDS, available_backend, make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, in_parts, statuses_of, unusable, without
-from softrobots.compiled.run.chain_search import ChainSearch
-from softrobots.compiled.run.machines import BACKENDS, available_backend, make_run
+from softrobots.compiled.run.looped_search import LoopedSearch
 from softrobots.compiled.run.results import CompiledEquilibrium, CompiledLoadEstimate, EquilibriumBatch, LoadBatch, MotorBatch
-from softrobots.compiled.run.short_search import ShortSearch
+from softrobots.compiled.run.unrolled_search import UnrolledSearch
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import choice, finite_array, positive_number, read_only
@@ -125,7 +125,7 @@ class CompiledModel:
         Raises:
             ParameterError: If the prefix is no name.
         """
-        from softrobots.compiled.c.c_source import to_c
+        from softrobots.compiled.c.source import to_c
 
         if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
             raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
@@ -188,7 +188,7 @@ class CompiledModel:
                 f"{Status(status).explanation}; {found.residual:.3g} N m are out of balance",
                 best=found,
                 residual=found.residual,
-                iterations=int(w[run.layout.single("spent")]),
+                iterations=int(w[run.layout.single("iterations")]),
             )
         return found
 
@@ -277,7 +277,7 @@ class CompiledModel:
                 f"{found.unexplained:.3g} N m remain (softrobots.estimate_load tells which directions are not felt)",
                 best=found,
                 residual=found.unexplained,
-                iterations=int(w[run.layout.single("spent")]),
+                iterations=int(w[run.layout.single("iterations")]),
             )
         return found
 
@@ -427,20 +427,20 @@ class CompiledModel:
             motors = solve_ik(self._model, points[0], load, gravity=gravity, tolerance=tolerance).q_motors
         else:
             motors = self._actuation.checked(q_motors0, "q_motors0")
-        batch, spent = self._search(run).follow(points, load, gravity_vector(gravity), motors, tolerance)
+        batch, iterations = self._search(run).follow(points, load, gravity_vector(gravity), motors, tolerance)
         if batch.status[0] != Status.CERTIFIED:
             raise TargetUnreachable(
                 f"waypoint 1 of {len(points)} is not reached from motors {motors.tolist()}: the tip comes within "
                 f"{batch.tip_error[0]:.3g} m of it ({Status(batch.status[0]).name})",
                 best=batch.q_motors[0],
                 residual=float(batch.tip_error[0]),
-                iterations=spent,
+                iterations=iterations,
             )
         return batch
 
-    def _search(self, run: Any) -> ShortSearch | ChainSearch:
+    def _search(self, run: Any) -> UnrolledSearch | LoopedSearch:
         """Who does load estimation and inverse kinematics: generated code, or searches in Python on top of it."""
-        kind = ShortSearch if self._unknowns.is_short else ChainSearch
+        kind = UnrolledSearch if self._unknowns.is_unrolled else LoopedSearch
         return kind(self._model, self._actuation, run)
 
     def _run(self, weight: bool) -> Any:

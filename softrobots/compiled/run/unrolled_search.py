@@ -14,8 +14,8 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.model.soft_model import SoftModel
 
 
-class ShortSearch:
-    """Searches by the functions of `motor_drivers` and `path_drivers`; `ChainSearch` for short chains."""
+class UnrolledSearch:
+    """Searches by the functions of `motor_drivers` and `path_drivers`; `LoopedSearch` for short chains."""
 
     def __init__(self, model: SoftModel, actuation: Actuation, run: Any) -> None:
         """Search with the functions of a program that has searches of its own."""
@@ -23,7 +23,7 @@ class ShortSearch:
         self.estimate_batch, self.reach_batch = run.estimate_batch, run.reach_batch
 
     def estimate(self, q_motors: FloatArray, torques: FloatArray, gravity: FloatArray) -> tuple[Status, Any]:
-        """Find the force that explains motor torques; see `ChainSearch.estimate`."""
+        """Find the force that explains motor torques; see `LoopedSearch.estimate`."""
         run = self._run
         w = run.workspace()
         self._actuation.put(run, w, q_motors)
@@ -34,7 +34,7 @@ class ShortSearch:
     def follow(
         self, targets: FloatArray, force: FloatArray, gravity: FloatArray, q_motors: FloatArray, tolerance: float
     ) -> tuple[MotorBatch, int]:
-        """Move the tip through targets, shape (n, 3) [m], each step from the last; see `ChainSearch.follow`."""
+        """Move the tip through targets, shape (n, 3) [m], each step from the last; see `LoopedSearch.follow`."""
         run, layout, count = self._run, self._run.layout, len(targets)
         w = run.workspace()
         self._actuation.put(run, w, q_motors)
@@ -52,4 +52,4 @@ class ShortSearch:
             read_only(np.reshape(found, (count, len(q_motors)))),
             read_only(np.sqrt(errors)),
         )
-        return batch, int(w[layout.single("spent")])
+        return batch, int(w[layout.single("iterations")])

@@ -1,7 +1,7 @@
 r"""A look at the tip of a long chain in equilibrium: how it follows the motors, the held sums and a force.
 
-The loops of `softrobots.compiled.chain.long_chain` with tip columns, and straight-line functions around them. With the columns
-`X = K^-1 J_k^T` the elastostatic Jacobian of a motor `m` is (`softrobots.compiled.chain.tip_motion`)
+The loops of `softrobots.compiled.chain.looped_chain` with tip columns, and straight-line functions around them. With the
+columns `X = K^-1 J_k^T` the elastostatic Jacobian of a motor `m` is (`softrobots.compiled.chain.tip_motion`)
 
 .. math:: E_m = J_m + \omega_m \cdot \sum_{k\,beyond} c_k X_k + c_m \cdot \varphi_m
 
@@ -15,55 +15,55 @@ three tip columns the derivative of the tip with respect to them: from `K X + A^
 from __future__ import annotations
 
 from softrobots.compiled.chain.elements import Load, vector
-from softrobots.compiled.chain.elimination import Beyond
+from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.passing import Passing, TipPlaces
-from softrobots.compiled.chain.recursion import Balance, leave
-from softrobots.compiled.chain.short_chain import seen_backwards
+from softrobots.compiled.chain.recursion import Balance, inward
+from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
 from softrobots.compiled.chain.tip_motion import motor_of
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.unrolled_chain import seen_backwards
 from softrobots.compiled.trace.blocks import Block
 
 CONTROL = '''def look_at_tip(w: Array) -> None:
     """Look how the tip follows motors, held sums and a force, from an equilibrium that was settled."""
-    begin(w)
-    enter_tip_all(w)
-    turn_round(w)
-    turn_round_tip(w)
-    leave_tip_all(w)
-    take_tip_all(w)
+    start_outward(w)
+    outward_tip_all(w)
+    start_inward(w)
+    start_inward_tip(w)
+    inward_tip_all(w)
+    step_tip_all(w)
     finish_tip(w)
     for i in range(N):
         finish_column(w, i)'''
 """The function that goes all the ways."""
 
 
-def tip_frame(unknowns: Unknowns, layout: Layout, passing: Passing, tip: TipPlaces, *, weight: bool) -> list[Block]:
+def tip_frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, tip: TipLayout, *, weight: bool) -> list[Block]:
     """Trace the straight-line functions around the loops.
 
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        passing: Places of what elements pass on.
+        recursion: Places of what elements pass on.
         tip: Places of what the look passes on and finds.
         weight: Whether there is gravity.
 
     Returns:
         The functions.
     """
-    return [_turn_round(tip), _finish(unknowns, layout, passing, tip, weight=weight), _finish_column(passing, tip)]
+    return [_start_inward_tip(tip), _finish(unknowns, layout, recursion, tip, weight=weight), _finish_column(recursion, tip)]
 
 
-def _turn_round(tip: TipPlaces) -> Block:
-    block = Block("turn_round_tip", "Begin the sums of the tip columns.")
+def _start_inward_tip(tip: TipLayout) -> Block:
+    block = Block("start_inward_tip", "Begin the sums of the tip columns.")
     block.store_all(tip.column, [0.0] * (tip.end - tip.column))
     return block
 
 
-def _finish(unknowns: Unknowns, layout: Layout, passing: Passing, tip: TipPlaces, *, weight: bool) -> Block:
+def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, tip: TipLayout, *, weight: bool) -> Block:
     """Add what is beyond each motor, pass the leading motors, and turn all into world axes."""
     block = Block("finish_tip", "Put together what the loops have found of motors and held sums.")
-    axes = vector(block.loads(passing.base, 9)).reshape(3, 3)
+    axes = vector(block.loads(recursion.base, 9)).reshape(3, 3)
     total = vector(block.loads(tip.bends, 9)).reshape(3, 3)
     leading = [
         unknowns.traced(row, lambda motor: block.load(motor), lambda _: 0.0, lambda _: 0.0)
@@ -72,14 +72,14 @@ def _finish(unknowns: Unknowns, layout: Layout, passing: Passing, tip: TipPlaces
     motors = [motor for row in range(len(leading)) if (motor := motor_of(unknowns, row)) is not None]
     loads = []
     for place in (0, 3) if weight else (0,):
-        force, lever = block.loads(passing.force + place, 3), block.loads(passing.lever + place, 3)
+        force, lever = block.loads(recursion.force + place, 3), block.loads(recursion.lever + place, 3)
         loads.append(Load(vector(force), vector(lever), 1.0))
     jacobian = {}
-    for element, entered, motor in zip(leading[::-1], seen_backwards(leading)[::-1], motors[::-1], strict=True):
-        left = leave(element, entered, loads, Beyond.tip(1), Balance())
-        loads = left.loads
-        jacobian[motor] = left.motion.moves[:, 0] + total @ left.motion.twists[:, 0]
-        block.store(tip.motor_torques + motor, left.motion.torque[0])
+    for element, outward_pass, motor in zip(leading[::-1], seen_backwards(leading)[::-1], motors[::-1], strict=True):
+        inward_pass = inward(element, outward_pass, loads, Outboard.tip(1), Balance())
+        loads = inward_pass.loads
+        jacobian[motor] = inward_pass.motion.moves[:, 0] + total @ inward_pass.motion.twists[:, 0]
+        block.store(tip.motor_torques + motor, inward_pass.motion.torque[0])
     for motor in set(range(tip.motors)) - set(jacobian):
         places = [axis * tip.motors + motor for axis in range(3)]
         known, twist = ([block.load(first + place) for place in places] for first in (tip.jacobian, tip.twists))
@@ -87,17 +87,17 @@ def _finish(unknowns: Unknowns, layout: Layout, passing: Passing, tip: TipPlaces
     for motor, column in jacobian.items():
         for axis, value in enumerate((axes @ column).tolist()):
             block.store(tip.jacobian + axis * tip.motors + motor, value)
-    for group in range(tip.held):
-        column = vector([block.load(tip.held_columns + axis * tip.held + group) for axis in range(3)])
+    for group in range(tip.n_constraints):
+        column = vector([block.load(tip.constraint_columns + axis * tip.n_constraints + group) for axis in range(3)])
         for axis, value in enumerate((axes @ column).tolist()):
-            block.store(tip.held_columns + axis * tip.held + group, value)
+            block.store(tip.constraint_columns + axis * tip.n_constraints + group, value)
     return block
 
 
-def _finish_column(passing: Passing, tip: TipPlaces) -> Block:
+def _finish_column(recursion: RecursionLayout, tip: TipLayout) -> Block:
     block = Block("finish_column", "Turn the tip column of an unknown into world axes.", ("i",))
-    axes = vector(block.loads(passing.base, 9)).reshape(3, 3)
-    column = vector([block.load(tip.columns + axis * tip.unknowns, "i") for axis in range(3)])
+    axes = vector(block.loads(recursion.base, 9)).reshape(3, 3)
+    column = vector([block.load(tip.tip_columns + axis * tip.unknowns, "i") for axis in range(3)])
     for axis, value in enumerate((axes @ column).tolist()):
-        block.store(tip.columns + axis * tip.unknowns, value, "i")
+        block.store(tip.tip_columns + axis * tip.unknowns, value, "i")
     return block

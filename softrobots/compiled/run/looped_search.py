@@ -1,7 +1,7 @@
 """Load estimation and inverse kinematics of long chains and of those with muscles.
 
 The searches of `softrobots.statics.force_search` and `softrobots.statics.tip_search`, which the solvers on Pinocchio use, too;
-here generated code settles the springs and looks at the tip (`softrobots.compiled.chain.long_tip`). A step costs some tens of
+here generated code settles the springs and looks at the tip (`softrobots.compiled.chain.looped_tip`). A step costs some tens of
 microseconds.
 """
 
@@ -35,7 +35,7 @@ class ChainState(NamedTuple):
     """Elastic coordinates, shape (n_springs,) [rad or m]."""
 
 
-class ChainSearch:
+class LoopedSearch:
     """Searches for the force or the actuators; the counterpart of the functions in `motor_drivers`."""
 
     def __init__(self, model: SoftModel, actuation: Actuation, run: Any) -> None:
@@ -88,7 +88,7 @@ class ChainSearch:
         single = self.run.layout.single
         if status != Status.CERTIFIED:
             return status, state.w
-        _, state, spent = search_force(problem, problem.looked_at(state), SEARCH_STEPS)
+        _, state, iterations = search_force(problem, problem.looked_at(state), SEARCH_STEPS)
         left, values, _, observable = problem.directions(state)
         unexplained = problem.unexplained(state)
         missing = float(np.linalg.norm(left[:, : len(values)].T @ unexplained))
@@ -96,7 +96,7 @@ class ChainSearch:
         state.w[single("unexplained")], state.w[single("missing")] = float(unexplained @ unexplained), missing**2
         whole = len(values) == 3  # fewer actuators never feel all of a force
         state.w[single("observed")] = float(values[-1]) ** 2 if whole else 0.0
-        state.w[single("spent")] = float(spent)
+        state.w[single("iterations")] = float(iterations)
         if not (whole and observable.all()) and missing <= HIDDEN * size:
             return Status.UNOBSERVABLE, state.w
         return Status.CERTIFIED if missing <= problem.tolerance else Status.NOT_REACHED, state.w
@@ -221,7 +221,7 @@ class ChainSearch:
 class _MeasuredTorques:
     """What `search_force` needs; states that it gets have been looked at."""
 
-    chain: ChainSearch
+    chain: LoopedSearch
     motors: FloatArray
     torques: FloatArray
     gravity: FloatArray
@@ -238,8 +238,8 @@ class _MeasuredTorques:
         self.chain.run.look_at_tip(state.w)
         return state
 
-    def equilibrium(self, force: FloatArray, near: ChainState) -> ChainState | None:
-        status, state = self.chain.settle(self.motors, force, self.gravity, near.q_springs)
+    def equilibrium(self, force: FloatArray, is_near: ChainState) -> ChainState | None:
+        status, state = self.chain.settle(self.motors, force, self.gravity, is_near.q_springs)
         return self.looked_at(state) if status == Status.CERTIFIED else None
 
     def unexplained(self, state: ChainState) -> FloatArray:
@@ -254,7 +254,7 @@ class _SoughtTip:
     """What `tip_search` needs: see `tip_search.SoughtTip`."""
 
     model: SoftModel
-    chain: ChainSearch
+    chain: LoopedSearch
     force: FloatArray
     gravity: FloatArray
     target: FloatArray

@@ -15,16 +15,16 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.compiled.chain.elements import constants
-from softrobots.compiled.chain.elimination import Beyond, Eliminated, eliminate, release
+from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate, eliminate_multipliers
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.short_chain import Evaluation, evaluate, solve_again
 from softrobots.compiled.chain.small_systems import inverse_small, smallest_square, solve_small
 from softrobots.compiled.chain.tip_motion import step_with_motors, tip_motion
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.unrolled_chain import Evaluation, evaluate, solve_again
 from softrobots.compiled.program.generated_module import make_program
 from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.machines import Run
-from softrobots.compiled.settings import LEAST_GUARD as FLOOR
+from softrobots.compiled.run.backends import Run
+from softrobots.compiled.settings import SMALL_PIVOT_SHIFT as FLOOR
 from softrobots.compiled.trace.blocks import Block
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state
@@ -76,9 +76,9 @@ def dense(parts: Sequence[Part]) -> np.ndarray:
     return made
 
 
-def go_back(parts: Sequence[Part], guard: float = 0.0) -> tuple[list[Eliminated], Beyond]:
+def go_back(parts: Sequence[Part], pivot_shift: float = 0.0) -> tuple[list[Eliminated], Outboard]:
     """Eliminate from the tip to the base."""
-    beyond, made = Beyond.tip(len(parts[0].sides)), []
+    beyond, made = Outboard.tip(len(parts[0].sides)), []
     for part in reversed(parts):
         one, beyond = eliminate(
             beyond,
@@ -87,7 +87,7 @@ def go_back(parts: Sequence[Part], guard: float = 0.0) -> tuple[list[Eliminated]
             constants(part.stiffness),
             part.sides.tolist(),
             part.scales.tolist(),
-            guard=guard,
+            pivot_shift=pivot_shift,
         )
         made.append(one)
     return made[::-1], beyond
@@ -132,11 +132,11 @@ def test_elimination_solves_the_dense_system(sizes: list[int], seed: int, stiff:
         found = steps_of(parts, eliminated, side)
         residual = matrix @ found + right
         assert np.abs(residual).max() < 1e-14 * (1.0 + growth) * (1.0 + np.abs(matrix).max() * np.abs(found).max())
-    softest = min(1.0, float(np.abs(pivots / scales).min()))
-    assert float(beyond.softest) == pytest.approx(softest, rel=1e-12 * (1.0 + growth))
+    min_pivot = min(1.0, float(np.abs(pivots / scales).min()))
+    assert float(beyond.min_pivot) == pytest.approx(min_pivot, rel=1e-12 * (1.0 + growth))
     values_ = np.linalg.eigvalsh(matrix)
     if np.abs(values_).min() > 1e-9:
-        assert beyond.negatives == np.sum(values_ < 0.0)
+        assert beyond.n_negative_pivots == np.sum(values_ < 0.0)
 
 
 @given(sizes_, seeds_, st.sampled_from((0.0, 3.0, 20.0)))
@@ -145,7 +145,7 @@ def test_guarded_steps_go_downhill(sizes: list[int], seed: int, stiff: float) ->
     """The matrix that they invert is positive definite; where all pivots are large enough anyway, it is the same matrix."""
     parts = parts_of(np.random.default_rng(seed), sizes, stiff)
     gradient = np.concatenate([part.sides[0] for part in parts])
-    eliminated, beyond = go_back(parts, guard=FLOOR)
+    eliminated, beyond = go_back(parts, pivot_shift=FLOOR)
     plain, same = go_back(parts)
     for one, part in zip(eliminated, parts, strict=True):
         assert np.all(floats(one.inverse_pivots) > 0.0)
@@ -153,21 +153,21 @@ def test_guarded_steps_go_downhill(sizes: list[int], seed: int, stiff: float) ->
     found = steps_of(parts, eliminated, 0)
     assert np.all(np.isfinite(found))
     assert gradient @ found < 0.0
-    if same.negatives == 0.0 and float(same.softest) > FLOOR:
+    if same.n_negative_pivots == 0.0 and float(same.min_pivot) > FLOOR:
         assert found.tolist() == steps_of(parts, plain, 0).tolist()
-        assert beyond.softest == same.softest
+        assert beyond.min_pivot == same.min_pivot
     else:
-        assert beyond.negatives > 0.0 or float(beyond.softest) <= FLOOR  # the state of the matrix is told as it is
+        assert beyond.n_negative_pivots > 0.0 or float(beyond.min_pivot) <= FLOOR  # the state of the matrix is told as it is
 
 
 def test_a_zero_pivot_is_guarded() -> None:
     part = Part(np.zeros((3, 1)), np.zeros((3, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.full(1, 5.0))
-    (one,), beyond = go_back([part], guard=FLOOR)
+    (one,), beyond = go_back([part], pivot_shift=FLOOR)
     assert one.inverse_pivots == [1.0 / (5.0 * FLOOR)]
-    assert (beyond.softest, beyond.negatives) == (0.0, 1.0)
+    assert (beyond.min_pivot, beyond.n_negative_pivots) == (0.0, 1.0)
 
 
-def with_multipliers(beyond: Beyond, count: int) -> Beyond:
+def with_multipliers(beyond: Outboard, count: int) -> Outboard:
     """What is handed on, with components that nothing is coupled with yet."""
     n = len(beyond.matrix)
     matrix = constants(np.zeros((n + count, n + count)))
@@ -178,7 +178,7 @@ def with_multipliers(beyond: Beyond, count: int) -> Beyond:
 
 @given(st.lists(st.integers(2, 4), min_size=2, max_size=4), seeds_, st.sampled_from((0.0, 1.0)))
 @settings(max_examples=60)
-def test_held_sums_are_those_of_the_dense_system_with_multipliers(sizes: list[int], seed: int, guard: float) -> None:
+def test_held_sums_are_those_of_the_dense_system_with_multipliers(sizes: list[int], seed: int, pivot_shift: float) -> None:
     """Sums of the first two coordinates of all elements of a segment are held; one element stands before and behind it.
 
     A sum that is not where it should be is put there by the first step.
@@ -191,8 +191,8 @@ def test_held_sums_are_those_of_the_dense_system_with_multipliers(sizes: list[in
     holds = np.zeros((2, len(gradient)))
     for row in inside:
         holds[[0, 1], [starts[row], starts[row] + 1]] = 1.0
-    softness, gaps = [0.7, 1.3], rng.normal(size=2) * (guard == 0.0)
-    beyond, made, released = Beyond.tip(1), {}, None
+    softness, gaps = [0.7, 1.3], rng.normal(size=2) * (pivot_shift == 0.0)
+    beyond, made, released = Outboard.tip(1), {}, None
     for row in reversed(range(len(parts))):
         part = parts[row]
         if row == inside[-1]:
@@ -207,10 +207,10 @@ def test_held_sums_are_those_of_the_dense_system_with_multipliers(sizes: list[in
             constants(part.stiffness),
             part.sides.tolist(),
             part.scales.tolist(),
-            guard=guard,
+            pivot_shift=pivot_shift,
         )
         if row == inside[0]:
-            released, beyond = release(beyond, gaps, softness)
+            released, beyond = eliminate_multipliers(beyond, gaps, softness)
     assert released is not None
     turn, steps, multipliers = constants(np.zeros(3)), [], np.zeros(2)
     for row, part in enumerate(parts):
@@ -225,14 +225,14 @@ def test_held_sums_are_those_of_the_dense_system_with_multipliers(sizes: list[in
     size = 1.0 + np.abs(step).max()
     assert np.abs(holds @ step + gaps).max() < 1e-9 * size
     whole = np.block([[matrix, holds.T], [holds, np.zeros((2, 2))]])
-    if guard == 0.0:
+    if pivot_shift == 0.0:
         residual = whole @ np.concatenate([step, multipliers]) + np.concatenate([gradient, gaps])
-        smallest = float(beyond.softest)
+        smallest = float(beyond.min_pivot)
         # As above: no pivot is exchanged.
         assert np.abs(residual).max() < 1e-11 * size * (1.0 + 1.0 / smallest**2)
         signs = np.linalg.eigvalsh(whole)
         if np.abs(signs).min() > 1e-9:
-            assert beyond.negatives == np.sum(signs < 0.0)
+            assert beyond.n_negative_pivots == np.sum(signs < 0.0)
     else:
         assert gradient @ step < 0.0
         assert np.all(floats(released.inverse_pivots) < 0.0)  # never guarded
@@ -269,15 +269,18 @@ def program_at(
     return program, functions(program.text), actuation, w
 
 
-def evaluated(run: tuple[Any, dict[str, Any], Actuation, list[float]], unknown: np.ndarray, guard: float = 0.0) -> Any:
+def evaluated(run: tuple[Any, dict[str, Any], Actuation, list[float]], unknown: np.ndarray, pivot_shift: float = 0.0) -> Any:
     """Step, energy and the other numbers of a point."""
     program, code, _, before = run
     w, layout = list(before), program.layout
     w[layout.unknown : layout.unknown + layout.unknowns] = unknown.tolist()
-    w[layout.single("guard")] = guard
+    w[layout.single("pivot_shift")] = pivot_shift
     code["prepare"](w)
     code["evaluate"](w)
-    numbers = {name: w[layout.single(name)] for name in ("energy", "slope", "error", "length", "softest", "negatives", "room")}
+    numbers = {
+        name: w[layout.single(name)]
+        for name in ("energy", "slope", "error", "length", "min_pivot", "n_negative_pivots", "range_margin")
+    }
     return SimpleNamespace(
         step=np.array(w[layout.step : layout.step + layout.unknowns]), tip=np.array(w[layout.tip : layout.tip + 3]), **numbers
     )
@@ -303,14 +306,15 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
         if not held:
             assert found.error == pytest.approx(float(state.residual @ state.residual), rel=1e-9)
             assert found.length == pytest.approx(float(step @ step), rel=1e-9)
-        assert found.negatives == held + np.sum(np.linalg.eigvalsh(state.tangent) < 0.0)
-        assert found.room > 0.0
+        assert found.n_negative_pivots == held + np.sum(np.linalg.eigvalsh(state.tangent) < 0.0)
+        assert found.range_margin > 0.0
         assert np.abs(found.tip - frame_placement(model, state.q, model.tip).translation).max() < 1e-13
         offsets.append((found.energy - state.energy, abs(state.energy) + 1.0))
-        guarded = evaluated(run, unknown, guard=FLOOR)
-        assert guarded.slope < 0.0
-        if guarded.negatives == held and guarded.softest > FLOOR:  # with multipliers, stable springs may have negative pivots
-            assert guarded.step.tolist() == found.step.tolist()
+        shifted = evaluated(run, unknown, pivot_shift=FLOOR)
+        assert shifted.slope < 0.0
+        # With multipliers, stable springs may have negative pivots.
+        if shifted.n_negative_pivots == held and shifted.min_pivot > FLOOR:
+            assert shifted.step.tolist() == found.step.tolist()
     # Energies differ by a constant, that of what does not move.
     assert all(abs(offset - offsets[0][0]) < 1e-12 * scale for offset, scale in offsets)
 
@@ -345,11 +349,11 @@ def test_loops_compute_what_the_straight_line_does(
     for gravity in (None, GRAVITY):
         runs = [program_at(model, motors, force, gravity)]
         with monkeypatch.context() as patch:
-            patch.setattr("softrobots.compiled.chain.unknowns.LONGEST_LINE", 0)
+            patch.setattr("softrobots.compiled.chain.unknowns.MAX_UNROLLED_JOINTS", 0)
             runs.append(program_at(model, motors, force, gravity))
         assert ["enter_all" in code for _, code, _, _ in runs] == [False, True]
-        for guard in (0.0, 1.0):
-            line, loops = (vars(evaluated(run, springs, guard)) for run in runs)
+        for pivot_shift in (0.0, 1.0):
+            line, loops = (vars(evaluated(run, springs, pivot_shift)) for run in runs)
             for name, value in line.items():
                 # The same formulas; rounding of other sums.
                 assert np.allclose(loops[name], value, rtol=1e-10, atol=1e-13), name
@@ -516,7 +520,9 @@ def test_another_right_hand_side_of_a_chain(odd_arm: SoftModel, rng: np.random.G
     unknowns, block, point = traced_at(odd_arm, gravity=False)
     motors, springs = drawn(odd_arm, rng)
     force, right = rng.normal(size=3) * 20.0, rng.normal(size=odd_arm.n_springs)
-    sides = [[float(right[unknowns.place[strain]]) for strain in unknowns.moving(row)] for row in range(len(point.left))]
+    sides = [
+        [float(right[unknowns.place[strain]]) for strain in unknowns.moving(row)] for row in range(len(point.inward_passes))
+    ]
     found = values(block, solve_again(unknowns, point, sides), workspace(odd_arm, motors, springs, force, None))
     tangent = elastic_state(odd_arm, motors, springs, Load.of(odd_arm, force)).tangent
     assert np.allclose(found, -np.linalg.solve(tangent, right), rtol=1e-10, atol=1e-12)

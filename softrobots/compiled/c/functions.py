@@ -6,9 +6,9 @@ import ast
 import textwrap
 from collections.abc import Iterable, Sequence
 
-from softrobots.compiled.c.c_expressions import ARITHMETIC, SUM, Part, Scope, as_float
-from softrobots.compiled.c.c_locals import assigned_in, mentions, plan_locals
+from softrobots.compiled.c.expressions import ARITHMETIC, SUM, Part, Scope, as_float
 from softrobots.compiled.c.kernel_language import WORDS, Function
+from softrobots.compiled.c.local_variables import assigned_in, mentions, plan_locals
 
 C_TYPES = {"none": "void", "int": "int", "bool": "int", "float": "double"}
 """Types in C."""

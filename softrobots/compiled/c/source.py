@@ -11,9 +11,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from softrobots.compiled.c.c_expressions import Scope
-from softrobots.compiled.c.c_functions import FunctionWriter, comment, prototype, wrapped
-from softrobots.compiled.c.c_intrinsics import C_INTRINSICS, NEEDS_WIDE_INTEGERS
+from softrobots.compiled.c.expressions import Scope
+from softrobots.compiled.c.functions import FunctionWriter, comment, prototype, wrapped
+from softrobots.compiled.c.intrinsics import C_INTRINSICS, NEEDS_WIDE_INTEGERS
 from softrobots.compiled.c.kernel_language import Module, Number, read_module
 from softrobots.core.errors import NameNotFound, ParameterError
 

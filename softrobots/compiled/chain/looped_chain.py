@@ -1,12 +1,11 @@
 """Code for a long chain: a body for each kind of element, and loops over the elements.
 
-Three ways per evaluation, each a loop: outwards with the axes (`enter`), back with the loads and the elimination (`leave`),
-outwards again with the steps (`take`). Elements of a kind share their code; numbers in which they differ stand in a table, and
+Three ways per evaluation, each a loop: outwards with the axes (`outward`), back with the loads and the elimination (`inward`),
+outwards again with the steps (`step`). Elements of a kind share their code; numbers in which they differ stand in a table, and
 what an element needs again on a later way is kept in its record in the workspace. The cost is proportional to the number of
 elements.
 
-A look at the tip (`softrobots.compiled.chain.long_tip`) goes the same ways with three more right-hand sides: how the tip moves
-with the unknowns.
+The response of the tip (`softrobots.compiled.chain.looped_tip`) comes of the same passes with three more right-hand sides.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, constants, vector
-from softrobots.compiled.chain.elimination import Beyond
+from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.passing import Passing, TipPlaces, load_beyond, sides, store_beyond
-from softrobots.compiled.chain.recursion import Balance, Left, TracedElement, enter, leave
+from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
+from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout, load_outboard, sides, store_outboard
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Expression, Scalar
@@ -36,7 +35,7 @@ class Kind:
     rows: list[int]
     """Its elements."""
     blocks: list[Block]
-    """`enter`, `leave`, `take`; markers of segments lack the first."""
+    """`outward`, `inward`, `step`; markers of segments lack the first."""
     table: list[float]
     """Numbers in which the elements differ, element by element."""
     width: int
@@ -82,14 +81,14 @@ class TableColumns:
 
 
 def element_kinds(
-    unknowns: Unknowns, layout: Layout, passing: Passing, *, weight: bool, tip: TipPlaces | None = None
+    unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, *, weight: bool, tip: TipLayout | None = None
 ) -> list[Kind]:
     """Trace the code of every kind of element behind the leading motors.
 
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        passing: Places of what elements pass on.
+        recursion: Places of what elements pass on.
         weight: Whether there is gravity.
         tip: For a look at the tip: the places of what that passes on and finds.
 
@@ -100,7 +99,7 @@ def element_kinds(
     for row in range(unknowns.leading_motors, len(unknowns.chain.elements)):
         groups.setdefault(_signature(unknowns, row), []).append(row)
     return [
-        _trace_kind(number, rows, unknowns, layout, passing, weight=weight, tip=tip)
+        _trace_kind(number, rows, unknowns, layout, recursion, weight=weight, tip=tip)
         for number, rows in enumerate(groups.values())
     ]
 
@@ -109,8 +108,8 @@ def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     """What must be the same for two elements to share code."""
     one = unknowns.traced(row, lambda _: 0.0, lambda _: 0.0, lambda _: 0.0)
     zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
-    held = unknowns.multipliers_at(row)
-    return one.kind, one.moving, one.held, held, str(zeros), bool(np.any(one.translation != 0.0))
+    constraint = unknowns.multipliers_at(row)
+    return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0))
 
 
 def _trace_kind(
@@ -118,95 +117,125 @@ def _trace_kind(
     rows: list[int],
     unknowns: Unknowns,
     layout: Layout,
-    passing: Passing,
+    recursion: RecursionLayout,
     *,
     weight: bool,
-    tip: TipPlaces | None,
+    tip: TipLayout | None,
 ) -> Kind:
     names, look = ("at", "row", "q"), "" if tip is None else "tip_"
-    way_out = Block(f"enter_{look}{number}", "Go through an element outwards.", names)
-    trace = way_out.trace
-    way_in = Block(f"leave_{look}{number}", "Go through it inwards and eliminate its coordinates.", names, trace)
-    take = Block(f"take_{look}{number}", "Find its steps.", names, trace)
-    columns = TableColumns(way_out, f"TABLE_{number}", len(rows))
-    element = _common(rows, unknowns, way_out, layout, columns)
-    axes_loads = way_out.loads(passing.axes, 9)
-    entered = enter(element, vector(axes_loads).reshape(3, 3))
-    way_out.store_all(passing.axes, entered.end.ravel().tolist())
+    out = Block(f"outward_{look}{number}", "Go through an element outwards.", names)
+    trace = out.trace
+    back = Block(f"inward_{look}{number}", "Go through it inwards and eliminate its coordinates.", names, trace)
+    step_pass = Block(f"step_{look}{number}", "Find its steps.", names, trace)
+    columns = TableColumns(out, f"TABLE_{number}", len(rows))
+    element = _common(rows, unknowns, out, layout, columns)
+    axes_loads = out.loads(recursion.axes, 9)
+    outward_pass = outward(element, vector(axes_loads).reshape(3, 3))
+    out.store_all(recursion.axes, outward_pass.end.ravel().tolist())
 
     multipliers = unknowns.multipliers_at(rows[0])
-    state, loads, beyond, balance = _arriving(way_in, element, passing, multipliers, weight=weight, tip=tip)
-    guard = way_in.load(layout.single("guard"))
-    left = leave(element, entered, loads, beyond, balance, tip_columns=tip is not None, guard=guard if tip is None else 0.0)
-    way_in.store_all(passing.lever, [one for load in left.loads for one in load.lever])
-    store_beyond(way_in, passing, left.beyond, tip)
+    state, loads, beyond, balance = _arriving(back, element, recursion, multipliers, weight=weight, tip=tip)
+    pivot_shift = back.load(layout.single("pivot_shift"))
+    result = inward(
+        element,
+        outward_pass,
+        loads,
+        beyond,
+        balance,
+        tip_columns=tip is not None,
+        pivot_shift=pivot_shift if tip is None else 0.0,
+    )
+    back.store_all(recursion.lever, [one for load in result.loads for one in load.lever])
+    store_outboard(back, recursion, result.beyond, tip)
     if tip is None:
-        state = [*state, *_add_held(way_in, element, left, passing, multipliers)]
-        way_in.store_all(
-            passing.sums, [balance.energy, balance.weight, balance.room, left.beyond.softest, left.beyond.negatives]
+        state = [*state, *_store_constraints(back, element, result, recursion, multipliers)]
+        back.store_all(
+            recursion.sums,
+            [
+                balance.energy,
+                balance.weight,
+                balance.range_margin,
+                result.beyond.min_pivot,
+                result.beyond.n_negative_pivots,
+            ],
         )
-        second = _take_step(take, element, left, layout, passing, multipliers)
+        second = _store_step(step_pass, element, result, layout, recursion, multipliers)
     else:
-        second = _take_tip(take, way_in, left, layout, passing, tip, multipliers)
-    size = hoist([way_in, take], way_out, [*state, guard, *second], 0, "at", overwritten=axes_loads)
-    size += hoist([take], way_in, second, size, "at", overwritten=state)
-    return Kind(number, rows, [way_out, way_in, take], columns.numbers, columns.width, size)
+        second = _store_tip_step(step_pass, back, result, layout, recursion, tip, multipliers)
+    size = hoist([back, step_pass], out, [*state, pivot_shift, *second], 0, "at", overwritten=axes_loads)
+    size += hoist([step_pass], back, second, size, "at", overwritten=state)
+    return Kind(number, rows, [out, back, step_pass], columns.numbers, columns.width, size)
 
 
-def _add_held(block: Block, element: TracedElement, left: Left, passing: Passing, multipliers: int) -> list[Expression]:
+def _store_constraints(
+    block: Block, element: TracedElement, result: InwardPass, recursion: RecursionLayout, multipliers: int
+) -> list[Expression]:
     """Add an element to the held sums of its segment, and to the torques that hold them; return what they were before."""
-    gaps, torques = block.loads(passing.gaps, multipliers), block.loads(passing.held_torques, multipliers)
+    gaps, torques = block.loads(recursion.gaps, multipliers), block.loads(recursion.constraint_torques, multipliers)
     with_own: list[list[Scalar]] = [list(gaps), list(torques)]
-    for place, held in enumerate(element.held):
-        if held is not None:
-            with_own[0][held] = with_own[0][held] + (element.coordinates[element.moving[place]] - element.rest[place])
-            with_own[1][held] = with_own[1][held] + left.gradient[place]
-    block.store_all(passing.gaps, with_own[0])
-    block.store_all(passing.held_torques, with_own[1])
+    for place, constraint in enumerate(element.constraints):
+        if constraint is not None:
+            with_own[0][constraint] = with_own[0][constraint] + (
+                element.coordinates[element.moving[place]] - element.rest[place]
+            )
+            with_own[1][constraint] = with_own[1][constraint] + result.gradient[place]
+    block.store_all(recursion.gaps, with_own[0])
+    block.store_all(recursion.constraint_torques, with_own[1])
     return [*gaps, *torques]
 
 
-def _take_step(
-    take: Block, element: TracedElement, left: Left, layout: Layout, passing: Passing, multipliers: int
+def _store_step(
+    step_pass: Block,
+    element: TracedElement,
+    result: InwardPass,
+    layout: Layout,
+    recursion: RecursionLayout,
+    multipliers: int,
 ) -> list[Expression]:
     """Find the Newton step of an element; return what it reads that the elements before have written."""
-    turn_loads, sum_loads = take.loads(passing.turn, 3 + multipliers), take.loads(passing.steps, 3)
-    if left.eliminated is not None:
+    turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + multipliers), step_pass.loads(recursion.steps, 3)
+    if result.eliminated is not None:
         turn = vector(turn_loads)
-        steps = left.eliminated.steps(0, turn)
+        steps = result.eliminated.steps(0, turn)
         sums: list[Scalar] = list(sum_loads)
-        means = take.loads(passing.held_torques, multipliers)
+        means = step_pass.loads(recursion.constraint_torques, multipliers)
         for place, step in enumerate(steps):
-            held = element.held[place]
-            residual = left.gradient[place] if held is None else left.gradient[place] - means[held]
-            sums = [sums[0] + left.gradient[place] * step, sums[1] + residual * residual, sums[2] + step * step]
-            take.store(layout.step - layout.unknown + place, step, "q")
-        take.store_all(passing.turn, (turn + left.twists @ steps)[:3].tolist())
-        take.store_all(passing.steps, sums)
+            constraint = element.constraints[place]
+            residual = result.gradient[place] if constraint is None else result.gradient[place] - means[constraint]
+            sums = [sums[0] + result.gradient[place] * step, sums[1] + residual * residual, sums[2] + step * step]
+            step_pass.store(layout.step - layout.unknown + place, step, "q")
+        step_pass.store_all(recursion.turn, (turn + result.twists @ steps)[:3].tolist())
+        step_pass.store_all(recursion.steps, sums)
         return [*turn_loads, *sum_loads, *means]
     return [*turn_loads, *sum_loads]
 
 
-def _take_tip(
-    take: Block, way_in: Block, left: Left, layout: Layout, passing: Passing, tip: TipPlaces, multipliers: int
+def _store_tip_step(
+    step_pass: Block,
+    back: Block,
+    result: InwardPass,
+    layout: Layout,
+    recursion: RecursionLayout,
+    tip: TipLayout,
+    multipliers: int,
 ) -> list[Expression]:
     """Find how an element follows a force on the tip; for a motor, what is known of the Jacobian before the last element."""
-    turn_loads = [take.loads(place, 3 + multipliers) for place in sides(passing.turn, tip.turn)]
-    bend_loads = [take.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
-    if left.eliminated is None:
-        twist, bend = left.motion.twists[:, 0], left.motion.bends[:, 0]
-        way_in.store(tip.motor_torques, left.motion.torque[0], "q")
+    turn_loads = [step_pass.loads(place, 3 + multipliers) for place in sides(recursion.turn, tip.turn)]
+    bend_loads = [step_pass.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
+    if result.eliminated is None:
+        twist, bend = result.motion.twists[:, 0], result.motion.bends[:, 0]
+        back.store(tip.motor_torques, result.motion.torque[0], "q")
         for axis, (nearer, turn) in enumerate(zip(bend_loads, turn_loads[1:], strict=True)):
-            follow = left.motion.moves[axis, 0] - twist @ vector(nearer) + bend @ vector(turn[:3])
-            take.store(tip.jacobian + axis * tip.motors, follow, "q")
-            way_in.store(tip.twists + axis * tip.motors, twist[axis], "q")
+            follow = result.motion.moves[axis, 0] - twist @ vector(nearer) + bend @ vector(turn[:3])
+            step_pass.store(tip.jacobian + axis * tip.motors, follow, "q")
+            back.store(tip.twists + axis * tip.motors, twist[axis], "q")
     else:
-        steps = [left.eliminated.steps(side, vector(turn)) for side, turn in enumerate(turn_loads)]
-        for place, turn, step in zip(sides(passing.turn, tip.turn), turn_loads, steps, strict=True):
-            take.store_all(place, (vector(turn) + left.twists @ step)[:3].tolist())
+        steps = [result.eliminated.steps(side, vector(turn)) for side, turn in enumerate(turn_loads)]
+        for place, turn, step in zip(sides(recursion.turn, tip.turn), turn_loads, steps, strict=True):
+            step_pass.store_all(place, (vector(turn) + result.twists @ step)[:3].tolist())
         for axis, (nearer, step) in enumerate(zip(bend_loads, steps[1:], strict=True)):
-            take.store_all(tip.columns + axis * tip.unknowns - layout.unknown, step.tolist(), "q")
-            take.store_all(tip.bends + 3 * axis, (vector(nearer) + left.motion.bends @ step).tolist())
+            step_pass.store_all(tip.tip_columns + axis * tip.unknowns - layout.unknown, step.tolist(), "q")
+            step_pass.store_all(tip.bends + 3 * axis, (vector(nearer) + result.motion.bends @ step).tolist())
     return [one for part in (*turn_loads, *bend_loads) for one in part]
 
 
@@ -248,20 +277,20 @@ def _relaxed(ones: Sequence[TracedElement], block: Block, layout: Layout, column
     at_rest: list[Scalar] = columns.entries([one.rest for one in ones]).tolist()
     start = layout.start - layout.unknown
     return [
-        rest if held is None else block.load(start + place, "q")
-        for place, (rest, held) in enumerate(zip(at_rest, ones[0].held, strict=True))
+        rest if constraint is None else block.load(start + place, "q")
+        for place, (rest, constraint) in enumerate(zip(at_rest, ones[0].constraints, strict=True))
     ]
 
 
 def _arriving(
-    block: Block, element: TracedElement, passing: Passing, multipliers: int, *, weight: bool, tip: TipPlaces | None
-) -> tuple[list[Expression], list[Load], Beyond, Balance]:
+    block: Block, element: TracedElement, recursion: RecursionLayout, multipliers: int, *, weight: bool, tip: TipLayout | None
+) -> tuple[list[Expression], list[Load], Outboard, Balance]:
     """What an element finds on the way back."""
-    levers = block.loads(passing.lever, 6 if weight else 3)
-    forces = block.loads(passing.force, 6 if weight else 3)
+    levers = block.loads(recursion.lever, 6 if weight else 3)
+    forces = block.loads(recursion.force, 6 if weight else 3)
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0)]
     if weight:
         loads.append(Load(vector(forces[3:]), vector(levers[3:]), element.mass_beyond))
-    sums = block.loads(passing.sums, 5)
-    beyond, state = load_beyond(block, passing, 3 + multipliers, tip)
+    sums = block.loads(recursion.sums, 5)
+    beyond, state = load_outboard(block, recursion, 3 + multipliers, tip)
     return [*levers, *state, *sums], loads, beyond, Balance(sums[0], sums[1], sums[2])

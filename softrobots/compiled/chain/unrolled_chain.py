@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Vector, constants, turned, vector
-from softrobots.compiled.chain.elimination import Beyond
+from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.recursion import Balance, Entered, Left, TracedElement, enter, leave
+from softrobots.compiled.chain.recursion import Balance, InwardPass, OutwardPass, TracedElement, inward, outward
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
@@ -25,7 +25,7 @@ from softrobots.compiled.trace.expressions import Scalar
 class Evaluation:
     """A chain at given coordinates, traced; vectors in the axes behind the leading motors."""
 
-    left: list[Left]
+    inward_passes: list[InwardPass]
     """What is known of each element, the leading motors included."""
     turns: list[list[Vector]]
     """By element and right-hand side: the turn of all that is nearer to the base."""
@@ -37,7 +37,7 @@ class Evaluation:
     """Newton step of the unknowns."""
     balance: Balance
     """Sums over the elements."""
-    beyond: Beyond
+    beyond: Outboard
     """Pivots."""
     energy: Scalar
     """Elastic energy plus potential of the loads, up to a constant [J]."""
@@ -60,7 +60,7 @@ def evaluate(
     at_rest: bool = False,
     forceless: bool = False,
     tip_columns: bool = False,
-    guarded: bool = False,
+    shift_pivots: bool = False,
 ) -> Evaluation:
     """Trace a chain at the coordinates in the workspace.
 
@@ -72,7 +72,7 @@ def evaluate(
         at_rest: Take the unknowns at rest, whatever the workspace says.
         forceless: Take no force on the tip.
         tip_columns: Solve for the motion of the tip, too.
-        guarded: Make pivots positive if the workspace says so.
+        shift_pivots: Make pivots positive if the workspace says so.
 
     Returns:
         Everything about that point.
@@ -93,38 +93,40 @@ def evaluate(
     force = constants(np.zeros(3)) if forceless else base_axes.T @ vector(block.loads(layout.force, 3))
     forces = [force, base_axes.T @ vector(block.loads(layout.gravity, 3))] if weight else [force]
 
-    axes, way_out = constants(np.eye(3)), []
+    axes, outward_passes = constants(np.eye(3)), []
     for element in elements[leading:]:
-        way_out.append(enter(element, axes))
-        axes = way_out[-1].end
+        outward_passes.append(outward(element, axes))
+        axes = outward_passes[-1].end
     levers, shares = [axes @ constants(chain.tip_translation), constants(np.zeros(3))], [1.0, 0.0]
     loads = [Load(*one) for one in zip(forces, levers, shares, strict=False)]
-    guard = block.load(layout.single("guard")) if guarded else 0.0
+    pivot_shift = block.load(layout.single("pivot_shift")) if shift_pivots else 0.0
 
-    way_out = seen_backwards(elements[:leading]) + way_out
-    beyond, balance = Beyond.tip(4 if tip_columns else 1), Balance()
-    left: list[Left | None] = [None] * len(elements)
+    outward_passes = seen_backwards(elements[:leading]) + outward_passes
+    beyond, balance = Outboard.tip(4 if tip_columns else 1), Balance()
+    inward_passes: list[InwardPass | None] = [None] * len(elements)
     energy: Scalar = 0.0
     tip = loads[0].lever
     for row in reversed(range(len(elements))):
-        one = leave(elements[row], way_out[row], loads, beyond, balance, tip_columns=tip_columns, guard=guard)
-        left[row], loads, beyond = one, one.loads, one.beyond
+        one = inward(
+            elements[row], outward_passes[row], loads, beyond, balance, tip_columns=tip_columns, pivot_shift=pivot_shift
+        )
+        inward_passes[row], loads, beyond = one, one.loads, one.beyond
         if row == leading:
             tip = loads[0].lever
             energy = balance.energy - sum(load.force @ load.lever for load in loads)
     return _solved(
         unknowns,
-        [one for one in left if one is not None],
+        [one for one in inward_passes if one is not None],
         4 if tip_columns else 1,
         Evaluation([], [], [], [], [], balance, beyond, energy, tip, base_axes, base, force),
     )
 
 
-def _solved(unknowns: Unknowns, left: list[Left], sides: int, made: Evaluation) -> Evaluation:
+def _solved(unknowns: Unknowns, inward_passes: list[InwardPass], sides: int, made: Evaluation) -> Evaluation:
     """Find the steps on the second way out."""
     turns = [constants(np.zeros(3)) for _ in range(sides)]
     by_strain: dict[int, tuple[Scalar, Scalar]] = {}
-    for row, one in enumerate(left):
+    for row, one in enumerate(inward_passes):
         made.turns.append(list(turns))
         steps: list[Vector] = [constants(np.zeros(0))] * sides
         if one.eliminated is not None:
@@ -133,7 +135,7 @@ def _solved(unknowns: Unknowns, left: list[Left], sides: int, made: Evaluation) 
                 by_strain[strain] = (one.gradient[place], steps[0][place])
             turns = [turn + one.twists @ step for turn, step in zip(turns, steps, strict=True)]
         made.steps.append(steps)
-    made.left = left
+    made.inward_passes = inward_passes
     made.gradient, made.step = ([by_strain[strain][kind] for strain in unknowns.strains] for kind in range(2))
     return made
 
@@ -150,8 +152,8 @@ def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[
         Step of each unknown.
     """
     total, columns = constants(np.zeros(3)), {}
-    for row in reversed(range(len(point.left))):
-        one = point.left[row]
+    for row in reversed(range(len(point.inward_passes))):
+        one = point.inward_passes[row]
         if one.eliminated is not None:
             eliminated = one.eliminated
             column = eliminated.reduced([value + one.twists[:, j] @ total for j, value in enumerate(sides[row])])
@@ -162,7 +164,7 @@ def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[
     steps: dict[int, Scalar] = {}
     for row, eliminated in sorted(columns.items()):
         moved = eliminated.steps(0, turn)
-        turn = turn + point.left[row].twists @ moved
+        turn = turn + point.inward_passes[row].twists @ moved
         steps |= dict(zip(unknowns.moving(row), moved, strict=True))
     return [steps[strain] for strain in unknowns.strains]
 
@@ -179,12 +181,12 @@ def place_base(leading: list[TracedElement]) -> tuple[Any, Vector]:
     return axes, origin
 
 
-def seen_backwards(leading: list[TracedElement]) -> list[Entered]:
+def seen_backwards(leading: list[TracedElement]) -> list[OutwardPass]:
     """The leading motors as seen from behind the last of them."""
     axes, made = constants(np.eye(3)), []
     for element in reversed(leading):
         start = turned(axes, -element.coordinates[0]) if element.kind == "turn" else axes
         before = start @ element.rotation.T
-        made.append(Entered(start, before @ element.translation, axes, None))
+        made.append(OutwardPass(start, before @ element.translation, axes, None))
         axes = before
     return made[::-1]

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softrobots.compiled.chain.constrained_segments import segment_blocks
 from softrobots.compiled.chain.elements import Load, constants, vector
-from softrobots.compiled.chain.held_segments import segment_blocks
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.long_chain import Kind, element_kinds
-from softrobots.compiled.chain.long_tip import CONTROL as LOOK
-from softrobots.compiled.chain.long_tip import tip_frame
-from softrobots.compiled.chain.passing import Passing, TipPlaces
-from softrobots.compiled.chain.short_chain import place_base
+from softrobots.compiled.chain.looped_chain import Kind, element_kinds
+from softrobots.compiled.chain.looped_tip import CONTROL as LOOK
+from softrobots.compiled.chain.looped_tip import tip_frame
+from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.program.passes import decide, go_on, point_numbers
 from softrobots.compiled.settings import LEAST_SIZE
 from softrobots.compiled.trace.blocks import Block
@@ -24,7 +24,7 @@ from softrobots.model.serial_chain import ChainJoint
 
 
 @dataclass(frozen=True)
-class LongProgram:
+class LoopedProgram:
     """The parts of the code."""
 
     blocks: list[Block]
@@ -39,10 +39,10 @@ class LongProgram:
     """Size of the workspace that equilibria need."""
     size: int
     """Size of the workspace."""
-    tip: TipPlaces
+    tip: TipLayout
     """Places in it of what a look finds."""
     stages: dict[str, list[tuple[int, str]]]
-    """Of each of the three ways, `enter`, `leave`, `take`, and of those of a look: what is called for elements of which
+    """Of each of the three ways, `outward`, `inward`, `take`, and of those of a look: what is called for elements of which
     kind."""
 
     def loops(self, suffix: str = "") -> str:
@@ -58,7 +58,7 @@ class LongProgram:
     def _way(self, way: str, suffix: str) -> str:
         # The bounds come from the workspace: compilers would unroll a loop whose length they know, for minutes.
         place = " * LANES" if suffix else ""
-        back = way.startswith("leave")
+        back = way.startswith("inward")
         lines = [
             f"def {way}_all{suffix}(w: Array) -> None:",
             f'    """{_WAYS[way.removesuffix("_tip")]}"""',
@@ -74,18 +74,18 @@ class LongProgram:
 
 
 _WAYS = {
-    "enter": "Go outwards with the axes.",
-    "leave": "Go back with the loads and eliminate.",
-    "take": "Go outwards with the steps.",
+    "outward": "Go outwards with the axes.",
+    "inward": "Go back with the loads and eliminate.",
+    "step": "Go outwards with the steps.",
 }
 
 _CONTROL = '''def evaluate_SUFFIX(w: Array) -> None:
     """Evaluate the point: Newton step, energy, residual, pivots."""
-    begin_SUFFIX(w)
-    enter_all_SUFFIX(w)
-    turn_round_SUFFIX(w)
-    leave_all_SUFFIX(w)
-    take_all_SUFFIX(w)
+    start_outward_SUFFIX(w)
+    outward_all_SUFFIX(w)
+    start_inward_SUFFIX(w)
+    inward_all_SUFFIX(w)
+    step_all_SUFFIX(w)
     finish_SUFFIX(w)
 
 
@@ -101,13 +101,13 @@ def first_pass_SUFFIX(w: Array) -> None:
     """Prepare, evaluate the robot at its start, and go on from there."""
     prepare_SUFFIX(w)
     start_SUFFIX(w)
-    if HELD == 0:
+    if N_CONSTRAINTS == 0:
         for i in range(N):
             relax_SUFFIX(w, i)
     newton_pass_SUFFIX(w)'''
 
 
-def long_program(unknowns: Unknowns, layout: Layout, *, weight: bool) -> LongProgram:
+def looped_program(unknowns: Unknowns, layout: Layout, *, weight: bool) -> LoopedProgram:
     """Trace the functions that find equilibria of a long chain.
 
     Args:
@@ -118,40 +118,40 @@ def long_program(unknowns: Unknowns, layout: Layout, *, weight: bool) -> LongPro
     Returns:
         The program.
     """
-    passing = Passing(layout.prepared)
+    recursion = RecursionLayout(layout.prepared)
     tables: dict[str, tuple[float, ...] | tuple[int, ...]] = {}
     stages: dict[str, list[tuple[int, str]]] = {}
-    kinds = element_kinds(unknowns, layout, passing, weight=weight)
+    kinds = element_kinds(unknowns, layout, recursion, weight=weight)
     # Before the records: the share of the step that a pass goes, and the bounds of the loops.
-    blocks, sequence, lane_size = _sequence(unknowns, layout, passing, kinds, passing.end + 3, stages)
-    tip = TipPlaces(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.held))
-    looking = element_kinds(unknowns, layout, passing, weight=weight, tip=tip)
-    look, look_sequence, size = _sequence(unknowns, layout, passing, looking, tip.end, stages, tip)
+    blocks, sequence, lane_size = _sequence(unknowns, layout, recursion, kinds, recursion.end + 3, stages)
+    tip = TipLayout(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.held))
+    looking = element_kinds(unknowns, layout, recursion, weight=weight, tip=tip)
+    look, look_sequence, size = _sequence(unknowns, layout, recursion, looking, tip.end, stages, tip)
     tables |= {f"TABLE_{kind.number}": tuple(kind.table) for kind in kinds if kind.table}
     for name, column in zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True):
         tables[name] = tuple(column)
     tables["AT_TIP"] = tuple(at for _, at, _, _ in look_sequence)
-    bounds = {"FIRST": passing.end + 1, "COUNT": passing.end + 2, "N_ELEMENTS": len(sequence)}
-    frame = _frame(unknowns, layout, passing, len(sequence), weight=weight)
-    look = tip_frame(unknowns, layout, passing, tip, weight=weight) + look
-    return LongProgram(frame + blocks, look, tables, bounds | tip.constants(), lane_size, size, tip, stages)
+    bounds = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}
+    frame = _frame(unknowns, layout, recursion, len(sequence), weight=weight)
+    look = tip_frame(unknowns, layout, recursion, tip, weight=weight) + look
+    return LoopedProgram(frame + blocks, look, tables, bounds | tip.constants(), lane_size, size, tip, stages)
 
 
 def _sequence(
     unknowns: Unknowns,
     layout: Layout,
-    passing: Passing,
+    recursion: RecursionLayout,
     kinds: list[Kind],
     record: int,
     stages: dict[str, list[tuple[int, str]]],
-    tip: TipPlaces | None = None,
+    tip: TipLayout | None = None,
 ) -> tuple[list[Block], list[tuple[int, int, int, int]], int]:
     """Put the elements in order, with the ends of held segments between them.
 
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        passing: Places of what elements pass on.
+        recursion: Places of what elements pass on.
         kinds: The kinds of elements.
         record: Place of the first record.
         stages: What is called for which kind; added to.
@@ -162,27 +162,30 @@ def _sequence(
         place behind the records.
     """
     way, look, at = ("", "", "AT[i]") if tip is None else ("_tip", "tip_", "AT_TIP[i]")
-    enter, leave, take = (stages.setdefault(one + way, []) for one in _WAYS)
+    outward_calls, inward_calls, step_calls = (stages.setdefault(one + way, []) for one in _WAYS)
     steps: dict[int, tuple[int, int, int, int]] = {}  # by element
     for kind in kinds:
         for place, row in enumerate(kind.rows):
             steps[row] = (kind.number, record, place * kind.width, _coordinate(unknowns, layout, row))
             record += kind.record
-        for name, calls in (("enter", enter), ("leave", leave), ("take", take)):
+        for name, calls in (("outward", outward_calls), ("inward", inward_calls), ("step", step_calls)):
             calls.append((kind.number, f"{name}_{look}{kind.number}(w, {at}, ROW[i], PLACE[i])"))
     blocks = [block for kind in kinds for block in kind.blocks]
     sequence = [steps[row] for row in sorted(steps)]
     ends = list(zip(range(len(unknowns.segment_spans)), unknowns.segment_spans, strict=True))
     for segment, (first, last) in reversed(ends):
-        made, size = segment_blocks(unknowns, passing, segment, tip)
+        made, size = segment_blocks(unknowns, recursion, segment, tip)
         blocks += made
         base, end = len(kinds) + 2 * segment, len(kinds) + 2 * segment + 1
         leading = unknowns.leading_motors
         sequence.insert(last + 1 - leading, (end, 0, 0, 0))
         sequence.insert(first - leading, (base, record, 0, 0))
         record += size
-        leave += [(end, f"hold_{look}{segment}(w)"), (base, f"release_{look}{segment}(w, {at})")]
-        take.append((base, f"let_go_{look}{segment}(w, {at})"))
+        inward_calls += [
+            (end, f"add_multipliers_{look}{segment}(w)"),
+            (base, f"eliminate_multipliers_{look}{segment}(w, {at})"),
+        ]
+        step_calls.append((base, f"solve_multipliers_{look}{segment}(w, {at})"))
     return blocks, sequence, record
 
 
@@ -194,21 +197,21 @@ def _coordinate(unknowns: Unknowns, layout: Layout, row: int) -> int:
     return layout.unknown + unknowns.place[unknowns.moving(row)[0]]
 
 
-def _frame(unknowns: Unknowns, layout: Layout, passing: Passing, count: int, *, weight: bool) -> list[Block]:
+def _frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, count: int, *, weight: bool) -> list[Block]:
     """The straight-line functions around the loops."""
     return [
-        _prepare(unknowns, layout, passing, count),
-        _begin(passing),
-        _turn_round(unknowns, passing, weight=weight),
-        _finish(unknowns, layout, passing, weight=weight),
-        _decide(unknowns, layout, passing),
-        _advance(layout, passing),
+        _prepare(unknowns, layout, recursion, count),
+        _start_outward(recursion),
+        _start_inward(unknowns, recursion, weight=weight),
+        _finish(unknowns, layout, recursion, weight=weight),
+        _decide(unknowns, layout, recursion),
+        _advance(layout, recursion),
         _start(layout),
         _relax(unknowns, layout),
     ]
 
 
-def _prepare(unknowns: Unknowns, layout: Layout, passing: Passing, count: int) -> Block:
+def _prepare(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, count: int) -> Block:
     block = Block("prepare", "Compute what depends on motors and load only.")
     leading = [
         unknowns.traced(row, lambda motor: block.load(motor), lambda _: 0.0, lambda _: 0.0)
@@ -216,35 +219,35 @@ def _prepare(unknowns: Unknowns, layout: Layout, passing: Passing, count: int) -
     ]
     axes, origin = place_base(leading)
     for place, load in ((0, layout.force), (3, layout.gravity)):
-        block.store_all(passing.force + place, (axes.T @ vector(block.loads(load, 3))).tolist())
-    block.store_all(passing.base, [*axes.ravel().tolist(), *origin.tolist()])
-    block.store_all(passing.end + 1, [0.0, float(count)])
+        block.store_all(recursion.force + place, (axes.T @ vector(block.loads(load, 3))).tolist())
+    block.store_all(recursion.base, [*axes.ravel().tolist(), *origin.tolist()])
+    block.store_all(recursion.end + 1, [0.0, float(count)])
     return block
 
 
-def _begin(passing: Passing) -> Block:
-    block = Block("begin", "Stand at the base.")
-    block.store_all(passing.axes, constants(np.eye(3)).ravel().tolist())
+def _start_outward(recursion: RecursionLayout) -> Block:
+    block = Block("start_outward", "Stand at the base.")
+    block.store_all(recursion.axes, constants(np.eye(3)).ravel().tolist())
     return block
 
 
-def _turn_round(unknowns: Unknowns, passing: Passing, *, weight: bool) -> Block:
-    block = Block("turn_round", "Stand at the tip, with nothing beyond.")
-    axes = vector(block.loads(passing.axes, 9)).reshape(3, 3)
+def _start_inward(unknowns: Unknowns, recursion: RecursionLayout, *, weight: bool) -> Block:
+    block = Block("start_inward", "Stand at the tip, with nothing beyond.")
+    axes = vector(block.loads(recursion.axes, 9)).reshape(3, 3)
     lever = (axes @ constants(unknowns.chain.tip_translation)).tolist()
-    block.store_all(passing.lever, [*lever, 0.0, 0.0, 0.0] if weight else lever)
-    block.store_all(passing.matrix, [0.0] * 6)
-    block.store_all(passing.column, [0.0] * 3)
-    block.store_all(passing.turn, [0.0] * 3)
-    block.store_all(passing.sums, [0.0, 0.0, 1.0, 1.0, 0.0])
-    block.store_all(passing.steps, [0.0, 0.0, 0.0])
+    block.store_all(recursion.lever, [*lever, 0.0, 0.0, 0.0] if weight else lever)
+    block.store_all(recursion.matrix, [0.0] * 6)
+    block.store_all(recursion.column, [0.0] * 3)
+    block.store_all(recursion.turn, [0.0] * 3)
+    block.store_all(recursion.sums, [0.0, 0.0, 1.0, 1.0, 0.0])
+    block.store_all(recursion.steps, [0.0, 0.0, 0.0])
     return block
 
 
-def _finish(unknowns: Unknowns, layout: Layout, passing: Passing, *, weight: bool) -> Block:
+def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, *, weight: bool) -> Block:
     block = Block("finish", "Put together what the loops have summed up.")
-    sums, steps = block.loads(passing.sums, 5), block.loads(passing.steps, 3)
-    levers, forces = block.loads(passing.lever, 6), block.loads(passing.force, 6)
+    sums, steps = block.loads(recursion.sums, 5), block.loads(recursion.steps, 3)
+    levers, forces = block.loads(recursion.lever, 6), block.loads(recursion.force, 6)
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0), Load(vector(forces[3:]), vector(levers[3:]), 0.0)]
     energy: Scalar = sums[0] - sum((one.force @ one.lever for one in loads[: 2 if weight else 1]), 0.0)
     load = _square(block.loads(layout.force, 3)) * unknowns.chain.reach**2 + sums[1]
@@ -257,46 +260,46 @@ def _finish(unknowns: Unknowns, layout: Layout, passing: Passing, *, weight: boo
         energy=energy,
         elastic=sums[0],
         load=larger(load, LEAST_SIZE**2),
-        room=sums[2],
-        softest=sums[3],
-        negatives=sums[4],
+        range_margin=sums[2],
+        min_pivot=sums[3],
+        n_negative_pivots=sums[4],
     )
     for name, value in numbers.items():
         block.store(layout.single(name), value)
-    base = block.loads(passing.base, 12)
+    base = block.loads(recursion.base, 12)
     block.store_all(layout.tip, (vector(base[9:]) + vector(base[:9]).reshape(3, 3) @ loads[0].lever).tolist())
     return block
 
 
-def _decide(unknowns: Unknowns, layout: Layout, passing: Passing) -> Block:
+def _decide(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout) -> Block:
     block = Block("decide", "Decide what becomes of the case.")
-    names = ("energy", "slope", "error", "length", "size", "rounding", "softest", "negatives", "room")
+    names = ("energy", "slope", "error", "length", "size", "rounding", "min_pivot", "n_negative_pivots", "range_margin")
     point: dict[str, Scalar] = {name: block.load(layout.single(name)) for name in names}
     mode, share = decide(
         block,
         layout,
         point,
-        held=len(unknowns.chain.held),
+        n_constraints=len(unknowns.chain.held),
         spring_rounding=unknowns.spring_rounding,
         mode=block.load(layout.single("mode")),
         bound=block.load(layout.single("bound")),
     )
     del mode
-    block.store(passing.end, share)
+    block.store(recursion.end, share)
     return block
 
 
-def _advance(layout: Layout, passing: Passing) -> Block:
+def _advance(layout: Layout, recursion: RecursionLayout) -> Block:
     block = Block("advance", "Go on with one unknown, if the case goes on.", ("i",))
     unknown, step = block.load(layout.unknown, "i"), block.load(layout.step, "i")
-    share, mode = block.load(passing.end), block.load(layout.single("mode"))
+    share, mode = block.load(recursion.end), block.load(layout.single("mode"))
     block.store(layout.unknown, go_on(mode, unknown, share, step), "i")
     return block
 
 
 def _start(layout: Layout) -> Block:
     block = Block("start", "Begin a case.")
-    for name, value in (("mode", 0.0), ("bound", 1e300), ("guard", 0.0)):
+    for name, value in (("mode", 0.0), ("bound", 1e300), ("pivot_shift", 0.0)):
         block.store(layout.single(name), value)
     return block
 

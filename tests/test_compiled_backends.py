@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.compiled.c.c_source import to_c
 from softrobots.compiled.c.kernel_language import read_module
+from softrobots.compiled.c.source import to_c
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import Program, make_program
-from softrobots.compiled.run import machines
-from softrobots.compiled.run.machines import NumbaRun, PythonRun, available_backend, cache_folder, make_run
+from softrobots.compiled.run import backends
+from softrobots.compiled.run.backends import NumbaRun, PythonRun, available_backend, cache_folder, make_run
 from softrobots.model.soft_model import SoftModel
 from tests.support.serial_chains import ROBOTS
 from tests.support.tables import each_row
@@ -60,8 +60,8 @@ def test_the_places_of_the_workspace_do_not_overlap(kind: str) -> None:
     motors, unknowns = layout.motors, layout.unknowns
     varied = max(motors, 3) + unknowns
     sizes = dict(MOTORS=motors, FORCE=3, GRAVITY=3, PULL=unknowns, START=unknowns, UNKNOWN=unknowns, STEP=unknowns)
-    sizes |= dict(KEPT=unknowns, WAY=unknowns, TIP=3, TORQUES=motors, TARGET=3, FOLLOWING=3)
-    sizes |= dict(AHEAD=varied, BEFORE=varied, FORESEEN=varied, CORRECTION=varied)
+    sizes |= dict(LINE_ORIGIN=unknowns, LINE_DIRECTION=unknowns, TIP=3, TORQUES=motors, TARGET=3, NEXT_TARGET=3)
+    sizes |= dict(NEXT_POINT=varied, PREVIOUS=varied, PREDICTED=varied, CORRECTION=varied)
     places = layout.constants()
     taken: list[int] = []
     for name, place in places.items():
@@ -74,7 +74,7 @@ def test_the_places_of_the_workspace_do_not_overlap(kind: str) -> None:
 SCRIPT = """
 import hashlib, sys
 import softrobots as sr
-from softrobots.compiled.run.machines import cache_folder
+from softrobots.compiled.run.backends import cache_folder
 for robot in (sr.InflatableArm(), sr.PccArm(segment_lengths=(0.5, 0.4), bending_stiffness=(1.9, 1.2), elastic_sections=2)):
     text = sr.compile(sr.load_model(robot), backend="python").source(lanes=True)
     print(hashlib.sha256(text.encode()).hexdigest())
@@ -168,13 +168,13 @@ def module_text(number: int) -> str:
 def test_a_text_becomes_a_module_in_a_file_of_its_own(no_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOFTROBOTS_CACHE", str(no_folder / "cache"))
     text = module_text(1_000_001)
-    module = machines._module(text)
+    module = backends._module(text)
     assert module.NUMBER == 1_000_001
     assert sys.modules[module.__name__] is module
     file = no_folder / "cache" / f"{module.__name__}.py"
     assert file.read_text(encoding="utf-8") == text
-    assert machines._module(text) is module
-    assert machines._module(module_text(1_000_002)).NUMBER == 1_000_002
+    assert backends._module(text) is module
+    assert backends._module(module_text(1_000_002)).NUMBER == 1_000_002
     assert sorted(one.suffix for one in (no_folder / "cache").iterdir() if one.is_file()) == [".py", ".py"]
 
 
@@ -184,7 +184,7 @@ def test_a_damaged_file_is_written_anew(no_folder: Path, monkeypatch: pytest.Mon
     text = module_text(2_000_000 + len(damage))
     file = no_folder / f"softrobots_{hashlib.sha256(text.encode()).hexdigest()[:24]}.py"
     file.write_text(damage, encoding="utf-8")
-    module = machines._module(text)
+    module = backends._module(text)
     assert len(damage) + 2_000_000 == module.NUMBER
     assert file.read_text(encoding="utf-8") == text
 
@@ -192,7 +192,7 @@ def test_a_damaged_file_is_written_anew(no_folder: Path, monkeypatch: pytest.Mon
 RACE = """
 import sys, time
 from pathlib import Path
-from softrobots.compiled.run.machines import _module
+from softrobots.compiled.run.backends import _module
 here = Path(sys.argv[1])
 (here / sys.argv[2]).touch()
 while len(list(here.glob("ready*"))) < 2:

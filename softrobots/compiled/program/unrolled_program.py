@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.short_chain import Evaluation, evaluate
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.unrolled_chain import Evaluation, evaluate
 from softrobots.compiled.program.passes import decide, dot, go_on, point_numbers
 from softrobots.compiled.settings import LEAST_SIZE
 from softrobots.compiled.trace.blocks import Block, hoist
@@ -30,12 +30,12 @@ def equilibrium_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> t
     at_point = evaluate(unknowns, newton_pass, layout, weight=weight)
     _advance(newton_pass, layout, unknowns, at_point, starts=False)
     point = Block("evaluate", "Evaluate the point: Newton step, energy, residual, pivots.", trace=trace)
-    guarded = evaluate(unknowns, point, layout, weight=weight, guarded=True)
-    for name, value in numbers(unknowns, layout, point, guarded).items():
+    shift_pivots = evaluate(unknowns, point, layout, weight=weight, shift_pivots=True)
+    for name, value in numbers(unknowns, layout, point, shift_pivots).items():
         point.store(layout.single(name), value)
-    point.store_all(layout.step, guarded.step)
-    store_tip(point, layout, guarded)
-    singles = [point.load(layout.single(one)) for one in ("mode", "bound", "guard")]
+    point.store_all(layout.step, shift_pivots.step)
+    store_tip(point, layout, shift_pivots)
+    singles = [point.load(layout.single(one)) for one in ("mode", "bound", "pivot_shift")]
     varying = [*point.loads(layout.unknown, layout.unknowns), *singles]
     count = hoist([newton_pass, point], prepare, varying, layout.prepared)
     first_pass = Block("first_pass", "Prepare, evaluate the robot at its start, and go on from there.", trace=trace)
@@ -56,9 +56,9 @@ def numbers(unknowns: Unknowns, layout: Layout, block: Block, made: Evaluation) 
         energy=made.energy,
         elastic=made.balance.energy,
         load=larger(load, LEAST_SIZE**2),
-        room=made.balance.room,
-        softest=made.beyond.softest,
-        negatives=made.beyond.negatives,
+        range_margin=made.balance.range_margin,
+        min_pivot=made.beyond.min_pivot,
+        n_negative_pivots=made.beyond.n_negative_pivots,
     )
 
 
@@ -74,7 +74,7 @@ def _advance(block: Block, layout: Layout, unknowns: Unknowns, made: Evaluation,
         block,
         layout,
         numbers(unknowns, layout, block, made),
-        held=0,
+        n_constraints=0,
         spring_rounding=unknowns.spring_rounding,
         mode=0.0 if starts else block.load(layout.single("mode")),
         bound=1e300 if starts else block.load(layout.single("bound")),

@@ -1,0 +1,73 @@
+"""The ends of a segment whose muscle lengths are given: its multipliers come in at its tip and are eliminated at its base."""
+
+from __future__ import annotations
+
+from softrobots.compiled.chain.elements import vector
+from softrobots.compiled.chain.elimination import eliminate_multipliers
+from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout, load_outboard, sides, store_outboard
+from softrobots.compiled.chain.unknowns import Unknowns, softness_of
+from softrobots.compiled.trace.blocks import Block, hoist
+from softrobots.compiled.trace.expressions import Scalar
+
+
+def segment_blocks(
+    unknowns: Unknowns, recursion: RecursionLayout, segment: int, tip: TipLayout | None = None
+) -> tuple[list[Block], int]:
+    """Trace what happens at the ends of a segment whose sums are held.
+
+    Args:
+        unknowns: The chain.
+        recursion: Places of what elements pass on.
+        segment: Its number.
+        tip: For a look at the tip: the places of what that passes on and finds.
+
+    Returns:
+        Functions that add the multipliers at its tip, eliminate them at its base, and solve for them there on the step pass;
+        and the size of the record.
+    """
+    softness, look = softness_of(unknowns, segment), "" if tip is None else "tip_"
+    count = len(softness)
+    column_places = sides(recursion.column, None if tip is None else tip.column)
+    turn_places = sides(recursion.turn, None if tip is None else tip.turn)
+    add = Block(
+        f"add_multipliers_{look}{segment}", "Begin with the multipliers of a segment: nothing is coupled with them yet."
+    )
+    add.store_all(recursion.matrix + 6, [0.0] * (count * (count + 7) // 2))
+    if tip is None:
+        add.store_all(recursion.gaps, [0.0] * count)
+        add.store_all(recursion.constraint_torques, [0.0] * count)
+    for place in column_places:
+        add.store_all(place + 3, [0.0] * count)
+    eliminate = Block(f"eliminate_multipliers_{look}{segment}", "Eliminate the multipliers of a segment.", ("at",))
+    given, state = load_outboard(eliminate, recursion, 3 + count, tip)
+    gaps: list[Scalar] = [0.0] * count
+    if tip is None:
+        arrived = eliminate.loads(recursion.gaps, count)
+        state = [*state, *arrived]
+        gaps = [*arrived]
+    made, beyond = eliminate_multipliers(given, gaps, softness)
+    store_outboard(eliminate, recursion, beyond, tip)
+    eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
+    solve = Block(f"solve_multipliers_{look}{segment}", "Find the multipliers of a segment.", ("at",), eliminate.trace)
+    turns = [solve.loads(place, 3) for place in turn_places]
+    groups = [row for row, one in enumerate(unknowns.segment_of_group) if one == segment]
+    sums = solve.loads(recursion.steps, 3)
+    if tip is None:
+        totals = eliminate.loads(recursion.constraint_torques, count)
+        error: Scalar = sums[1]
+        for place, (group, total, gap, soft) in enumerate(zip(groups, totals, gaps, softness, strict=True)):
+            solve.store(recursion.constraint_torques + place, total * (1.0 / len(unknowns.chain.held[group])))
+            torque = gap * (1.0 / soft)  # what closing the gap takes
+            error = error + torque * torque
+        solve.store(recursion.steps + 1, error)
+        state = [*state, *totals]
+    for side, (place, turn) in enumerate(zip(turn_places, turns, strict=True)):
+        multipliers = made.steps(side, vector(turn)).tolist()
+        solve.store_all(place + 3, multipliers)
+        if tip is not None:
+            found = tip.constraint_loads if side == 0 else tip.constraint_columns + (side - 1) * tip.n_constraints
+            for group, value in zip(groups, multipliers, strict=True):
+                solve.store(found + group, value)
+    arriving = [*(one for turn in turns for one in turn), *sums]
+    size = hoist([solve], eliminate, arriving, 0, "at", overwritten=state)
+    return [add, eliminate, solve], size
