@@ -100,9 +100,9 @@ def whole(w: Array, count: int) -> int:
 
 
 def locals_and_loops(w: Array, count: int, unused: float) -> None:
-    """Names that C declares in different places, and names that C keeps for itself."""
-    double = 2.0
-    long = zeros(N)
+    """Names that C declares in different places."""
+    twice = 2.0
+    row = zeros(N)
     first = True
     for i in range(count):
         x = w[i]
@@ -115,25 +115,25 @@ def locals_and_loops(w: Array, count: int, unused: float) -> None:
         if i % 3 == 0:
             both = 1.0
         elif i % 3 == 1 and not first:
-            both = double * x
+            both = twice * x
         else:
             continue
         w[i] += both + (i if x > 0.0 else -i)
         for j in range(N):
             cleared = zeros(2)
-            cleared[j % 2] += long[j] + j
-            long[j] = cleared[0] - cleared[1] * 0.5 + j
+            cleared[j % 2] += row[j] + j
+            row[j] = cleared[0] - cleared[1] * 0.5 + j
         ignored = x
-    register = 0
+    tries = 0
     while True:
-        register += 1
-        if register > 3 or is_large(w[register]) and w[0] < 1e9:
+        tries += 1
+        if tries > 3 or is_large(w[tries]) and w[0] < 1e9:
             break
-    w[count] = register
+    w[count] = tries
     total = 0.0
-    total = total + register
+    total = total + tries
     for i in range(N - 1, -1, -1):
-        total += long[i] * TABLE[i % 4]
+        total += row[i] * TABLE[i % 4]
     w[count + 1] = total
     nothing()
     is_large(total)
@@ -509,6 +509,10 @@ INSIDE = [
     ("x = 1e999", "a float is finite"),
     ("floor = 1.0", "is called floor"),
     ("größe = 1.0", "names are ASCII"),
+    ("register = 1.0", "a keyword of C"),
+    ("__x = 1.0", "a keyword of C or begins with _"),
+    ("stop_1 = 1.0", "a keyword of C or begins with _"),
+    ("p_f = 1.0", "a keyword of C or begins with _"),
     ("x = writes(w) + w[0]", "without other array accesses"),
     ("x = writes(w) + writes(w)", "without other array accesses"),
     ("w[0] += writes(w)", "without other array accesses"),

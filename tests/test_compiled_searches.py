@@ -12,7 +12,7 @@ import pytest
 import softrobots as sr
 from softrobots.compiled import Status
 from softrobots.compiled.run.compiled_model import CompiledModel
-from softrobots.compiled.run.looped_search import ChainSearch
+from softrobots.compiled.run.looped_search import LoopedSearch
 from tests.support.oracles import central_difference
 
 GRAVITY = (0.4, -1.0, -9.7)  # [m/s^2]
@@ -49,7 +49,7 @@ def solver(name: str) -> CompiledModel:
 
 
 @cache
-def searching(name: str, locked: tuple[str, ...] = (), *, gravity: bool = False) -> ChainSearch:
+def searching(name: str, locked: tuple[str, ...] = (), *, gravity: bool = False) -> LoopedSearch:
     """The searches of a robot, with the code that its solver has already."""
     c = sr.compile(robot(name), backend="python", locked_strains=locked) if locked else solver(name)
     return c._search(c._run(gravity))

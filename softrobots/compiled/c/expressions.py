@@ -1,32 +1,23 @@
-"""Expressions of the kernel language in C: what type they have, and as few parentheses as C needs."""
+"""Expressions of the kernel language in C, with their types; every compound operand stands in parentheses."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from softrobots.compiled.c.kernel_language import INTRINSICS, Function, Module, literal_number
 
-ATOM, UNARY, PRODUCT, SUM, RELATION, EQUALITY, AND, OR, CHOICE = range(9, 0, -1)
-"""How strongly C binds, from names and calls to the conditional operator."""
-
-ARITHMETIC: dict[type[ast.operator], tuple[str, int]] = {
-    ast.Add: ("+", SUM),
-    ast.Sub: ("-", SUM),
-    ast.Mult: ("*", PRODUCT),
-    ast.Div: ("/", PRODUCT),
-}
-"""Operators that C has, too, and how strongly they bind."""
+_ARITHMETIC: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _ON_INTS: dict[type[ast.operator], str] = {ast.FloorDiv: "int_quotient", ast.Mod: "int_remainder"}
-_COMPARISONS: dict[type[ast.cmpop], tuple[str, int]] = {
-    ast.Eq: ("==", EQUALITY),
-    ast.NotEq: ("!=", EQUALITY),
-    ast.Lt: ("<", RELATION),
-    ast.LtE: ("<=", RELATION),
-    ast.Gt: (">", RELATION),
-    ast.GtE: (">=", RELATION),
+_COMPARISONS: dict[type[ast.cmpop], str] = {
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
 }
 
 
@@ -37,17 +28,17 @@ class Part(NamedTuple):
     """Its text."""
     kind: str
     """`int`, `float`, `bool` or `none`."""
-    strength: int = ATOM
-    """How strongly its outermost operator binds."""
+    operator: str = ""
+    """Its outermost operator; empty for names, literals, elements and calls."""
 
-    def within(self, strength: int) -> str:
-        """Its text as an operand of an operator that binds as strongly as `strength`."""
-        return self.text if self.strength >= strength else f"({self.text})"
+    def operand(self, chained: str = "") -> str:
+        """Return its text as an operand, bare if it is a chain of the operator `chained` or has no operator."""
+        return self.text if self.operator in ("", chained) else f"({self.text})"
 
 
 @dataclass
 class Scope:
-    """What names mean at some place of a function, and what of the module it has needed so far."""
+    """Names known at some place of a function, and the names of the module that the function has used so far."""
 
     module: Module
     """The module."""
@@ -59,19 +50,15 @@ class Scope:
     """Types of parameters and locals so far: `int`, `float`, `bool` or `array`."""
     sizes: dict[str, int] = field(default_factory=dict)
     """Lengths of local arrays."""
-    c_names: dict[str, str] = field(default_factory=dict)
-    """Names in C of all parameters and locals; in the function they hide what the module calls so."""
+    local_names: set[str] = field(default_factory=set)
+    """All parameters and locals; in the function they hide names of the module."""
     needs: set[str] = field(default_factory=set)
-    """Names of functions, constants and intrinsics that the function uses."""
+    """Functions, constants and intrinsics that the function uses."""
 
     def global_name(self, name: str) -> str:
-        """Name in C of something at the level of the file, which is needed from now on."""
+        """Return the name in C of something at the level of the file, and note that it is needed."""
         self.needs.add(name)
         return self.prefix + name
-
-    def local_name(self, name: str) -> str:
-        """Name in C of a parameter or a local."""
-        return self.c_names[name]
 
     def value(self, node: ast.expr) -> Part:
         """Translate an expression that has a value.
@@ -90,33 +77,32 @@ class Scope:
             case ast.Subscript():
                 return self.element(node)
             case ast.Call():
-                made = self.call(node)
-                if made.kind == "none":
+                called = self.call(node)
+                if called.kind == "none":
                     self.module.refuse(node, "a function that returns None is called as a statement of its own")
-                return made
+                return called
             case ast.BinOp(left=left, op=operator, right=right):
                 return self.arithmetic(node, self.value(left), operator, self.value(right))
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 negated = self._number(operand)
-                inner = negated.within(UNARY)
-                return Part(f"-({inner})" if inner.startswith("-") else f"-{inner}", negated.kind, UNARY)
+                return Part(f"-{negated.operand()}", negated.kind, "negation")
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return Part(f"!{self.condition(operand).within(UNARY)}", "bool", UNARY)
+                return Part(f"!{self.condition(operand).operand()}", "bool", "!")
             case ast.Compare(left=left, ops=[operator], comparators=[right]) if type(operator) in _COMPARISONS:
-                sign, strength = _COMPARISONS[type(operator)]
+                sign = _COMPARISONS[type(operator)]
                 one, other = _alike(self._number(left), self._number(right))
-                return Part(f"{one.within(SUM)} {sign} {other.within(SUM)}", "bool", strength)
+                return Part(f"{one.operand()} {sign} {other.operand()}", "bool", sign)
             case ast.BoolOp(op=operation, values=values):
                 parts = [self.value(value) for value in values]
                 if any(part.kind != "bool" for part in parts):
                     self.module.refuse(node, "`and` and `or` join comparisons and other bools")
-                return _joined(operation, parts)
+                return _joined(operation, iter(parts))
             case ast.IfExp(test=test, body=body, orelse=otherwise):
-                chosen = self.condition(test).within(OR)
+                chosen = self.condition(test).operand()
                 one, other = _alike(self.value(body), self.value(otherwise))
                 if "bool" in (one.kind, other.kind) and one.kind != other.kind:
                     self.module.refuse(node, "`a if c else b` gives a number, or a bool")
-                return Part(f"{chosen} ? {one.within(OR)} : {other.within(OR)}", one.kind, CHOICE)
+                return Part(f"{chosen} ? {one.operand()} : {other.operand()}", one.kind, "?")
         self.module.refuse(
             node,
             "numbers, names, array[index], calls by position, + - * / // % on numbers, one comparison at a time, and, or, not, "
@@ -126,14 +112,14 @@ class Scope:
     def condition(self, node: ast.expr) -> Part:
         """Translate the condition of a branch or a loop: a bool, or an int that may be zero."""
         if isinstance(node, ast.BoolOp):
-            return _joined(node.op, [self.condition(value) for value in node.values])
-        made = self.value(node)
-        if made.kind not in ("bool", "int"):
+            return _joined(node.op, map(self.condition, node.values))
+        part = self.value(node)
+        if part.kind not in ("bool", "int"):
             self.module.refuse(node, "a condition is a comparison, a bool or an int")
-        return made
+        return part
 
     def arithmetic(self, node: ast.AST, left: Part, operator: ast.operator, right: Part) -> Part:
-        """Translate an operation on two numbers; `node` is where it stands."""
+        """Translate an operation on two numbers; `node` is its place in the text."""
         if "bool" in (left.kind, right.kind):
             self.module.refuse(node, "arithmetic is on numbers; where(condition, a, b) makes a number of a bool")
         ints = left.kind == right.kind == "int"
@@ -141,17 +127,14 @@ class Scope:
             if not ints:
                 self.module.refuse(node, "// and % are for ints; floor(x / y) serves for floats")
             return Part(f"{self.global_name(_ON_INTS[type(operator)])}({left.text}, {right.text})", "int")
-        if type(operator) not in ARITHMETIC:
+        if type(operator) not in _ARITHMETIC:
             self.module.refuse(node, "operations on numbers are + - * /, on ints also // and %")
-        sign, strength = ARITHMETIC[type(operator)]
+        sign = _ARITHMETIC[type(operator)]
         if ints and sign == "/":
-            ints, left, right = False, as_float(left), as_float(right)
-            if left.kind == right.kind == "int":
-                left = Part(f"(double){left.within(ATOM)}", "float", UNARY)
+            ints, left = False, Part(f"(double){left.operand()}", "float", "cast")
         if not ints:
             left, right = as_float(left), as_float(right)
-        # An operand to the right that binds equally was in parentheses: a - (b - c), but also a + (b + c), rounded otherwise.
-        return Part(f"{left.within(strength)} {sign} {right.within(strength + 1)}", "int" if ints else "float", strength)
+        return Part(f"{left.operand(sign)} {sign} {right.operand()}", "int" if ints else "float", sign)
 
     def element(self, node: ast.Subscript, *, store: bool = False) -> Part:
         """Translate an element of an array or a table."""
@@ -160,8 +143,8 @@ class Scope:
         name = node.value.id
         table = self.module.constants.get(name)
         if self.kinds.get(name) == "array":
-            size, kind, shown = self.sizes.get(name), "float", self.local_name(name)
-        elif name not in self.c_names and isinstance(table, tuple) and not store:
+            size, kind, shown = self.sizes.get(name), "float", name
+        elif name not in self.local_names and isinstance(table, tuple) and not store:
             size, kind, shown = len(table), type(table[0]).__name__, self.global_name(name)
         else:
             self.module.refuse(node, f"an element of an array{'' if store else ' or a table'}; {name!r} is none here")
@@ -176,7 +159,7 @@ class Scope:
     def call(self, node: ast.Call) -> Part:
         """Translate a call of a function of the module or of an intrinsic."""
         name = node.func.id if isinstance(node.func, ast.Name) else ""
-        if node.keywords or name in self.c_names or (name not in self.earlier and name not in INTRINSICS):
+        if node.keywords or name in self.local_names or (name not in self.earlier and name not in INTRINSICS):
             known = ", ".join((*INTRINSICS, *self.earlier))
             self.module.refuse(node, f"a call, by position, of a function that is defined above; here: {known}")
         if name in INTRINSICS:
@@ -192,13 +175,13 @@ class Scope:
             if parameter.kind == "array":
                 if not isinstance(argument, ast.Name) or self.kinds.get(argument.id) != "array":
                     self.module.refuse(node, f"for {parameter.name} of {name} the name of an array")
-                shown.append(self.local_name(argument.id))
+                shown.append(argument.id)
             else:
                 shown.append(self.fitting(argument, self.value(argument), parameter.kind, parameter.name).text)
         return Part(f"{self.global_name(name)}({', '.join(shown)})", function.returns)
 
     def fitting(self, node: ast.AST, part: Part, kind: str, name: str) -> Part:
-        """The part as a value of type `kind`, for `name`.
+        """Return the part as a value of type `kind`, for `name`.
 
         Raises:
             ParameterError: If it is of another type; a float takes ints, an int takes bools.
@@ -210,11 +193,11 @@ class Scope:
         return part
 
     def known_int(self, node: ast.expr) -> int | None:
-        """Value of an expression of int literals and constants; None for others."""
+        """Return the value of an expression of int literals and constants; None for others."""
         match node:
             case ast.Constant(value=value) if type(value) is int:
                 return value
-            case ast.Name(id=name) if name not in self.c_names:
+            case ast.Name(id=name) if name not in self.local_names:
                 named = self.module.constants.get(name)
                 return named if isinstance(named, int) else None
             case ast.UnaryOp(op=ast.USub(), operand=operand):
@@ -234,38 +217,36 @@ class Scope:
 
     def _name(self, node: ast.expr, name: str) -> Part:
         constant = self.module.constants.get(name)
-        if name in self.kinds and self.kinds[name] != "array":
-            return Part(self.local_name(name), self.kinds[name])
-        if name not in self.c_names and constant is not None and not isinstance(constant, tuple):
+        if self.kinds.get(name, "array") != "array":
+            return Part(name, self.kinds[name])
+        if name not in self.local_names and constant is not None and not isinstance(constant, tuple):
             return Part(self.global_name(name), type(constant).__name__)
         self.module.refuse(node, f"a number that is given above in the text; {name!r} is none here")
 
     def _number(self, node: ast.expr) -> Part:
-        made = self.value(node)
-        if made.kind == "bool":
+        part = self.value(node)
+        if part.kind == "bool":
             self.module.refuse(node, "a number; where(condition, a, b) makes one of a bool")
-        return made
+        return part
 
     def _count(self, node: ast.Call, name: str, count: int) -> None:
         if len(node.args) != count or any(isinstance(argument, ast.Starred) for argument in node.args):
             self.module.refuse(node, f"{name} takes {count} argument{'' if count == 1 else 's'}")
 
 
-def _joined(operation: ast.boolop, parts: Sequence[Part]) -> Part:
-    sign, strength = (" && ", AND) if isinstance(operation, ast.And) else (" || ", OR)
-    return Part(sign.join(part.within(EQUALITY) for part in parts), "bool", strength)
+def _joined(operation: ast.boolop, parts: Iterator[Part]) -> Part:
+    sign = "&&" if isinstance(operation, ast.And) else "||"
+    return Part(f" {sign} ".join(part.operand() for part in parts), "bool", sign)
 
 
 def as_float(part: Part) -> Part:
-    """The part where C wants a double: an int literal as a float literal; C converts other ints by itself."""
-    if part.kind == "int" and part.text.lstrip("-").isdigit():
-        return Part(f"{part.text}.0", "float", part.strength)
-    return part
+    """Return the part where C wants a double: an int literal as a float literal; C converts other ints by itself."""
+    return Part(f"{part.text}.0", "float") if part.text.isdigit() else part
 
 
 def _alike(one: Part, other: Part) -> tuple[Part, Part]:
-    """Two numbers as C compares or chooses them: both floats if one of them is."""
+    """Return two numbers as C compares or chooses them: both floats if one of them is."""
     if one.kind == other.kind:
         return one, other
-    made: Sequence[Part] = [as_float(part)._replace(kind="float") if part.kind == "int" else part for part in (one, other)]
-    return made[0], made[1]
+    one, other = (as_float(part)._replace(kind="float") if part.kind == "int" else part for part in (one, other))
+    return one, other

@@ -1,83 +1,59 @@
-"""Functions of the kernel language in C: statements, declarations and the order in which C computes."""
+"""Functions of the kernel language in C: statements, declarations and the order of evaluation.
+
+Python has one scope in a function, C one in each block: a local is declared with its first assignment if that stands in the
+function's own block, else at the top, as zero.
+"""
 
 from __future__ import annotations
 
 import ast
-import textwrap
-from collections.abc import Iterable, Sequence
+import re
+from collections import Counter
+from collections.abc import Sequence
 
-from softrobots.compiled.c.expressions import ARITHMETIC, SUM, Part, Scope, as_float
+from softrobots.compiled.c.expressions import Part, Scope
 from softrobots.compiled.c.kernel_language import WORDS, Function
-from softrobots.compiled.c.local_variables import assigned_in, mentions, plan_locals
+from softrobots.compiled.c.lines import INDENT, comment, wrapped
 
 C_TYPES = {"none": "void", "int": "int", "bool": "int", "float": "double"}
 """Types in C."""
-WIDTH = 116
-"""Characters of a line, where it can be helped."""
 _RESERVED = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register restrict
 return short signed sizeof static struct switch typedef union unsigned void volatile while asm typeof linux unix
 """.split()  # noqa: SIM905 (readable)
-_INDENT = "    "
 
 
-def prototype(function: Function, scope: Scope) -> str:
-    """Declaration of a function, without the semicolon."""
+def prototype(function: Function, prefix: str) -> str:
+    """Return the declaration of a function, without the semicolon."""
     shown = []
     for parameter in function.parameters:
-        name = scope.local_name(parameter.name)
-        constant = "" if parameter.written else "const "
-        shown.append(f"{constant}double *{name}" if parameter.kind == "array" else f"{C_TYPES[parameter.kind]} {name}")
-    return f"{C_TYPES[function.returns]} {scope.prefix}{function.name}({', '.join(shown) or 'void'})"
-
-
-def comment(lines: Iterable[str]) -> str:
-    """A comment in C; what would end it or mean something else in it is spaced out."""
-    made = []
-    for line in lines:
-        plain = line.encode("ascii", "backslashreplace").decode().replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
-        indent = " " * (len(plain) - len(plain.lstrip()))
-        made += textwrap.wrap(plain, WIDTH - 3, subsequent_indent=indent, break_on_hyphens=False) or [""]
-    if len(made) == 1:
-        return f"/* {made[0]} */"
-    return "\n".join(["/*", *(f" * {line}".rstrip() for line in made), " */"])
-
-
-def wrapped(line: str) -> list[str]:
-    """A line of C in lines that are not too long; C takes a new line wherever it takes a space, a reader not before an `*`."""
-    indent = line[: len(line) - len(line.lstrip())]
-    made = textwrap.wrap(
-        line.replace("double *", "double\0*"),
-        WIDTH - 3,  # declarations stand in comments, too
-        subsequent_indent=indent + 2 * _INDENT,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return [one.replace("\0", " ") for one in made] or [line]
+        array = f"{'' if parameter.written else 'const '}double *{parameter.name}"
+        shown.append(array if parameter.kind == "array" else f"{C_TYPES[parameter.kind]} {parameter.name}")
+    return f"{C_TYPES[function.returns]} {prefix}{function.name}({', '.join(shown) or 'void'})"
 
 
 class FunctionWriter:
     """Writes one function."""
 
     def __init__(self, function: Function, scope: Scope) -> None:
-        """Prepare to write `function`; `scope` is that of the module, with what is defined before the function."""
-        self.function = function
-        self.scope = scope
-        self._module = scope.module
-        self._plan = plan_locals(scope.module, function)
-        self._declared: set[str] = set()
-        self._taken = {scope.prefix + name for name in (*scope.module.functions, *scope.module.constants, *WORDS)}
-        self._taken.update(_RESERVED)
-        self._lines: list[str | tuple[str, str]] = []  # a pair is the declaration of a name: indentation and name
+        """Prepare to write `function`; `scope` is that of the module, with all that is defined before the function."""
+        self.function, self.scope, self._module = function, scope, scope.module
+        self._counts = _counts(function.body)
+        self._at_top: list[str] = []  # locals to declare there
+        self._lines: list[str] = []
+        self._bounds = 0  # of loops, so far
         parameters = [parameter.name for parameter in function.parameters]
-        for name in dict.fromkeys((*parameters, *self._plan.stores)):
-            if name in WORDS:
-                self._module.refuse(function.node, f"no parameter and no local is called {name}")
-            scope.c_names[name] = self._free(name)
+        names = _names(function.body)
+        self._stored = Counter(node.id for node in names if isinstance(node.ctx, ast.Store))
+        self._read = {node.id for node in names if isinstance(node.ctx, ast.Load)}
+        self._check_loops(parameters)
+        for name in (*parameters, *self._stored):
+            self._check_name(name)
+        scope.local_names.update(parameters, self._stored)
         scope.kinds.update({parameter.name: parameter.kind for parameter in function.parameters})
 
     def text(self, *, external: bool) -> str:
-        """The function in C.
+        """Return the function in C.
 
         Args:
             external: Whether it can be called from other files.
@@ -85,38 +61,54 @@ class FunctionWriter:
         Raises:
             ParameterError: If a statement is outside the kernel language.
         """
-        for parameter in self.function.parameters:
-            if parameter.name not in self._plan.read and parameter.name not in self._plan.stores:
-                self._lines.append(f"{_INDENT}(void){self.scope.local_name(parameter.name)};")
-        self._block(self.function.body, _INDENT, top=True)
-        if self.function.returns != "none" and not _ends(self.function.body):
-            self._module.refuse(self.function.node, f"{self.function.name} returns a value on every way through it")
-        lines = comment(self.function.docstring.splitlines()).splitlines() if self.function.docstring else []
-        lines += [*wrapped(("" if external else "static ") + prototype(self.function, self.scope)), "{"]
-        for line in self._lines:
-            lines += wrapped(line) if isinstance(line, str) else self._zero(*line)
-        return "\n".join([*lines, "}"])
+        function, kinds = self.function, self.scope.kinds
+        self._block(function.body, INDENT)
+        if function.returns != "none" and not _ends(function.body):
+            self._module.refuse(function.node, f"{function.name} returns a value on every way through it")
+        lines = comment(function.docstring.splitlines()).splitlines() if function.docstring else []
+        head = ("" if external else "static ") + prototype(function, self.scope.prefix)
+        declared = [
+            f"{INDENT}double {name}[{self.scope.sizes[name]}];"
+            if kinds[name] == "array"
+            else f"{INDENT}{C_TYPES[kinds[name]]} {name} = {'0.0' if kinds[name] == 'float' else '0'};"
+            for name in self._at_top
+        ]
+        local = [*(parameter.name for parameter in function.parameters), *self._at_top]
+        unused = [f"{INDENT}(void){name};" for name in local if name not in self._read]
+        body = [short for line in (head, "{", *declared, *unused, *self._lines, "}") for short in wrapped(line)]
+        return "\n".join([*lines, *body])
 
-    def _free(self, name: str) -> str:
-        while name in self._taken or name.startswith("__") or (name[0] == "_" and name[1:2].isupper()):
-            name = name.lstrip("_") + "_"
+    def _check_name(self, name: str) -> None:
+        if name in WORDS:
+            self._module.refuse(self.function.node, f"no parameter or local is called {name}")
         if not name.isascii():
             self._module.refuse(self.function.node, f"names are ASCII; {name!r} is not")
-        self._taken.add(name)
-        return name
+        if name in _RESERVED or re.match(rf"_[_A-Z]|stop_|{self.scope.prefix}", name):
+            self._module.refuse(
+                self.function.node,
+                f"no parameter or local is a keyword of C or begins with _A, __, stop_ or {self.scope.prefix}; {name} does",
+            )
 
-    def _zero(self, indent: str, name: str) -> list[str]:
-        kind, shown = self.scope.kinds[name], self.scope.local_name(name)
-        lines = [f"{indent}{C_TYPES[kind]} {shown} = {'0.0' if kind == 'float' else '0'};"]
-        return lines if name in self._plan.read else [*lines, f"{indent}(void){shown};"]
+    def _check_loops(self, parameters: Sequence[str]) -> None:
+        """Refuse variables of `for` that are used outside of their loops, or assigned in them: C counts on after the last."""
+        inside: Counter[str] = Counter()
+        loops = [node for statement in self.function.body for node in ast.walk(statement) if isinstance(node, ast.For)]
+        for loop in loops:
+            if isinstance(loop.target, ast.Name):
+                name = loop.target.id
+                stored = any(node.id == name and isinstance(node.ctx, ast.Store) for node in _names(loop.body))
+                if stored or name in parameters or _counts([loop.iter])[name]:
+                    self._module.refuse(loop, f"{name} counts this loop, and is neither a parameter nor assigned in it")
+                inside[name] += _counts([loop])[name]
+        for loop in loops:
+            if isinstance(loop.target, ast.Name) and inside[loop.target.id] != self._counts[loop.target.id]:
+                self._module.refuse(loop, f"{loop.target.id} counts this loop, and is used in such loops only")
 
-    def _block(self, block: Sequence[ast.stmt], indent: str, *, top: bool = False) -> None:
-        for statement in block:
-            if top:
-                self._lines += [(indent, name) for name in self._plan.before.get(statement, ())]
-            self._statement(statement, indent)
+    def _block(self, block: Sequence[ast.stmt], indent: str) -> None:
+        for place, statement in enumerate(block):
+            self._statement(statement, block[place:], indent)
 
-    def _statement(self, node: ast.stmt, indent: str) -> None:
+    def _statement(self, node: ast.stmt, rest: Sequence[ast.stmt], indent: str) -> None:
         match node:
             case ast.Pass():
                 pass
@@ -128,15 +120,16 @@ class FunctionWriter:
                 self._return(node, value, indent)
             case ast.Expr(value=ast.Call() as called):
                 self._ordered(node)
-                self._lines.append(f"{indent}{self._bare_call(called)};")
-            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=ast.Name(id="zeros")) as made):
-                self._local_array(node, name, made, indent)
+                part = self.scope.call(called)
+                self._lines.append(f"{indent}{'' if part.kind == 'none' else '(void)'}{part.text};")
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=ast.Name(id="zeros")) as called):
+                self._clear(node, name, called, rest, indent)
             case ast.Assign(targets=[ast.Name(id=name)], value=value):
                 self._ordered(node)
-                self._assign(node, name, self.scope.value(value), "=", indent)
+                self._assign(node, name, self.scope.value(value), indent)
             case ast.Assign(targets=[ast.Subscript() as target], value=value):
                 self._ordered(node)
-                self._store(node, target, self.scope.value(value), "=", indent)
+                self._store(node, target, self.scope.value(value), indent)
             case ast.AugAssign(target=target, op=operator, value=value):
                 self._ordered(node)
                 self._update(node, target, operator, value, indent)
@@ -146,7 +139,7 @@ class FunctionWriter:
                 self._ordered(test)
                 always = isinstance(test, ast.Constant) and test.value is True
                 self._lines.append(f"{indent}while ({'1' if always else self.scope.condition(test).text}) {{")
-                self._block(body, indent + _INDENT)
+                self._block(body, indent + INDENT)
                 self._lines.append(f"{indent}}}")
             case ast.For(
                 target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=limits, keywords=[]), orelse=[]
@@ -159,10 +152,6 @@ class FunctionWriter:
                     "for name in range(...), break, continue, return and pass",
                 )
 
-    def _bare_call(self, called: ast.Call) -> str:
-        made = self.scope.call(called)
-        return made.text if made.kind == "none" else f"(void){made.text}"
-
     def _return(self, node: ast.stmt, value: ast.expr | None, indent: str) -> None:
         wanted = self.function.returns
         if (value is None) != (wanted == "none"):
@@ -173,61 +162,52 @@ class FunctionWriter:
             self._lines.append(f"{indent}return;")
             return
         self._ordered(node)
-        made = self.scope.fitting(node, self.scope.value(value), wanted, f"the value of {self.function.name}")
-        self._lines.append(f"{indent}return {made.text};")
+        part = self.scope.fitting(node, self.scope.value(value), wanted, f"the value of {self.function.name}")
+        self._lines.append(f"{indent}return {part.text};")
 
-    def _assign(self, node: ast.stmt, name: str, part: Part, sign: str, indent: str) -> None:
+    def _assign(self, node: ast.stmt, name: str, part: Part, indent: str) -> None:
         known = self.scope.kinds.get(name)
         if known == "array":
             self._module.refuse(node, f"{name} is an array: only its elements are assigned")
-        made = self.scope.fitting(node, part, known or part.kind, name)
-        shown, declaration = self.scope.local_name(name), ""
+        fitting, declaration = self.scope.fitting(node, part, known or part.kind, name), ""
         if known is None:
             self.scope.kinds[name] = part.kind
-            if name in self._plan.with_assignment:
-                declaration = f"{'const ' if self._plan.stores[name] == 1 else ''}{C_TYPES[part.kind]} "
-        self._lines.append(f"{indent}{declaration}{shown} {sign} {made.text};")
-        if declaration and name not in self._plan.read:
-            self._lines.append(f"{indent}(void){shown};")
+            if indent == INDENT and name in self._read:
+                declaration = f"{'const ' if self._stored[name] == 1 else ''}{C_TYPES[part.kind]} "
+            else:
+                self._at_top.append(name)
+        self._lines.append(f"{indent}{declaration}{name} = {fitting.text};")
 
-    def _store(self, node: ast.stmt, target: ast.Subscript, part: Part, sign: str, indent: str) -> None:
+    def _store(self, node: ast.stmt, target: ast.Subscript, part: Part, indent: str) -> None:
         element = self.scope.element(target, store=True)
-        made = self.scope.fitting(node, part, "float", element.text)
-        self._lines.append(f"{indent}{element.text} {sign} {made.text};")
+        fitting = self.scope.fitting(node, part, "float", element.text)
+        self._lines.append(f"{indent}{element.text} = {fitting.text};")
 
     def _update(self, node: ast.AugAssign, target: ast.expr, operator: ast.operator, value: ast.expr, indent: str) -> None:
         if isinstance(target, ast.Subscript):
             before = self.scope.element(target, store=True)
+            self._store(node, target, self.scope.arithmetic(node, before, operator, self.scope.value(value)), indent)
         elif isinstance(target, ast.Name):
             before = self.scope.value(ast.copy_location(ast.Name(target.id, ast.Load()), target))
+            self._assign(node, target.id, self.scope.arithmetic(node, before, operator, self.scope.value(value)), indent)
         else:
             self._module.refuse(node, "what is updated is a name or an element of an array")
-        after = self.scope.value(value)
-        result = self.scope.arithmetic(node, before, operator, after)
-        sign = "="
-        if type(operator) in ARITHMETIC:
-            sign = f"{ARITHMETIC[type(operator)][0]}="
-            result = (as_float(after) if result.kind == "float" else after)._replace(kind=result.kind)
-        if isinstance(target, ast.Name):
-            self._assign(node, target.id, result, sign, indent)
-        else:
-            self._store(node, target, result, sign, indent)
 
-    def _local_array(self, node: ast.stmt, name: str, made: ast.Call, indent: str) -> None:
-        size = self.scope.known_int(made.args[0]) if len(made.args) == 1 and not made.keywords else None
+    def _clear(self, node: ast.stmt, name: str, called: ast.Call, rest: Sequence[ast.stmt], indent: str) -> None:
+        """Write the call that clears a local array; `rest` is the block from here on."""
+        size = self.scope.known_int(called.args[0]) if len(called.args) == 1 and not called.keywords else None
         if size is None or size < 1:
             self._module.refuse(node, "a local array is made by zeros(N) with a positive int N, written out or a constant")
-        if name in self.scope.kinds or name not in self._plan.with_assignment or self._plan.stores[name] != 1:
+        if name in self.scope.kinds or self._stored[name] != 1 or _counts(rest)[name] != self._counts[name]:
             self._module.refuse(node, f"{name}, a local array, is assigned once, in the block that uses it and before its use")
         self.scope.kinds[name], self.scope.sizes[name] = "array", size
-        shown, count = self.scope.local_name(name), self.scope.value(made.args[0]).text
-        self._lines.append(f"{indent}double {shown}[{count}];")
-        self._lines.append(f"{indent}{self.scope.global_name('clear_array')}({shown}, {count});")
+        self._at_top.append(name)
+        self._lines.append(f"{indent}{self.scope.global_name('clear_array')}({name}, {size});")
 
     def _branch(self, node: ast.If, indent: str, word: str) -> None:
         self._ordered(node.test)
         self._lines.append(f"{indent}{word} ({self.scope.condition(node.test).text}) {{")
-        self._block(node.body, indent + _INDENT)
+        self._block(node.body, indent + INDENT)
         match node.orelse:
             case []:
                 self._lines.append(f"{indent}}}")
@@ -235,7 +215,7 @@ class FunctionWriter:
                 self._branch(other, indent, "} else if")
             case _:
                 self._lines.append(f"{indent}}} else {{")
-                self._block(node.orelse, indent + _INDENT)
+                self._block(node.orelse, indent + INDENT)
                 self._lines.append(f"{indent}}}")
 
     def _for(self, node: ast.For, name: str, limits: Sequence[ast.expr], indent: str) -> None:
@@ -245,17 +225,15 @@ class FunctionWriter:
         parts = [self.scope.value(limit) for limit in limits[:2]]
         if any(part.kind != "int" for part in parts):
             self._module.refuse(node, "a range is of ints")
-        start, stop = ("0" if len(parts) == 1 else parts[0].text), parts[-1]
-        bound = stop.within(SUM)
-        if mentions(limits[len(parts) - 1], assigned_in(node.body)) or "(" in stop.text or "[" in stop.text:
-            bound = self._free(f"{name}_stop")  # Python looks at it once
-            self._lines.append(f"{indent}const int {bound} = {stop.text};")
-        counter = self.scope.local_name(name)
+        start, bound = ("0" if len(parts) == 1 else parts[0].text), parts[-1].text
+        if self.scope.known_int(limits[len(parts) - 1]) is None:  # Python looks at it once
+            self._bounds += 1
+            bound = f"stop_{self._bounds}"
+            self._lines.append(f"{indent}const int {bound} = {parts[-1].text};")
         self.scope.kinds[name] = "int"
-        change = {1: f"++{counter}", -1: f"--{counter}"}.get(step, f"{counter} {'+' if step > 0 else '-'}= {abs(step)}")
-        compared = f"{counter} {'<' if step > 0 else '>'} {bound}"
-        self._lines.append(f"{indent}for (int {counter} = {start}; {compared}; {change}) {{")
-        self._block(node.body, indent + _INDENT)
+        compared = f"{name} {'<' if step > 0 else '>'} {bound}"
+        self._lines.append(f"{indent}for (int {name} = {start}; {compared}; {name} += {step}) {{")
+        self._block(node.body, indent + INDENT)
         self._lines.append(f"{indent}}}")
 
     def _ordered(self, node: ast.AST) -> None:
@@ -294,3 +272,12 @@ def _ends(block: Sequence[ast.stmt]) -> bool:
         case ast.While(test=ast.Constant(value=True), body=body):
             return not any(isinstance(inner, ast.Break) for statement in body for inner in ast.walk(statement))
     return False
+
+
+def _names(block: Sequence[ast.AST]) -> list[ast.Name]:
+    return [node for part in block for node in ast.walk(part) if isinstance(node, ast.Name)]
+
+
+def _counts(block: Sequence[ast.AST]) -> Counter[str]:
+    """Return how often each name stands in a piece of the text."""
+    return Counter(node.id for node in _names(block))

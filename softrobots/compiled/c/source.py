@@ -12,9 +12,10 @@ import re
 from collections.abc import Iterable, Sequence
 
 from softrobots.compiled.c.expressions import Scope
-from softrobots.compiled.c.functions import FunctionWriter, comment, prototype, wrapped
+from softrobots.compiled.c.functions import FunctionWriter, prototype
 from softrobots.compiled.c.intrinsics import C_INTRINSICS, NEEDS_WIDE_INTEGERS
 from softrobots.compiled.c.kernel_language import Module, Number, read_module
+from softrobots.compiled.c.lines import comment, wrapped
 from softrobots.core.errors import NameNotFound, ParameterError
 
 _CHECKS = """\
@@ -66,7 +67,7 @@ def to_c(text: str, *, prefix: str, exported: Sequence[str]) -> str:
     for name in reversed(scopes):  # whatever a function calls stands before it
         if name in needed:
             needed |= scopes[name].needs
-    heads = {name: prototype(module.functions[name], scopes[name]) for name in functions}
+    heads = {name: prototype(module.functions[name], prefix) for name in functions}
     pieces = [
         _about(module, prefix, exported, heads),
         "#include <float.h>\n#include <limits.h>"

@@ -49,7 +49,7 @@ class Actuation:
     def loads(self, run: Any, w: Any) -> FloatArray:
         """Load on motor joints and muscles of given length there, shape (n_motors,) [N m or N].
 
-        The multipliers tell what holds the sums beyond what their even spread takes, see `long_chain`.
+        The multipliers tell what holds the sums beyond what their even spread takes, see `looped_chain`.
         """
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.motor_torques, self._count, 1)[0]
