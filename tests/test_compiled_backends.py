@@ -24,6 +24,7 @@ from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import Program, make_program
 from softrobots.compiled.run import backends
 from softrobots.compiled.run.backends import NumbaRun, PythonRun, available_backend, cache_folder, make_run
+from softrobots.compiled.run.batches import solve_batch
 from softrobots.model.soft_model import SoftModel
 from tests.support.serial_chains import ROBOTS
 from tests.support.tables import each_row
@@ -257,15 +258,9 @@ def settle(run: Any, motors: np.ndarray, force: np.ndarray) -> tuple[int, np.nda
 
 
 def batch(run: Any, motors: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    count, unknowns = len(motors), run.layout.unknowns
-    found, tips, residuals, statuses = (
-        np.zeros((count, unknowns)),
-        np.zeros((count, 3)),
-        np.zeros(count),
-        np.zeros(count, np.uint8),
-    )
-    nothing = np.zeros((0, unknowns))
-    run.settle_batch(motors, forces, np.zeros(3), nothing, nothing, found, residuals, tips, statuses, 0, count)
+    layout = run.layout
+    inputs, results = [(0, motors), (layout.force, forces)], [(layout.unknown, layout.unknowns)]
+    (found,), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), 1)
     return statuses, found
 
 

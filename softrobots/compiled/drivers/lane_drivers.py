@@ -1,37 +1,31 @@
 """Batches: many cases side by side, in blocks of lanes, for a compiler that makes vector instructions of them.
 
-The passes of `softrobots.compiled.drivers.equilibrium_drivers` are done for all lanes of a block together; cases that they do
-not settle go through the descent one by one. Besides the kernel language, these functions use arrays with rows (one a case).
+The passes of `softrobots.compiled.drivers.equilibrium_drivers` are done for all lanes of a block together; cases that need more
+than those are solved one by one. Besides the kernel language, these functions use tuples of arrays with one row a case.
+
+All batch functions take the same arguments: `inputs`, arrays of shape (n, columns), or (1, columns) for a row that goes for all
+cases; `places`, where the columns of each stand in the workspace; `outputs` and `result_places`, the same for the results; the
+`statuses` to write, shape (n,); the `first` case and the one behind the `last`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from softrobots.compiled.drivers.equilibrium_drivers import go_to_start, settle_from
-from softrobots.compiled.drivers.intrinsics import Array, sqrt, zeros
+from softrobots.compiled.drivers.intrinsics import Array, zeros
 from softrobots.compiled.drivers.motor_drivers import estimate, estimated, reach, within_limits
 from softrobots.compiled.settings import FORCE_PASSES, PASSES
 
-# Made for each robot.
+Rows: TypeAlias = "tuple[Any, ...]"
+"""Arrays of floats with one row a case."""
+Places: TypeAlias = "tuple[int, ...]"
+"""Places in the workspace."""
+
+# Declared in the generated module.
 CERTIFIED: int
-FORCE: int
-GRAVITY: int
-PULL: int
-START: int
-UNKNOWN: int
-ERROR: int
 MODE: int
-MISSING: int
-UNEXPLAINED: int
-OBSERVED: int
-TIP: int
-TORQUES: int
-TARGET: int
-TOLERATED: int
-N: int
-N_MOTORS: int
 LANES: int
 LANE_SIZE: int
 WORKSPACE_SIZE: int
@@ -51,37 +45,52 @@ def running(w: Array) -> bool:
     return count > 0.5
 
 
+def load_block(w: Array, inputs: Rows, places: Places, first: int, last: int) -> None:
+    """Write the cases from `first` on into the lanes; behind the last case it is repeated."""
+    for k in range(len(places)):
+        values = inputs[k]
+        for lane in range(LANES):
+            row = min(first + lane, last - 1, values.shape[0] - 1)
+            for j in range(values.shape[1]):
+                w[(places[k] + j) * LANES + lane] = values[row, j]
+
+
+def load_case(w: Array, inputs: Rows, places: Places, case: int) -> None:
+    """Write one case into a workspace."""
+    for k in range(len(places)):
+        values = inputs[k]
+        row = min(case, values.shape[0] - 1)
+        for j in range(values.shape[1]):
+            w[places[k] + j] = values[row, j]
+
+
+def copy_lane(w: Array, lanes: Array, lane: int) -> None:
+    """Copy a lane into the workspace of a single case."""
+    for j in range(LANE_SIZE):
+        w[j] = lanes[j * LANES + lane]
+
+
+def store_results(w: Array, stride: int, lane: int, outputs: Rows, places: Places, row: int) -> None:
+    """Read the results of a case out of a lane, or with `stride` 1 and `lane` 0 out of a workspace of its own."""
+    for k in range(len(places)):
+        values = outputs[k]
+        for j in range(values.shape[1]):
+            values[row, j] = w[(places[k] + j) * stride + lane]
+
+
+def is_solved(w: Array, lane: int) -> bool:
+    """Tell whether the passes ended in a stable equilibrium."""
+    return w[MODE * LANES + lane] > 0.5 and w[MODE * LANES + lane] < 1.5
+
+
 def settle_batch(
-    motors: Any,
-    forces: Any,
-    gravity: Any,
-    pulls: Any,
-    starts: Any,
-    unknowns: Any,
-    residuals: Any,
-    tips: Any,
-    statuses: Any,
-    first: int,
-    last: int,
+    inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int
 ) -> None:
-    """Settle the cases from `first` up to `last`, each from rest; `pulls` and `starts` may be empty."""
+    """Find equilibria, each from rest."""
     lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
     for begin in range(first, last, LANES):
-        for lane in range(LANES):
-            row = min(begin + lane, last - 1)
-            for j in range(N_MOTORS):
-                lanes[j * LANES + lane] = motors[row, j]
-            for j in range(3):
-                lanes[(FORCE + j) * LANES + lane] = forces[row, j]
-                lanes[(GRAVITY + j) * LANES + lane] = gravity[j]
-            if pulls.shape[0] > 0:
-                for j in range(N):
-                    lanes[(PULL + j) * LANES + lane] = pulls[row, j]
-            if starts.shape[0] > 0:
-                for j in range(N):
-                    lanes[(START + j) * LANES + lane] = starts[row, j]
-                    lanes[(UNKNOWN + j) * LANES + lane] = starts[row, j]
+        load_block(lanes, inputs, places, begin, last)
         first_pass_lanes(lanes)
         for _ in range(PASSES):
             if not running(lanes):
@@ -89,50 +98,24 @@ def settle_batch(
             newton_pass_lanes(lanes)
         for lane in range(min(LANES, last - begin)):
             row = begin + lane
-            mode = lanes[MODE * LANES + lane]
-            if mode > 0.5 and mode < 1.5:
-                for j in range(N):
-                    unknowns[row, j] = lanes[(UNKNOWN + j) * LANES + lane]
-                for j in range(3):
-                    tips[row, j] = lanes[(TIP + j) * LANES + lane]
-                residuals[row] = sqrt(lanes[ERROR * LANES + lane])
+            if is_solved(lanes, lane):
                 statuses[row] = CERTIFIED
+                store_results(lanes, LANES, lane, outputs, result_places, row)
             else:
-                for j in range(UNKNOWN):
-                    case[j] = lanes[j * LANES + lane]
+                load_case(case, inputs, places, row)
                 go_to_start(case)
                 statuses[row] = settle_from(case)
-                for j in range(N):
-                    unknowns[row, j] = case[UNKNOWN + j]
-                for j in range(3):
-                    tips[row, j] = case[TIP + j]
-                residuals[row] = sqrt(case[ERROR])
+                store_results(case, 1, 0, outputs, result_places, row)
 
 
 def estimate_batch(
-    motors: Any,
-    torques: Any,
-    gravity: Any,
-    forces: Any,
-    unknowns: Any,
-    residuals: Any,
-    unexplained: Any,
-    observed: Any,
-    statuses: Any,
-    first: int,
-    last: int,
+    inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int
 ) -> None:
-    """Estimate the forces of the cases from `first` up to `last`."""
+    """Estimate forces."""
     lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
     for begin in range(first, last, LANES):
-        for lane in range(LANES):
-            row = min(begin + lane, last - 1)
-            for j in range(N_MOTORS):
-                lanes[j * LANES + lane] = motors[row, j]
-                lanes[(TORQUES + j) * LANES + lane] = torques[row, j]
-            for j in range(3):
-                lanes[(GRAVITY + j) * LANES + lane] = gravity[j]
+        load_block(lanes, inputs, places, begin, last)
         first_force_pass_lanes(lanes)
         for _ in range(FORCE_PASSES):
             if not running(lanes):
@@ -140,50 +123,23 @@ def estimate_batch(
             force_pass_lanes(lanes)
         for lane in range(min(LANES, last - begin)):
             row = begin + lane
-            mode = lanes[MODE * LANES + lane]
-            for j in range(LANE_SIZE):
-                case[j] = lanes[j * LANES + lane]
-            if mode > 0.5 and mode < 1.5:
+            copy_lane(case, lanes, lane)
+            if is_solved(lanes, lane):
                 statuses[row] = estimated(case)
             else:
                 statuses[row] = estimate(case)
-            for j in range(N):
-                unknowns[row, j] = case[UNKNOWN + j]
-            for j in range(3):
-                forces[row, j] = case[FORCE + j]
-            residuals[row] = sqrt(case[ERROR])
-            unexplained[row] = sqrt(case[UNEXPLAINED])
-            observed[row] = sqrt(case[OBSERVED])
+            store_results(case, 1, 0, outputs, result_places, row)
 
 
 def reach_batch(
-    targets: Any,
-    forces: Any,
-    gravity: Any,
-    motors: Any,
-    unknowns: Any,
-    residuals: Any,
-    errors: Any,
-    statuses: Any,
-    tolerance: float,
-    first: int,
-    last: int,
+    inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int
 ) -> None:
-    """Put the tips of the cases from `first` up to `last` at their targets, from the motors and unknowns that come in."""
+    """Put the tips at their targets, from given motors and unknowns."""
     lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
     for begin in range(first, last, LANES):
+        load_block(lanes, inputs, places, begin, last)
         for lane in range(LANES):
-            row = min(begin + lane, last - 1)
-            for j in range(N_MOTORS):
-                lanes[j * LANES + lane] = motors[row, j]
-            for j in range(N):
-                lanes[(UNKNOWN + j) * LANES + lane] = unknowns[row, j]
-            for j in range(3):
-                lanes[(FORCE + j) * LANES + lane] = forces[row, j]
-                lanes[(GRAVITY + j) * LANES + lane] = gravity[j]
-                lanes[(TARGET + j) * LANES + lane] = targets[row, j]
-            lanes[TOLERATED * LANES + lane] = tolerance
             lanes[MODE * LANES + lane] = 0.0
         for _ in range(PASSES):
             if not running(lanes):
@@ -191,26 +147,16 @@ def reach_batch(
             target_pass_lanes(lanes)
         for lane in range(min(LANES, last - begin)):
             row = begin + lane
-            mode = lanes[MODE * LANES + lane]
-            for j in range(LANE_SIZE):
-                case[j] = lanes[j * LANES + lane]
+            copy_lane(case, lanes, lane)
             statuses[row] = CERTIFIED
-            if mode < 0.5 or mode > 1.5 or within_limits(case, 0) != CERTIFIED:
-                for j in range(N_MOTORS):
-                    case[j] = motors[row, j]
-                for j in range(N):
-                    case[UNKNOWN + j] = unknowns[row, j]
+            if not is_solved(lanes, lane) or within_limits(case, 0) != CERTIFIED:
+                load_case(case, inputs, places, row)
                 statuses[row] = reach(case)
-            for j in range(N_MOTORS):
-                motors[row, j] = case[j]
-            for j in range(N):
-                unknowns[row, j] = case[UNKNOWN + j]
-            residuals[row] = sqrt(case[ERROR])
-            errors[row] = sqrt(case[MISSING])
+            store_results(case, 1, 0, outputs, result_places, row)
 
 
-FUNCTIONS: tuple[Callable[..., object], ...] = (running, settle_batch)
+FUNCTIONS: tuple[Callable[..., object], ...] = (running, load_block, load_case, store_results, is_solved, settle_batch)
 """Equilibria, each behind those that it uses."""
 
-MOTOR_FUNCTIONS: tuple[Callable[..., object], ...] = (estimate_batch, reach_batch)
+MOTOR_FUNCTIONS: tuple[Callable[..., object], ...] = (copy_lane, estimate_batch, reach_batch)
 """Load estimation and inverse kinematics."""

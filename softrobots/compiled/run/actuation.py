@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.settings import LARGEST_POSITION
 from softrobots.core.checks import FloatArray
@@ -60,12 +61,15 @@ class Actuation:
             return np.concatenate([joints, held @ chain.held_slope])
         return np.asarray(joints)
 
-    def rows(self, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Motor joints, loads of tensions and starts of many cases; without muscles the latter have no rows."""
-        nothing = np.zeros((0, len(self._strains)))
-        pulls = self._pulls(motors) if self._tensions else nothing
-        starts = self._starts(motors) if self._lengths else nothing
-        return np.ascontiguousarray(motors[:, : self._count]), pulls, starts
+    def rows(self, motors: FloatArray, layout: Layout) -> list[tuple[int, FloatArray]]:
+        """Return places in the workspace and values of many cases: motor joints, loads of tensions, starts at the lengths."""
+        inputs = [(0, motors[:, : self._count])]
+        if self._tensions:
+            inputs.append((layout.pull, self._pulls(motors)))
+        if self._lengths:
+            starts = self._starts(motors)
+            inputs += [(layout.start, starts), (layout.unknown, starts)]
+        return inputs
 
     def unsuited(self, motors: FloatArray) -> Any:
         """Which rows no shape of the robot has, or are too large to compute with, truth values."""

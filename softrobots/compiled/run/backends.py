@@ -98,11 +98,8 @@ class PythonRun(Run):
                 setattr(module, name, _guarded(getattr(module, name), getattr(careful, name)))
         super().__init__(program, module)
         batches = NumpyBatches(module, program)
-        self.settle_batch, self.estimate_batch, self.reach_batch = (
-            batches.settle_batch,
-            batches.estimate_batch,
-            batches.reach_batch,
-        )
+        for name in ("settle_batch", "estimate_batch", "reach_batch"):
+            setattr(self, name, getattr(batches, name))
 
     def array(self, count: int) -> Any:
         """A list of zeros."""

@@ -1,4 +1,4 @@
-"""What all batches share: rows of numbers, cases that cannot be computed, threads."""
+"""Common parts of all batches: rows of numbers, cases that cannot be computed, threads."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CHUNK = 8192  # cases that a thread takes at a time; small, as another program 
 
 
 def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
-    """Return arrays with one row a case each; a single row goes for all.
+    """Return arrays with one row a case each; a single row is repeated for all cases.
 
     Args:
         **arrays: By name, the array, shape (n, columns) or (columns,), and its number of columns.
@@ -27,7 +27,7 @@ def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
     Raises:
         ParameterError: If an array is not made of numbers, has another shape, or the rows differ in number.
     """
-    made: list[FloatArray] = []
+    rows: list[FloatArray] = []
     counts: dict[str, int] = {}
     for name, (value, columns) in arrays.items():
         requirement = f"an array of numbers, shape (n, {columns}) or ({columns},)"
@@ -42,12 +42,12 @@ def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
             raise ParameterError(name, value, f"{requirement} (it has shape {array.shape})")
         if array.ndim == 2:
             counts[name] = len(array)
-        made.append(array)
+        rows.append(array)
     if len(set(counts.values())) > 1:
-        told = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise ParameterError(next(iter(counts)), counts, f"as many rows as the others have ({told})")
+        listed = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise ParameterError(next(iter(counts)), counts, f"as many rows as the others have ({listed})")
     count = next(iter(counts.values()), 1)
-    return [array if array.ndim == 2 else np.tile(array, (count, 1)) for array in made]
+    return [array if array.ndim == 2 else np.tile(array, (count, 1)) for array in rows]
 
 
 def gravity_vector(gravity: Any) -> FloatArray:
@@ -60,31 +60,31 @@ def gravity_vector(gravity: Any) -> FloatArray:
 
 
 def unusable(*arrays: FloatArray) -> Any:
-    """Which rows hold a number that is not finite or too large to compute with, truth values."""
-    made = np.zeros(len(arrays[0]), dtype=bool)
+    """Return a mask of the rows that hold a number that is not finite or too large to compute with."""
+    bad = np.zeros(len(arrays[0]), dtype=bool)
     for array in arrays:
         if array.size and not (array.min() >= -LARGEST and array.max() <= LARGEST):  # rarely; both are NaN if a number is
-            made |= ~np.all(np.abs(array) <= LARGEST, axis=1)
-    return made
+            bad |= ~np.all(np.abs(array) <= LARGEST, axis=1)
+    return bad
 
 
 def without(array: FloatArray, bad: Any, instead: Any = 0.0) -> FloatArray:
-    """The array with other numbers in some rows; itself if there are none."""
+    """Return the array with other numbers in some rows; itself if there are no such rows."""
     if not np.any(bad):
         return array
-    made = array.copy()
-    made[bad] = instead
-    return made
+    changed = array.copy()
+    changed[bad] = instead
+    return changed
 
 
 def fail(statuses: Any, bad: Any, errors: Sequence[FloatArray], others: Sequence[FloatArray]) -> None:
-    """Mark rows whose input was none, and take NaN out of all that failed.
+    """Mark rows of bad input, and replace NaN and infinity in the results of all failed cases.
 
     Args:
         statuses: Status of each case, changed in place.
-        bad: Which rows had no input, truth values.
-        errors: What is infinite where there is no answer, shape (n,) each, changed in place.
-        others: What is zero there instead of no number, shape (n,) or (n, columns) each, changed in place.
+        bad: Mask of the rows of bad input.
+        errors: Results that become infinite there, shape (n,) each, changed in place.
+        others: Results that become zero there, shape (n,) or (n, columns) each, changed in place.
     """
     statuses[bad] = Status.NOT_A_NUMBER
     failed = np.flatnonzero(statuses)
@@ -102,12 +102,12 @@ def statuses_of(values: Any) -> Any:
 
 
 def in_parts(work: Callable[[int, int], None], count: int, threads: int) -> None:
-    """Do cases from first to last, in chunks that threads take as they become free.
+    """Work on cases in chunks that threads take as they become free.
 
     Args:
-        work: Does the cases from its first argument up to its second.
+        work: Function that solves the cases from its first argument up to its second.
         count: Number of cases.
-        threads: How many threads.
+        threads: Number of threads.
 
     Raises:
         ParameterError: If the number of threads is not positive.
@@ -119,3 +119,38 @@ def in_parts(work: Callable[[int, int], None], count: int, threads: int) -> None
         parts = [pool.submit(work, first, min(first + _CHUNK, count)) for first in range(0, count, _CHUNK)]
         for part in parts:
             part.result()
+
+
+def solve_batch(
+    function: Callable[..., None],
+    inputs: Sequence[tuple[int, FloatArray]],
+    results: Sequence[tuple[int, int]],
+    count: int,
+    threads: int,
+) -> tuple[list[FloatArray], Any]:
+    """Solve many cases with a batch function of generated code; see `softrobots.compiled.drivers.lane_drivers`.
+
+    Args:
+        function: The batch function.
+        inputs: Place in the workspace and values, shape (count, columns), or (1, columns) for all cases.
+        results: Place in the workspace and number of columns of each result.
+        count: Number of cases.
+        threads: Number of threads.
+
+    Returns:
+        The results, shape (count, columns) each, and the status of each case, shape (count,).
+
+    Raises:
+        ParameterError: If the number of threads is not positive.
+    """
+    arrays = [np.ascontiguousarray(values) for _, values in inputs]
+    given = tuple(array if array.flags.writeable else array.copy() for array in arrays)  # all of one type for numba
+    places, result_places = tuple(place for place, _ in inputs), tuple(place for place, _ in results)
+    outputs, statuses = tuple(np.zeros((count, columns)) for _, columns in results), np.zeros(count, dtype=np.uint8)
+    in_parts(lambda first, last: function(given, places, outputs, result_places, statuses, first, last), count, threads)
+    return list(outputs), statuses
+
+
+def root(squares: FloatArray) -> FloatArray:
+    """Return the square roots of a column, shape (n,); 0 of numbers that rounding has made negative."""
+    return np.asarray(np.sqrt(np.maximum(squares[:, 0], 0.0)))

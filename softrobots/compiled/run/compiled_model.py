@@ -16,7 +16,7 @@ from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import make_program
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.backends import BACKENDS, available_backend, make_run
-from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, in_parts, statuses_of, unusable, without
+from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, statuses_of, unusable, without
 from softrobots.compiled.run.looped_search import LoopedSearch
 from softrobots.compiled.run.results import CompiledEquilibrium, CompiledLoadEstimate, EquilibriumBatch, LoadBatch, MotorBatch
 from softrobots.compiled.run.unrolled_search import UnrolledSearch
@@ -212,17 +212,11 @@ class CompiledModel:
         down = gravity_vector(gravity)
         bad = unusable(motors, loads) | self._actuation.unsuited(motors)
         motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)
-        count, unknowns = len(motors), run.layout.unknowns
-        joints, pulls, starts = self._actuation.rows(motors)
-        found, tips = np.zeros((count, unknowns)), np.zeros((count, 3))
-        residuals, statuses = np.zeros(count), np.zeros(count, dtype=np.uint8)
-        in_parts(
-            lambda first, last: run.settle_batch(
-                joints, loads, down, pulls, starts, found, residuals, tips, statuses, first, last
-            ),
-            count,
-            threads,
-        )
+        layout = run.layout
+        inputs = [(layout.force, loads), (layout.gravity, down[None]), *self._actuation.rows(motors, layout)]
+        results = [(layout.unknown, layout.unknowns), (layout.tip, 3), (layout.single("error"), 1)]
+        (found, tips, squares), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
+        residuals = root(squares)
         fail(statuses, bad, [residuals], [found, tips])
         return EquilibriumBatch(
             read_only(self._actuation.elastic(found)), statuses_of(statuses), read_only(residuals), read_only(tips)
@@ -303,17 +297,8 @@ class CompiledModel:
         down = gravity_vector(gravity)
         bad = unusable(motors, torques) | self._actuation.unsuited(motors)
         motors, torques = without(motors, bad, self._model.relaxed_motors), without(torques, bad)
-        count = len(motors)
-        unknowns, forces = np.zeros((count, run.layout.unknowns)), np.zeros((count, 3))
-        residuals, unexplained, observed = np.zeros(count), np.zeros(count), np.zeros(count)
-        statuses = np.zeros(count, dtype=np.uint8)
-        in_parts(
-            lambda first, last: self._search(run).estimate_batch(
-                motors, torques, down, forces, unknowns, residuals, unexplained, observed, statuses, first, last
-            ),
-            count,
-            threads,
-        )
+        search = self._search(run)
+        statuses, unknowns, forces, residuals, unexplained, observed = search.estimate_batch(motors, torques, down, threads)
         fail(statuses, bad, [residuals, unexplained], [unknowns, forces, observed])
         return LoadBatch(
             read_only(self._actuation.elastic(unknowns)),
@@ -369,15 +354,8 @@ class CompiledModel:
         bad = unusable(points, loads, motors, unknowns) | self._actuation.unsuited(motors)
         points, loads, motors = without(points, bad), without(loads, bad), without(motors, bad, relaxed)
         unknowns = self._actuation.of_elastic(motors, without(unknowns, bad))
-        count = len(points)
-        motors, unknowns = np.array(motors), np.array(unknowns)
-        residuals, errors, statuses = np.zeros(count), np.zeros(count), np.zeros(count, dtype=np.uint8)
-        in_parts(
-            lambda first, last: self._search(run).reach_batch(
-                points, loads, down, motors, unknowns, residuals, errors, statuses, tolerance, first, last
-            ),
-            count,
-            threads,
+        statuses, motors, unknowns, residuals, errors = self._search(run).reach_batch(
+            points, loads, down, motors, unknowns, tolerance, threads
         )
         fail(statuses, bad, [residuals, errors], [unknowns, motors])
         return MotorBatch(

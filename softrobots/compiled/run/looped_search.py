@@ -18,7 +18,7 @@ from softrobots.compiled.run.batches import statuses_of
 from softrobots.compiled.run.results import MotorBatch
 from softrobots.compiled.settings import HIDDEN, LEAST_SIZE, SEARCH_STEPS
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.checks import FloatArray, positive_integer, read_only
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.force_search import Directions, search_force, torque_tolerance
 from softrobots.statics.tip_search import LocalSolution, advance, search
@@ -163,27 +163,31 @@ class LoopedSearch:
         return batch, first.iterations
 
     def estimate_batch(
-        self,
-        motors: FloatArray,
-        torques: FloatArray,
-        gravity: FloatArray,
-        forces: FloatArray,
-        unknowns: FloatArray,
-        residuals: FloatArray,
-        unexplained: FloatArray,
-        observed: FloatArray,
-        statuses: Any,
-        first: int,
-        last: int,
-    ) -> None:
-        """See `lane_drivers.estimate_batch`."""
-        layout = self.run.layout
-        for row in range(first, last):
+        self, motors: FloatArray, torques: FloatArray, gravity: FloatArray, threads: int
+    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Find the forces of many cases, one after the other whatever the number of threads.
+
+        Args:
+            motors: Actuators, shape (n, n_motors).
+            torques: Their loads, shape (n, n_motors) [N m or N].
+            gravity: Gravity, shape (3,) [m/s^2].
+            threads: Number of threads.
+
+        Returns:
+            Status, unknowns, force, residual, unexplained torque and observability of each case.
+
+        Raises:
+            ParameterError: If the number of threads is not positive.
+        """
+        positive_integer("threads", threads)
+        count, layout = len(motors), self.run.layout
+        statuses, unknowns, forces = np.zeros(count, dtype=np.uint8), np.zeros((count, layout.unknowns)), np.zeros((count, 3))
+        norms = np.zeros((3, count))
+        for row in range(count):
             statuses[row], w = self.estimate(motors[row], torques[row], gravity)
             unknowns[row], forces[row] = self.unknowns(w), self._part(w, layout.force, 3)
-            residuals[row], unexplained[row], observed[row] = (
-                math.sqrt(w[layout.single(name)]) for name in ("error", "unexplained", "observed")
-            )
+            norms[:, row] = [math.sqrt(w[layout.single(name)]) for name in ("error", "unexplained", "observed")]
+        return statuses, unknowns, forces, norms[0], norms[1], norms[2]
 
     def reach_batch(
         self,
@@ -192,19 +196,23 @@ class LoopedSearch:
         gravity: FloatArray,
         motors: FloatArray,
         unknowns: FloatArray,
-        residuals: FloatArray,
-        errors: FloatArray,
-        statuses: Any,
         tolerance: float,
-        first: int,
-        last: int,
-    ) -> None:
-        """See `lane_drivers.reach_batch`."""
-        for row in range(first, last):
+        threads: int,
+    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Put the tips at their targets, one after the other; see `reach` and `estimate_batch`.
+
+        Returns:
+            Status, actuators, unknowns, residual and distance from the target of each case.
+        """
+        positive_integer("threads", threads)
+        statuses, motors, unknowns = np.zeros(len(motors), dtype=np.uint8), motors.copy(), unknowns.copy()
+        norms = np.zeros((2, len(motors)))
+        for row in range(len(motors)):
             start = self.actuation.elastic(unknowns[row])
             statuses[row], found = self.reach(targets[row], forces[row], gravity, motors[row], start, tolerance)
-            motors[row], unknowns[row], errors[row] = found.q_motors, self.unknowns(found.state.w), found.error
-            residuals[row] = self.residual(found.state.w)
+            motors[row], unknowns[row] = found.q_motors, self.unknowns(found.state.w)
+            norms[:, row] = self.residual(found.state.w), found.error
+        return statuses, motors, unknowns, norms[0], norms[1]
 
     def _arrived(self, found: LocalSolution[ChainState], tolerance: float) -> Status:
         if not found.arrived(tolerance):

@@ -1,7 +1,7 @@
 """Batches without a compiler: the passes on blocks of cases, every element of the workspace a NumPy array.
 
-The text of the straight-line functions is the one that runs single cases; only its intrinsics are NumPy's. Cases that the
-passes do not settle go through the drivers one by one, in plain floats.
+The straight-line functions are those of single cases, with NumPy's intrinsics. Cases that the passes do not solve go through
+the drivers one by one, in plain floats.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.compiled.drivers.lane_drivers import Places, Rows
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.settings import FORCE_PASSES, OBSERVABLE, PASSES
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray
 
 BLOCK = 4096
 """Cases in a block: their workspace stays in the cache of a core."""
@@ -35,118 +35,56 @@ class NumpyBatches:
         self._functions.update(sine=np.sin, cosine=np.cos)
 
     def settle_batch(
-        self,
-        motors: FloatArray,
-        forces: FloatArray,
-        gravity: FloatArray,
-        pulls: FloatArray,
-        starts: FloatArray,
-        unknowns: FloatArray,
-        residuals: FloatArray,
-        tips: FloatArray,
-        statuses: Any,
-        first: int,
-        last: int,
+        self, inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int
     ) -> None:
-        """See `lane_drivers.settle_batch`."""
-        layout = self._layout
-        for rows in self._blocks(first, last):
-            count = rows.stop - rows.start
-            w = self._workspace(count, [(0, motors[rows]), (layout.force, forces[rows]), (layout.gravity, gravity)])
-            if len(pulls):
-                self._put(w, layout.pull, pulls[rows])
-            if len(starts):
-                self._put(w, layout.start, starts[rows])
-                self._put(w, layout.unknown, starts[rows])
+        """Find equilibria; see `lane_drivers`."""
+        for rows in _blocks(first, last):
+            w = self._workspace(rows, inputs, places)
             for lane in self._run(w, rows, statuses, "first_pass", "newton_pass"):
                 statuses[rows.start + lane] = self._alone(w, lane, self._module.settle)
-            unknowns[rows] = self._taken(w, layout.unknown, unknowns.shape[1], count)
-            tips[rows] = self._taken(w, layout.tip, 3, count)
-            residuals[rows] = self._root(w, "error", count)
+            _store_results(w, rows, outputs, result_places)
 
     def estimate_batch(
-        self,
-        motors: FloatArray,
-        torques: FloatArray,
-        gravity: FloatArray,
-        forces: FloatArray,
-        unknowns: FloatArray,
-        residuals: FloatArray,
-        unexplained: FloatArray,
-        observed: FloatArray,
-        statuses: Any,
-        first: int,
-        last: int,
+        self, inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int
     ) -> None:
-        """See `lane_drivers.estimate_batch`."""
-        layout = self._layout
-        for rows in self._blocks(first, last):
-            count = rows.stop - rows.start
-            w = self._workspace(count, [(0, motors[rows]), (layout.torques, torques[rows]), (layout.gravity, gravity)])
+        """Estimate forces; see `lane_drivers`."""
+        for rows in _blocks(first, last):
+            w = self._workspace(rows, inputs, places)
             for lane in self._run(w, rows, statuses, "first_force_pass", "force_pass", FORCE_PASSES):
                 statuses[rows.start + lane] = self._alone(w, lane, self._module.estimate)
-            observed[rows] = self._root(w, "observed", count)
-            hidden = (statuses[rows] == Status.CERTIFIED) & (observed[rows] < OBSERVABLE * self._module.REACH)
-            statuses[rows][hidden] = Status.UNOBSERVABLE
-            unknowns[rows] = self._taken(w, layout.unknown, unknowns.shape[1], count)
-            forces[rows] = self._taken(w, layout.force, 3, count)
-            residuals[rows] = self._root(w, "error", count)
-            unexplained[rows] = self._root(w, "unexplained", count)
+            weak = np.sqrt(np.abs(w[self._layout.single("observed")])) < OBSERVABLE * self._module.REACH
+            statuses[rows][(statuses[rows] == Status.CERTIFIED) & weak] = Status.UNOBSERVABLE
+            _store_results(w, rows, outputs, result_places)
 
     def reach_batch(
-        self,
-        targets: FloatArray,
-        forces: FloatArray,
-        gravity: FloatArray,
-        motors: FloatArray,
-        unknowns: FloatArray,
-        residuals: FloatArray,
-        errors: FloatArray,
-        statuses: Any,
-        tolerance: float,
-        first: int,
-        last: int,
+        self, inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int
     ) -> None:
-        """See `lane_drivers.reach_batch`."""
-        layout = self._layout
-        for rows in self._blocks(first, last):
-            count = rows.stop - rows.start
-            given = [(0, motors[rows]), (layout.unknown, unknowns[rows]), (layout.force, forces[rows])]
-            w = self._workspace(count, [*given, (layout.gravity, gravity), (layout.target, targets[rows])])
-            w[layout.single("tolerated")] = np.full(count, tolerance)
-            left = self._run(w, rows, statuses, "target_pass", "target_pass")
-            found = self._taken(w, 0, layout.motors, count)
-            outside = np.any((found < self._low - 1e-9) | (found > self._high + 1e-9), axis=1)
-            for lane in np.union1d(left, np.flatnonzero(outside)):
-                for place, values in ((0, motors), (layout.unknown, unknowns)):
-                    self._put(w, place, values[rows], lane)
+        """Put the tips at their targets; see `lane_drivers`."""
+        for rows in _blocks(first, last):
+            w = self._workspace(rows, inputs, places)
+            unsolved = self._run(w, rows, statuses, "target_pass", "target_pass")
+            motors = np.reshape(w[: self._layout.motors], (self._layout.motors, -1)).T
+            outside = np.any((motors < self._low - 1e-9) | (motors > self._high + 1e-9), axis=1)
+            for lane in np.union1d(unsolved, np.flatnonzero(outside)):
+                for place, values in zip(places, inputs, strict=True):
+                    for column in range(values.shape[1]):
+                        w[place + column][lane] = values[min(rows.start + lane, len(values) - 1), column]
                 statuses[rows.start + lane] = self._alone(w, lane, self._module.reach)
-            motors[rows] = self._taken(w, 0, layout.motors, count)
-            unknowns[rows] = self._taken(w, layout.unknown, unknowns.shape[1], count)
-            residuals[rows] = self._root(w, "error", count)
-            errors[rows] = self._root(w, "missing", count)
+            _store_results(w, rows, outputs, result_places)
 
-    def _blocks(self, first: int, last: int) -> list[slice]:
-        return [slice(begin, min(begin + BLOCK, last)) for begin in range(first, last, BLOCK)]
-
-    def _workspace(self, count: int, given: list[tuple[int, FloatArray]]) -> list[Any]:
+    def _workspace(self, rows: slice, inputs: Rows, places: Places) -> list[Any]:
+        count = rows.stop - rows.start
         w: list[Any] = [np.zeros(count) for _ in range(self._size)]
-        for place, values in given:
-            self._put(w, place, np.broadcast_to(values, (count, values.shape[-1])))
+        for place, values in zip(places, inputs, strict=True):
+            block = values[rows] if len(values) > 1 else np.broadcast_to(values, (count, values.shape[1]))
+            for column in range(values.shape[1]):
+                w[place + column] = np.array(block[:, column])
         return w
 
-    def _put(self, w: list[Any], place: int, values: FloatArray, lane: int | None = None) -> None:
-        """Write columns into the workspace, of all cases or of one."""
-        for column in range(values.shape[1]):
-            if lane is None:
-                w[place + column] = np.array(values[:, column])
-            else:
-                w[place + column][lane] = values[lane, column]
-
     def _run(self, w: list[Any], rows: slice, statuses: Any, first: str, then: str, most: int = PASSES) -> Any:
-        """Do the passes; return the lanes that they do not settle."""
+        """Do the passes; return the lanes that they do not solve."""
         mode = self._layout.single("mode")
-        with np.errstate(all="ignore"):  # cases that overflow are told by their numbers
+        with np.errstate(all="ignore"):  # cases that overflow have infinite numbers
             self._functions[first](w)
             for _ in range(most):
                 if not np.any(w[mode] < 0.5):
@@ -154,7 +92,7 @@ class NumpyBatches:
                 self._functions[then](w)
         statuses[rows] = Status.CERTIFIED
         count = rows.stop - rows.start
-        w[:] = [np.array(np.broadcast_to(one, count)) for one in w]  # what is the same for all was written once
+        w[:] = [np.array(np.broadcast_to(one, count)) for one in w]  # constants are written once
         return np.flatnonzero(~((w[mode] > 0.5) & (w[mode] < 1.5)))
 
     def _alone(self, w: list[Any], lane: int, function: Any) -> int:
@@ -165,8 +103,12 @@ class NumpyBatches:
             one[lane] = value
         return status
 
-    def _taken(self, w: list[Any], place: int, columns: int, count: int) -> FloatArray:
-        return np.array(w[place : place + columns], dtype=np.float64).reshape(columns, count).T
 
-    def _root(self, w: list[Any], name: str, count: int) -> FloatArray:
-        return np.asarray(np.sqrt(np.abs(w[self._layout.single(name)])).reshape(count))
+def _blocks(first: int, last: int) -> list[slice]:
+    return [slice(begin, min(begin + BLOCK, last)) for begin in range(first, last, BLOCK)]
+
+
+def _store_results(w: list[Any], rows: slice, outputs: Rows, places: Places) -> None:
+    for place, values in zip(places, outputs, strict=True):
+        for column in range(values.shape[1]):
+            values[rows, column] = w[place + column]

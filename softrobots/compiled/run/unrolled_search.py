@@ -1,4 +1,4 @@
-"""Load estimation and inverse kinematics of short chains: Newton's method on all unknowns, generated as straight-line code."""
+"""Load estimation and inverse kinematics of unrolled chains: Newton's method on all unknowns, as straight-line code."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.batches import statuses_of
+from softrobots.compiled.run.batches import root, solve_batch, statuses_of
 from softrobots.compiled.run.results import MotorBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
@@ -15,12 +15,11 @@ from softrobots.model.soft_model import SoftModel
 
 
 class UnrolledSearch:
-    """Searches by the functions of `motor_drivers` and `path_drivers`; `LoopedSearch` for short chains."""
+    """Searches of unrolled chains, by the functions of `motor_drivers` and `path_drivers`; see `LoopedSearch`."""
 
     def __init__(self, model: SoftModel, actuation: Actuation, run: Any) -> None:
-        """Search with the functions of a program that has searches of its own."""
+        """Use the functions of a program that has generated searches."""
         self._model, self._actuation, self._run = model, actuation, run
-        self.estimate_batch, self.reach_batch = run.estimate_batch, run.reach_batch
 
     def estimate(self, q_motors: FloatArray, torques: FloatArray, gravity: FloatArray) -> tuple[Status, Any]:
         """Find the force that explains motor torques; see `LoopedSearch.estimate`."""
@@ -30,6 +29,44 @@ class UnrolledSearch:
         run.put(w, run.layout.torques, torques)
         run.put(w, run.layout.gravity, gravity)
         return Status(run.estimate(w)), w
+
+    def estimate_batch(
+        self, motors: FloatArray, torques: FloatArray, gravity: FloatArray, threads: int
+    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Find the forces of many cases; see `LoopedSearch.estimate_batch`."""
+        run, layout = self._run, self._run.layout
+        inputs = [(0, motors), (layout.torques, torques), (layout.gravity, gravity[None])]
+        squares = [(layout.single(name), 1) for name in ("error", "unexplained", "observed")]
+        results = [(layout.unknown, layout.unknowns), (layout.force, 3), *squares]
+        (unknowns, forces, error, unexplained, observed), statuses = solve_batch(
+            run.estimate_batch, inputs, results, len(motors), threads
+        )
+        return statuses, unknowns, forces, root(error), root(unexplained), root(observed)
+
+    def reach_batch(
+        self,
+        targets: FloatArray,
+        forces: FloatArray,
+        gravity: FloatArray,
+        motors: FloatArray,
+        unknowns: FloatArray,
+        tolerance: float,
+        threads: int,
+    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Put the tips at their targets; see `LoopedSearch.reach_batch`."""
+        run, layout = self._run, self._run.layout
+        inputs = [
+            (0, motors),
+            (layout.unknown, unknowns),
+            (layout.force, forces),
+            (layout.gravity, gravity[None]),
+            (layout.target, targets),
+            (layout.single("tolerated"), np.full((1, 1), float(tolerance))),
+        ]
+        squares = [(layout.single(name), 1) for name in ("error", "missing")]
+        results = [(0, layout.motors), (layout.unknown, layout.unknowns), *squares]
+        (motors, unknowns, error, missing), statuses = solve_batch(run.reach_batch, inputs, results, len(motors), threads)
+        return statuses, motors, unknowns, root(error), root(missing)
 
     def follow(
         self, targets: FloatArray, force: FloatArray, gravity: FloatArray, q_motors: FloatArray, tolerance: float
