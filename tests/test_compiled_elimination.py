@@ -351,7 +351,7 @@ def test_loops_compute_what_the_straight_line_does(
         with monkeypatch.context() as patch:
             patch.setattr("softrobots.compiled.chain.unknowns.MAX_UNROLLED_JOINTS", 0)
             runs.append(program_at(model, motors, force, gravity))
-        assert ["enter_all" in code for _, code, _, _ in runs] == [False, True]
+        assert ["outward_all" in code for _, code, _, _ in runs] == [False, True]
         for pivot_shift in (0.0, 1.0):
             line, loops = (vars(evaluated(run, springs, pivot_shift)) for run in runs)
             for name, value in line.items():
