@@ -15,14 +15,13 @@ import json
 import sys
 import textwrap
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import write_bytes
-from softrobots.view.figures import plots
+from softrobots.view.figures.canvas import require_matplotlib
 
 PACKAGE = Path(sr.__file__).resolve().parent
 PICTURE = PACKAGE.parent / "docs" / "images" / "architecture.png"
@@ -34,8 +33,7 @@ TOLERANCE = 0.1
 """Share by which the lines of a room may differ from the picture."""
 
 
-@dataclass(frozen=True)
-class Room:
+class Room(NamedTuple):
     """A folder of the package."""
 
     purpose: str
@@ -156,7 +154,7 @@ def draw(rooms: dict[str, Room]) -> Any:
     right = max(abs(x) for x in layout.x.values()) + WIDTH / 2 + 0.2
     top = RISE * (len(layout.layers) - 1) + HEIGHT / 2 + 0.2
     bottom = -HEIGHT / 2 - 0.2
-    figure = plots.require_matplotlib()(figsize=(2 * right, top - bottom), dpi=120)
+    figure = require_matplotlib()(figsize=(2 * right, top - bottom), dpi=120)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(-right, right), ylim=(bottom, top))
     axes.axis("off")
@@ -219,8 +217,8 @@ def run(arguments: argparse.Namespace) -> bool:
         found = differences(rooms, arguments.output)
         print("\n".join(found) or f"{arguments.output}: up to date")
         return not found
-    plots.require_matplotlib()
-    text = json.dumps({name: asdict(room) for name, room in rooms.items()})
+    require_matplotlib()
+    text = json.dumps({name: room._asdict() for name, room in rooms.items()})
     picture = io.BytesIO()
     draw(rooms).savefig(picture, format="png", metadata={KEY: text, "Software": None})
     print(f"{write_bytes(arguments.output, picture.getvalue(), overwrite=True)}: written")

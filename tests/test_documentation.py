@@ -303,7 +303,7 @@ def test_the_navigation_shows_every_page(site: Callable[[str], ModuleType]) -> N
     there = {path.name for path in (*DOCS.glob("*.md"), *DOCS.glob("*.ipynb"))}
     listed = nav_pages()
     assert len(listed) == len(set(listed))
-    assert set(listed) == there | api | {"changelog.md"}
+    assert set(listed) == there | api | {"changelog.md", "contributing.md"}
 
 
 def test_the_reference_has_every_public_name(site: Callable[[str], ModuleType]) -> None:
@@ -338,7 +338,7 @@ def test_every_command_has_an_example_and_its_help() -> None:
 
 
 def test_links_and_pictures_lead_somewhere() -> None:
-    for name in PAGES:
+    for name in (*PAGES, "CONTRIBUTING.md"):
         text = re.sub(r"```.*?```", "", page_text(name), flags=re.DOTALL)
         for target in re.findall(r"\]\((?!https?:|mailto:|#)([^)#\s]+)", text):
             path = (CHECKOUT / name).parent / target

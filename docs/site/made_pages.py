@@ -24,7 +24,7 @@ SHELL = re.compile(r'<div class="language-(?:sh|console) highlight">.*?</pre>', 
 SOURCES = {"scripts/*.py": "python", "xacro/**/*.xacro": "xml", "urdf/*.urdf": "xml", "docs/examples/**/*.*": ""}
 """Files of the checkout that become pages, and their languages."""
 LANGUAGES = {".py": "python", ".xacro": "xml", ".urdf": "xml", ".csv": "text"}
-TOP = {"README.md": "index.md", "CHANGELOG.md": "changelog.md"}
+TOP = {"README.md": "index.md", "CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 """Files beside docs/, and the pages that stand for them."""
 
 
@@ -55,7 +55,9 @@ def _folder_text(folder: Path, files: list[Path]) -> str:
 def on_files(files: Any, config: Any) -> Any:
     """Add the pages."""
     made = {f"api/{name}.md": page_text(page) for name, page in PAGES.items()}
-    made |= {"api/index.md": overview(), "changelog.md": (CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8")}
+    made |= {"api/index.md": overview()}
+    for name in ("CHANGELOG.md", "CONTRIBUTING.md"):
+        made[TOP[name]] = (CHECKOUT / name).read_text(encoding="utf-8").replace("](docs/", "](")
     sources = source_files()
     made |= {source_page(path): _source_text(path) for path in sources}
     for folder in (CHECKOUT / "scripts", CHECKOUT / "xacro", CHECKOUT / "urdf"):
