@@ -299,15 +299,15 @@ def test_a_mesh_of_another_kind_is_left_out_and_the_kinds_are_told(tmp_path: Pat
 @each_row(
     ("old", "new", "told"),
     [
-        ("0 0 0 1 0 0", "0 0 0 1 0 zero", "many numbers as it says"),
-        ('count="12"', 'count="13"', "many numbers as it says"),
+        ("0 0 0 1 0 0", "0 0 0 1 0 zero", "another count of numbers"),
+        ('count="12"', 'count="13"', "another count of numbers"),
         ('count="4" stride="3"', 'count="5" stride="3"', "beyond the end of its array"),
         ('count="4" stride="3"', 'count="-4" stride="3"', "has count = '-4' in <accessor>"),
         ('semantic="POSITION"', 'semantic="NORMAL"', "<vertices> without positions"),
         ('semantic="VERTEX"', 'semantic="NORMAL"', "<triangles> without corners"),
-        ('url="#g"', 'url="#h"', "has url = '#h', which nothing is called"),
+        ('url="#g"', 'url="#h"', "has url = '#h', which does not exist"),
         ('<source id="p">', '<source id="v">', "two elements with the id 'v'"),
-        ("<p>0", "<p>-0", "what is no whole number"),
+        ("<p>0", "<p>-0", "text other than whole numbers"),
         ("<instance_geometry", '<instance_node url="#n"/><instance_geometry', "in a circle"),
         ("<asset>", "<asset>" + "<a>" * 100 + "</a>" * 100, "more than 100 deep"),
         ("<asset>", "<asset>&x;", "undefined entity"),
@@ -336,7 +336,7 @@ def test_collada_of_the_ur5_is_read() -> None:
 
 def test_mjcf_that_is_text_includes_nothing() -> None:
     need_simulators()
-    with pytest.raises(sr.DescriptionError, match="which has no folder; give the path of a file"):
+    with pytest.raises(sr.DescriptionError, match="which has no folder; a path of a file is required"):
         sr.load_model(mjcf(before='<include file="a.xml"/>'))
 
 

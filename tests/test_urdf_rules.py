@@ -74,7 +74,7 @@ CHANGES = [
     (JOINTS, 'axis xyz="0.0 -1.0 0.0"', 'axis xyz="0.0 -1.0"', "a unit vector is required"),
     (JOINTS, '<dynamics damping="0.0" friction="0.0"/>', '<dynamics damping="0.0"/>', "motor_1 has no <dynamics>"),
     (JOINTS, 'damping="0.0" friction="0.0"', 'damping="-1.0" friction="0.0"', "motor_1 has no <dynamics>"),
-    (MIMICS, ROLE, f'<mimic joint="motor_3"/>{ROLE}', "not on its way"),
+    (MIMICS, ROLE, f'<mimic joint="motor_3"/>{ROLE}', "not on its path"),
     (MIMICS, ROLE, f'<mimic joint="nothing"/>{ROLE}', "mimics 'nothing'"),
     (SHAPES, '<cylinder length="0.11" radius="0.07150000000000001"/>', '<capsule length="0.1" radius="0.1"/>', "is capsule"),
     (SHAPES, '<cylinder length="0.11" radius="0.07150000000000001"/>', '<mesh filename="a.stl"/>', "is mesh"),
@@ -195,8 +195,8 @@ def test_what_is_no_urdf_is_refused(source: str, message: str) -> None:
 @each_row(
     ("before", "after", "what", "message"),
     [
-        ('stiffness="172.71"', 'stiffness="-1"', "tags of softrobots", "a positive one is required"),
-        ('stiffness="172.71"', 'stiffness="-1"', "softrobots", "a positive one is required"),
+        ('stiffness="172.71"', 'stiffness="-1"', "tags of softrobots", "a positive number is required"),
+        ('stiffness="172.71"', 'stiffness="-1"', "softrobots", "a positive number is required"),
         ('name="motor_1" type="revolute"', 'name="motor_1" type="planar"', "softrobots", "revolute, continuous and prismatic"),
         ('name="motor_1" type="revolute"', 'name="motor_1" type="planar"', "yourdfpy's kinematics", "not revolute"),
         ("<limit ", "<limits ", "Pinocchio", ""),

@@ -1,1 +1,1 @@
-"""Robot descriptions: xacro to URDF, our tags, trees of links, foreign MJCF and SDF, one robot mounted on another."""
+"""Robot descriptions: xacro to URDF, the tags of this package, third-party MJCF and SDF, one robot mounted on another."""

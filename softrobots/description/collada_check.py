@@ -1,7 +1,7 @@
-"""COLLADA files (.dae) before Assimp reads them, by which Pinocchio draws meshes.
+"""Checks of COLLADA files (.dae) before Assimp, Pinocchio's mesh reader, opens them.
 
-Assimp trusts how such a file hangs together: corners without positions end the process (Assimp 5, through Coal 3.0), and what
-is no number where a count or an index is expected becomes one that fills the memory. Found by scripts/fuzz_readers.py.
+Assimp trusts the references inside such a file: corners without positions end the process (Assimp 5, through Coal 3.0), and a
+malformed count or index is read as one that exhausts the memory. Found by scripts/fuzz_readers.py.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from softrobots.core.bounded_reading import read_bytes
 from softrobots.core.errors import FileFormatError
 
 LARGEST_FILE = 50_000_000
-"""Bytes that a COLLADA file may have; the largest among the robots that we know has 29 million."""
+"""Largest size of a COLLADA file [bytes]; the largest among known robots has 29 million."""
 DEEPEST = 100
-"""Elements that may be within each other."""
+"""Deepest nesting of elements."""
 MOST_COUNT = 100_000_000
-"""The largest count, stride or offset."""
+"""Largest count, stride or offset."""
 
 _WHOLE = re.compile(r"[\s\d]*", re.ASCII)
 _REAL = re.compile(r"[\s\d.eE+-]*", re.ASCII)
@@ -29,14 +29,7 @@ _NAMED = re.compile(r"\{[^}]*\}")
 
 
 def collada_problem(file: Path) -> str:
-    """Tell why a COLLADA file is not read.
-
-    Args:
-        file: The file.
-
-    Returns:
-        The reason; empty if there is none.
-    """
+    """Return why a COLLADA file is not safe to read; empty if it is."""
     try:
         data = read_bytes(file, LARGEST_FILE)
         if b"<!DOCTYPE" in data or b"<!ENTITY" in data or b"\0" in data:  # NUL: also UTF-16
@@ -74,18 +67,18 @@ def _number_problems(element: ElementTree.Element) -> Iterator[str]:
         if text is not None and not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) <= MOST_COUNT):
             yield f"has {name} = {text[:100]!r} in <{element.tag}>"
     if element.tag in ("p", "vcount", "v", "h") and not _WHOLE.fullmatch(element.text or ""):
-        yield f"has <{element.tag}> with what is no whole number"
+        yield f"has <{element.tag}> with text other than whole numbers"
     if element.tag == "float_array":
         text = element.text or ""
         if not _REAL.fullmatch(text) or len(text.split()) != int(element.get("count", "-1")):
-            yield "has a <float_array> that is not as many numbers as it says"
+            yield "has a <float_array> with another count of numbers than it declares"
 
 
 def _reference_problems(element: ElementTree.Element, named: Mapping[str, ElementTree.Element]) -> Iterator[str]:
     for name in ("source", "url", "target"):
         text = element.get(name)
         if text is not None and text.startswith("#") and text[1:] not in named:
-            yield f"has {name} = {text[:100]!r}, which nothing is called"
+            yield f"has {name} = {text[:100]!r}, which does not exist"
     if element.tag == "vertices":
         inputs = [inner for inner in element.findall("input") if inner.get("semantic") == "POSITION"]
         sources = [named.get(inner.get("source", "")[1:]) for inner in inputs]
@@ -105,12 +98,12 @@ def _reference_problems(element: ElementTree.Element, named: Mapping[str, Elemen
 
 
 def _circles(root: ElementTree.Element) -> Iterator[str]:
-    """Nodes that contain themselves, or so many that they never end."""
-    called: dict[str, list[ElementTree.Element]] = {}
+    """Nodes that contain themselves, or instances that multiply without bound."""
+    by_id: dict[str, list[ElementTree.Element]] = {}
     for node in root.iter("node"):
-        called.setdefault(node.get("id", ""), []).append(node)
+        by_id.setdefault(node.get("id", ""), []).append(node)
     inside = {
-        node: [inner for instance in node.iter("instance_node") for inner in called.get(instance.get("url", "")[1:], ())]
+        node: [inner for instance in node.iter("instance_node") for inner in by_id.get(instance.get("url", "")[1:], ())]
         for node in root.iter("node")
     }
     level, steps = list(inside), 0

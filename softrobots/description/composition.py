@@ -1,7 +1,7 @@
-"""Putting two robots together: a soft arm on a link of another robot, as one URDF.
+"""Composition of two robots into one URDF: a soft arm mounted on a link of another robot.
 
-xacro joins the two descriptions (`xacro/mounted.urdf.xacro`); here they are made ready for that: names get a prefix, and text
-that xacro would evaluate is quoted.
+xacro joins the two descriptions (`xacro/mounted.urdf.xacro`) after names have got a prefix and text that it would evaluate is
+quoted.
 """
 
 from __future__ import annotations
@@ -44,19 +44,19 @@ def mount(
 ) -> str:
     """Mount a robot on a link of another one.
 
-    The carrier stays as it is. All names of the mounted robot get the prefix, wherever they stand; its segments are numbered on
-    from those of the carrier. If its root is a link `world` without mass and shape that carries one fixed joint, that link goes
-    and the joint starts at `link`. Its tip becomes the tip of the whole, by a tag that `load_model` reads
-    (`<softrobots:tip link=../>`); a mounted robot with several ends and no `tip` leaves the tip where it was. Of two tags
-    `<mujoco>` the carrier's stays. Relative paths of meshes in files are written out, so that they are found from everywhere.
+    The carrier is not changed. All names of the mounted robot get the prefix; its segments are numbered after those of the
+    carrier. If its root is a link `world` without mass and shape that carries one fixed joint, that link is removed and
+    the joint starts at `link`. Its tip becomes the tip of the whole, by a tag that `load_model` reads
+    (`<softrobots:tip link=../>`); a mounted robot with several ends and no `tip` leaves the tip of the carrier. Of two tags
+    `<mujoco>` the carrier's is kept. Relative paths of meshes are made absolute.
 
     Args:
         parent_urdf: The carrier: a robot of this package, the path of a URDF file, or URDF text (what `load_model` takes).
         link: Link of the carrier.
         robot: The robot to be mounted, likewise.
-        prefix: Put before every name of the mounted robot; letters, digits and underscores.
-        xyz: Where the root of the mounted robot is in the frame of `link`, shape (3,) [m].
-        rpy: How it is turned there, roll, pitch, yaw, shape (3,) [rad].
+        prefix: Prefix of every name of the mounted robot; letters, digits and underscores.
+        xyz: Position of the root of the mounted robot in the frame of `link`, shape (3,) [m].
+        rpy: Its orientation there as roll, pitch, yaw, shape (3,) [rad].
         name: Name of the whole; by default `<carrier>_with_<robot>`.
 
     Returns:
@@ -90,7 +90,7 @@ def mount(
         if np.any(base.placement.position) or np.any(base.placement.rotation != np.eye(3)):
             pose = pose @ base.placement
             position, angles = pose.position, pose.rpy
-    prefix_names(child.dom, prefix)  # first: what refers to the joint on the world gets its new name, too
+    prefix_names(child.dom, prefix)  # first, so that references to the joint on the world get its new name, too
     _prepare_child(child, base, carrier, prefix)
     for tag in ours(carrier.dom, "tip") if tip is not None else ():
         carrier.dom.removeChild(tag)
@@ -109,7 +109,7 @@ def mount(
         for argument, part in (("carrier", carrier), ("robot", child)):
             file = Path(folder) / f"{argument}.urdf"
             _quote(part.dom)
-            # ASCII, because xacro reads in the encoding of the system; and it takes brackets in file names for patterns.
+            # ASCII, because xacro reads in the encoding of the system; escaped, because it expands brackets in file names.
             file.write_bytes(part.dom.toxml().encode("ascii", "xmlcharrefreplace"))
             arguments[argument] = glob.escape(str(file))
         text = expand(xacro_folder() / "mounted.urdf.xacro", arguments)
@@ -118,14 +118,14 @@ def mount(
 
 
 def fix_joints(robot: Robot | Path | str, positions: Mapping[str, float]) -> str:
-    """Make motor joints fixed at given positions, e.g. those of an arm that another robot carries.
+    """Replace motor joints by fixed ones at given positions, e.g. those of an arm that carries another robot.
 
     Args:
         robot: A robot of this package, the path of a URDF file, or URDF text.
         positions: Position by joint name [rad or m].
 
     Returns:
-        URDF text in which these joints are fixed, and their links stand where the joints had moved them.
+        URDF text in which these joints are fixed with their links at these positions.
 
     Raises:
         ParameterError: If an argument has the wrong type, or a position is not finite or beyond the limits of its joint.
@@ -160,7 +160,7 @@ def fix_joints(robot: Robot | Path | str, positions: Mapping[str, float]) -> str
 
 
 class _Part(NamedTuple):
-    """A description, read in three ways."""
+    """A description as text, DOM, rigid tree and tags."""
 
     label: str
     document: minidom.Document
@@ -170,7 +170,7 @@ class _Part(NamedTuple):
 
     @property
     def tip(self) -> str | None:
-        """The link that is its tip; None if it has several ends."""
+        """Name of the tip link; None if there are several ends."""
         names = [body.name for body in self.tree.bodies]
         ends = [name for name in names if not self.tree.joints_of(name)]
         if self.tags.tip is not None:
@@ -179,9 +179,8 @@ class _Part(NamedTuple):
 
 
 def _read(source: Any, field: str) -> _Part:
-    """Read a description and refuse what is no URDF."""
     text, label = read_source(source, field)
-    tags = read_tags(text, label)  # refuses what is no URDF
+    tags = read_tags(text, label)  # raises for anything but URDF
     document = minidom.parseString(text.encode("utf-8"))
     (dom,) = children(document)
     both = {e.getAttribute("name") for e in children(dom) if e.tagName == "link"}
@@ -192,7 +191,7 @@ def _read(source: Any, field: str) -> _Part:
 
 
 def _joint_on_world(part: _Part) -> Joint | None:
-    """The only joint on a root `world` that is nothing else than the place where the robot stands; None otherwise."""
+    """The only joint on a root `world` without mass and shapes, if it is fixed; None otherwise."""
     root = part.tree.body(part.tree.root)
     joints = part.tree.joints_of(root.name)
     empty = root.name == _WORLD and root.mass == 0.0 and not root.visuals and not root.collisions
@@ -201,19 +200,19 @@ def _joint_on_world(part: _Part) -> Joint | None:
 
 
 def _prepare_child(child: _Part, base: Joint | None, carrier: _Part, prefix: str) -> None:
-    """Take out what the whole has once, or not at all; names have their prefix already."""
-    gone = ours(child.dom, "tip")
+    """Remove what the whole has only once (tip, world, `<mujoco>`); names have their prefix already."""
+    removed = ours(child.dom, "tip")
     for element in children(child.dom):
         if base is not None and (element.tagName, element.getAttribute("name")) in (
             ("link", prefix + _WORLD),
             ("joint", prefix + base.name),
         ):
-            gone.append(element)
+            removed.append(element)
         if base is not None and element.tagName == "gazebo" and element.getAttribute("reference") == prefix + _WORLD:
-            gone.append(element)
+            removed.append(element)
         if element.tagName == "mujoco" and any(other.tagName == "mujoco" for other in children(carrier.dom)):
-            gone.append(element)
-    for element in gone:
+            removed.append(element)
+    for element in removed:
         child.dom.removeChild(element)
     numbers = [tag.segment for tag in carrier.tags.sections] + [tag.segment for tag in carrier.tags.lumped_sections]
     shift_segments(child.dom, max(numbers, default=0))
@@ -234,9 +233,9 @@ def _check_names(carrier: _Part, child: _Part, prefix: str, joint: str) -> None:
     for kind, names in below.items():
         for name in names:
             if name in above.get(kind, {}) and not (kind == "material" and above[kind][name] == names[name]):
-                told = "a material of another colour" if kind == "material" else f"a {kind}"
+                holder = "a material of another colour" if kind == "material" else f"a {kind}"
                 raise DescriptionError(
-                    f"{carrier.label} already has {told} called {name!r}, as {child.label} with the prefix {prefix!r}; "
+                    f"{carrier.label} already has {holder} called {name!r}, as {child.label} with the prefix {prefix!r}; "
                     "choose another prefix"
                 )
 
@@ -247,12 +246,12 @@ def _check_namespaces(carrier: _Part, child: _Part) -> None:
         for attribute, value in part.dom.attributes.items():
             if attribute.startswith("xmlns:") and attribute != "xmlns:xacro" and declared.setdefault(attribute, value) != value:
                 raise DescriptionError(
-                    f"{part.label} declares {attribute}={value!r}, which stands for {declared[attribute]!r} here; rename it"
+                    f"{part.label} declares {attribute}={value!r}, already declared as {declared[attribute]!r}; rename it"
                 )
 
 
 def _quote(node: Any) -> None:
-    """Quote dollar signs in attributes and texts, which xacro would evaluate, and drop comments that are orders to it."""
+    """Quote dollar signs in attributes and texts, which xacro would evaluate, and drop comments with instructions to it."""
     for inner in list(node.childNodes):
         if inner.nodeType == inner.ELEMENT_NODE:
             _quote(inner)

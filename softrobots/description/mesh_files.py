@@ -1,6 +1,6 @@
-"""Mesh files that a description names: where they are, and a description without those that are not there.
+"""Mesh files of a description: how they are found, and the description without those that are missing.
 
-A URDF names a mesh as `package://<package>/<path>`, as `file://<path>`, or as a path, relative to the file that names it.
+A URDF names a mesh as `package://<package>/<path>`, as `file://<path>`, or as a path relative to the URDF file.
 """
 
 from __future__ import annotations
@@ -18,28 +18,27 @@ from softrobots.description.collada_check import collada_problem
 
 _MESH = re.compile(r"""(<mesh\b[^<>]*?\bfilename\s*=\s*)(?:"([^"]*)"|'([^']*)')""")
 
-
 LARGEST_MESH = 100_000_000
-"""Bytes that a mesh file, or another file that a description names, may have."""
+"""Largest size of a mesh file, or another file that a description names [bytes]."""
 DRAWN_FILES = (".obj", ".stl", ".dae")
-"""Mesh files that are read. Assimp, by which Pinocchio does that, knows more kinds, and ends the process at one in six
-damaged PLY files."""
+"""Suffixes of mesh files that are read. Assimp, Pinocchio's reader, knows more formats, but crashes on one in six damaged PLY
+files."""
 
 
 class MissingMeshWarning(UserWarning):
-    """Meshes that cannot be drawn, because their files are not found or cannot be read.
+    """Meshes are not drawn, because their files are not found or cannot be read.
 
     Attributes:
-        meshes: Their names, as the description spells them.
+        meshes: Their names in the description.
     """
 
     def __init__(self, robot: str, meshes: Sequence[str]) -> None:
-        """Say which they are, and what may help."""
+        """Name the robot and up to five meshes, with hints."""
         hint = " (package:// is looked up in the folders of ROS_PACKAGE_PATH, of AMENT_PREFIX_PATH and of example-robot-data)"
-        told = ", ".join(meshes[:5]) + (", ..." if len(meshes) > 5 else "")
+        listed = ", ".join(meshes[:5]) + (", ..." if len(meshes) > 5 else "")
         other = any(Path(name).suffix.lower() not in DRAWN_FILES for name in meshes)
         super().__init__(
-            f"{robot} is drawn without {len(meshes)} mesh files that are not found or cannot be read: {told}"
+            f"{robot} is drawn without {len(meshes)} mesh files that are not found or cannot be read: {listed}"
             + (f" ({', '.join(DRAWN_FILES)} files are read)" if other else "")
             + (hint if any(name.startswith("package://") for name in meshes) else "")
         )
@@ -47,14 +46,11 @@ class MissingMeshWarning(UserWarning):
 
 
 def with_absolute_paths(urdf: str, folder: Path) -> str:
-    """Write out the relative paths of meshes, so that the text means the same away from its folder.
+    """Return URDF text with relative paths of meshes made absolute; nothing else changes.
 
     Args:
-        urdf: URDF text of a file.
-        folder: The folder of that file.
-
-    Returns:
-        The text; nothing else of it changes, and nothing at all where every mesh has an absolute path or a scheme.
+        urdf: Text of a URDF file.
+        folder: Folder of that file.
     """
 
     def absolute(match: re.Match[str]) -> str:
@@ -63,7 +59,7 @@ def with_absolute_paths(urdf: str, folder: Path) -> str:
             return match[0]
         try:
             path = (folder / name).resolve()
-        except (OSError, RuntimeError, ValueError):  # links in a circle, a name that is none
+        except (OSError, RuntimeError, ValueError):  # a loop of links, an invalid name
             return match[0]
         return f'{match[1]}"{html.escape(str(path))}"'
 
@@ -71,40 +67,32 @@ def with_absolute_paths(urdf: str, folder: Path) -> str:
 
 
 def find_mesh(name: str, folders: Sequence[str]) -> Path | None:
-    """Find a mesh file.
+    """Return the path of a mesh file; None if it does not exist or is larger than `LARGEST_MESH`.
 
     Args:
-        name: Its name, as the description spells it.
-        folders: Folders that hold packages; those of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH come after them.
-
-    Returns:
-        The path of the file, or None if there is none, or none of at most `LARGEST_MESH` bytes.
+        name: Its name in the description.
+        folders: Folders that hold packages; those of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH are searched after them.
     """
     scheme, separator, path = name.partition("://")
     if not separator:
-        found = [Path(name)]
+        candidates = [Path(name)]
     elif scheme == "package":
         ros = [Path(folder) for folder in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if folder]
         ament = [Path(folder) / "share" for folder in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if folder]
-        found = [folder / path for folder in (*map(Path, folders), *ros, *ament)]
+        candidates = [folder / path for folder in (*map(Path, folders), *ros, *ament)]
     else:
-        found = [Path(path)] if scheme == "file" else []
-    return next((file.resolve() for file in found if unfit_file(file) == ""), None)
+        candidates = [Path(path)] if scheme == "file" else []
+    return next((file.resolve() for file in candidates if unfit_file(file) == ""), None)
 
 
 def unfit_file(file: Path) -> str | None:
-    """Tell why a file that a description names cannot be read.
+    """Return why a file that a description names cannot be read, e.g. that it is a pipe, for which a library would wait.
 
-    Args:
-        file: Its path.
-
-    Returns:
-        The reason, e.g. that it is a pipe, for which a library would wait; empty if there is none; None if there is no such
-        file.
+    Empty if it can be read; None if it does not exist.
     """
     try:
         status = file.stat()
-    except (OSError, ValueError):  # not there, links in a circle, a name that is too long or has a NUL
+    except (OSError, ValueError):  # missing, a loop of links, a name that is too long or has a NUL
         return None
     if not stat.S_ISREG(status.st_mode):
         return "is a folder, a device or a pipe"
@@ -112,17 +100,13 @@ def unfit_file(file: Path) -> str | None:
 
 
 def _ends_reader(file: Path) -> bool:
-    """Whether a file is one that Assimp may not survive, or fill the memory with."""
+    """Whether Assimp may crash on the file or exhaust the memory."""
     kind = file.suffix.lower()
     return kind not in DRAWN_FILES or (kind == ".dae" and collada_problem(file) != "")
 
 
 def remove_mesh_shapes(robot: ElementTree.Element) -> None:
-    """Take the shapes from mesh files, visual and collision, out of a description, in place.
-
-    Args:
-        robot: Its root element.
-    """
+    """Remove visual and collision shapes from mesh files from the root element of a description, in place."""
     for link in robot.iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             if shape.find("geometry/mesh") is not None:
@@ -132,15 +116,15 @@ def remove_mesh_shapes(robot: ElementTree.Element) -> None:
 def only_found(
     urdf: str, folders: Sequence[str], readable: Callable[[Path], bool] | None = None
 ) -> tuple[str, tuple[str, ...]]:
-    """Leave out the visual shapes whose mesh files are missing, and name the others by their whole path.
+    """Remove visual shapes whose mesh files are missing, and name the others by absolute paths.
 
     Args:
         urdf: URDF text.
         folders: Folders that hold packages, as for `find_mesh`.
-        readable: Tells of a file that is there whether it can be read; by default every file can.
+        readable: Whether an existing file can be read; by default every file can.
 
     Returns:
-        The text for drawing, and the names of the meshes that are left out. A text without meshes comes back as it is.
+        The text for drawing, and the names of the removed meshes.
     """
     if "<mesh" not in urdf:
         return urdf, ()

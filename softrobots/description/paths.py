@@ -1,4 +1,4 @@
-"""Where the robot descriptions are: the folders xacro/ and urdf/, in a checkout and in an installed wheel."""
+"""The folders xacro/ and urdf/ of the robot descriptions, in a checkout and in an installed wheel."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 def _folder(name: str) -> Path:
     """Find a data folder of the project.
 
-    A wheel carries the folder inside the package. In a checkout (also after `pip install -e`) it lies beside the
-    package; `pyproject.toml` tells a checkout from site-packages, where a folder called `xacro` is another package.
+    In a wheel the folder is inside the package, in a checkout (also after `pip install -e`) beside it; `pyproject.toml`
+    distinguishes a checkout from site-packages, where a folder called `xacro` is another package.
     """
     if (_PACKAGE / name).is_dir():
         return _PACKAGE / name

@@ -1,8 +1,8 @@
-"""Other names for all that a robot description names, so that two of them fit into one.
+"""Prefixes for all names in a robot description, so that two descriptions fit into one.
 
-Names of links, joints, materials, sections, muscles and lines are prefixed wherever they stand: in `parent`, `child` and
-`mimic`, in the tags of this package, as the reference of a `gazebo` tag, and in tags that are not of URDF (transmissions,
-plugins, collision filters): there an attribute or a text that equals a name is taken for that name.
+Names of links, joints, materials, sections, muscles and lines are prefixed where they are defined and referred to: in `parent`,
+`child` and `mimic`, in the tags of this package, as the reference of a `gazebo` tag, and in tags outside URDF (transmissions,
+plugins, collision filters), where an attribute or text that equals a name counts as that name.
 """
 
 from __future__ import annotations
@@ -18,45 +18,39 @@ _NO_NAMES = ("type", "value", "filename")  # attributes of foreign tags that hol
 
 
 def children(element: minidom.Element | minidom.Document) -> list[minidom.Element]:
-    """Elements directly inside an element, or the root of a document."""
+    """Return the child elements of an element, or the root of a document."""
     return [node for node in element.childNodes if node.nodeType == node.ELEMENT_NODE]
 
 
 def ours(robot: minidom.Element, name: str = "*") -> list[minidom.Element]:
-    """Tags of this package directly inside a description, all or those of one name."""
+    """Return the tags of this package directly inside a description, all or those of one name."""
     tags = [element for element in children(robot) if element.namespaceURI == NAMESPACE]
     return [element for element in tags if name in ("*", element.localName)]
 
 
 def used_names(robot: minidom.Element) -> dict[str, dict[str, str]]:
-    """Names that must not come twice in one description, by their kind; each with what it stands for.
+    """Return the names that must be unique in a description, by kind; each with its tag, or a material's colour.
 
-    Kinds are "link or joint", "material", "section", "muscle or line", and the tags of what else has a name. A material stands
-    for its colour.
+    Kinds are "link or joint", "material", "section", "muscle or line", and the tags of other elements that have a name.
     """
-    made: dict[str, dict[str, str]] = {"link or joint": {}, "material": {}, "section": {}, "muscle or line": {}}
+    names: dict[str, dict[str, str]] = {"link or joint": {}, "material": {}, "section": {}, "muscle or line": {}}
     for element in children(robot):
         if element.namespaceURI == NAMESPACE or not element.hasAttribute("name"):
             continue
         kind = "link or joint" if element.tagName in ("link", "joint") else element.tagName
-        made.setdefault(kind, {})[element.getAttribute("name")] = element.tagName
+        names.setdefault(kind, {})[element.getAttribute("name")] = element.tagName
     for material in robot.getElementsByTagName("material"):
         inside = " ".join(child.toxml() for child in children(material))
-        if material.getAttribute("name") and (inside or material.getAttribute("name") not in made["material"]):
-            made["material"][material.getAttribute("name")] = " ".join(inside.split())
+        if material.getAttribute("name") and (inside or material.getAttribute("name") not in names["material"]):
+            names["material"][material.getAttribute("name")] = " ".join(inside.split())
     for tag in _NAMED_BY_US:
         kind = "section" if tag.endswith("section") else "muscle or line"
-        made[kind] |= {element.getAttribute("name"): tag for element in ours(robot, tag)}
-    return made
+        names[kind] |= {element.getAttribute("name"): tag for element in ours(robot, tag)}
+    return names
 
 
 def prefix_names(robot: minidom.Element, prefix: str) -> None:
-    """Put a prefix before every name of a description, in place.
-
-    Args:
-        robot: Its root element.
-        prefix: The prefix.
-    """
+    """Put a prefix before every name in the root element of a description, in place."""
     known = {name for names in used_names(robot).values() for name in names}
     known |= {element.getAttribute("name") for element in robot.getElementsByTagName("actuator")} - {""}
     for element in ours(robot):
@@ -76,14 +70,14 @@ def prefix_names(robot: minidom.Element, prefix: str) -> None:
 
 
 def shift_segments(robot: minidom.Element, shift: int) -> None:
-    """Add a number to the number of every segment of a description, in place."""
+    """Add `shift` to the number of every segment of a description, in place."""
     for tag in _NAMED_BY_US:
         for element in ours(robot, tag):
             element.setAttribute("segment", str(int(element.getAttribute("segment")) + shift))
 
 
 def _plain(element: minidom.Element) -> Iterator[minidom.Element]:
-    """Elements anywhere inside, but those of this package."""
+    """Elements anywhere inside, without those of this package."""
     return (inner for inner in element.getElementsByTagName("*") if inner.namespaceURI != NAMESPACE)
 
 

@@ -1,6 +1,6 @@
-"""The rigid bodies and joints of a description as plain data, between the formats; `rigid_tree_urdf` does URDF.
+"""Rigid bodies and joints of a description as plain data, independent of the file format.
 
-Pinocchio merges bodies behind fixed joints and knows no shapes of its own; other formats want every link as it was written.
+Pinocchio merges bodies behind fixed joints and keeps no shapes; translation between formats needs every link as written.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.description.urdf_tags import SpringTag
 
 SOLIDS = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
-"""Shapes that need no file, with the attributes that hold their sizes in URDF."""
+"""Shapes without a file, with the attributes of their sizes in URDF."""
 
 _NO_ROTATION = read_only(np.eye(3))
 _ORIGIN = read_only(np.zeros(3))
@@ -23,10 +23,10 @@ _ORIGIN = read_only(np.zeros(3))
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where a frame is in another one."""
+    """Pose of a frame in another one."""
 
     position: FloatArray = field(default_factory=lambda: _ORIGIN)
-    """Its origin, shape (3,) [m]."""
+    """Position of its origin, shape (3,) [m]."""
     rotation: FloatArray = field(default_factory=lambda: _NO_ROTATION)
     """Its axes as columns, shape (3, 3)."""
 
@@ -39,12 +39,9 @@ class Placement:
 
     @staticmethod
     def moved(kind: str, axis: FloatArray, position: float) -> Placement:
-        """What a joint does: a slide along its axis, or a turn about it.
+        """Motion of a joint: a translation along its unit axis, shape (3,), if `kind` is "prismatic", else a rotation about it.
 
-        Args:
-            kind: "prismatic", or what turns.
-            axis: Unit axis, shape (3,).
-            position: How far [m or rad].
+        `position` is the coordinate of the joint [m or rad].
         """
         if kind == "prismatic":
             return Placement(read_only(position * axis))
@@ -52,12 +49,12 @@ class Placement:
 
     @property
     def inverse(self) -> Placement:
-        """Placement of the other frame in this one."""
+        """Inverse pose."""
         return Placement(read_only(-self.rotation.T @ self.position), read_only(self.rotation.T.copy()))
 
     @property
     def rpy(self) -> FloatArray:
-        """Roll, pitch, yaw as URDF counts them, shape (3,) [rad]."""
+        """Roll, pitch, yaw of URDF, shape (3,) [rad]."""
         return np.asarray(pin.rpy.matrixToRpy(self.rotation))
 
     @property
@@ -67,7 +64,7 @@ class Placement:
         return np.array([w, x, y, z])
 
     def __matmul__(self, inner: Placement) -> Placement:
-        """Placement of a frame that is placed at `inner` in this one."""
+        """Composition of poses."""
         return Placement(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
 
@@ -80,11 +77,11 @@ class Shape:
     size: tuple[float, ...]
     """Edges of a box, radius and length of a cylinder, radius of a sphere [m]; scale of a mesh along x, y, z."""
     placement: Placement
-    """Where its centre is in the body."""
+    """Pose of its centre in the body."""
     rgba: tuple[float, ...] | None = None
-    """Red, green, blue, opacity in [0, 1]; None if not said."""
+    """Red, green, blue, opacity in [0, 1]; None if not given."""
     filename: str = ""
-    """File of a mesh, as the description spells it."""
+    """File of a mesh, as written in the description."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +97,9 @@ class Body:
     inertia: FloatArray
     """Inertia about the centre of mass in those axes, shape (3, 3) [kg m^2]."""
     visuals: tuple[Shape, ...] = ()
-    """What is drawn."""
+    """Visual shapes."""
     collisions: tuple[Shape, ...] = ()
-    """What collides."""
+    """Collision shapes."""
 
     @property
     def inertia_in_body(self) -> FloatArray:
@@ -117,13 +114,13 @@ class Joint:
     name: str
     """Name."""
     kind: str
-    """"revolute", "continuous", "prismatic" or "fixed"; others as the description spells them."""
+    """Type: "revolute", "continuous", "prismatic", "fixed", or another one as written in the description."""
     parent: str
-    """Body that it hangs on."""
+    """Name of the parent body."""
     child: str
-    """Body that it carries; its frame is that of the joint."""
+    """Name of the child body, whose frame is that of the joint."""
     placement: Placement
-    """Where the child is in the parent while the joint is at zero."""
+    """Pose of the child in the parent with the joint at zero."""
     axis: FloatArray
     """Unit axis in the child, shape (3,)."""
     limits: tuple[float, float]
@@ -137,11 +134,11 @@ class Joint:
 
     @property
     def movable(self) -> bool:
-        """Whether it moves."""
+        """Whether it is not fixed."""
         return self.kind != "fixed"
 
     def placement_at(self, position: float) -> Placement:
-        """Where the child is in the parent while the joint is at a position [rad or m]."""
+        """Pose of the child in the parent with the joint at a position [rad or m]."""
         return self.placement @ Placement.moved(self.kind, self.axis, position)
 
 
@@ -154,26 +151,26 @@ class RigidTree:
     bodies: tuple[Body, ...]
     """Bodies, each before its children."""
     joints: tuple[Joint, ...]
-    """Joints, each before those that its child carries."""
+    """Joints, each before those of its child."""
     springs: Mapping[str, SpringTag]
     """Joint springs by joint name."""
     tip: str | None = None
-    """Body that is the tip unless the caller says another; None if that is not told."""
+    """Body that is the tip by default; None if the description names none."""
 
     @property
     def root(self) -> str:
-        """Name of the body that no joint carries."""
+        """Name of the root body."""
         return self.bodies[0].name
 
     def body(self, name: str) -> Body:
-        """Body of that name."""
+        """Return the body of that name."""
         return next(body for body in self.bodies if body.name == name)
 
     def joints_of(self, body: str) -> tuple[Joint, ...]:
-        """Joints that hang on a body."""
+        """Return the joints whose parent is that body."""
         return tuple(joint for joint in self.joints if joint.parent == body)
 
 
 def number_text(values: Iterable[float]) -> str:
-    """Numbers separated by spaces, so that reading them gives the same numbers back."""
+    """Return numbers separated by spaces, with all digits."""
     return " ".join(repr(float(value) + 0.0) for value in values)  # without -0.0

@@ -1,4 +1,4 @@
-"""Rigid bodies and joints out of URDF text, and back: what exporters read, and what readers of other formats write."""
+"""Conversion between URDF text and `RigidTree`, for exporters and for readers of other formats."""
 
 from __future__ import annotations
 
@@ -18,19 +18,14 @@ _SHAPES = (*SOLIDS, "mesh")
 
 
 def read_rigid_tree(urdf: str, source: str = "the URDF") -> RigidTree:
-    """Read bodies and joints out of URDF text that Pinocchio accepts.
-
-    Springs are not read: `SoftModel.spring_table` has them, also those that the caller said.
+    """Read bodies and joints from URDF text that Pinocchio accepts; springs are in `SoftModel.spring_table`.
 
     Args:
         urdf: The whole document.
-        source: Where it comes from, for errors.
-
-    Returns:
-        The tree, every parent before its children.
+        source: Its origin, for errors.
 
     Raises:
-        DescriptionError: If the text is no URDF, has no single root, or a number is none.
+        DescriptionError: If the text is no URDF, has no single root, or has a malformed number.
     """
     root = parse_xml(urdf, source)
     try:
@@ -49,19 +44,15 @@ def read_rigid_tree(urdf: str, source: str = "the URDF") -> RigidTree:
         ordered += below
         order += [joint.child for joint in below]
     if len(order) != len(bodies) or any(name not in bodies for name in order):
-        raise DescriptionError(f"{source} is no tree: {len(order)} of its {len(bodies)} links hang on {roots[0]}")
+        raise DescriptionError(f"{source} is no tree: {len(order)} of its {len(bodies)} links are connected to {roots[0]}")
     return RigidTree(root.get("name", ""), tuple(bodies[name] for name in order), tuple(ordered), {})
 
 
 def write_rigid_tree(tree: RigidTree) -> str:
-    """Write a tree as URDF text, springs as tags of ours, all numbers with full precision.
+    """Return a tree as URDF text, springs as tags of this package, all numbers with full precision.
 
-    Args:
-        tree: Bodies, joints and springs.
-
-    Returns:
-        URDF text, with the hints that keep links and springs in MuJoCo and Gazebo's parser. A joint without finite limits
-        becomes continuous if it turns.
+    The text has the hints that keep links and springs in MuJoCo and Gazebo's parser. A revolute joint without finite limits
+    becomes continuous.
     """
     ElementTree.register_namespace("softrobots", NAMESPACE)
     robot = ElementTree.Element("robot", {"name": tree.name or "robot"})
@@ -127,18 +118,18 @@ def _body(link: ElementTree.Element, colours: _Colours) -> Body:
 
 def _shape(element: ElementTree.Element, colours: _Colours) -> Shape:
     geometry = element.find("geometry")
-    found = next(iter(geometry)) if geometry is not None and len(geometry) else None
-    if found is None or found.tag not in _SHAPES:
-        raise ValueError(f"a shape {found.tag if found is not None else '(none)'}; one of {', '.join(_SHAPES)} is required")
-    if found.tag == "mesh":
-        size = _numbers(found, "scale", "1 1 1")
+    solid = next(iter(geometry)) if geometry is not None and len(geometry) else None
+    if solid is None or solid.tag not in _SHAPES:
+        raise ValueError(f"a shape {solid.tag if solid is not None else '(none)'}; one of {', '.join(_SHAPES)} is required")
+    if solid.tag == "mesh":
+        size = _numbers(solid, "scale", "1 1 1")
     else:
-        size = np.concatenate([_numbers(found, name, "1 1 1" if name == "size" else "1") for name in SOLIDS[found.tag]])
+        size = np.concatenate([_numbers(solid, name, "1 1 1" if name == "size" else "1") for name in SOLIDS[solid.tag]])
     material, colour = element.find("material"), element.find("material/color")
     if material is not None and colour is None:
         colour = colours.get(material.get("name", ""))
     rgba = None if colour is None else tuple(_numbers(colour, "rgba", "1 1 1 1").tolist())
-    return Shape(found.tag, tuple(size.tolist()), _placement(element), rgba, found.get("filename", ""))
+    return Shape(solid.tag, tuple(size.tolist()), _placement(element), rgba, solid.get("filename", ""))
 
 
 def _joint(element: ElementTree.Element) -> Joint:
@@ -165,7 +156,7 @@ def _joint(element: ElementTree.Element) -> Joint:
 
 
 def link_at(joint: ElementTree.Element, end: str) -> str:
-    """Name of the link at an end of a joint of URDF, "parent" or "child"; empty if it has none."""
+    """Return the name of the "parent" or "child" link of a URDF joint; empty if it has none."""
     element = joint.find(end)
     return "" if element is None else element.get("link", "")
 
@@ -176,15 +167,15 @@ def _write_placement(element: ElementTree.Element, placement: Placement) -> None
 
 def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
     _write_placement(element, shape.placement)
-    made = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
+    solid = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
     if shape.kind == "mesh":
-        made.set("filename", shape.filename)
-        made.set("scale", number_text(shape.size))
+        solid.set("filename", shape.filename)
+        solid.set("scale", number_text(shape.size))
     elif shape.kind == "box":
-        made.set("size", number_text(shape.size))
+        solid.set("size", number_text(shape.size))
     else:
         for name, value in zip(SOLIDS[shape.kind], shape.size, strict=True):
-            made.set(name, repr(float(value)))
+            solid.set(name, repr(float(value)))
     if shape.rgba is not None:
         name = "colour_" + "_".join(f"{value:.6g}" for value in shape.rgba)
         material = ElementTree.SubElement(element, "material", {"name": name})
@@ -192,14 +183,14 @@ def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
 
 
 def _write_hints(robot: ElementTree.Element, joint: str, **hints: str) -> None:
-    """Tell Gazebo's parser about a joint."""
+    """Write a `<gazebo>` tag of a joint for Gazebo's parser."""
     element = ElementTree.SubElement(robot, "gazebo", {"reference": joint})
     for name, value in hints.items():
         ElementTree.SubElement(element, name).text = value
 
 
 def _write_joint(element: ElementTree.Element, joint: Joint, spring: SpringTag | None) -> None:
-    bounded = bool(np.any(np.isfinite(joint.limits)))  # one without a bound on one side gets a very large one
+    bounded = bool(np.any(np.isfinite(joint.limits)))  # a bound on one side only: the other is `LARGEST`
     element.set("type", "continuous" if joint.kind == "revolute" and not bounded else joint.kind)
     _write_placement(element, joint.placement)
     ElementTree.SubElement(element, "parent", {"link": joint.parent})

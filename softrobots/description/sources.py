@@ -1,4 +1,4 @@
-"""Where a description comes from: a robot of this package, a file, or text; as URDF, MJCF or SDF."""
+"""Sources of a description: a robot of this package, a file, or text; in URDF, MJCF or SDF."""
 
 from __future__ import annotations
 
@@ -12,28 +12,24 @@ from softrobots.description.readers import to_urdf
 
 
 class Robot(Protocol):
-    """Anything that describes itself as URDF."""
+    """Object with a URDF description."""
 
     def urdf(self) -> str:
         """Return the robot as URDF text."""
 
 
 def read_source(source: Any, field: str = "source") -> tuple[str, str]:
-    """Return a description as URDF text, and a label for errors.
+    """Return a description as URDF text, and its origin for errors.
 
-    MJCF and SDF are translated (`softrobots.description.readers`). Relative paths of meshes are relative to the file that names
-    them; in the text they are written out.
+    MJCF and SDF are translated (`softrobots.description.readers`). Relative paths of meshes are made absolute.
 
     Args:
         source: A robot of this package, a path (`Path` or text), or the text itself (starting with `<`).
         field: Name of the parameter, for the error.
 
-    Returns:
-        URDF text, and where it comes from.
-
     Raises:
         ParameterError: If it is something else.
-        DescriptionError: If the file cannot be read, is of another kind, or has what cannot be translated.
+        DescriptionError: If the file cannot be read, is of another kind, or has features that cannot be translated.
         MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
     """
     if not isinstance(source, type) and callable(getattr(source, "urdf", None)):

@@ -1,4 +1,4 @@
-"""Springs, sections, muscles and roles read out of a URDF, with every mistake in them named."""
+"""Reader of the tags of this package in a URDF: springs, sections, muscles and roles."""
 
 from __future__ import annotations
 
@@ -26,18 +26,15 @@ from softrobots.description.urdf_tags import (
 
 
 def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
-    """Read springs, roles, sections, muscles and inflated links out of URDF text.
+    """Read the tags of this package from URDF text; all are empty for a file that has none.
 
     Args:
         urdf_text: The whole document.
-        source: Where it comes from, for the errors.
-
-    Returns:
-        The tags; all empty for a file that has none.
+        source: Its origin, for errors.
 
     Raises:
-        DescriptionError: If the text is no URDF (see `softrobots.description.urdf_structure.check_structure`), or a tag of ours
-            is malformed.
+        DescriptionError: If the text is no URDF (see `softrobots.description.urdf_structure.check_structure`), or a tag is
+            malformed.
     """
     root = parse_xml(urdf_text, source)
     if root.tag != "robot":
@@ -101,10 +98,10 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
         )
     where = f"the inflated_link of {' '.join(names)} in {source}"
     most = _positive(element, "max_moment", where) if "max_moment" in element.attrib else None
-    made = InflatedLinkTag(names, _number(element, "radius", where), _number(element, "pressure", where), most)
-    if made.radius <= 0.0 or made.pressure < 0.0:
-        raise DescriptionError(f"{where} has radius {made.radius} and pressure {made.pressure}; required > 0 and >= 0")
-    return made
+    tag = InflatedLinkTag(names, _number(element, "radius", where), _number(element, "pressure", where), most)
+    if tag.radius <= 0.0 or tag.pressure < 0.0:
+        raise DescriptionError(f"{where} has radius {tag.radius} and pressure {tag.pressure}; required > 0 and >= 0")
+    return tag
 
 
 def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]) -> SectionTag:
@@ -141,11 +138,11 @@ def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[
     where = f"the lumped section {name!r} of {source}"
     joints = {key: element.get(key, "") for key in COORDINATES if element.get(key)}
     missing = [key for key in ("bend_x", "bend_y") if key not in joints]
-    strangers = [joint for joint in joints.values() if joint not in springs]
-    if missing or strangers or len(set(joints.values())) != len(joints):
+    unknown = [joint for joint in joints.values() if joint not in springs]
+    if missing or unknown or len(set(joints.values())) != len(joints):
         raise DescriptionError(
-            f"{where} names the joints {joints}; bend_x and bend_y, each a spring joint of its own, are required "
-            f"(twist and stretch may follow)"
+            f"{where} names the joints {joints}; different spring joints bend_x and bend_y are required; "
+            "twist and stretch are optional"
         )
     length, hinge, radius = (_positive(element, key, where) for key in ("length", "hinge", "radius"))
     return LumpedSectionTag(name, _segment(element, where), joints, length, hinge, _rest(element, where), radius)
@@ -177,7 +174,7 @@ def _tip(root: ElementTree.Element, source: str) -> str | None:
 
 
 def _check_together(tags: RobotTags, source: str) -> None:
-    """Names are unique, no joint serves twice, and muscles run along segments that exist."""
+    """Check that names are unique, no joint is in two sections, and muscles run along segments that exist."""
     if tags.sections and tags.lumped_sections:
         raise DescriptionError(f"{source} has sections and lumped sections; one kind is required")
     _unique("section", [*(tag.name for tag in tags.sections), *(tag.name for tag in tags.lumped_sections)], source)
@@ -201,7 +198,7 @@ def _check_together(tags: RobotTags, source: str) -> None:
 def _unique(what: str, names: Sequence[str], source: str) -> None:
     twice = {name for name in names if names.count(name) > 1}
     if twice or "" in names:
-        raise DescriptionError(f"{source} uses a {what} name twice or leaves it empty: {', '.join(sorted(twice)) or '(empty)'}")
+        raise DescriptionError(f"{source} has a {what} name twice or an empty one: {', '.join(sorted(twice)) or '(empty)'}")
 
 
 def _segment(element: ElementTree.Element, where: str) -> int:
@@ -214,7 +211,7 @@ def _segment(element: ElementTree.Element, where: str) -> int:
 def _positive(element: ElementTree.Element, attribute: str, where: str) -> float:
     value = _number(element, attribute, where)
     if value < 1.0 / LARGEST:
-        raise DescriptionError(f"{where} has {attribute} {value}; a positive one is required, at least {1.0 / LARGEST:g}")
+        raise DescriptionError(f"{where} has {attribute} {value}; a positive number is required")
     return value
 
 
@@ -222,6 +219,6 @@ def _number(element: ElementTree.Element, attribute: str, where: str) -> float:
     text = element.get(attribute)
     value = number_in(text)
     if math.isnan(value):
-        given = text if text is None else text[:100]
-        raise DescriptionError(f"{where} has {attribute} = {given!r}; a finite number is required, at most {LARGEST:g} in size")
+        shown = text if text is None else text[:100]
+        raise DescriptionError(f"{where} has {attribute} = {shown!r}; a finite number is required, at most {LARGEST:g} in size")
     return value

@@ -1,4 +1,4 @@
-"""Robots of other people that come with the package example-robot-data: where their files are."""
+"""Files of third-party robots in the package example-robot-data."""
 
 from __future__ import annotations
 
@@ -9,17 +9,14 @@ from softrobots.core.errors import MissingDependency, NameNotFound
 UR5 = "ur_description/urdf/ur5_robot.urdf"
 """The UR5 of Universal Robots."""
 
-_SHARE = "cmeel.prefix/share"  # where the wheel keeps its data; the package has no Python module
+_SHARE = "cmeel.prefix/share"  # the data folder of the wheel, which has no Python module
 
 
 def robot_file(name: str) -> Path:
-    """Path of a robot description of example-robot-data.
+    """Return the path of a robot description of example-robot-data.
 
     Args:
         name: Path below its folder `robots`, e.g. `UR5`.
-
-    Returns:
-        The path; the file exists.
 
     Raises:
         MissingDependency: If example-robot-data is not installed (extra `robots`).
@@ -33,7 +30,7 @@ def robot_file(name: str) -> Path:
 
 
 def package_folders() -> list[str]:
-    """Folders in which `package://` paths of mesh files are looked up; empty without example-robot-data."""
+    """Return the folders of `package://` paths of mesh files; empty without example-robot-data."""
     try:
         return [str(_share())]
     except MissingDependency:
@@ -41,7 +38,7 @@ def package_folders() -> list[str]:
 
 
 def _share() -> Path:
-    from importlib import metadata  # brings the email package along
+    from importlib import metadata  # slow to import
 
     try:
         distribution = metadata.distribution("example-robot-data")

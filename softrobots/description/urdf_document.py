@@ -1,4 +1,4 @@
-"""A URDF file as its rules look at it: links and joints by name, the way to the root, and what is not ours in it."""
+"""A parsed URDF file for the portability rules: links and joints by name, paths to the root, and mounted robots."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from softrobots.description.rigid_tree_urdf import link_at
 from softrobots.description.urdf_tags import NAMESPACE
 
 Problems = Iterator[tuple[str, str]]
-"""What breaks a rule: the link or joint (empty: the whole file), and what is wrong with it."""
+"""Violations of a rule: the link or joint (empty: the whole file), and the problem."""
 
 
 class UrdfDocument:
@@ -21,7 +21,7 @@ class UrdfDocument:
 
     Args:
         urdf: The whole document.
-        source: Where it comes from, for errors.
+        source: Its origin, for errors.
 
     Raises:
         DescriptionError: If the text is not XML, or its root tag is not `<robot>`.
@@ -41,12 +41,12 @@ class UrdfDocument:
         self.moving = {name: joint for name, joint in self.joints.items() if joint.get("type") != "fixed"}
         """Joints that are not fixed, by name."""
         self.carrier = {link_at(joint, "child"): joint for joint in self.joints.values()}
-        """The joint that carries a link, by the name of the link."""
+        """Parent joint by the name of the link."""
         self.has_tags = any(str(element.tag).startswith(f"{{{NAMESPACE}}}") for element in self.root.iter())
-        """Whether any tag of this package is in it."""
+        """Whether it has tags of this package."""
 
     def way_to_root(self, link: str) -> list[str]:
-        """Names of the joints on the way from a link to the root, the nearest first."""
+        """Return the names of the joints on the path from a link to the root, the nearest first."""
         path: list[str] = []
         while link in self.carrier and len(path) <= len(self.carrier):
             path.append(name_of(self.carrier[link]))
@@ -54,9 +54,9 @@ class UrdfDocument:
         return path
 
     def foreign(self) -> frozenset[str]:
-        """Names of links and joints of another robot, on which one of this package is mounted.
+        """Return the names of links and joints of another robot that carries one of this package.
 
-        They are those that stand before the first joint with a role of ours, in a file where joints without a role move there.
+        These come before the first joint with a role tag, in a file with movable joints without a role there.
         """
         with_role = {name for name, joint in self.moving.items() if tag_of(joint, "role") is not None}
         ways = {name: [name, *self.way_to_root(link_at(joint, "parent"))] for name, joint in self.joints.items()}
@@ -67,7 +67,7 @@ class UrdfDocument:
         return frozenset([*before, *links])
 
     def declares_namespaces_inside(self) -> bool:
-        """Whether a namespace is declared below the root element."""
+        """Return whether a namespace is declared below the root element."""
         inside = False
         for event, _ in ElementTree.iterparse(io.StringIO(self.text), events=("start", "start-ns")):
             if event == "start-ns" and inside:
@@ -77,17 +77,17 @@ class UrdfDocument:
 
 
 def name_of(element: ElementTree.Element) -> str:
-    """The name of an element; empty if it has none."""
+    """Return the name of an element; empty if it has none."""
     return element.get("name", "")
 
 
 def tag_of(element: ElementTree.Element, name: str) -> ElementTree.Element | None:
-    """The first tag of this package of that name inside an element, or None."""
+    """Return the first tag of this package of that name inside an element, or None."""
     return element.find(f"{{{NAMESPACE}}}{name}")
 
 
 def numbers_of(element: ElementTree.Element | None, *attributes: str) -> list[float]:
-    """Numbers of attributes, one after the other; none if one is missing or holds something else."""
+    """Return the numbers of attributes in a row; an empty list if one is missing or malformed."""
     try:
         texts: Sequence[str] = [] if element is None else [element.attrib[name] for name in attributes]
         return [float(part) for text in texts for part in text.split()]
@@ -96,6 +96,6 @@ def numbers_of(element: ElementTree.Element | None, *attributes: str) -> list[fl
 
 
 def number_of(element: ElementTree.Element | None, attribute: str) -> float:
-    """The number of an attribute; nan if there is none."""
+    """Return the number of an attribute; NaN if there is not exactly one."""
     values = numbers_of(element, attribute)
     return values[0] if len(values) == 1 else math.nan

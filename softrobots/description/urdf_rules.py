@@ -1,6 +1,6 @@
-"""What a URDF file must be so that every tool loads the same robot: one function a rule, each tells what breaks it.
+"""Rules for URDF files that all tools load alike, one function each, with the consequence of a violation.
 
-The rules come from loading 91 variants of a file in 18 tools. With each stands what happens where it is broken.
+The rules come from loading 91 variants of a file in 18 tools.
 """
 
 from __future__ import annotations
@@ -21,41 +21,37 @@ from softrobots.description.urdf_document import Problems, UrdfDocument, name_of
 from softrobots.description.urdf_tags import NAMESPACE
 
 LIGHTEST = 1e-6
-"""Links must be heavier [kg]: at this mass Gazebo's parser drops a link and everything that it carries."""
+"""Mass that links must exceed [kg]; at this mass Gazebo's parser drops a link and its whole subtree."""
 SMALLEST_INERTIA = 1e-15
-"""Principal moments of inertia must be larger [kg m^2]: MuJoCo refuses a file with smaller ones."""
+"""Moment that principal moments of inertia must exceed [kg m^2]; MuJoCo refuses smaller ones."""
 
-_ROUNDING = 1e-12  # relative; of lengths and eigenvalues of numbers that are written with all their digits
+_ROUNDING = 1e-12  # relative; of lengths and eigenvalues of numbers with all digits
 
 
 class Finding(NamedTuple):
-    """What a rule, or another look at a robot, found."""
+    """Result of a rule or another check."""
 
     what: str
-    """What was looked at."""
+    """Subject of the check."""
     problems: tuple[str, ...] = ()
-    """What is wrong; empty if nothing is."""
+    """Violations."""
     remarks: tuple[str, ...] = ()
-    """What is there, or would be wrong if it were ours: a robot of somebody else carries it."""
+    """Facts, and violations by a third-party robot that carries one of this package."""
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether there are no violations."""
         return not self.problems
 
 
 def check_rules(urdf: str, source: str = "the URDF") -> tuple[Finding, ...]:
-    """Check URDF text against every rule.
+    """Return a finding for each of `RULES`.
 
-    The rules bind a whole file, but where a robot of this package is mounted on another one, only what is ours: what breaks a
-    rule before the first joint of ours is a remark.
+    Where a robot of this package is mounted on another one, violations by the other robot are remarks.
 
     Args:
         urdf: The whole document.
-        source: Where it comes from, for errors.
-
-    Returns:
-        A finding for each of `RULES`.
+        source: Its origin, for errors.
 
     Raises:
         DescriptionError: If the text is not XML, or its root tag is not `<robot>`.
@@ -71,7 +67,7 @@ def check_rules(urdf: str, source: str = "the URDF") -> tuple[Finding, ...]:
 
 
 def _names(document: UrdfDocument) -> Problems:
-    """Undeclared prefixes, a version, names used twice: each refused by several tools."""
+    """Undeclared prefixes, a version, duplicate names: each refused by several tools."""
     root = document.root
     if not root.get("name"):
         yield "", "<robot> has no name"
@@ -88,7 +84,7 @@ def _names(document: UrdfDocument) -> Problems:
 
 
 def _root_link(document: UrdfDocument) -> Problems:
-    """Other roots: Gazebo's parser fails, others warn, or the base floats."""
+    """Another root: Gazebo's parser fails, other tools warn, or the base floats."""
     roots = [name for name in document.links if name not in document.carrier]
     if roots != ["world"]:
         yield roots[0] if roots else "", f"the root is {', '.join(roots) or '(none)'}; a link world without mass is required"
@@ -101,7 +97,7 @@ def _root_link(document: UrdfDocument) -> Problems:
 
 
 def _masses(document: UrdfDocument) -> Problems:
-    """Too light: refused by MuJoCo, cut off with the rest by Gazebo's parser, 1 kg in PyBullet."""
+    """Light links: refused by MuJoCo, dropped with their subtree by Gazebo's parser, 1 kg in PyBullet."""
     for name, link in document.links.items():
         if name not in document.carrier:
             continue
@@ -120,7 +116,7 @@ def _masses(document: UrdfDocument) -> Problems:
 
 
 def _joints(document: UrdfDocument) -> Problems:
-    """No limit or effort: refused by Pinocchio and others; continuous joints have two coordinates there."""
+    """Missing limit or effort: refused by Pinocchio and others; continuous joints have two coordinates in Pinocchio."""
     for name, joint in document.moving.items():
         if joint.get("type") not in ("revolute", "prismatic"):
             yield name, f"joint {name} is {joint.get('type') or 'of no type'}; revolute, prismatic or fixed is required"
@@ -140,25 +136,25 @@ def _joints(document: UrdfDocument) -> Problems:
 
 
 def _mimics(document: UrdfDocument) -> Problems:
-    """A mimic of a mimic is wrong in yourdfpy and urchin; a master behind its follower is refused by Pinocchio."""
+    """A mimic of a mimic is misread by yourdfpy and urchin; a master outward of its follower is refused by Pinocchio."""
     mimics = {name: mimic for name, joint in document.moving.items() for mimic in joint.findall("mimic")}
     for name, mimic in mimics.items():
         master = mimic.get("joint", "")
         if master not in document.moving or master in mimics:
             yield name, f"joint {name} mimics {master!r}; a movable joint that mimics none is required"
         elif master not in document.way_to_root(link_at(document.joints[name], "parent")):
-            yield name, f"joint {name} mimics {master}, which is not on its way to the root"
+            yield name, f"joint {name} mimics {master}, which is not on its path to the root"
 
 
 def _shapes(document: UrdfDocument) -> Problems:
-    """Capsules and empty shapes are refused by many; no path of a mesh works in all."""
+    """Capsules and empty shapes are refused by many tools; no path of a mesh works in all."""
     for name, link in document.links.items():
         for element in (*link.findall("visual"), *link.findall("collision")):
             geometry = element.find("geometry")
             shapes = [] if geometry is None else list(geometry)
             if len(shapes) != 1 or shapes[0].tag not in SOLIDS:
-                told = ", ".join(str(shape.tag) for shape in shapes) or "nothing"
-                yield name, f"a {element.tag} of link {name} is {told}; one of {', '.join(SOLIDS)} is required"
+                tags = ", ".join(str(shape.tag) for shape in shapes) or "nothing"
+                yield name, f"a {element.tag} of link {name} is {tags}; one of {', '.join(SOLIDS)} is required"
                 continue
             sizes = numbers_of(shapes[0], *SOLIDS[shapes[0].tag])
             if not sizes or not all(0.0 < size < math.inf for size in sizes):
@@ -166,7 +162,7 @@ def _shapes(document: UrdfDocument) -> Problems:
 
 
 def _colours(document: UrdfDocument) -> Problems:
-    """One name with two colours, or with none: refused by Drake."""
+    """A material name with two colours or none: refused by Drake."""
     seen: dict[str, str] = {}
     for link in document.links.values():
         for material in link.iter("material"):
@@ -179,7 +175,7 @@ def _colours(document: UrdfDocument) -> Problems:
 
 
 def _springs(document: UrdfDocument) -> Problems:
-    """Roles and springs tell softrobots what moves; their copies for Gazebo become SDF, for Drake and Gazebo."""
+    """Roles and springs for softrobots; the copies of springs become SDF, for Drake and Gazebo."""
     if not document.has_tags:
         return
     tags = [element for element in document.root.findall("gazebo") if element.find("springStiffness") is not None]
@@ -194,15 +190,15 @@ def _springs(document: UrdfDocument) -> Problems:
         spring = tag_of(joint, "spring")
         if tag_of(joint, "role") is None:
             yield name, f"joint {name} has no <softrobots:role>"
-        told = None if spring is None else (spring.get("stiffness", ""), spring.get("rest", ""))
-        if copies.get(name) != told:
-            yield name, f"joint {name} has the spring {told} and the copy {copies.get(name)} for Gazebo"
+        original = None if spring is None else (spring.get("stiffness", ""), spring.get("rest", ""))
+        if copies.get(name) != original:
+            yield name, f"joint {name} has the spring {original} and the copy {copies.get(name)} for Gazebo"
     for name in copies.keys() - document.moving.keys():
         yield name, f"a spring for Gazebo on {name}, which does not move"
 
 
 def _hints(document: UrdfDocument) -> Problems:
-    """Without them MuJoCo drops base and tip with their names, and Gazebo's parser the tip."""
+    """Without these hints MuJoCo drops base and tip, and Gazebo's parser the tip."""
     if not document.has_tags:
         return
     compiler = document.root.find("mujoco/compiler")
@@ -224,15 +220,15 @@ def _is_preserved(document: UrdfDocument, joint: str) -> bool:
 
 
 def _order_of_hinges(document: UrdfDocument) -> Problems:
-    """Two orthogonal springs in one order twist by half the product of their angles; as many in the other order undo it."""
+    """Two orthogonal springs twist by half the product of their angles; as many in the other order cancel that."""
     first = Counter[bool]()
     for section in document.root.findall(f"{{{NAMESPACE}}}lumped_section"):
         x, y = section.get("bend_x", ""), section.get("bend_y", "")
         if x in document.joints and y in document.joints:
             first[x in document.way_to_root(link_at(document.joints[y], "parent"))] += 1
     if abs(first[True] - first[False]) > 1:
-        told = f"{first[True]} sections bend about x first, {first[False]} about y"
-        yield "", f"{told}; both orders must be as frequent, or the chain converges at first order only"
+        counts = f"{first[True]} sections bend about x first, {first[False]} about y"
+        yield "", f"{counts}; both orders must be as frequent, or the chain converges at first order only"
 
 
 RULES: Mapping[str, Callable[[UrdfDocument], Problems]] = {
@@ -248,11 +244,11 @@ RULES: Mapping[str, Callable[[UrdfDocument], Problems]] = {
     "hints for MuJoCo and Gazebo": _hints,
     "order of the hinges": _order_of_hinges,
 }
-"""Every rule by what it looks at."""
+"""Every rule by its subject."""
 
 
 def _principal_moments(inertia: ElementTree.Element | None) -> list[float]:
-    """The principal moments, smallest first; nan if an entry is missing."""
+    """Principal moments, smallest first; NaN if an entry is missing."""
     xx, xy, xz, yy, yz, zz = (number_of(inertia, f"i{axes}") for axes in ("xx", "xy", "xz", "yy", "yz", "zz"))
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     moments: list[float] = np.linalg.eigvalsh(matrix).tolist() if np.all(np.isfinite(matrix)) else [math.nan] * 3

@@ -1,8 +1,8 @@
-"""What every URDF must be before Pinocchio reads it: a tree of links that have names, with numbers that are numbers.
+"""Checks of a URDF before Pinocchio reads it: a tree of named links with well-formed numbers.
 
-Pinocchio's parser refuses less than this, and takes what it does not understand for something else. Measured: of a link whose
-mass is `1,5`, `nan` or empty it drops the mass without a word; links that carry each other in a circle vanish, as does a joint
-called `universe`; of a link with two parents it takes one; a mass may be negative; and a chain of 4000 links ends the process.
+Pinocchio's parser silently misreads what these checks refuse. Measured: it drops a mass of `1,5`, `nan` or an empty one, links
+that carry each other in a circle, and a joint called `universe`; of a link with two parents it keeps one; it accepts negative
+masses; and a chain of 4000 links ends the process.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import number_in
 
 MOST_LINKS = 2000
-"""Links that a robot may have; where every one hangs on the next, Pinocchio's parser has about 2 kB of stack for each."""
+"""Most links of a robot; Pinocchio's parser recurses and has about 2 kB of stack for each of so many in one chain."""
 
 _ORIGIN = {"xyz": 3, "rpy": 3}
 _OF_LINKS: Mapping[str, Mapping[str, int]] = {
@@ -38,22 +38,22 @@ _OF_SHAPES: Mapping[str, Mapping[str, int]] = {
     "cylinder": {"radius": 1, "length": 1},
     "capsule": {"radius": 1, "length": 1},
     "sphere": {"radius": 1},
-    "mesh": {"scale": 0},  # as many as there are: four are about, and harmless
+    "mesh": {"scale": 0},  # of any length: some files have four numbers, which is harmless
 }
-_TAKEN = "universe"  # what Pinocchio calls the place where the robot stands
+_RESERVED = "universe"  # Pinocchio's name of the world
 
 
 def check_structure(root: ElementTree.Element, source: str) -> None:
-    """Refuse a URDF that is no tree, or has names or numbers that parsers take for something else.
+    """Refuse a URDF that is no tree, or has names or numbers that parsers misread.
 
     Args:
         root: The root element.
-        source: Where it comes from, for errors.
+        source: Its origin, for errors.
 
     Raises:
         DescriptionError: If it has no links or more than `MOST_LINKS`; if a link or joint has no name or that of another, or a
-            joint is called `universe`; if a joint has not one parent and one child that exist; if the links are no tree; if a
-            number is none or beyond 1e30; if a mass is negative, or the axis of a joint is zero.
+            joint is called `universe`; if a joint has not one existing parent and child; if the links are no tree; if a number
+            is malformed or beyond 1e30; if a mass is negative, or the axis of a joint is zero.
     """
     check_link_count(root, source)
     links, joints = root.findall("link"), root.findall("joint")
@@ -84,12 +84,8 @@ def check_structure(root: ElementTree.Element, source: str) -> None:
 def check_link_count(root: ElementTree.Element, source: str) -> None:
     """Refuse more links than Pinocchio's parser survives.
 
-    Args:
-        root: The root element.
-        source: Where it comes from, for errors.
-
     Raises:
-        DescriptionError: If it has more than `MOST_LINKS`.
+        DescriptionError: If there are more than `MOST_LINKS`.
     """
     count = sum(1 for _ in root.iter("link"))
     if count > MOST_LINKS:
@@ -101,8 +97,8 @@ def _check_names(kind: str, elements: Iterable[ElementTree.Element], source: str
     for name, count in names.items():
         if count > 1 or not name:
             raise DescriptionError(f"{source} has a {kind} without a name, or several that are called {name!r}")
-    if kind == "joint" and _TAKEN in names:
-        raise DescriptionError(f"{source} has a joint called {_TAKEN!r}, Pinocchio's own name for the world; rename it")
+    if kind == "joint" and _RESERVED in names:
+        raise DescriptionError(f"{source} has a joint called {_RESERVED!r}, Pinocchio's name of the world; rename it")
 
 
 def _check_numbers(where: str, elements: Iterable[ElementTree.Element], table: Mapping[str, Mapping[str, int]]) -> None:
@@ -111,7 +107,7 @@ def _check_numbers(where: str, elements: Iterable[ElementTree.Element], table: M
             text = element.get(attribute)
             if text is None:
                 continue
-            parts, most = text.split(), math.inf if element.tag == "limit" else LARGEST  # very large limits stand for none
+            parts, most = text.split(), math.inf if element.tag == "limit" else LARGEST  # very large limits mean none
             if (count and len(parts) != count) or any(math.isnan(number_in(part, most)) for part in parts):
                 numbers = "a number" if count == 1 else f"{count or 3} numbers"
                 size = "" if most == math.inf else f" up to {most:g} in size"
@@ -139,9 +135,9 @@ def _check_tree(links: set[str], joints: Iterable[ElementTree.Element], source: 
         below[parent].append(child)
     roots = sorted(links - carried.keys())
     if len(roots) != 1:
-        told = ", ".join(roots[:5]) + (", ..." if len(roots) > 5 else "")
+        listed = ", ".join(roots[:5]) + (", ..." if len(roots) > 5 else "")
         raise DescriptionError(
-            f"{source} has {len(roots)} root links ({told or 'none'}): links that no joint carries; one is required"
+            f"{source} has {len(roots)} root links ({listed or 'none'}), which are no joint's child; one is required"
         )
     order = list(roots)
     for name in order:

@@ -1,4 +1,4 @@
-"""Our own tags in a URDF: springs, sections, muscles and roles, as plain data (`tag_reader` reads them)."""
+"""The tags of this package in a URDF as plain data: springs, sections, muscles and roles (`tag_reader` reads them)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ NAMESPACE = "urn:softrobots:urdf"
 """XML namespace of the tags."""
 
 ROLES = ("motor", "spring", "section", "locked")
-"""What a movable joint can be."""
+"""Roles of movable joints."""
 
 COORDINATES = ("bend_x", "bend_y", "twist", "stretch")
 """The coordinates of a section, `softrobots.constant_curvature.strain_chain.STRAINS`."""
@@ -27,7 +27,7 @@ class SpringTag:
 
 @dataclass(frozen=True)
 class InflatedLinkTag:
-    """The springs that stand for one inflated link, and what sets its wrinkling moment."""
+    """The springs that represent one inflated link, with the properties that set its wrinkling moment."""
 
     springs: tuple[str, ...]
     """Names of the spring joints, or of coordinates of a section, `<section>_bend_x` and so on."""
@@ -36,7 +36,7 @@ class InflatedLinkTag:
     pressure: float
     """Gauge pressure [Pa]."""
     max_moment: float | None = None
-    """Largest moment of the link, beyond wrinkling [N m]; None: its springs are linear."""
+    """Largest moment of the link, beyond wrinkling [N m]; None for linear springs."""
 
 
 @dataclass(frozen=True)
@@ -92,36 +92,36 @@ class MuscleTag:
     segment: int
     """Number of the segment, from 1."""
     azimuth: float
-    """Where it runs, from the x axis of the segment towards y [rad]."""
+    """Azimuth, from the x axis of the segment towards y [rad]."""
     distance: float
     """Distance from the backbone [m]."""
     rest_length: float
-    """Length while the segment is straight and as long as at rest [m]."""
+    """Length with the segment straight at its rest length [m]."""
     shortest: float
     """Lower limit of its length [m]."""
     longest: float
     """Upper limit of its length [m]."""
     strongest: float
-    """Largest tension, and push, that it can exert [N]."""
+    """Largest tension and push [N]."""
 
 
 @dataclass(frozen=True)
 class LineTag:
-    """A line along a segment, parallel to its backbone, that is drawn and does nothing: the actuator of a helix."""
+    """A drawn line along a segment, parallel to its backbone, without effect: the actuator of a helix."""
 
     name: str
     """Name of the line."""
     segment: int
     """Number of the segment, from 1."""
     azimuth: float
-    """Where it runs, from the x axis of the segment towards y [rad]."""
+    """Azimuth, from the x axis of the segment towards y [rad]."""
     distance: float
     """Distance from the backbone [m]."""
 
 
 @dataclass(frozen=True)
 class RobotTags:
-    """Everything softrobots reads from a URDF beyond what Pinocchio reads."""
+    """All tags of this package in a URDF."""
 
     springs: Mapping[str, SpringTag]
     """Springs by joint name."""
@@ -140,4 +140,4 @@ class RobotTags:
     mimics: tuple[str, ...]
     """Names of the joints that mimic another joint."""
     tip: str | None = None
-    """Name of the link that is the tip unless the caller says another; None if the file does not tell."""
+    """Name of the link that is the tip by default; None if the file names none."""

@@ -92,7 +92,7 @@ REFUSED: dict[str, tuple[str, Content | Callable[[], Content], str]] = {
     "twice a link": ("URDF", ROBOT % '<link name="a"/>', "several that are called 'a'"),
     "twice a joint": ("URDF", BRANCHED.replace('"elbow"', '"wrist"'), "several that are called 'wrist'"),
     "no name": ("URDF", BRANCHED.replace('name="elbow"', 'name=""'), "a joint without a name"),
-    "the world's name": ("URDF", BRANCHED.replace('"elbow"', '"universe"'), "Pinocchio's own name"),
+    "the world's name": ("URDF", BRANCHED.replace('"elbow"', '"universe"'), "Pinocchio's name of the world"),
     "link that is not there": ("URDF", BRANCHED.replace('parent link="lower"', 'parent link="z"'), "the parent z; one link"),
     "two parents of a joint": (
         "URDF",
@@ -125,7 +125,7 @@ REFUSED: dict[str, tuple[str, Content | Callable[[], Content], str]] = {
     "grid": ("MJCF", mjcf('<flexcomp type="grid" count="3000 3000 3000" name="f"/>'), "<flexcomp count="),
     "simulation": ("MJCF", mjcf(before='<compiler><lengthrange timestep="1e-9"/></compiler>'), "<lengthrange timestep="),
     "many geoms": ("MJCF", lambda: mjcf("<geom size='.1'/>" * (MOST_ELEMENTS + 1)), f"more than {MOST_ELEMENTS} elements"),
-    "class that is a format": ("MJCF", mjcf('<geom size=".1" class="%s%n"/>'), "<geom class='%s%n'>, which MuJoCo may take"),
+    "class that is a format": ("MJCF", mjcf('<geom size=".1" class="%s%n"/>'), "<geom class='%s%n'>, which MuJoCo may use"),
     "class that spells a format": ("MJCF", mjcf('<geom size=".1" class="&#37;n"/>'), "<geom class='%n'>"),
     "axis whose length overflows": (
         "MJCF",
@@ -170,7 +170,7 @@ REFUSED: dict[str, tuple[str, Content | Callable[[], Content], str]] = {
     # SDF: where Drake ends the process, or raises what it should not
     "version": ("SDF", sdf().replace("1.9", "nan"), "Drake refuses .*"),
     "stiffness": ("SDF", SDF.replace(">20<", ">-20<"), "stiffness -20"),
-    "limit": ("SDF", SDF.replace("<lower>-1<", "<lower>nan<"), "a number of joint j that is none"),
+    "limit": ("SDF", SDF.replace("<lower>-1<", "<lower>nan<"), "a NaN in joint j"),
     "many links": ("SDF", lambda: sdf("<link name='b'/>" * (MOST_LINKS + 1)), f"at most {MOST_LINKS} are read"),
     "included model": ("SDF", sdf("<include><uri>model://x</uri></include>"), "included files"),
     # MuJoCo doubles such a sensor with every copy

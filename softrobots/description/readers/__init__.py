@@ -1,7 +1,6 @@
-"""Robots of other people in the formats of other tools, as URDF text with our tags.
+"""Translation of MJCF and SDF, recognised by their root tag, to URDF text with the tags of this package.
 
-The kind of a description is told by its root tag. URDF stays as it is; MJCF is compiled by MuJoCo and SDF parsed by Drake, so
-that their defaults, classes, units and frames hold, and what comes out is written as URDF.
+MJCF is compiled by MuJoCo and SDF parsed by Drake, so that defaults, classes, units and frames are those of the format.
 """
 
 from __future__ import annotations
@@ -18,26 +17,23 @@ from softrobots.description.rigid_tree_urdf import write_rigid_tree
 from softrobots.description.urdf_structure import check_link_count
 
 KINDS: Mapping[str, str] = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF"}
-"""What can be read, by root tag."""
+"""Formats by root tag."""
 
 _READERS: Mapping[str, Callable[[str, str, Path | None], RigidTree]] = {"mujoco": read_mjcf, "sdf": read_sdf}
 
 
 def to_urdf(text: str, source: str, path: Path | None = None) -> str:
-    """Translate a description to URDF text.
+    """Translate a description to URDF text; URDF is returned unchanged.
 
     Args:
         text: The description.
-        source: Where it comes from, for errors.
-        path: Its file, if it is one: what it includes is found from there.
-
-    Returns:
-        URDF text; of URDF the text itself.
+        source: Its origin, for errors.
+        path: Its file, if any, to which included files are relative.
 
     Raises:
-        MissingDependency: If MJCF is given without MuJoCo, or SDF without Drake (extra `interop`).
-        DescriptionError: If it is of another kind or has too many links, if MuJoCo or Drake refuses it, or if it has something
-            that bears on the statics and that we do not have; all of that is listed.
+        MissingDependency: If MuJoCo (for MJCF) or Drake (for SDF) is not installed (extra `interop`).
+        DescriptionError: If it is of another format or has too many links, if MuJoCo or Drake refuses it, or if it has features
+            that affect the statics and are not supported; all of them are listed.
     """
     root = parse_xml(text, source)
     tag = str(root.tag)

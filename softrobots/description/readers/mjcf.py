@@ -1,8 +1,7 @@
-"""MJCF, the format of MuJoCo: the compiled model as bodies and joints of URDF.
+"""Reader of MJCF, the format of MuJoCo, from the model that MuJoCo compiles.
 
-MuJoCo compiles the file, so defaults, classes, degrees, inertia from geoms, includes and nested frames are its own. Coordinates
-are MuJoCo's `qpos`, also where `ref` is not zero: the placement of a joint carries `-ref`. `stiffness` and `springref` become
-springs; hinges and slides without stiffness are motors. The gravity of the file is not read.
+Coordinates are MuJoCo's `qpos`, also where `ref` is not zero: the placement of a joint carries `-ref`. `stiffness` and
+`springref` become springs; hinges and slides without stiffness are motors. The gravity of the file is not read.
 """
 
 from __future__ import annotations
@@ -24,31 +23,27 @@ from softrobots.description.urdf_tags import SpringTag
 
 
 def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
-    """Read MJCF.
+    """Read MJCF into a tree with the root link `world`.
 
-    A body without a name is called `body_<number>`, a joint `joint_<number>`, as MuJoCo counts them. A body with several
-    joints gets a link before each but the last, `<body>_<joint>`, with a little of the body's mass where that changes nothing
-    (`softrobots.description.readers.shared_mass`), else without mass. A hinge beside the origin of its body gets a link without
-    mass at its anchor. A site with a name becomes a link without mass, unless a body has that name. The tip is the body or site
-    called `tip`, or the only moving body at the end of the tree. Of shapes, visible boxes, cylinders, spheres and mesh files
-    are read, and capsules as cylinders.
+    Unnamed bodies and joints are called `body_<number>` and `joint_<number>`, numbered by MuJoCo. A body with several joints
+    gets a link `<body>_<joint>` before each but the last, with a little of the body's mass where that does not change the
+    statics (`softrobots.description.readers.shared_mass`), else without mass. A hinge away from the origin of its body gets a
+    link without mass at its anchor. A named site becomes a link without mass, unless a body has that name. The tip is the body
+    or site called `tip`, or the only moving body at an end of the tree. Visible boxes, cylinders, spheres and mesh files are
+    read, and capsules as cylinders.
 
-    What does not bear on a loaded robot at rest is left out: contacts, damping polynomials, armature, sensors, actuators at
-    zero. A position actuator of a joint without stiffness says nothing: that joint is a motor.
+    Features without effect on a loaded robot at rest are ignored: contacts, damping polynomials, armature, sensors, actuators
+    with zero control, and position actuators of joints without stiffness, which are motors.
 
     Args:
         text: The document.
-        source: Where it comes from, for errors.
-        path: Its file, for what it includes.
-
-    Returns:
-        The tree; its root is the link `world`.
+        source: Its origin, for errors.
+        path: Its file, if any, to which included files are relative.
 
     Raises:
         MissingDependency: If MuJoCo is not installed (extra `interop`).
-        DescriptionError: If MuJoCo refuses it, it has no bodies, a number is not finite, it has what is listed in
-            `softrobots.description.readers.mjcf_refusals`, or it asks for more than
-            `softrobots.description.readers.mjcf_limits` lets through.
+        DescriptionError: If MuJoCo refuses it, it has no bodies, a number is not finite, it has a feature listed in
+            `softrobots.description.readers.mjcf_refusals`, or exceeds a limit of `softrobots.description.readers.mjcf_limits`.
     """
     try:
         import mujoco
@@ -57,12 +52,12 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     check_mjcf(parse_xml(text, source), source, path)
     try:
         model = mujoco.MjModel.from_xml_string(text) if path is None else mujoco.MjModel.from_xml_path(str(path))
-    except Exception as error:  # ValueError, RuntimeError, mujoco.FatalError, and what its compiler runs into
+    except Exception as error:  # ValueError, RuntimeError, mujoco.FatalError, and others from its compiler
         reason = " ".join(str(error).split())
         raise DescriptionError(f"MuJoCo {mujoco.__version__} refuses {source}: {reason}") from error
     reasons = not_carried(mujoco, model)
     if reasons:
-        raise DescriptionError(f"{source} has what does not become a robot of springs and motors: {'; '.join(reasons)}")
+        raise DescriptionError(f"{source} has features that a robot of springs and motors lacks: {'; '.join(reasons)}")
     shapes = visible_shapes(mujoco, model, text, path)
     bodies = [_body_name(model, number) for number in range(model.nbody)]
     joints = [joint_name(model, number) for number in range(model.njnt)]
@@ -88,7 +83,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
 
 
 def _motions(mujoco: Any, model: Any, body: int, source: str) -> tuple[list[Motion], Placement]:
-    """Degrees of freedom of a body, and the body in the frame of the last one: all about one anchor after another."""
+    """Degrees of freedom of a body, each about its anchor, and the pose of the body in the frame of the last one."""
     place = Placement.turned(model.body_pos[body], model.body_quat[body])
     motions: list[Motion] = []
     first = int(model.body_jntadr[body])
@@ -125,7 +120,7 @@ def _spring(model: Any, joint: int) -> SpringTag | None:
 
 
 def _effort(mujoco: Any, model: Any, joint: int) -> float:
-    """Largest torque of the actuators of a joint; infinite if none is said."""
+    """Largest torque of the actuators of a joint; infinite without limits."""
     if model.jnt_actfrclimited[joint]:
         return float(np.abs(model.jnt_actfrcrange[joint]).max())
     limits = [

@@ -1,9 +1,8 @@
-"""What an MJCF file may ask of MuJoCo, looked at before MuJoCo reads it.
+"""Limits of MJCF files, checked before MuJoCo reads them.
 
-A short file can ask for much: `<replicate count="100000000">` and generated meshes ran for minutes until the memory was gone,
-a model that attaches itself ended the process, a named pipe in place of a mesh was waited for, and the name of a class that is
-not there was taken for a format of C, which can write to memory (MuJoCo 4.0). Files are included from the folder of the
-description only.
+Measured with MuJoCo 4.0: `<replicate count="100000000">` and generated meshes exhaust the memory after minutes, a model that
+attaches itself ends the process, a named pipe in place of a mesh blocks, and the name of a missing class is used as a C format
+string, which can write to memory. Files may be included from below the folder of the description only.
 """
 
 from __future__ import annotations
@@ -20,20 +19,15 @@ from softrobots.core.xml_input import number_in, parse_xml, read_xml
 from softrobots.description.mesh_files import unfit_file
 
 MOST_ELEMENTS = 20_000
-"""Elements of a file with all that it includes, attaches and replicates; MuJoCo's time grows with the square of them."""
+"""Most elements with all included, attached and replicated ones; MuJoCo's time grows with their square."""
 MOST_PIXELS = 50_000_000
-"""Numbers of colours and heights that it makes, and pixels of the PNG files that it names; MuJoCo keeps them all."""
+"""Most pixels of textures, height fields and PNG files together; MuJoCo keeps them all in memory."""
 MOST_FOLDERS = 20
-"""Folders in which it may let MuJoCo look for files, with all that it includes and attaches."""
+"""Most folders in which MuJoCo searches files."""
 
-_CHAIN = 10  # models within models
-_COST = {"composite": 1.0, "flexcomp": 8.0}  # of one of the `count` parts that an element makes, in elements
-_WITHOUT_OBJECT = (
-    "user",
-    "clock",
-    "e_potential",
-    "e_kinetic",
-)  # sensors; each copy that <replicate> makes doubles their number
+_CHAIN = 10  # nesting of models
+_COST = {"composite": 1.0, "flexcomp": 8.0}  # elements for each of the `count` parts of an element
+_WITHOUT_OBJECT = ("user", "clock", "e_potential", "e_kinetic")  # sensors that every copy of <replicate> doubles
 _LARGEST: Mapping[str, Mapping[str, float]] = {
     "composite": {"count": 10_000},
     "flexcomp": {"count": 10_000, "cellcount": 10_000},
@@ -50,27 +44,27 @@ _LARGEST: Mapping[str, Mapping[str, float]] = {
         **{f"nuser_{of}": 1000 for of in ("actuator", "body", "cam", "geom", "jnt", "sensor", "site", "tendon")},
     },
 }
-"""The largest product of the numbers of an attribute, by element."""
-_ANYWHERE = {"nsample": 10_000.0, "actdim": 10_000.0}  # attributes of actuators and sensors, which have many names
-_LEAST = {"timestep": 1e-4, "interval": 1e-4}  # of <lengthrange>, which simulates so finely
+"""Largest product of the numbers of an attribute, by element."""
+_ANYWHERE = {"nsample": 10_000.0, "actdim": 10_000.0}  # attributes of actuators and sensors of any tag
+_LEAST = {"timestep": 1e-4, "interval": 1e-4}  # time steps of the simulation for <lengthrange>
 _MEMORY = {"K": 2.0**10, "M": 2.0**20, "G": 2.0**30}
-_MOST_MEMORY = 2.0**30  # bytes; MuJoCo sets them aside
+_MOST_MEMORY = 2.0**30  # bytes that MuJoCo allocates
 _RESOLUTION = 100.0  # of a generated mesh; the first numbers of its `params`
 
 
 def check_mjcf(root: ElementTree.Element, source: str, path: Path | None) -> None:
-    """Refuse an MJCF description that asks for too much, or includes what it must not.
+    """Refuse an MJCF description that exceeds a limit or includes files from elsewhere.
 
     Args:
         root: The root element.
-        source: Where it comes from, for errors.
-        path: Its file, if it is one.
+        source: Its origin, for errors.
+        path: Its file, if any.
 
     Raises:
-        DescriptionError: If it becomes more than `MOST_ELEMENTS` elements; if a file that it includes is not below its folder,
-            is included twice, is no XML or not in UTF-8; if it is text and includes files; if models attach each other in a
-            circle; if a file that it names is no file, or too large; if a size that it asks for is beyond a limit; or if an
-            attribute has a percent sign.
+        DescriptionError: If it expands to more than `MOST_ELEMENTS` elements; if an included file is not below its folder,
+            included twice, no XML or not in UTF-8; if text without a file includes files; if models attach each other in a
+            circle; if a named file is a pipe or folder, or too large; if a size exceeds its limit; or if an attribute has a
+            percent sign.
     """
     survey = _Survey(source, None if path is None else path.parent.resolve())
     if path is not None:
@@ -80,7 +74,7 @@ def check_mjcf(root: ElementTree.Element, source: str, path: Path | None) -> Non
 
 
 class _Survey:
-    """Goes through a description and the files that it includes."""
+    """Counts the elements, files and pixels of a description and its included files."""
 
     def __init__(self, source: str, folder: Path | None) -> None:
         self._source, self._folder = source, folder
@@ -90,11 +84,11 @@ class _Survey:
         self._weights: dict[Path, int] = {}
 
     def weight(self, root: ElementTree.Element, chain: tuple[Path, ...]) -> int:
-        """Number of elements that MuJoCo makes of a document.
+        """Return the number of elements to which MuJoCo expands a document.
 
         Args:
             root: Its root.
-            chain: Files that lead here: the description, and models within it.
+            chain: The description and the models that lead to this one.
         """
         included = set(chain)
         models = [self._model(element, chain) for element in root.iter("model") if element.get("file") is not None]
@@ -102,10 +96,10 @@ class _Survey:
         sensors = doublings = 0
         while stack:
             element, times = stack.pop()
-            self._look_at(element)
+            self._check_element(element)
             cost = _COST.get(str(element.tag))
-            made = 0 if cost is None else math.ceil(cost * _product(element.get("count", "1")))
-            total += times * (1 + made + (each if element.tag == "attach" else 0))
+            parts = 0 if cost is None else math.ceil(cost * _product(element.get("count", "1")))
+            total += times * (1 + parts + (each if element.tag == "attach" else 0))
             if element.tag == "replicate":
                 count = number_in(element.get("count", "1"))
                 if not 0.0 <= count <= MOST_ELEMENTS:
@@ -114,7 +108,7 @@ class _Survey:
                 times *= math.ceil(count)
             sensors += element.tag in _WITHOUT_OBJECT and element.get("objname") is None
             if total > MOST_ELEMENTS:
-                self._refuse(f"more than {MOST_ELEMENTS} elements, with all that it includes, attaches and replicates")
+                self._refuse(f"more than {MOST_ELEMENTS} elements, with included, attached and replicated ones")
             children: Iterator[ElementTree.Element] = iter(element)
             if element.tag == "include":
                 file = self._included(element)
@@ -128,19 +122,19 @@ class _Survey:
         return total
 
     def check_files(self) -> None:
-        """Look at the meshes, pictures and other files that it names, wherever MuJoCo may look for them."""
+        """Check meshes, pictures and other named files in all folders where MuJoCo searches them."""
         if len(self._folders) > MOST_FOLDERS:
             self._refuse(f"files in more than {MOST_FOLDERS} folders")
         for name, times in sorted(self._names.items()):
             for folder in sorted(self._folders):
-                for spelled in {name, name.replace("\\", "/").rpartition("/")[2]}:
-                    file = (self._folder or Path()) / folder / spelled
+                for relative in {name, name.replace("\\", "/").rpartition("/")[2]}:
+                    file = (self._folder or Path()) / folder / relative
                     why = unfit_file(file)
                     if why:
-                        self._refuse(f"the file {spelled[:200]!r}, which {why}")
+                        self._refuse(f"the file {relative[:200]!r}, which {why}")
                     width, height = _size_of_picture(file)
                     if width * height > MOST_PIXELS:
-                        self._refuse(f"the file {spelled[:200]!r}, which has {width} x {height} pixels")
+                        self._refuse(f"the file {relative[:200]!r}, which has {width} x {height} pixels")
                     self._count_pixels(times * width * height)
 
     def _count_pixels(self, pixels: float) -> None:
@@ -149,10 +143,10 @@ class _Survey:
             self._refuse(f"pictures, textures and heights of more than {MOST_PIXELS:g} pixels in all")
 
     def _refuse(self, what: str) -> None:
-        raise DescriptionError(f"{self._source} asks for more than is read: {what}")
+        raise DescriptionError(f"{self._source} exceeds what is read: {what}")
 
     def _model(self, element: ElementTree.Element, chain: tuple[Path, ...]) -> int:
-        """Weight of a model that can be attached."""
+        """Weight of a model for `<attach>`."""
         file = self._included(element)
         if file in chain or len(chain) > _CHAIN:
             self._refuse(f"the model {file.name}, which contains itself")
@@ -163,11 +157,11 @@ class _Survey:
     def _included(self, element: ElementTree.Element) -> Path:
         name = element.get("file", "")
         if self._folder is None:
-            self._refuse(f"the file {name[:200]!r} included by text, which has no folder; give the path of a file")
+            self._refuse(f"the file {name[:200]!r} included by text, which has no folder; a path of a file is required")
         folder = self._folder or Path()
         try:
             file = (folder / name).resolve()
-        except (OSError, RuntimeError, ValueError):  # links in a circle; a name that is none
+        except (OSError, RuntimeError, ValueError):  # a loop of links, an invalid name
             file = Path("/")
         if folder not in file.parents:
             self._refuse(f"the included file {name[:200]!r}, which is not below the folder of the description")
@@ -175,18 +169,18 @@ class _Survey:
 
     def _read(self, file: Path) -> ElementTree.Element:
         if unfit_file(file) is None:
-            return ElementTree.Element("missing")  # MuJoCo tells where it is named
-        text = read_xml(file)  # first, as it refuses what is too large
+            return ElementTree.Element("missing")  # MuJoCo reports it
+        text = read_xml(file)  # first, because it limits the size
         _check_utf8(file, self._source)
         return parse_xml(text, str(file))
 
-    def _look_at(self, element: ElementTree.Element) -> None:
-        """Check the numbers of an element, and keep the files that it names."""
+    def _check_element(self, element: ElementTree.Element) -> None:
+        """Check the numbers of an element, and collect its files."""
         tag = str(element.tag)
         limits = {**_ANYWHERE, **_LARGEST.get(tag, {})}
         for name, text in element.items():
             if "%" in text:
-                self._refuse(f"<{tag} {name}={text[:100]!r}>, which MuJoCo may take for a format of C; use another sign than %")
+                self._refuse(f"<{tag} {name}={text[:100]!r}>, which MuJoCo may use as a C format string; no % is allowed")
             if name in limits and not abs(_product(text)) <= limits[name]:
                 self._refuse(f"<{tag} {name}={text[:100]!r}>; at most {limits[name]:g} in all")
             if tag == "lengthrange" and name in _LEAST and not number_in(text) >= _LEAST[name]:
@@ -208,7 +202,7 @@ class _Survey:
 
 
 def _product(text: str) -> float:
-    """Product of the numbers of an attribute; NaN if one is none, zeros and signs left out."""
+    """Product of the numbers of an attribute without zeros and signs; NaN if one is malformed."""
     return math.prod(max(abs(number), 1.0) if not math.isnan(number) else number for number in map(number_in, text.split()))
 
 
@@ -218,13 +212,13 @@ def _largest(text: str) -> float:
 
 
 def _bytes_in(text: str) -> float:
-    """Memory as MuJoCo has it: a number and K, M or G; -1 leaves it to MuJoCo."""
+    """Memory size in MuJoCo's notation: a number and K, M or G; -1 for automatic."""
     unit = text.strip()[-1:].upper()
     return number_in(text.strip()[:-1]) * _MEMORY[unit] if unit in _MEMORY else number_in(text)
 
 
 def _size_of_picture(file: Path) -> tuple[int, int]:
-    """Width and height of a PNG file; zeros if it is none."""
+    """Width and height of a PNG file; zeros for other files."""
     try:
         with file.open("rb") as stream:
             head = stream.read(24)
@@ -237,11 +231,11 @@ def _size_of_picture(file: Path) -> tuple[int, int]:
 
 
 def _check_utf8(file: Path, source: str) -> None:
-    """MuJoCo takes every file for UTF-8, whatever it declares."""
+    """Refuse other encodings: MuJoCo reads every file as UTF-8, whatever it declares."""
     if not unfit_file(file):
         try:
             file.read_bytes().decode("utf-8")
         except UnicodeDecodeError as error:
             raise DescriptionError(f"{source} is MJCF, and {file.name} is not in UTF-8: {error}") from error
         except OSError:
-            return  # it is read, and refused, elsewhere
+            return  # reported where it is read

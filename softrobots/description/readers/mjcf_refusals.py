@@ -1,4 +1,4 @@
-"""What a MuJoCo model can have that bears on the statics and that a tree of springs and motors has not."""
+"""Features of MuJoCo models that affect the statics and are not supported."""
 
 from __future__ import annotations
 
@@ -9,33 +9,23 @@ import numpy as np
 
 
 def joint_name(model: Any, number: int) -> str:
-    """Name of a joint of a MuJoCo model; `joint_<number>` if it has none."""
+    """Return the name of a joint of a MuJoCo model; `joint_<number>` if it has none."""
     return str(model.joint(number).name) or f"joint_{number}"
 
 
 def driven_joint(mujoco: Any, model: Any, actuator: int) -> int | None:
-    """Number of the joint that an actuator of a MuJoCo model drives; None if it drives something else."""
+    """Return the number of the joint that an actuator drives; None if it drives something else."""
     on_joints = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
     return int(model.actuator_trnid[actuator, 0]) if int(model.actuator_trntype[actuator]) in on_joints else None
 
 
 def not_carried(mujoco: Any, model: Any) -> list[str]:
-    """List what would be lost.
+    """Return the unsupported features of a compiled model, with reasons.
 
-    Args:
-        mujoco: The package.
-        model: A compiled model.
-
-    Returns:
-        A reason each; empty if the statics of the model is that of its masses, hinges, slides and linear springs.
+    Empty if its statics is that of masses, hinges, slides and linear springs.
     """
-    found = [
-        *_joints(mujoco, model),
-        *_tendons(model),
-        *_actuators(mujoco, model),
-        *_elsewhere(mujoco, model),
-    ]
-    return [f"{what} ({why})" for what, why in found]
+    features = [*_joints(mujoco, model), *_tendons(model), *_actuators(mujoco, model), *_elsewhere(mujoco, model)]
+    return [f"{what} ({why})" for what, why in features]
 
 
 def _joints(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
@@ -50,8 +40,8 @@ def _joints(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
         ("free joints", free, "a floating base is not at rest under a load; fix it to the world"),
         ("ball joints", ball, "hinges and slides are supported"),
         ("joints with nonlinear stiffness", nonlinear & ~free, "springs are linear"),
-        ("plastic joint springs", plastic, "where they rest depends on what has happened"),
-        ("joints with spring and dry friction", springs & rubbing, "they rest anywhere within the friction"),
+        ("plastic joint springs", plastic, "their rest position depends on the history"),
+        ("joints with spring and dry friction", springs & rubbing, "their equilibrium is not unique"),
     ):
         names = [f"{joint_name(model, number)} of body {_body(model, number)}" for number in np.flatnonzero(chosen).tolist()]
         if names:
@@ -70,7 +60,7 @@ def _tendons(model: Any) -> Iterable[tuple[str, str]]:
 
 
 def _actuators(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
-    """Actuators that pull although their control is zero, except on a motor, which stands where it is told."""
+    """Actuators that exert a force at zero control, except on motors, whose position is prescribed."""
     none, affine = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
     names = []
     for number, bias in enumerate(model.actuator_biastype.tolist()):
@@ -85,7 +75,7 @@ def _actuators(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
 
 
 def _kept_from_zero(model: Any, actuator: int) -> bool:
-    """Whether the range of its control, activation or force leaves out zero, so that MuJoCo moves zero into it."""
+    """Whether the range of its control, activation or force excludes zero, which MuJoCo then clips."""
     return any(
         limited[actuator] and not ranges[actuator, 0] <= 0.0 <= ranges[actuator, 1]
         for limited, ranges in (
@@ -103,24 +93,26 @@ def _elsewhere(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
     if model.nflex:
         yield (
             f"{model.nflex} flexes",
-            "bodies that deform between their vertices; a chain of hinges with stiffness is supported",
+            "deformable bodies; a chain of hinges with stiffness is supported",
         )
     bodies = [str(model.body(number).name) or f"body_{number}" for number in np.flatnonzero(model.body_plugin >= 0)]
     if bodies:
         yield f"plugins with forces on bodies {_few(bodies)}", "as of the cable; a chain of hinges with stiffness is supported"
     floating = [str(model.body(number).name) or f"body_{number}" for number in np.flatnonzero(model.body_gravcomp)]
     if floating:
-        yield f"gravity compensation of bodies {_few(floating)}", "every body has its whole weight"
+        yield f"gravity compensation of bodies {_few(floating)}", "every body has its full weight"
     if np.any(model.opt.wind) and (model.opt.density > 0.0 or model.opt.viscosity > 0.0):
-        yield "wind", "loads are said by the caller"
+        yield "wind", "loads are given to the solvers"
     flags = mujoco.mjtDisableBit
-    off = flags.mjDSBL_SPRING if hasattr(flags, "mjDSBL_SPRING") else flags.mjDSBL_PASSIVE  # springs had no flag of their own
+    off = (
+        flags.mjDSBL_SPRING if hasattr(flags, "mjDSBL_SPRING") else flags.mjDSBL_PASSIVE
+    )  # older versions have one flag for all passive forces
     if model.opt.disableflags & int(off) and np.any(model.jnt_stiffness):
-        yield "springs that are switched off", "take their stiffness away instead"
+        yield "springs that are disabled", "remove their stiffness instead"
 
 
 def _rows(model: Any, field: str, count: int) -> Any:
-    """Which rows of a field are not all zero; MuJoCo before 4 does not have it."""
+    """Which rows of a field, absent before MuJoCo 4, are not all zero."""
     values = getattr(model, field, None)
     return np.zeros(count, dtype=bool) if values is None else np.any(np.asarray(values) != 0.0, axis=1)
 

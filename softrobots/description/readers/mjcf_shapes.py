@@ -1,4 +1,4 @@
-"""What MuJoCo draws of a model, as far as URDF has such shapes."""
+"""Visible shapes of a MuJoCo model, as far as URDF has them."""
 
 from __future__ import annotations
 
@@ -11,24 +11,19 @@ from softrobots.description.mesh_files import DRAWN_FILES, unfit_file
 from softrobots.description.rigid_tree import Placement, Shape
 
 _SHOWN = 3  # MuJoCo's viewers show the geom groups below
-_UNSAID = np.array(
-    [0.5, 0.5, 0.5, 1.0], dtype=np.float32
-)  # MuJoCo's colour of a geom that says none; its material's holds then
+_DEFAULT_COLOUR = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)  # of a geom without colour; its material's applies then
 
 
 def visible_shapes(mujoco: Any, model: Any, text: str, path: Path | None) -> list[tuple[Shape, ...]]:
-    """Visible shapes of every body.
+    """Return the visible shapes of every body of a compiled model, by number of the body.
 
-    Planes, ellipsoids, height fields and meshes without a file are left out, as are meshes with a reference pose.
+    Planes, ellipsoids, height fields, and meshes without a file or with a reference pose are omitted.
 
     Args:
         mujoco: The package.
-        model: A compiled model.
-        text: The document that it was compiled from.
-        path: Its file, if it is one.
-
-    Returns:
-        Shapes by number of the body.
+        model: The compiled model.
+        text: Its MJCF document.
+        path: The file of the document, if any.
     """
     files = _mesh_files(mujoco, model, text, path) if model.nmesh else {}
     shapes: list[list[Shape]] = [[] for _ in range(model.nbody)]
@@ -56,12 +51,12 @@ def _shape(
     mesh = int(model.geom_dataid[geom])
     if kind != int(kinds.mjGEOM_MESH) or mesh not in files:
         return None
-    moved = Placement.turned(model.mesh_pos[mesh], model.mesh_quat[mesh])  # MuJoCo puts meshes into their principal axes
+    moved = Placement.turned(model.mesh_pos[mesh], model.mesh_quat[mesh])  # MuJoCo moves meshes to their principal axes
     return Shape("mesh", tuple(model.mesh_scale[mesh].tolist()), place @ moved.inverse, colour, files[mesh])
 
 
 def _mesh_files(mujoco: Any, model: Any, text: str, path: Path | None) -> dict[int, str]:
-    """Files of meshes that are read as they are, by number of the mesh."""
+    """Files of meshes without a reference pose, by number of the mesh."""
     spec = mujoco.MjSpec.from_string(text) if path is None else mujoco.MjSpec.from_file(str(path))
     folder, files = (Path() if path is None else path.parent) / spec.meshdir, {}
     for mesh in spec.meshes:
@@ -74,6 +69,6 @@ def _mesh_files(mujoco: Any, model: Any, text: str, path: Path | None) -> dict[i
 
 def _colour(model: Any, geom: int) -> tuple[float, ...]:
     rgba, material = model.geom_rgba[geom], int(model.geom_matid[geom])
-    if material >= 0 and np.array_equal(rgba, _UNSAID):
+    if material >= 0 and np.array_equal(rgba, _DEFAULT_COLOUR):
         rgba = model.mat_rgba[material]
     return tuple(np.clip(rgba.astype(np.float64).round(6), 0.0, 1.0).tolist())

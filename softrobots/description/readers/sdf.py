@@ -1,8 +1,8 @@
-"""SDF, the format of Gazebo: what Drake's parser makes of it as bodies and joints of URDF.
+"""Reader of SDF, the format of Gazebo, from the plant that Drake's parser builds.
 
-Drake resolves the poses, the frames that they and the axes are expressed in, and nested models. `spring_stiffness` and
-`spring_reference` of revolute, continuous and prismatic joints become springs; other movable joints are motors. Coordinates are
-those of the SDF joints. The gravity of a world is not read.
+Drake resolves poses, frames and nested models. `spring_stiffness` and `spring_reference` of revolute, continuous and prismatic
+joints become springs; other movable joints are motors. Coordinates are those of the SDF joints. The gravity of a world is not
+read.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ import numpy as np
 from softrobots.core.checks import read_only
 from softrobots.core.errors import DescriptionError, MissingDependency
 from softrobots.core.xml_input import parse_xml
-from softrobots.description.readers.drake_log import warnings_of_drake
 from softrobots.description.readers.sdf_refusals import not_carried
 from softrobots.description.readers.sdf_shapes import placement_of, visible_shapes
-from softrobots.description.readers.sdf_text import without_drawings
+from softrobots.description.readers.sdf_text import warnings_of_drake, without_drawings
 from softrobots.description.readers.tree_builder import Motion, TreeBuilder
 from softrobots.description.rigid_tree import Body, Placement, RigidTree
 from softrobots.description.urdf_structure import MOST_LINKS
@@ -30,7 +29,7 @@ _KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
 
 
 class _Edge(NamedTuple):
-    """A joint of Drake as seen from the world: it may have been written the other way round."""
+    """A joint of Drake directed away from the world; `reversed` if the file has parent and child the other way round."""
 
     joint: Any
     parent: Any
@@ -39,29 +38,24 @@ class _Edge(NamedTuple):
 
 
 def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
-    """Read SDF.
+    """Read SDF into a tree with the root link `world`.
 
-    The file has one model that moves; static models of a world come along as part of the world. Links, joints and frames keep
-    their names; those of a nested model get its name in front, `arm__link`, those of a static one beside the robot, too. A
-    joint off the origin of its child link gets a link without mass. Frames of the file become links without mass. The tip is
-    the link or frame called `tip`, or the only moving link at the end of the tree. Visible boxes, cylinders, spheres and mesh
-    files are read, and capsules as cylinders; meshes whose files are missing are left out.
-
-    Contacts, damping, plugins and controllers are left out.
+    One model of the file may move; static models are fixed to the world. Links, joints and frames keep their names; those of
+    nested models, and of static ones beside the robot, get the name of the model in front, `arm__link`. A joint away from the
+    origin of its child link gets a link without mass. Frames of the file become links without mass. The tip is the link or
+    frame called `tip`, or the only moving link at an end of the tree. Visible boxes, cylinders, spheres and existing mesh files
+    are read, and capsules as cylinders. Contacts, plugins and controllers are ignored.
 
     Args:
         text: The document.
-        source: Where it comes from, for errors.
-        path: Its file, for the meshes that it names.
-
-    Returns:
-        The tree; its root is the link `world`.
+        source: Its origin, for errors.
+        path: Its file, if any, to which mesh files are relative.
 
     Raises:
         MissingDependency: If Drake is not installed (extra `interop`).
-        DescriptionError: If Drake refuses it, finds no model or an inertia that no body has; if several models move or a body
-            is not fixed to the world; if bodies form a loop; or if there are other joints than revolute, continuous,
-            prismatic and fixed ones, other force elements than springs, constraints, or what is listed in
+        DescriptionError: If Drake refuses it, or finds no model or an invalid inertia; if several models move or a body is not
+            fixed to the world; if bodies form a loop; or if it has other joints than revolute, continuous, prismatic and fixed
+            ones, other force elements than springs, constraints, or a feature listed in
             `softrobots.description.readers.sdf_refusals`.
     """
     try:
@@ -75,16 +69,16 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
         if count > most:
             raise DescriptionError(f"{source} has {count} {kind}s; at most {most} are read")
     reasons = not_carried(root)
-    plant = MultibodyPlant(1e-3)  # discrete, because a continuous one takes no constraints
+    plant = MultibodyPlant(1e-3)  # discrete, because continuous plants refuse constraints
     if not reasons:
         try:
             with warnings_of_drake(shown=True) as warnings:
                 Parser(plant).AddModelsFromString(without_drawings(text), "sdf")
-        except (Exception, SystemExit) as error:  # RuntimeError; SystemExit is what its assertions become in Python
+        except (Exception, SystemExit) as error:  # RuntimeError, or SystemExit for its assertions
             raise DescriptionError(f"Drake refuses {source}: {' '.join(str(error).split())}") from error
         reasons = [*_not_supported(plant), *(line for line in warnings if "invalid inertia" in line)]
     if reasons:
-        raise DescriptionError(f"{source} has what does not become a robot of springs and motors: {'; '.join(reasons)}")
+        raise DescriptionError(f"{source} has features that a robot of springs and motors lacks: {'; '.join(reasons)}")
     return _tree(plant, source, {str(frame.get("name")) for frame in root.iter("frame")}, visible_shapes(text, path))
 
 
@@ -109,14 +103,14 @@ def _tree(plant: Any, source: str, frames: set[str], shapes: dict[str, list[Any]
 
 
 def _edges(plant: Any, source: str) -> list[_Edge]:
-    """Joints from the world outwards; every body is at the end of exactly one."""
-    left = list(_items(plant.get_joint, "JointIndex", plant.num_joints()))
+    """Joints from the world outwards; every body is the child of exactly one."""
+    remaining = list(_items(plant.get_joint, "JointIndex", plant.num_joints()))
     reached, edges = {plant.world_body().index()}, []
     while True:
-        joint = next((j for j in left if {j.parent_body().index(), j.child_body().index()} & reached), None)
+        joint = next((j for j in remaining if {j.parent_body().index(), j.child_body().index()} & reached), None)
         if joint is None:
             break
-        left.remove(joint)
+        remaining.remove(joint)
         backward = joint.child_body().index() in reached
         if backward and joint.parent_body().index() in reached:
             raise DescriptionError(f"{source} has a loop of bodies that joint {joint.name()} closes; a tree is required")
@@ -127,7 +121,7 @@ def _edges(plant: Any, source: str) -> list[_Edge]:
     loose = [body.scoped_name().get_full() for body in bodies if body.index() not in reached]
     if loose:
         raise DescriptionError(
-            f"{source} has bodies that are not fixed to the world ({_some(loose)}): a floating base is not at rest under a "
+            f"{source} has bodies that are not fixed to the world ({_some(loose)}): a floating base has no equilibrium under "
             "load; add a fixed joint with the parent world"
         )
     return edges
@@ -151,8 +145,8 @@ def _moving_model(plant: Any, edges: list[_Edge], source: str) -> str:
 def _not_supported(plant: Any) -> Iterator[str]:
     for joint in _items(plant.get_joint, "JointIndex", plant.num_joints()):
         if joint.type_name() not in _KINDS:
-            told = f"joint {joint.name()} of kind {joint.type_name()}"
-            yield f"{told} (revolute, continuous, prismatic and fixed ones are supported)"
+            supported = "revolute, continuous, prismatic and fixed ones are supported"
+            yield f"joint {joint.name()} of kind {joint.type_name()} ({supported})"
     for element in _items(plant.get_force_element, "ForceElementIndex", plant.num_force_elements()):
         kind = type(element).__name__
         if kind not in ("UniformGravityFieldElement", "RevoluteSpring", "PrismaticSpring"):
@@ -173,7 +167,7 @@ def _motions(
         joined = start @ placement_of(joint.X_FM()) @ end.inverse
         return [], joined.inverse if edge.reversed else joined
     axis = np.array(joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis())
-    if edge.reversed:  # the same motion seen from the other side
+    if edge.reversed:  # the same motion with parent and child exchanged
         start, end, axis = end, start, -axis
     motion = Motion(
         name,
@@ -195,7 +189,7 @@ def _springs(plant: Any) -> dict[Any, SpringTag]:
         if type(element).__name__ not in ("RevoluteSpring", "PrismaticSpring"):
             continue
         rest = "nominal_angle" if type(element).__name__ == "RevoluteSpring" else "nominal_position"
-        stiffness, reference = (  # older versions of Drake call them as the prismatic spring still does
+        stiffness, reference = (  # names differ between versions of Drake and kinds of springs
             float((getattr(element, f"default_{field}", None) or getattr(element, field))()) for field in ("stiffness", rest)
         )
         if stiffness > 0.0:
@@ -219,7 +213,7 @@ def _body(body: Any, name: str, shapes: dict[str, list[Any]]) -> Body:
 
 
 def _name(plant: Any, thing: Any, model: str) -> str:
-    """Name of a body, joint or frame; with those of the models that it is in, below the robot's own."""
+    """Name of a body, joint or frame, after the names of its models below the robot's own."""
     within = str(plant.GetModelInstanceName(thing.model_instance())).split("::")
     return "__".join([*(within[1:] if within[0] == model else within), str(thing.name())])
 

@@ -1,4 +1,4 @@
-"""What Drake draws of an SDF file, as far as URDF has such shapes."""
+"""Visible shapes of an SDF file, as far as URDF has them."""
 
 from __future__ import annotations
 
@@ -9,34 +9,31 @@ import numpy as np
 
 from softrobots.core.checks import read_only
 from softrobots.description.mesh_files import DRAWN_FILES
-from softrobots.description.readers.drake_log import warnings_of_drake
-from softrobots.description.readers.sdf_text import with_found_meshes
+from softrobots.description.readers.sdf_text import warnings_of_drake, with_found_meshes
 from softrobots.description.rigid_tree import Placement, Shape
 
 
 def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
-    """Visual shapes of every link.
+    """Return the visual shapes of every link, by its scoped name `model::link`.
+
+    Meshes whose files are missing are omitted; the result is empty if Drake cannot read one of the others.
 
     Args:
-        text: An SDF document that Drake takes.
-        path: Its file, for the meshes that it names.
-
-    Returns:
-        Shapes by scoped name of the link, `model::link`, without meshes whose files are missing; none at all if Drake cannot
-        read one of them.
+        text: An SDF document that Drake accepts.
+        path: Its file, if any, to which mesh files are relative.
     """
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
     from pydrake.multibody.tree import BodyIndex
     from pydrake.systems.framework import DiagramBuilder
 
-    builder = DiagramBuilder()  # owns the other two
+    builder = DiagramBuilder()  # owns plant and scene
     plant, scene = AddMultibodyPlantSceneGraph(builder, 1e-3)
     parser = Parser(plant)
     try:
         with warnings_of_drake(shown=False):
             parser.AddModelsFromString(with_found_meshes(text, None if path is None else path.parent), "sdf")
-    except (Exception, SystemExit):  # SystemExit: what its assertions become in Python
+    except (Exception, SystemExit):  # SystemExit: assertions of Drake
         return {}
     inspector, shapes = scene.model_inspector(), {}
     for number in range(plant.num_bodies()):
@@ -47,7 +44,7 @@ def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
 
 
 def placement_of(pose: Any) -> Placement:
-    """A `RigidTransform` of Drake as a placement."""
+    """Return a `RigidTransform` of Drake as a placement."""
     return Placement(read_only(np.array(pose.translation())), read_only(np.array(pose.rotation().matrix())))
 
 

@@ -1,12 +1,14 @@
-"""SDF text as Drake gets it: without what the statics does not need, and without names of files that Drake would look for.
+"""Preparation of SDF text for Drake: parts without effect on the statics and unresolved file names are removed.
 
-Drake reads meshes where they collide, fetches packages of its own from the network, and fails as a whole at shapes that it does
-not like, e.g. a plane without a direction. None of that bears on a loaded robot at rest.
+Drake otherwise reads collision meshes, fetches packages from the network, and refuses a file for one invalid shape, e.g. a
+plane without a direction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from xml.dom import minidom
@@ -19,40 +21,52 @@ _LEFT_OUT = (
     "battery", "drake:controller_gains",
 )  # fmt: skip
 _DRAWN = ("box", "cylinder", "sphere", "capsule", "mesh")
-_SAID_OF_COLOUR = ("ambient", "diffuse", "specular", "emissive")
+_COLOURS = ("ambient", "diffuse", "specular", "emissive")
 
 
 def without_drawings(text: str) -> str:
-    """Leave out shapes, sensors, lights and plugins.
-
-    Args:
-        text: An SDF document.
-    """
+    """Return an SDF document without shapes, sensors, lights and plugins."""
     document = minidom.parseString(text.encode("utf-8"))
     _remove(document, lambda element: element.tagName in _LEFT_OUT)
     return str(document.toxml())
 
 
 def with_found_meshes(text: str, folder: Path | None) -> str:
-    """Leave out all but what is drawn: visible boxes, cylinders, spheres, capsules, and meshes whose files are there.
+    """Return an SDF document with visible boxes, cylinders, spheres, capsules and existing meshes as its only shapes.
+
+    Mesh files are named by URIs, and of materials only the colours are kept.
 
     Args:
         text: An SDF document.
-        folder: The folder of its file, if it is one: where names of meshes start.
-
-    Returns:
-        The text; meshes are named by the addresses of their files, and of their look only the colours are left.
+        folder: Folder of its file, if any, to which mesh files are relative.
     """
     document = minidom.parseString(text.encode("utf-8"))
     _remove(document, lambda e: not _drawn(e, folder) if e.tagName == "visual" else e.tagName in _LEFT_OUT)
     for visual in document.getElementsByTagName("visual"):
         for node in _elements(visual):
             if node.tagName == "material":
-                for look in [inner for inner in _elements(node) if inner.tagName not in _SAID_OF_COLOUR]:
+                for look in [inner for inner in _elements(node) if inner.tagName not in _COLOURS]:
                     node.removeChild(look)
             elif node.tagName not in ("pose", "geometry", "transparency"):
                 visual.removeChild(node)
     return str(document.toxml())
+
+
+@contextmanager
+def warnings_of_drake(*, shown: bool) -> Iterator[list[str]]:
+    """Collect the lines of Drake's warnings; if `shown`, they are logged, too."""
+    lines: list[str] = []
+
+    def collect(record: logging.LogRecord) -> bool:
+        lines.append(" ".join(record.getMessage().split()))
+        return shown
+
+    logger = logging.getLogger("drake")
+    logger.addFilter(collect)
+    try:
+        yield lines
+    finally:
+        logger.removeFilter(collect)
 
 
 def _drawn(visual: minidom.Element, folder: Path | None) -> bool:
@@ -61,7 +75,7 @@ def _drawn(visual: minidom.Element, folder: Path | None) -> bool:
 
 
 def _found(shape: minidom.Element, folder: Path | None) -> bool:
-    """Whether a shape can be drawn; a mesh gets the address of its file."""
+    """Whether a shape can be drawn; a mesh gets the URI of its file."""
     if shape.tagName != "mesh":
         return True
     names = shape.getElementsByTagName("uri")
@@ -82,7 +96,7 @@ def _elements(node: minidom.Node) -> list[minidom.Element]:
 
 
 def _remove(document: minidom.Document, unwanted: Callable[[minidom.Element], bool]) -> None:
-    """Take elements out, but the root, those of a parent at once: one by one takes time with their number squared."""
+    """Remove elements below the root, all of a parent at once, because one by one takes quadratic time."""
     parents: list[Any] = [document.documentElement]
     for parent in parents:
         parent.childNodes[:] = [

@@ -1,12 +1,11 @@
-r"""Bodies and joints of another format put together as a `RigidTree`, as URDF counts them.
+r"""Assembly of bodies and joints of another format into a `RigidTree` for URDF.
 
-In URDF a joint is at the origin of the link that it carries, and carries it alone. Elsewhere a joint has an anchor of its own,
-and a body may have several joints:
+In URDF a link has one parent joint, at its origin. In other formats joints have anchors, and a body may have several joints:
 
 .. math:: X_{PB}(q) = A_1 J_1(q_1) A_2 J_2(q_2) \ldots A_n J_n(q_n) C
 
-with `A_i` from one joint frame to the next and `C` from the last one to the body. Each `J_i` but the last gets a link of its
-own. A last hinge with `C` off its axis gets one too, to which the body is fixed; otherwise `C` goes before `J_n`.
+with `A_i` from one joint frame to the next and `C` from the last one to the body. Each `J_i` but the last gets an extra link. A
+last hinge with `C` off its axis gets one too, to which the body is fixed; otherwise `C` is moved before `J_n`.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ from softrobots.description.readers.shared_mass import give_mass, gyration, smal
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree
 from softrobots.description.urdf_tags import SpringTag
 
-_ROUNDING = 1e-12  # [m]; a joint that is less beside the origin of its body is at it
-_UNIT = 1e-6  # by how much the length of an axis may differ from 1
+_ROUNDING = 1e-12  # [m]; a joint nearer to the origin of its body counts as at it
+_UNIT = 1e-6  # tolerance of the length of an axis
 _X_AXIS = read_only(np.array([1.0, 0.0, 0.0]))
 
 
@@ -36,7 +35,7 @@ class Motion:
     kind: str
     """"revolute" or "prismatic"."""
     start: Placement
-    """Its frame in the one before it (of the previous joint, or of the parent body), at zero."""
+    """Pose of its frame in that of the previous joint, or of the parent body, at zero."""
     axis: FloatArray
     """Unit axis in its frame, shape (3,)."""
     limits: tuple[float, float]
@@ -48,7 +47,7 @@ class Motion:
     damping: float
     """Viscous damping [N m s/rad or N s/m]."""
     spring: SpringTag | None
-    """Its spring."""
+    """Its spring, if any."""
 
 
 class TreeBuilder:
@@ -59,19 +58,19 @@ class TreeBuilder:
 
         Args:
             name: Name of the robot.
-            source: Where it comes from, for errors.
-            bodies: Names of all bodies to come; made-up links get others.
-            joints: Names of all joints to come.
+            source: Its origin, for errors.
+            bodies: Names of all bodies; extra links get other names.
+            joints: Names of all joints.
 
         Raises:
-            DescriptionError: If a name is there twice: that of the file is the one that another body or joint is given.
+            DescriptionError: If a name in the file is also generated for an unnamed or nested part.
         """
         bodies, joints = list(bodies), list(joints)
         for names in (bodies, joints):
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise DescriptionError(
-                    f"{source} has a name {', '.join(twice)} that is also made up for a part without one or in a nested model; "
+                    f"{source} has a name {', '.join(twice)} that is also generated for an unnamed or nested part; "
                     "choose another"
                 )
         self._name, self._source = name, source
@@ -83,7 +82,7 @@ class TreeBuilder:
         self._carriers: set[str] = set()
 
     def draw_on_world(self, world: Body) -> None:
-        """Give the world its shapes."""
+        """Copy the visual shapes of a body to the world."""
         self._bodies[0] = replace(self._bodies[0], visuals=world.visuals)
 
     def add(self, body: Body, parent: str, motions: Sequence[Motion], end: Placement) -> None:
@@ -91,12 +90,12 @@ class TreeBuilder:
 
         Args:
             body: The body.
-            parent: Body that it hangs on.
+            parent: Its parent body.
             motions: Degrees of freedom from the parent to it; none if it is fixed.
-            end: The body in the frame of the last of them, or in its parent.
+            end: Pose of the body in the frame of the last of them, or in its parent.
 
         Raises:
-            DescriptionError: If a number is not finite, or a joint has no axis, as where its length overflows.
+            DescriptionError: If a number is not finite, or the axis of a joint is no unit vector (its length overflows).
         """
         self._check(f"the body {body.name}", body.mass, body.centre.position, body.centre.rotation, body.inertia)
         self._check(f"the body {body.name}", end.position, end.rotation)
@@ -136,17 +135,17 @@ class TreeBuilder:
             self._move(last, parent, body.name)
 
     def add_frame(self, name: str, parent: str, placement: Placement) -> None:
-        """Add a link without mass that only marks a place on a body; not if another link has its name."""
+        """Add a link without mass that marks a frame on a body, unless another link has its name."""
         if name in self._links:
             return
         self._links.add(name)
         self._fix(small_ball(name, 0.0, np.zeros(3), 0.0), parent, placement)
 
     def tree(self) -> RigidTree:
-        """Return the tree; its tip is the link called `tip`, or the only moving body that carries none.
+        """Return the tree; its tip is the link called `tip`, or the only moving body without children.
 
         Raises:
-            DescriptionError: If there is nothing but the world.
+            DescriptionError: If there are no bodies.
         """
         if len(self._bodies) == 1:
             raise DescriptionError(f"{self._source} has no bodies")
@@ -155,7 +154,7 @@ class TreeBuilder:
         return RigidTree(self._name, tuple(self._bodies), tuple(self._joints), dict(self._springs), tip)
 
     def _shared(self, body: Body, motions: Sequence[Motion], end: Placement) -> tuple[Body, list[float]]:
-        """Let the body give a mass to each link before a hinge whose axis, with all that follow, meets it at one point."""
+        """Move mass from the body to each link before the last hinges whose axes meet at one point."""
         takers = 0
         for motion in reversed(motions[1:]):
             if motion.kind != "revolute":
@@ -170,8 +169,8 @@ class TreeBuilder:
     def _move(self, motion: Motion, parent: str, child: str) -> None:
         spring = motion.spring
         effort, velocity = (value if value > 0.0 else LARGEST for value in (motion.effort, motion.velocity))
-        made = (motion.start, motion.axis, motion.limits, effort, velocity, motion.damping)
-        self._joints.append(Joint(motion.name, motion.kind, parent, child, *made))
+        details = (motion.start, motion.axis, motion.limits, effort, velocity, motion.damping)
+        self._joints.append(Joint(motion.name, motion.kind, parent, child, *details))
         if spring is not None:
             self._springs[motion.name] = spring
 
@@ -182,7 +181,7 @@ class TreeBuilder:
 
     def _check(self, what: str, *values: FloatArray | float) -> None:
         if not all(np.all(np.abs(value) <= LARGEST) for value in values):
-            raise DescriptionError(f"{self._source}: {what} has a number that is not finite or beyond {LARGEST:g}")
+            raise DescriptionError(f"{self._source}: {what} has a number that is not finite or above {LARGEST:g} in size")
 
     @staticmethod
     def _free_name(taken: set[str], wanted: str) -> str:
