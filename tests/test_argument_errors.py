@@ -135,7 +135,7 @@ LIMITS: list[tuple[str, str, list[Any], list[Any], str]] = [
     ("deflection", "wall_thickness", [0.1 * 0.055], [up(0.1 * 0.055)], "a thin wall, at most a tenth of the radius 0.055 m"),
     (
         "young_modulus_from_stiffness", "stiffness", [1.01 * PRESSURE_ALONE], [0.99 * PRESSURE_ALONE],
-        f"above {PRESSURE_ALONE:.6g} N m/rad, what the pressure alone gives",
+        f"above {PRESSURE_ALONE:.6g} N m/rad, the stiffness due to the pressure alone",
     ),
     ("BendingTest", "hinge_offset", [0.0, 0.43], [0.5, 0.6], "below the distance of the probe, 0.5 m"),
     ("BendingTest", "offset", [0.0, down(0.47)], [0.47, 0.6], "below the distance of the probe from the hinge, 0.47 m"),

@@ -1,4 +1,4 @@
-"""Segments of constant curvature in closed form: muscles, arcs, poses, chains and their Jacobians; [PCC paper]."""
+"""Constant-curvature kinematics in closed form: muscles, arcs, poses, chains and their Jacobians; [PCC paper]."""
 
 from softrobots.constant_curvature.arcs import Arc, arc_from_strains, strains_from_arc
 from softrobots.constant_curvature.jacobians import (

@@ -1,8 +1,8 @@
-"""One segment of constant curvature: its arc, and the same as a bending vector.
+"""Arc parameters of a segment of constant curvature, and its section coordinates (bending vector and length).
 
-A segment is an arc of a circle: backbone length `l`, bending angle `theta` and azimuth `alpha` of the bending plane, counted
-from x towards y. The backbone leaves the base along +z. The polar pair `(theta, alpha)` has no derivative when straight; the
-bending vector `theta (-sin alpha, cos alpha)` has, and every computation that must pass through straight goes over it.
+A segment is an arc of a circle: backbone length `l`, bending angle `theta` and azimuth `alpha` of the bending plane, measured
+from x towards y. The backbone starts at the base along +z. The polar pair `(theta, alpha)` is not differentiable at the
+straight configuration; the bending vector `theta (-sin alpha, cos alpha)` is, and all derivatives use it.
 
 References:
     [PCC paper]: the kinematic model of a two-segment continuum robot with three pneumatic muscles a segment. Its figures 3 to 5
@@ -23,7 +23,7 @@ from softrobots.core.errors import ParameterError
 
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """One arc, or any number of them in an array: three read-only arrays of one shape.
+    """Parameters of one arc, or of several: three read-only arrays of one shape.
 
     Numbers and arrays are accepted; they are broadcast to their common shape.
 
@@ -57,7 +57,7 @@ class Arc:
 
 
 def strains_from_arc(arc: Arc) -> FloatArray:
-    """Section coordinates of an arc: its strains integrated over the segment.
+    """Return the section coordinates of an arc: its strains integrated over the segment.
 
     `(kx h, ky h, tau h, stretch h) = (-theta sin(alpha), theta cos(alpha), 0, l)` with the rest length `h`: the bending vector,
     which is the rotation vector from base to tip in base axes, no twist, and the backbone length. The segment is the screw
@@ -79,7 +79,7 @@ def strains_from_arc(arc: Arc) -> FloatArray:
 
 
 def arc_from_strains(strains: Any) -> Arc:
-    """Arc of the section coordinates `(kx h, ky h, tau h, stretch h)`; inverse of `strains_from_arc`.
+    """Return the arc of the section coordinates `(kx h, ky h, tau h, stretch h)`; inverse of `strains_from_arc`.
 
     `theta = hypot(kx h, ky h)` and `alpha = atan2(-kx h, ky h)`, in (-pi, pi]; 0 when straight.
 
@@ -109,7 +109,7 @@ def checked_strains(strains: Any) -> FloatArray:
     if checked.ndim == 0 or checked.shape[-1] != 4:
         raise ParameterError("strains", strains, f"of shape (..., 4) (it has shape {checked.shape})")
     if np.any(checked[..., 2] != 0.0):
-        raise ParameterError("strains", strains, "without twist, as an arc is: zero in the third column")
+        raise ParameterError("strains", strains, "without twist: zero in the third column")
     if np.any(checked[..., 3] < 0.0):
         raise ParameterError("strains", strains, "of zero or positive length [m], the fourth column")
     return checked

@@ -1,9 +1,9 @@
 """Geometric Jacobians of arcs and chains: from arcs, strains and muscle lengths to the velocity of the tip.
 
 All have six rows in the axes of the base: the velocity of the tip point [m], then the angular velocity [rad], each for a unit
-rate of the coordinate. Those with respect to strains and muscle lengths go over the bending vector and are smooth through
-straight in the torsion-free frame. In the bending-plane frame the tip turns about the backbone with the azimuth, which has no
-derivative with respect to the bending vector when straight.
+rate of the coordinate. Those with respect to strains and muscle lengths use the bending vector and are smooth at the straight
+configuration in the torsion-free frame. In the bending-plane frame the tip rotates about the backbone with the azimuth, which
+is not differentiable with respect to the bending vector there.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from softrobots.core.errors import ParameterError
 
 
 def arc_jacobian(arc: Arc, frame: str = "torsion_free") -> FloatArray:
-    """Jacobian of `transform` with respect to `(length, bending, azimuth)`.
+    """Return the Jacobian of `transform` with respect to `(length, bending, azimuth)`.
 
     With `c_k` the Stumpff functions of `theta^2` and `n = (cos alpha, sin alpha, 0)`, `t = (-sin alpha, cos alpha, 0)`, the
     linear columns are `theta c_2 n + c_1 z`, `l ((c_1 - c_2) n + theta (c_3 - c_2) z)` and `l theta c_2 t`. The angular columns
     are 0, `t` and `z` in the bending-plane frame, where `R = Rz(alpha) Ry(theta)`; in the torsion-free frame the last is
-    `z - R z`. These coordinates are polar: both frames have all three columns when straight, but with a zero column or two that
-    depend on the azimuth.
+    `z - R z`. These coordinates are polar: for a straight arc both frames have all three columns, but one or two of them are
+    zero or depend on the azimuth.
 
     Args:
         arc: Arc of shape (...).
@@ -62,7 +62,7 @@ def arc_jacobian(arc: Arc, frame: str = "torsion_free") -> FloatArray:
 
 
 def strain_jacobian(strains: Any) -> FloatArray:
-    """Jacobian of the torsion-free pose with respect to the section coordinates `(kx h, ky h, tau h, stretch h)`.
+    """Return the Jacobian of the torsion-free pose with respect to the section coordinates `(kx h, ky h, tau h, stretch h)`.
 
     With `w` the bending vector in base axes, the angular columns are those of `I + c_2 [w] + c_3 [w]^2`, the left Jacobian of
     the rotation group, and the linear ones are the derivatives of `p = l (c_1 z + c_2 w x z)`. Smooth everywhere. The twist
@@ -87,7 +87,7 @@ def strain_jacobian(strains: Any) -> FloatArray:
     jacobian[..., 2, 0], jacobian[..., 2, 1] = length * (c3 - c2) * x, length * (c3 - c2) * y
     jacobian[..., 0, 2], jacobian[..., 1, 2] = length * c3 * x, length * c3 * y
     jacobian[..., 0, 3], jacobian[..., 1, 3], jacobian[..., 2, 3] = c2 * y, -c2 * x, c1
-    # 1 - c_3 y^2 = c_1 + c_3 x^2 and the like: sums instead of differences.
+    # 1 - c_3 y^2 = c_1 + c_3 x^2 etc.: sums instead of differences
     jacobian[..., 3, 0], jacobian[..., 4, 1], jacobian[..., 5, 2] = c1 + c3 * x**2, c1 + c3 * y**2, c1
     jacobian[..., 3, 1] = jacobian[..., 4, 0] = c3 * x * y
     jacobian[..., 3, 2], jacobian[..., 4, 2] = c2 * y, -c2 * x
@@ -98,9 +98,10 @@ def strain_jacobian(strains: Any) -> FloatArray:
 def muscle_jacobian(
     lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, frame: str = "torsion_free", tolerance: float = 1e-6
 ) -> FloatArray:
-    """Jacobian of the pose of a segment with respect to its muscle lengths.
+    """Return the Jacobian of the pose of a segment with respect to its muscle lengths.
 
-    Smooth through straight in the torsion-free frame. For more than three muscles it is that of the least-squares arc.
+    It is smooth at the straight configuration in the torsion-free frame. For more than three muscles it is that of the
+    least-squares arc.
 
     Args:
         lengths: Muscle lengths [m], positive, shape (..., N).
@@ -120,7 +121,7 @@ def muscle_jacobian(
 
 
 def chain_arc_jacobian(arcs: Arc | Sequence[Arc], offsets: Any = None, frame: str = "torsion_free") -> FloatArray:
-    """Jacobian of `chain_transform` with respect to `(length, bending, azimuth)` of each segment, base to tip.
+    """Return the Jacobian of `chain_transform` with respect to `(length, bending, azimuth)` of each segment, base to tip.
 
     Args:
         arcs: One `Arc` a segment, base to tip, of shapes that broadcast to (...); or one `Arc` of shape (..., S).
@@ -145,7 +146,7 @@ def chain_muscle_jacobian(
     frame: str = "torsion_free",
     tolerance: float = 1e-6,
 ) -> FloatArray:
-    """Jacobian of the tip pose of a chain with respect to the muscle lengths of each segment, base to tip.
+    """Return the Jacobian of the tip pose of a chain with respect to the muscle lengths of each segment, base to tip.
 
     Args:
         lengths: Muscle lengths [m], positive, shape (..., S, N).
@@ -186,10 +187,10 @@ def _muscle_columns(lengths: Any, distance: Any, azimuths: Any, frame: str, tole
         raise ParameterError(
             "lengths",
             lengths,
-            "of bent segments in the bending-plane frame: straight, its azimuth has no derivative (use 'torsion_free')",
+            "of bent segments in the bending-plane frame: the azimuth of a straight one has no derivative (use 'torsion_free')",
         )
     # The linear rows of both frames are the same. The angular rows are t d(theta) + z d(alpha), as in `arc_jacobian`; the twist
-    # column stays as it is, for muscles do not twist.
+    # column does not matter, because muscles do not twist.
     cosine, sine = np.cos(arc.azimuth), np.sin(arc.azimuth)
     jacobian[..., 3, 0], jacobian[..., 4, 1] = sine**2, cosine**2
     jacobian[..., 3, 1] = jacobian[..., 4, 0] = -sine * cosine
@@ -198,7 +199,7 @@ def _muscle_columns(lengths: Any, distance: Any, azimuths: Any, frame: str, tole
 
 
 def _at_tip(local: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
-    """Turn the Jacobians of the segments (..., S, 6, n) into base axes and carry them to the tip: shape (..., 6, S n)."""
+    """Transform the Jacobians of the segments (..., S, 6, n) to base axes and to the tip point: shape (..., 6, S n)."""
     axes = starts[..., :3, :3]
     linear, angular = axes @ local[..., :3, :], axes @ local[..., 3:, :]
     lever = ends[..., -1:, :3, 3] - ends[..., :3, 3]

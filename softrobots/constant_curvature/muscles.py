@@ -1,12 +1,12 @@
-r"""Muscles beside a backbone: their lengths from an arc, and the arc from their lengths.
+r"""Muscle kinematics of a segment: muscle lengths from an arc, and the arc from muscle lengths.
 
 Muscle `i` runs parallel to the backbone at the distance `d` and the azimuth `phi_i` of the cross-section, so that it bends with
 the radius `r - d cos(alpha - phi_i)`:
 
 .. math:: l_i = l - \theta d \cos(\alpha - \phi_i)
 
-[PCC paper] (20)-(22). This is linear in the backbone length and the bending vector: three muscles determine an arc, and more
-than three overdetermine it. The backbone is extensible. The paper does not publish `d`.
+[PCC paper] (20)-(22). This is linear in the backbone length and the bending vector: three muscles determine an arc, more than
+three overdetermine it. The backbone is extensible. The paper does not publish `d`.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ AZIMUTHS = (0.0, -2.0 * math.pi / 3.0, 2.0 * math.pi / 3.0)
 """Azimuths of the three muscles of [PCC paper], figure 9 [rad]."""
 
 SAME_AZIMUTH = 1e-9  # [rad]
-LARGEST_CONDITION = 1e6  # of the map from arc to muscle lengths: beyond, more than six digits are lost
+LARGEST_CONDITION = 1e6  # condition number of the map from arc to muscle lengths; beyond, more than six digits are lost
 
 
 def muscles_from_arc(arc: Arc, distance: Any, azimuths: Any = AZIMUTHS) -> FloatArray:
-    """Lengths of the muscles of a segment: `l_i = l - theta d cos(alpha - phi_i)`, [PCC paper] (20)-(22).
+    """Return the lengths of the muscles of a segment: `l_i = l - theta d cos(alpha - phi_i)`, [PCC paper] (20)-(22).
 
     Args:
         arc: Arc of shape (...).
@@ -39,8 +39,8 @@ def muscles_from_arc(arc: Arc, distance: Any, azimuths: Any = AZIMUTHS) -> Float
         Lengths [m], shape (..., N).
 
     Raises:
-        ParameterError: If `arc` is not an `Arc`, the distance is not positive, two azimuths are the same (modulo a turn), there
-            are fewer than three or they lie too close together, shapes do not broadcast, or the arc is bent so sharply that a
+        ParameterError: If `arc` is not an `Arc`, the distance is not positive, two azimuths are equal (modulo a turn), there
+            are fewer than three or they are too close together, shapes do not broadcast, or the arc is bent so sharply that a
             muscle length is not positive.
     """
     arc = checked_arc(arc)
@@ -55,23 +55,23 @@ def muscles_from_arc(arc: Arc, distance: Any, azimuths: Any = AZIMUTHS) -> Float
 
 
 def strains_from_muscles(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, tolerance: float = 1e-6) -> FloatArray:
-    """Section coordinates of the segment that the muscle lengths describe: bending vector and backbone length.
+    """Return the section coordinates of a segment from its muscle lengths: bending vector and backbone length.
 
-    The least squares of `l_i = l + d (kx h sin(phi_i) - ky h cos(phi_i))`, which three muscles meet exactly. It works on the
-    differences `l_i - l_1`, so that nothing is lost near straight, where they are all that matters.
+    Least-squares solution of `l_i = l + d (kx h sin(phi_i) - ky h cos(phi_i))`, exact for three muscles. It uses the
+    differences `l_i - l_1`, so that no digits are lost near the straight configuration.
 
     Args:
         lengths: Muscle lengths [m], positive, shape (..., N).
         distance: Distance `d` of the muscles from the backbone [m], positive, any shape that broadcasts with (...).
         azimuths: Azimuths of the muscles in the base frame of the segment [rad], shape (N,), N >= 3.
-        tolerance: Largest `muscle_residual` of more than three muscles [m]; three always describe an arc.
+        tolerance: Largest `muscle_residual` of more than three muscles [m]; three always determine an arc.
 
     Returns:
         `(kx h, ky h, 0, l)` as in `strains_from_arc`, shape (..., 4) [rad, rad, rad, m].
 
     Raises:
         ParameterError: If lengths or distance are not positive, azimuths are wrong as in `muscles_from_arc`, counts or shapes
-            differ, no arc explains the lengths within the tolerance, or its backbone length would not be positive.
+            differ, no arc fits the lengths within the tolerance, or its backbone length would not be positive.
     """
     lengths, distance, azimuths = _checked_muscles(lengths, distance, azimuths)
     tolerance = non_negative_number("tolerance", tolerance, "m")
@@ -90,18 +90,18 @@ def strains_from_muscles(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, 
 
 
 def arc_from_muscles(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, tolerance: float = 1e-6) -> Arc:
-    """Arc that the muscle lengths describe; with the default azimuths [PCC paper] (34), (39) and (41).
+    """Return the arc of the muscle lengths; with the default azimuths [PCC paper] (34), (39) and (41).
 
     For the paper's three muscles `l = (l1 + l2 + l3)/3`, `theta = hypot(l2 + l3 - 2 l1, sqrt(3) (l2 - l3)) / (3 d)` and
     `alpha = atan2(sqrt(3) (l2 - l3), l2 + l3 - 2 l1)`. The paper's (34) prints a plain arctangent, which loses the quadrant.
     Its (41) takes the root of `l1^2 + l2^2 + l3^2 - l1 l2 - l1 l3 - l2 l3`, the same number, but that sum of large terms
-    cancels near straight and leaves half the digits, or none; the differences above leave all.
+    cancels near the straight configuration and loses half the digits or all; the differences above lose none.
 
     Args:
         lengths: Muscle lengths [m], positive, shape (..., N).
         distance: Distance `d` of the muscles from the backbone [m], positive, any shape that broadcasts with (...).
         azimuths: Azimuths of the muscles in the base frame of the segment [rad], shape (N,), N >= 3.
-        tolerance: Largest `muscle_residual` of more than three muscles [m]; three always describe an arc.
+        tolerance: Largest `muscle_residual` of more than three muscles [m]; three always determine an arc.
 
     Returns:
         Arc of shape (...), azimuth in (-pi, pi], 0 when straight.
@@ -113,10 +113,10 @@ def arc_from_muscles(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, tole
 
 
 def muscle_residual(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS) -> FloatArray:
-    """Largest difference between the muscle lengths and those of the nearest arc (least squares).
+    """Return the largest difference between the muscle lengths and those of the least-squares arc.
 
-    It tells whether the lengths of more than three muscles are consistent; for three it is zero up to rounding. It does not
-    depend on the distance, which is checked all the same.
+    It measures the consistency of the lengths of more than three muscles; for three it is zero up to rounding. It does not
+    depend on the distance, which is only checked.
 
     Args:
         lengths: Muscle lengths [m], positive, shape (..., N).
@@ -136,7 +136,7 @@ def muscle_residual(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS) -> Fl
 
 
 def strains_per_muscle(distance: Any, azimuths: Any) -> FloatArray:
-    """Derivative of `strains_from_muscles` with respect to the lengths, which is a constant.
+    """Return the derivative of `strains_from_muscles` with respect to the lengths, which is constant.
 
     Args:
         distance: Distance of the muscles from the backbone [m], positive, shape (...).
@@ -158,7 +158,7 @@ def strains_per_muscle(distance: Any, azimuths: Any) -> FloatArray:
 
 
 def _checked_azimuths(azimuths: Any) -> FloatArray:
-    """Return the azimuths, shape (N,), if an arc follows from the muscles there."""
+    """Return the azimuths, shape (N,), if muscles there determine an arc."""
     checked = finite_array("azimuths", azimuths, (None,), "rad")
     if len(checked) < 3:
         raise ParameterError("azimuths", azimuths, "at least three")
@@ -173,7 +173,7 @@ def _checked_azimuths(azimuths: Any) -> FloatArray:
 
 
 def _checked_muscles(lengths: Any, distance: Any, azimuths: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return lengths (..., N), distance and azimuths (N,), if an arc follows from them and the shapes broadcast."""
+    """Return lengths (..., N), distance and azimuths (N,), if they determine an arc and the shapes broadcast."""
     azimuths = _checked_azimuths(azimuths)
     distance = positive_array("distance", distance, "m")
     checked = positive_array("lengths", lengths, "m")
@@ -197,9 +197,9 @@ def _weights(azimuths: FloatArray) -> FloatArray:
 
 
 def _fit(lengths: FloatArray, azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Differences to the first muscle, shape (..., N), and the `(d kx h, d ky h, l - l_1)` that fits them, shape (..., 3)."""
+    """Differences to the first muscle, shape (..., N), and their fit `(d kx h, d ky h, l - l_1)`, shape (..., 3)."""
     differences = lengths - lengths[..., :1]
-    # Products first, then the sum: a fused multiply-add would leave a trace of azimuth where two lengths are equal.
+    # Products first, then the sum: a fused multiply-add would give a small azimuth where two lengths are equal.
     return differences, np.sum(_weights(azimuths) * differences[..., None, :], axis=-1)
 
 

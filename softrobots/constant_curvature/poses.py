@@ -1,11 +1,11 @@
-"""Poses of arcs and of chains of arcs, exact and smooth through straight.
+"""Poses of arcs and of chains of arcs, exact and smooth at the straight configuration.
 
-Two frames stand at the tip of a segment, both with z along the backbone:
+There are two conventions for the frame at the tip of a segment, both with z along the backbone:
 
-- "torsion_free": `R = Rz(alpha) Ry(theta) Rz(-alpha)`, the rotation by `theta` about `(-sin alpha, cos alpha, 0)`. This is how
-  the material of a body without twist turns.
-- "bending_plane": `R = Rz(alpha) Ry(theta)`, [PCC paper] (13) and (14). Its x axis lies in the bending plane, so that it turns
-  about the backbone with the azimuth, even when straight; the next segment's azimuth is then counted from the bending plane.
+- "torsion_free": `R = Rz(alpha) Ry(theta) Rz(-alpha)`, the rotation by `theta` about `(-sin alpha, cos alpha, 0)`: that of the
+  material of a body without twist.
+- "bending_plane": `R = Rz(alpha) Ry(theta)`, [PCC paper] (13) and (14). Its x axis lies in the bending plane, so that it
+  rotates about the backbone with the azimuth, even when straight; the next segment's azimuth is measured from that plane.
 
 The tip of a chain of two segments differs by centimetres between them.
 """
@@ -27,11 +27,11 @@ OFFSET = np.pi / 3.0
 
 
 def transform(arc: Arc, frame: str = "torsion_free") -> FloatArray:
-    """Pose of the tip of an arc in its base, [PCC paper] (9), (13), (14).
+    """Return the pose of the tip of an arc in its base, [PCC paper] (9), (13), (14).
 
-    Position `r ((1 - cos theta) cos alpha, (1 - cos theta) sin alpha, sin theta)` with `r = l / theta`, taken without dividing
-    by `theta`. The paper's (8) prints `r sin alpha` for the height; its (9) and (14) have `r sin theta`, as here. The rotation
-    is that of the frame named, see the head of this module.
+    Position `r ((1 - cos theta) cos alpha, (1 - cos theta) sin alpha, sin theta)` with `r = l / theta`, computed without
+    division by `theta`. The paper's (8) prints `r sin alpha` for the height; its (9) and (14) have `r sin theta`, as here. The
+    rotation depends on the frame; see the module.
 
     Args:
         arc: Arc of shape (...).
@@ -63,7 +63,7 @@ def transform(arc: Arc, frame: str = "torsion_free") -> FloatArray:
 
 
 def backbone(arc: Arc, s: Any) -> FloatArray:
-    """Points on the backbone of an arc: [PCC paper] (9) for a part of the arc.
+    """Return points on the backbone of an arc: [PCC paper] (9) for a part of the arc.
 
     Args:
         arc: Arc of shape (...).
@@ -73,7 +73,7 @@ def backbone(arc: Arc, s: Any) -> FloatArray:
         Points in the base frame [m], shape (..., m, 3).
 
     Raises:
-        ParameterError: If `arc` is not an `Arc`, or `s` has another shape or leaves [0, 1].
+        ParameterError: If `arc` is not an `Arc`, or `s` has another shape or is not within [0, 1].
     """
     arc = checked_arc(arc)
     fractions = finite_array("s", s, (None,), "-")
@@ -83,15 +83,15 @@ def backbone(arc: Arc, s: Any) -> FloatArray:
 
 
 def chain_transforms(arcs: Arc | Sequence[Arc], offsets: Any = None, frame: str = "torsion_free") -> FloatArray:
-    """Poses of the ends of all segments of a chain: `T = prod_i Rz(offset_i) T_i` up to each segment.
+    """Return the poses of the ends of all segments of a chain: `T = prod_i Rz(offset_i) T_i` up to each segment.
 
     The product is the definition. The paper writes `T_2` with `alpha_2 + pi/3` instead, (16), which is the same in its
-    bending-plane frame only. Its (16) prints wrong translations, and its closed form of the tip, (17)-(19), is wrong with them:
-    (19) ends in `cos theta_1 cos theta_2` where it must be `cos theta_1 sin theta_2`. Take the product.
+    bending-plane frame only. Its (16) prints wrong translations, and so does its closed form of the tip, (17)-(19): (19) ends
+    in `cos theta_1 cos theta_2` instead of `cos theta_1 sin theta_2`. The product is correct.
 
     Args:
         arcs: One `Arc` a segment, base to tip, of shapes that broadcast to (...); or one `Arc` of shape (..., S). The azimuth
-            of each is counted in the base frame of its own segment, after the offset.
+            of each is measured in the base frame of its own segment, after the offset.
         offsets: Angle about z before each segment [rad], shape (S,). Default: the paper's, 0 and then 60 degrees each.
         frame: "torsion_free" or "bending_plane" (the paper's).
 
@@ -106,7 +106,7 @@ def chain_transforms(arcs: Arc | Sequence[Arc], offsets: Any = None, frame: str 
 
 
 def chain_transform(arcs: Arc | Sequence[Arc], offsets: Any = None, frame: str = "torsion_free") -> FloatArray:
-    """Pose of the tip of a chain: the last of `chain_transforms`, whose arguments it takes.
+    """Return the pose of the tip of a chain: the last of `chain_transforms`.
 
     Args:
         arcs: One `Arc` a segment, base to tip, or one `Arc` of shape (..., S).
@@ -123,7 +123,7 @@ def chain_transform(arcs: Arc | Sequence[Arc], offsets: Any = None, frame: str =
 
 
 def chain_frames(arcs: Arc | Sequence[Arc], offsets: Any, frame: str) -> tuple[FloatArray, FloatArray]:
-    """Poses of both ends of all segments: the starts after the offset, and the ends.
+    """Return the poses of both ends of all segments: the starts after the offset, and the ends.
 
     Args:
         arcs: As for `chain_transforms`.
@@ -154,7 +154,7 @@ def chain_frames(arcs: Arc | Sequence[Arc], offsets: Any, frame: str) -> tuple[F
 
 
 def cardinal_sine(angle: FloatArray) -> FloatArray:
-    """`sin(angle) / angle`, 1 at zero: one division without cancellation, exact to rounding everywhere."""
+    """Return `sin(angle) / angle`, 1 at zero, exact to rounding everywhere."""
     return np.divide(np.sin(angle), angle, out=np.ones_like(angle), where=angle != 0.0)
 
 

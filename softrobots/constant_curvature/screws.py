@@ -1,15 +1,15 @@
-r"""The screw motion along a section of constant strain, with first and second derivative.
+r"""Screw motion along a section of constant strain, with first and second derivatives.
 
 A section has the *section coordinates* `z = h (kx, ky, tau, stretch - 1)`: the rotation over its length about x, y (bending)
-and z (twist) [rad], and its elongation [m], at rest length `h`. Its end stands in the frame of its start at
+and z (twist) [rad], and its elongation [m], at rest length `h`. The pose of its end in the frame of its start is
 
 .. math:: \exp\left(\begin{bmatrix} [\omega] & \ell e_z \\ 0 & 0 \end{bmatrix}\right) = (R, p), \qquad
    \omega = z_{0..2}, \quad \ell = h + z_3
 
     R = 1 + c_1 [w] + c_2 [w]^2,    p = l d,    d = c_1 e_z + c_2 w x e_z + c_3 w_z w
 
-with the Stumpff functions `c_k` of `|w|^2`, for which `dc_k = d_k w . dw` and `d_k = k c_{k+2} - c_{k+1}`. Everything is smooth
-through straight. All is vectorised over leading axes; twists are linear part first.
+with the Stumpff functions `c_k` of `|w|^2`, for which `dc_k = d_k w . dw` and `d_k = k c_{k+2} - c_{k+1}`. All functions are
+smooth at the straight configuration and vectorised over leading axes; twists have the linear part first.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ _CROSS_AXIS = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # 
 
 
 def skew(vectors: FloatArray) -> FloatArray:
-    """Matrices `[v]` with `[v] u = v x u`, shape (..., 3, 3), of vectors of shape (..., 3)."""
-    made = np.zeros((*vectors.shape, 3))
-    made[..., 2, 1], made[..., 0, 2], made[..., 1, 0] = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    made[..., 1, 2], made[..., 2, 0], made[..., 0, 1] = -vectors[..., 0], -vectors[..., 1], -vectors[..., 2]
-    return made
+    """Return the cross-product matrices `[v]`, `[v] u = v x u`, shape (..., 3, 3), of vectors of shape (..., 3)."""
+    matrices = np.zeros((*vectors.shape, 3))
+    matrices[..., 2, 1], matrices[..., 0, 2], matrices[..., 1, 0] = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    matrices[..., 1, 2], matrices[..., 2, 0], matrices[..., 0, 1] = -vectors[..., 0], -vectors[..., 1], -vectors[..., 2]
+    return matrices
 
 
 class Screw:
-    """End of a section in the frame of its start, and how it moves with the section coordinates."""
+    """Pose of the end of a section in the frame of its start, with derivatives with respect to the section coordinates."""
 
     def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
         """Evaluate the motion.
@@ -48,14 +48,14 @@ class Screw:
         self._turn = turn = skew(omega)
         self._turn_twice = turn @ turn
         self.rotation: FloatArray = _UNITS + c[1, ..., None] * turn + c[2, ..., None] * self._turn_twice
-        """Axes of the end in those of the start, shape (..., 3, 3)."""
+        """Rotation of the end in the frame of the start, shape (..., 3, 3)."""
         self._across = omega @ _CROSS_AXIS.T  # w x e_z
         self._direction = c[1] * _AXIS + c[2] * self._across + c[3] * omega[..., 2:] * omega
         self.position: FloatArray = self._length * self._direction
         """Position of the end in the frame of the start, shape (..., 3) [m]."""
 
     def twists(self) -> FloatArray:
-        r"""Twist of the end per section coordinate, in the axes of the end, linear part first, shape (..., 6, 4).
+        r"""Return the twist of the end per section coordinate, in the axes of the end, linear part first, shape (..., 6, 4).
 
         The columns of :math:`h\,T(h\xi)B`: angular `1 - c_2 [w] + c_3 [w]^2`, linear `R^T dp/dz`.
         """
@@ -64,38 +64,36 @@ class Screw:
         along = d[1] * _AXIS + d[2] * self._across + d[3] * omega[..., 2:] * omega
         slope = along[..., :, None] * omega[..., None, :] + c[2, ..., None] * _CROSS_AXIS
         slope += c[3, ..., None] * (omega[..., :, None] * _AXIS + omega[..., 2, None, None] * _UNITS)
-        moved = np.concatenate(
-            [self._length[..., None] * slope, self._direction[..., None]], axis=-1
-        )  # dp/dz, axes of the start
-        made = np.zeros((*omega.shape[:-1], 6, 4))
-        made[..., :3, :] = np.swapaxes(self.rotation, -1, -2) @ moved
-        made[..., 3:, :3] = _UNITS - c[2, ..., None] * self._turn + c[3, ..., None] * self._turn_twice
-        return made
+        # dp/dz, in the axes of the start
+        position_slope = np.concatenate([self._length[..., None] * slope, self._direction[..., None]], axis=-1)
+        twists = np.zeros((*omega.shape[:-1], 6, 4))
+        twists[..., :3, :] = np.swapaxes(self.rotation, -1, -2) @ position_slope
+        twists[..., 3:, :3] = _UNITS - c[2, ..., None] * self._turn + c[3, ..., None] * self._turn_twice
+        return twists
 
     def curvature(self, twists: FloatArray, covector: FloatArray) -> FloatArray:
-        r"""Derivative of `covector . twists` with respect to the section coordinates at constant covector.
+        r"""Return the derivative of `covector . twists` with respect to the section coordinates at constant covector.
 
-        Element `[a, b]` is :math:`\lambda \cdot \partial S_a / \partial z_b`. (Contracting before differentiating leaves
-        matrices where the second derivative itself is a field of tensors; unit covectors give that.)
+        Element `[a, b]` is :math:`\lambda \cdot \partial S_a / \partial z_b`: the second derivative contracted with a covector.
 
         Args:
-            twists: What `twists` returned, shape (..., 6, 4).
+            twists: Result of `twists`, shape (..., 6, 4).
             covector: Wrench in the axes of the end, linear part first, shape (..., 6).
 
         Returns:
             Shape (..., 4, 4); not symmetric.
         """
         force, moment = covector[..., :3], covector[..., 3:]
-        made = np.zeros((*covector.shape[:-1], 4, 4))
-        # Linear part R^T p': the Hessian of g . p with g = R f held, and the turn of the axes.
+        result = np.zeros((*covector.shape[:-1], 4, 4))
+        # Linear part R^T p': the Hessian of g . p at constant g = R f, and the rotation of the axes
         hessian, slope = self._position_hessian((self.rotation @ force[..., None])[..., 0])
-        made[..., :3, :3] = hessian + self._angular_slope(moment)
-        made[..., 3, :3] = made[..., :3, 3] = slope
-        made[..., :3] -= np.swapaxes(twists[..., :3, :], -1, -2) @ (skew(force) @ twists[..., 3:, :3])
-        return made
+        result[..., :3, :3] = hessian + self._angular_slope(moment)
+        result[..., 3, :3] = result[..., :3, 3] = slope
+        result[..., :3] -= np.swapaxes(twists[..., :3, :], -1, -2) @ (skew(force) @ twists[..., 3:, :3])
+        return result
 
     def _position_hessian(self, pull: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Second derivative of `pull . p` with respect to `w`, and of `w` and the length, shapes (..., 3, 3) and (..., 3)."""
+        """Second derivatives of `pull . p` with respect to `w`, and to `w` and the length, shapes (..., 3, 3) and (..., 3)."""
         omega, c = self._omega, self._c
         d = _slopes(c, 5)
         e = [None, *(k * d[k + 2] - d[k + 1] for k in (1, 2, 3))]
@@ -116,10 +114,10 @@ class Screw:
         turned = (self._turn @ moment[..., None])[..., 0]
         turned_twice = (self._turn_twice @ moment[..., None])[..., 0]
         along = (omega * moment).sum(-1)[..., None, None]
-        made = (d[2] * turned + d[3] * turned_twice)[..., :, None] * omega[..., None, :] - c[2, ..., None] * skew(moment)
+        slope = (d[2] * turned + d[3] * turned_twice)[..., :, None] * omega[..., None, :] - c[2, ..., None] * skew(moment)
         outer = omega[..., :, None] * moment[..., None, :]
-        made += c[3, ..., None] * (along * _UNITS + outer - 2.0 * np.swapaxes(outer, -1, -2))
-        return np.asarray(made)
+        slope += c[3, ..., None] * (along * _UNITS + outer - 2.0 * np.swapaxes(outer, -1, -2))
+        return np.asarray(slope)
 
 
 def _slopes(c: FloatArray, highest: int) -> FloatArray:

@@ -1,18 +1,18 @@
-r"""A section of constant strain as a chain of rigid joints: universal, prismatic, spherical.
+r"""Section of constant strain as an equivalent chain of rigid joints: universal, prismatic, spherical.
 
-The chain `Rx(u1) Ry(u2) Tz(c) Rx(r1) Ry(r2) Rz(r3)` carries the end of a section (see `softrobots.constant_curvature.screws`)
-exactly, position and orientation, twisted or not, and smoothly through straight: the prismatic joint spans the chord. Its joint
-positions are a map `m(z)` of the four section coordinates `z = h (kx, ky, tau, stretch - 1)`. With `(R, p)` the end of the
-section
+The chain `Rx(u1) Ry(u2) Tz(c) Rx(r1) Ry(r2) Rz(r3)` reproduces the pose of the end of a section exactly (see
+`softrobots.constant_curvature.screws`), with or without twist, and smoothly at the straight configuration: the prismatic joint
+spans the chord. Its joint positions are a map `m(z)` of the four section coordinates `z = h (kx, ky, tau, stretch - 1)`. With
+the pose `(R, p)` of the end of the section
 
     c = |p|,  u1 = atan2(-p_y, p_z),  u2 = atan2(p_x, hypot(p_y, p_z)),  Q = (Rx(u1) Ry(u2))^T R,
     r1 = atan2(-Q_12, Q_22),  r2 = atan2(Q_02, hypot(Q_12, Q_22)),  r3 = atan2(-Q_01, Q_00)
 
 and with the body Jacobian `J_b` of the chain and the twists `S` of the section, `dm/dz = J_b^-1 S`.
 
-(Chains that turn into the bending plane first, `Rz(alpha) Ry(theta/2) Tz Ry(theta/2) Rz(-alpha)`, are exact too, but
-undetermined when straight.) `|det J_b| = c^2 |cos u2 cos r2|` vanishes only where the chord lies along x of its base;
-`in_range` keeps away.
+(Chains that rotate into the bending plane first, `Rz(alpha) Ry(theta/2) Tz Ry(theta/2) Rz(-alpha)`, are exact too, but
+undetermined when straight.) `|det J_b| = c^2 |cos u2 cos r2|` vanishes only where the chord lies along x of its base, which
+`in_range` excludes.
 """
 
 from __future__ import annotations
@@ -26,21 +26,20 @@ from softrobots.constant_curvature.screws import Screw, skew
 from softrobots.core.checks import FloatArray
 
 JOINTS = ("u1", "u2", "c", "r1", "r2", "r3")
-"""The joints of a section, base to tip: two of the universal joint, the chord, three of the spherical joint."""
+"""Joints of a section, base to tip: two of the universal joint, the chord, three of the spherical joint."""
 
 STRAINS = ("bend_x", "bend_y", "twist", "stretch")
-"""The section coordinates: rotation over the section about x, y and z [rad], elongation [m]."""
+"""Section coordinates: rotation over the section about x, y and z [rad], elongation [m]."""
 
 LARGEST_BENDING = np.deg2rad(170.0)
-"""Bending of one section that muscle lengths may ask for [rad]. The chain ends at 180 degrees; from 120 on, rather use more
-sections."""
+"""Largest bending of a section by muscle lengths [rad]. The chain is singular at 180 degrees; above 120 use more sections."""
 
-_LARGEST_TURN = 0.999 * 4.0 * np.pi**2  # of the squared rotation of a section: at a whole turn it has no chord
-_UPPER = np.triu(np.ones((6, 6)), 1)  # pairs of joints, the first nearer to the base
+_LARGEST_TURN = 0.999 * 4.0 * np.pi**2  # squared rotation of a section; at a whole turn it has no chord
+_UPPER = np.triu(np.ones((6, 6)), 1)  # pairs of joints, the first closer to the base
 
 
 class SectionChain:
-    """Sections at given coordinates as joint positions, with derivatives."""
+    """Joint positions of sections at given section coordinates, with derivatives."""
 
     def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
         """Evaluate the map.
@@ -53,15 +52,15 @@ class SectionChain:
         self.positions = _positions(self._screw.rotation, self._screw.position)
         """Joint positions `m`, shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad]."""
         self.valid = _in_range(z, np.asarray(rest_length), self._screw, self.positions)
-        """Whether the chain carries every section, see `in_range`; if not, the rest means nothing."""
+        """Whether all sections are in range, see `in_range`; otherwise the other attributes have no meaning."""
 
     @cached_property
     def first(self) -> FloatArray:
-        """First derivative `J_b^-1 S`, shape (..., 6, 4)."""
+        """First derivative of the joint positions, `J_b^-1 S`, shape (..., 6, 4)."""
         return np.asarray(self._inverse @ self._twists)
 
     def curvature(self, torque: FloatArray) -> FloatArray:
-        r"""Second derivative of the joint positions, summed with weights: `sum_j torque_j d^2 m_j`.
+        r"""Return the weighted sum of the second derivatives of the joint positions, `sum_j torque_j d^2 m_j`.
 
         With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise,
         so `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`; everything is contracted with `J_b^-T torque` first.
@@ -78,8 +77,8 @@ class SectionChain:
         brackets = np.swapaxes(half, -1, -2) - half
         brackets -= np.swapaxes(angular, -1, -2) @ (skew(covector[..., 3:]) @ angular)
         first = self.first
-        known = self._screw.curvature(self._twists, covector)
-        return np.asarray(known - np.swapaxes(first, -1, -2) @ ((brackets * _UPPER) @ first))
+        screw_part = self._screw.curvature(self._twists, covector)
+        return np.asarray(screw_part - np.swapaxes(first, -1, -2) @ ((brackets * _UPPER) @ first))
 
     @cached_property
     def _twists(self) -> FloatArray:
@@ -95,7 +94,7 @@ class SectionChain:
 
 
 class JointMap(NamedTuple):
-    """Joint positions of a section with their derivatives with respect to the section coordinates."""
+    """Joint positions of a section and their derivatives with respect to the section coordinates."""
 
     positions: FloatArray
     """Joint positions `m`, shape (..., 6) [rad, rad, m, rad, rad, rad]."""
@@ -106,7 +105,7 @@ class JointMap(NamedTuple):
 
 
 def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArray:
-    """Joint positions of sections.
+    """Return the joint positions of sections.
 
     Args:
         z: Section coordinates, shape (..., 4) [rad, rad, rad, m], in range (see `in_range`).
@@ -119,7 +118,7 @@ def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArra
 
 
 def joint_map(z: FloatArray, rest_length: FloatArray | float) -> JointMap:
-    """Joint positions of sections with first and second derivative.
+    """Return the joint positions of sections with first and second derivatives.
 
     Args:
         z: Section coordinates, shape (..., 4) [rad, rad, rad, m], in range (see `in_range`).
@@ -134,11 +133,11 @@ def joint_map(z: FloatArray, rest_length: FloatArray | float) -> JointMap:
 
 
 def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
-    """Whether the chain carries every section.
+    """Return whether the chain can represent all sections.
 
-    Required of each: a positive length; less than a turn of rotation in all; a chord that points forwards at both ends (without
-    twist: bending below 180 degrees); and less than half a turn about the axis of its end, in the strain and in the joint r3,
-    which turns a little further than the twist.
+    Required of each: positive length; total rotation below a whole turn; a chord that points forwards at both ends (without
+    twist: bending below 180 degrees); and less than half a turn about the axis of its end, in the twist and in the joint r3,
+    which rotates a little further than the twist.
 
     Args:
         z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
@@ -150,10 +149,10 @@ def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
 def _in_range(z: FloatArray, rest_length: FloatArray, end: Screw, positions: FloatArray) -> bool:
     turn, twist = (z[..., :3] * z[..., :3]).sum(axis=-1), np.abs(z[..., 2])
     if not (np.all(turn < _LARGEST_TURN) and np.all(twist < np.pi) and np.all(rest_length + z[..., 3] > 1e-3 * rest_length)):
-        return False  # also where a number is none
+        return False  # also for NaN
     if not np.all(np.abs(positions[..., 5] - z[..., 2]) < np.pi):  # r3 has gone past half a turn to the other side
         return False
-    # Strain is constant: the chord has the same angle to the axis of the end as to that of the start.
+    # As the strain is constant, the chord has the same angle to the axes of both ends.
     return bool(np.all(end.position[..., 2] > 1e-3 * np.sqrt((end.position * end.position).sum(axis=-1))))
 
 
@@ -174,11 +173,11 @@ def _positions(rotation: FloatArray, position: FloatArray) -> FloatArray:
 def _universal(about_x: FloatArray, about_y: FloatArray) -> FloatArray:
     """`Rx Ry`, shape (..., 3, 3)."""
     sx, cx, sy, cy = np.sin(about_x), np.cos(about_x), np.sin(about_y), np.cos(about_y)
-    made = np.zeros((*np.shape(about_x), 3, 3))
-    made[..., 0, 0], made[..., 0, 2] = cy, sy
-    made[..., 1, 0], made[..., 1, 1], made[..., 1, 2] = sx * sy, cx, -sx * cy
-    made[..., 2, 0], made[..., 2, 1], made[..., 2, 2] = -cx * sy, sx, cx * cy
-    return made
+    rotation = np.zeros((*np.shape(about_x), 3, 3))
+    rotation[..., 0, 0], rotation[..., 0, 2] = cy, sy
+    rotation[..., 1, 0], rotation[..., 1, 1], rotation[..., 1, 2] = sx * sy, cx, -sx * cy
+    rotation[..., 2, 0], rotation[..., 2, 1], rotation[..., 2, 2] = -cx * sy, sx, cx * cy
+    return rotation
 
 
 def _body_jacobian(joints: FloatArray) -> FloatArray:
@@ -189,16 +188,16 @@ def _body_jacobian(joints: FloatArray) -> FloatArray:
     about_z[..., 0, 0], about_z[..., 0, 1], about_z[..., 1, 0], about_z[..., 1, 1] = c3, -s3, s3, c3
     about_z[..., 2, 2] = 1.0
     spherical = _universal(r1, r2) @ about_z
-    made = np.zeros((*c.shape, 6, 6))
-    # Rows of `spherical` are the axes before the spherical joint, in the axes of the end.
+    jacobian = np.zeros((*c.shape, 6, 6))
+    # Rows of `spherical` are the axes before the spherical joint, in the axes of the end
     x, y, z = (spherical[..., axis, :] for axis in range(3))
     su, cu = np.sin(u2)[..., None], np.cos(u2)[..., None]
-    made[..., 3:, 0] = cu * x + su * z
-    made[..., :3, 0] = -c[..., None] * cu * y
-    made[..., 3:, 1] = y
-    made[..., :3, 1] = c[..., None] * x
-    made[..., :3, 2] = z
-    made[..., 3:, 3] = x
-    made[..., 3:, 4] = about_z[..., 1, :]
-    made[..., 5, 5] = 1.0
-    return made
+    jacobian[..., 3:, 0] = cu * x + su * z
+    jacobian[..., :3, 0] = -c[..., None] * cu * y
+    jacobian[..., 3:, 1] = y
+    jacobian[..., :3, 1] = c[..., None] * x
+    jacobian[..., :3, 2] = z
+    jacobian[..., 3:, 3] = x
+    jacobian[..., 3:, 4] = about_z[..., 1, :]
+    jacobian[..., 5, 5] = 1.0
+    return jacobian

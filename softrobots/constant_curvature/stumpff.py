@@ -1,10 +1,10 @@
-r"""Stumpff functions: sine and cosine divided by powers of their angle, smooth through zero.
+r"""Stumpff functions: sine and cosine divided by powers of their angle, smooth at zero.
 
 .. math:: c_k(x) = \sum_{j \ge 0} \frac{(-x)^j}{(2j + k)!}, \qquad x = \theta^2
 
 so that `c_0 = cos(theta)`, `c_1 = sin(theta)/theta`, `c_2 = (1 - cos(theta))/theta^2`, `c_3 = (theta - sin(theta))/theta^3`.
-Arcs and screws are sums of them, and so are all derivatives: `dc_k/dx = (k c_{k+2} - c_{k+1}) / 2`. Nothing is divided by an
-angle, so that straight is a point like any other.
+Arcs and screws are sums of them, and so are all derivatives: `dc_k/dx = (k c_{k+2} - c_{k+1}) / 2`. There is no division by an
+angle, so that the straight configuration is no special case.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 
-_SERIES_UP_TO = 40.0  # of x: there the terms of the series still fall from the first on
-_TERMS = ((1.0, 9), (_SERIES_UP_TO, 24))  # up to which x how many
+_SERIES_UP_TO = 40.0  # largest x for the series; its terms decrease from the first on
+_TERMS = ((1.0, 9), (_SERIES_UP_TO, 24))  # (largest x, number of terms)
 
 
 def stumpff(x: FloatArray, highest: int) -> FloatArray:
     """Evaluate `c_0` to `c_highest`.
 
-    Up to an angle of 2 pi the two highest functions come from their alternating series, the others from
-    `c_k = 1/k! - x c_{k+2}` downwards; beyond, all come from sine and cosine upwards. Both lose no more than rounding.
+    Up to an angle of 2 pi the two highest functions come from their alternating series, the others from the downward recursion
+    `c_k = 1/k! - x c_{k+2}`; beyond, all come from sine and cosine by upward recursion. Both are accurate to rounding.
 
     Args:
         x: Squares of the angle, any shape [rad^2], not negative.

@@ -1,4 +1,4 @@
-"""Bending of one inflated link: deflection, stiffness and modulus, wrinkling.
+"""Bending of one inflated link: deflection, stiffness, Young's modulus, wrinkling.
 
 Notation of [Troise 2021], section 2.1: a tube of length `L`, radius `r` and wall thickness `t` (thin wall), gauge
 pressure `p`; cap force `P = p pi r^2`, wall section `S = 2 pi r t`, second moment `I = pi r^3 t`, shear coefficient
@@ -24,7 +24,7 @@ SHEAR_COEFFICIENT = 0.5
 
 
 def wrinkling_moment(pressure: float, radius: float) -> float:
-    """Bending moment at which the first wrinkle appears: `M_w = (pi/4) pi p r^3`, [Troise 2021] (3).
+    """Return the bending moment at which the first wrinkle appears: `M_w = (pi/4) pi p r^3`, [Troise 2021] (3).
 
     Every linear model of this package is valid below it.
 
@@ -42,7 +42,7 @@ def wrinkling_moment(pressure: float, radius: float) -> float:
 
 
 def required_pressure(moment: float, radius: float) -> float:
-    """Smallest gauge pressure whose wrinkling moment is `moment`: the inverse of [Troise 2021] (3).
+    """Return the gauge pressure whose wrinkling moment is `moment`: the inverse of [Troise 2021] (3).
 
     Args:
         moment: Bending moment [N m], zero or positive.
@@ -96,7 +96,7 @@ def deflection(
     young_modulus: float,
     poisson_ratio: float = 0.3,
 ) -> FloatArray:
-    r"""Deflection of an inflated cantilever under a transverse tip force.
+    r"""Return the deflection of an inflated cantilever under a transverse tip force.
 
     .. math:: v(x) = F / ((E + P/S) I) (l x^2/2 - x^3/6) + F x / (P + j G S)
 
@@ -140,7 +140,7 @@ def stiffness_from_young_modulus(
     wall_thickness: float,
     poisson_ratio: float = 0.3,
 ) -> float:
-    """Stiffness `k` of the pseudo-rigid hinge that a modulus gives.
+    """Return the stiffness `k` of the pseudo-rigid hinge from Young's modulus.
 
     `k = tau / theta` with `tau = F L` and `theta = v(L) / L`, `v` from [Troise 2021] (1) with the tip at the full length
     (`l = x = L`). These assumptions reproduce the paper's 136-140 MPa; the paper does not state its own.
@@ -182,7 +182,7 @@ def young_modulus_from_stiffness(
     wall_thickness: float,
     poisson_ratio: float = 0.3,
 ) -> float:
-    r"""Modulus of the wall that a measured hinge stiffness implies; inverse of `stiffness_from_young_modulus`.
+    r"""Return Young's modulus of the wall from a hinge stiffness; inverse of `stiffness_from_young_modulus`.
 
     With :math:`a = k L / (3 I)`, :math:`b = k / (c L)`, :math:`s = P/S`, :math:`t = P/c` and :math:`c = j S/(2 (1 + nu))`
     that is :math:`a/(E + s) + b/(E + t) = 1`, or :math:`(E - a + s)(E - b + t) = a b`, which has one root where both
@@ -200,7 +200,7 @@ def young_modulus_from_stiffness(
         The modulus [Pa].
 
     Raises:
-        ParameterError: If an argument is out of range, or the stiffness is so small that pressure alone exceeds it.
+        ParameterError: If an argument is out of range, or the stiffness is not above that of the pressure alone.
     """
     stiffness = positive_number("stiffness", stiffness, "N m/rad")
     length = positive_number("length", length, "m")
@@ -209,12 +209,12 @@ def young_modulus_from_stiffness(
     bending, shear = stiffness * length / (3.0 * section.second_moment), stiffness / (c * length)
     stress, shear_stress = section.cap_force / section.wall_section, section.cap_force / c
     middle = 0.5 * ((bending - stress) + (shear - shear_stress))
-    apart = math.hypot(0.5 * ((bending - stress) - (shear - shear_stress)), math.sqrt(bending) * math.sqrt(shear))
+    half_difference = math.hypot(0.5 * ((bending - stress) - (shear - shear_stress)), math.sqrt(bending) * math.sqrt(shear))
     if middle >= 0.0:
-        modulus = middle + apart
-    else:  # the product of both roots, over the other root
-        modulus = (bending * shear_stress + shear * stress - stress * shear_stress) / (apart - middle)
+        modulus = middle + half_difference
+    else:  # product of both roots over the other root
+        modulus = (bending * shear_stress + shear * stress - stress * shear_stress) / (half_difference - middle)
     if modulus <= 0.0:
         floor = stiffness / (bending / stress + shear / shear_stress)
-        raise ParameterError("stiffness", stiffness, f"above {floor:.6g} N m/rad, what the pressure alone gives")
+        raise ParameterError("stiffness", stiffness, f"above {floor:.6g} N m/rad, the stiffness due to the pressure alone")
     return modulus

@@ -1,4 +1,4 @@
-"""The bending test of a clamped inflated link, [Troise 2021] section 3: from probe and load cell to hinge angle and moment."""
+"""Bending test of a clamped inflated link, [Troise 2021] section 3: from probe and load cell to hinge angle and moment."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from softrobots.core.errors import ParameterError
 class BendingTest:
     r"""Geometry of a probe that pushes a clamped link, orthogonally to its axis at rest.
 
-    The link is the pseudo-rigid body of [Troise 2021] Figure 2: rigid up to its hinge at `l1`, and beyond it. The probe moves
-    on the straight line at the distance `h` from the clamp and slides along the link without friction. With `a = h - l1`, the
-    distance `c` of the probe's centre from the axis of the link, and the hinge angle :math:`\theta`, the centre has moved by
+    The link is the pseudo-rigid body of [Troise 2021] Figure 2: rigid on both sides of its hinge at `l1`. The probe moves on a
+    straight line at the distance `h` from the clamp and slides along the link without friction. With `a = h - l1`, the distance
+    `c` of the probe's centre from the axis of the link, and the hinge angle :math:`\theta`, the centre has moved by
 
     .. math:: v = a \tan\theta - c \left( 1 / \cos\theta - 1 \right)
 
@@ -27,7 +27,7 @@ class BendingTest:
 
     The paper evaluates both for small angles, :math:`\theta = v / a` and :math:`\tau = F a`, see `small_angles`; for its
     prototype, pushed 1.6 times as far as the knee with `c` = 65 mm, that changes fitted stiffnesses by up to 0.8 % and
-    plateaus by up to 0.6 %. Evaluated as of a probe that holds to its point of the link, :math:`v = a \sin\theta` and
+    plateaus by up to 0.6 %. For a probe fixed to a point of the link, :math:`v = a \sin\theta` and
     :math:`\tau = F a \cos\theta`, they change by up to 0.5 % and 2.0 %.
 
     Raises:
@@ -58,7 +58,7 @@ class BendingTest:
         return self.probe_distance - self.hinge_offset
 
     def displacement(self, angle: Any) -> FloatArray:
-        """How far the probe has moved where the hinge is bent by an angle.
+        """Return the displacement of the probe at a hinge angle.
 
         Args:
             angle: Hinge angles [rad], any shape, within +-pi/2 (both excluded).
@@ -73,7 +73,7 @@ class BendingTest:
         return np.asarray(self.arm * np.tan(theta) - self.offset * (1.0 / np.cos(theta) - 1.0))
 
     def angle(self, displacement: Any) -> FloatArray:
-        """Hinge angle at which the probe is displaced so far: the inverse of `displacement`.
+        """Return the hinge angle at a displacement of the probe: the inverse of `displacement`.
 
         Args:
             displacement: Displacements [m], any shape.
@@ -88,7 +88,7 @@ class BendingTest:
         return np.asarray(np.arctan2(centre, self.arm) + np.arcsin(self.offset / np.hypot(self.arm, centre)))
 
     def contact(self, angle: Any) -> FloatArray:
-        """Where the probe touches the link, counted from the hinge along the bent axis: `a / cos(angle) - c tan(angle)`.
+        """Return the distance of the contact point from the hinge along the bent axis: `a / cos(angle) - c tan(angle)`.
 
         Args:
             angle: Hinge angles [rad], any shape, within +-pi/2 (both excluded).
@@ -103,7 +103,7 @@ class BendingTest:
         return np.asarray((self.arm - self.offset * np.sin(theta)) / np.cos(theta))
 
     def moment(self, displacement: Any, force: Any) -> FloatArray:
-        """Moment at the hinge from displacement and force.
+        """Return the moment at the hinge from displacement and force.
 
         Args:
             displacement: Displacements [m], any shape.
@@ -120,7 +120,7 @@ class BendingTest:
         return np.asarray(loads * (self.arm - self.offset * np.sin(theta)) / np.cos(theta) ** 2)
 
     def small_angles(self, displacement: Any, force: Any) -> tuple[FloatArray, FloatArray]:
-        """Hinge angle `v / a` and moment `F a`, the paper's evaluation.
+        """Return hinge angle `v / a` and moment `F a`, the paper's evaluation.
 
         Args:
             displacement: Displacements [m], any shape.

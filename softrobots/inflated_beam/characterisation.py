@@ -1,4 +1,4 @@
-"""Bending tests of an inflated link: the paper's table, the moment-angle law, and its fit to raw data."""
+"""Moment-angle law of an inflated link: the paper's measured table, and the fit to raw data of a bending test."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MEAN_STIFFNESS = 172.71
 
 
 def required_tabulated_pressure(moment: float, radius: float) -> float | None:
-    """Smallest pressure of [Troise 2021] Table 3 whose wrinkling moment is at least `moment`.
+    """Return the smallest pressure of [Troise 2021] Table 3 whose wrinkling moment is at least `moment`.
 
     Args:
         moment: Bending moment [N m], zero or positive.
@@ -58,7 +58,7 @@ def required_tabulated_pressure(moment: float, radius: float) -> float | None:
 
 
 def moment(angle: Any, *, stiffness: float, max_moment: float) -> FloatArray:
-    """Moment of a link bent by an angle: `tau = sign(theta) min(k |theta|, M_max)`, [Troise 2021] section 4.
+    """Return the moment of a link bent by an angle: `tau = sign(theta) min(k |theta|, M_max)`, [Troise 2021] section 4.
 
     Args:
         angle: Hinge angle [rad], any shape.
@@ -79,7 +79,7 @@ def moment(angle: Any, *, stiffness: float, max_moment: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Characterisation:
-    """What `fit_characterisation` finds in the raw data of a bending test."""
+    """Result of `fit_characterisation`."""
 
     stiffness: float
     """Slope of the points below wrinkling, through the origin [N m/rad]."""
@@ -88,24 +88,24 @@ class Characterisation:
     max_moment: float | None
     """Mean moment of the points past the knee `M_max / k` [N m]; None if fewer than three points are there."""
     mean_moment_above_wrinkling: float | None
-    """Mean moment of all points above the wrinkling moment, the paper's `M_max` read literally [N m]; it includes the
-    points still rising between `M_w` and `M_max`, so it lies below `max_moment`. None if no point is above."""
+    """Mean moment of all points above the wrinkling moment, the literal definition of the paper's `M_max` [N m]; it includes
+    the rising points between `M_w` and `M_max`, so it is below `max_moment`. None if no point is above."""
     wrinkling_moment: float
     """`M_w` of [Troise 2021] (3) [N m]."""
     n_linear: int
-    """How many points the slope was fitted on."""
+    """Number of points in the fit of the slope."""
     n_saturated: int
-    """How many points `max_moment` was averaged over."""
+    """Number of points in the mean `max_moment`."""
 
 
 def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: float) -> Characterisation:
     """Fit the moment-angle law to the raw data of a bending test, as [Troise 2021] section 4 did.
 
-    First the knee between slope and plateau is found: the split of the points, ordered by angle, into a line through the
-    origin and a constant that leaves the least squares. The stiffness is then the slope (law (2) has no offset) of the points
-    before the knee and below the theoretical wrinkling moment (3), told by the angle, `k |theta| < M_w`: told by the noisy
-    moment, points of the plateau would be taken for the slope. The saturation moment is the mean past the knee. Negative
-    angles count by their absolute value (the law is odd).
+    The knee between slope and plateau is the split of the points, ordered by angle, into a line through the origin and a
+    constant with the least sum of squares. The stiffness is the slope (law (2) has no offset) of the points before the knee and
+    below the theoretical wrinkling moment (3), selected by the angle, `k |theta| < M_w`: the noisy moment would select points
+    of the plateau too. The saturation moment is the mean past the knee. Negative angles count by their absolute value (the law
+    is odd).
 
     Args:
         angle: Hinge angles [rad], shape (n,).
@@ -114,7 +114,7 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
         radius: Tube radius [m], positive.
 
     Returns:
-        The fit and what it rests on.
+        The fit.
 
     Raises:
         ParameterError: If shapes differ, a number is not finite, pressure or radius is not positive, fewer than three points
@@ -125,14 +125,14 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
     limit = wrinkling_moment(positive_number("pressure", pressure, "Pa"), radius)
     tau = np.where(theta < 0.0, -tau, tau)
     theta = np.abs(theta)
-    order = np.lexsort((tau, theta))  # by angle; of one angle by moment, so that the order in which the points came is nothing
+    order = np.lexsort((tau, theta))  # by angle, then by moment: independent of the order of the input
     theta, tau = theta[order], tau[order]
     if np.count_nonzero(theta) < 3:
         raise ParameterError("angle", angle, "at least three angles different from zero")
     knee = _knee(theta, tau)
     plateau = float(tau[knee:].mean()) if knee < len(theta) else None
     linear = np.arange(len(theta)) < knee
-    while True:  # the slope decides which points are below wrinkling, and they decide the slope; what is left out stays out
+    while True:  # slope and set of points below wrinkling depend on each other; a point left out stays out
         stiffness = _slope(theta, tau, linear, moment, limit)
         below = linear & (stiffness * theta < limit)
         if np.array_equal(below, linear):
@@ -155,8 +155,8 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
 def _knee(theta: FloatArray, tau: FloatArray) -> int:
     """Number of points before the plateau, of points ordered by angle; all of them if there is no plateau.
 
-    A plateau has at least three points, rises by less than half the slope before it, and must lower the sum of squares by
-    more than chance does (F-test, ratio 12).
+    A plateau has at least three points, rises with less than half the slope before it, and reduces the sum of squares
+    significantly (F-test, ratio 12).
     """
     n = len(theta)
     split = np.arange(3, n + 1)  # candidates: this many points before the knee

@@ -1,4 +1,4 @@
-"""Gas that deploys an inflated link: its volume, and the tank that fills it."""
+"""Gas to deploy an inflated link: volume, and the tank that fills it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from softrobots.core.errors import ParameterError
 
 
 def volume(length: float, radius: float) -> float:
-    """Volume of an inflated tube, `pi r^2 L` [m^3].
+    """Return the volume of an inflated tube, `pi r^2 L` [m^3].
 
     Args:
         length: Tube length [m], positive.
@@ -22,14 +22,14 @@ def volume(length: float, radius: float) -> float:
 
 
 def tank_volume(inflated_volume: float, pressure: float, tank_pressure: float, *, ambient_pressure: float = 0.0) -> float:
-    """Volume of the tank that inflates a given volume once, isothermally (Boyle).
+    """Return the volume of a tank that inflates a given volume once, isothermally (Boyle).
 
-    The tank gives gas until both are at the same absolute pressure `p + p_a`:
-    `(p_tank + p_a) V_tank = (p + p_a)(V_tank + V)`, the tubes being empty before.
+    Gas flows until both are at the same absolute pressure `p + p_a`: `(p_tank + p_a) V_tank = (p + p_a)(V_tank + V)`, with
+    initially empty tubes.
 
     Args:
         inflated_volume: Volume to fill [m^3], positive.
-        pressure: Gauge pressure wanted in it [Pa], positive.
+        pressure: Required gauge pressure in it [Pa], positive.
         tank_pressure: Gauge pressure of the full tank [Pa], above `pressure`. The paper mentions 30 MPa.
         ambient_pressure: Absolute pressure outside [Pa]; 0 in space (the default), 101325 on the ground.
 
@@ -49,13 +49,13 @@ def tank_volume(inflated_volume: float, pressure: float, tank_pressure: float, *
 
 
 def tank_pressure(inflated_volume: float, pressure: float, tank_volume: float, *, ambient_pressure: float = 0.0) -> float:
-    """Gauge pressure to which a tank of given volume must be filled to inflate a given volume once, isothermally.
+    """Return the gauge pressure of a full tank of given volume that inflates a given volume once, isothermally.
 
     The inverse of `tank_volume`.
 
     Args:
         inflated_volume: Volume to fill [m^3], positive.
-        pressure: Gauge pressure wanted in it [Pa], positive.
+        pressure: Required gauge pressure in it [Pa], positive.
         tank_volume: Volume of the tank [m^3], positive.
         ambient_pressure: Absolute pressure outside [Pa]; 0 in space (the default).
 
