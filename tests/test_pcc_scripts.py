@@ -205,5 +205,3 @@ def test_the_second_robot_in_the_readme_runs() -> None:
     exec(compile(code, "README.md", "exec"), names)
     assert names["held"].stable
     assert np.allclose(names["held"].muscle_lengths, (0.50, 0.53, 0.55, 0.54, 0.51, 0.52), atol=1e-12)
-    assert names["ik"].error <= 1e-9
-    assert names["pulled"].muscle_input == "forces"
