@@ -374,8 +374,8 @@ def test_what_cannot_be_written_is_refused(write: Callable[..., str]) -> None:
             write(sr.load_model(robot))
     refused = {
         'muscles="forces"': sr.load_model(sr.PccArm(chain="lumped", hinges=1)),
-        "linear springs, not Saturating": sr.load_model(sr.InflatableArm(max_moment=20.0)),
-        "a robot with springs; every tool": sr.load_model(BRANCHED, springs={}, tip="finger"),
+        "linear springs, without max_moment": sr.load_model(sr.InflatableArm(max_moment=20.0)),
+        "a robot with springs; a rigid robot": sr.load_model(BRANCHED, springs={}, tip="finger"),
         "SoftModel": sr.InflatableArm(),
     }
     for told, model in refused.items():

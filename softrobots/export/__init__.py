@@ -1,4 +1,4 @@
-"""Robots written in the formats of other tools."""
+"""Exporters: a robot as a file for MuJoCo, Drake, Gazebo, PyBullet or plain Pinocchio, or as JSON."""
 
 from softrobots.export.formats import FORMATS, export_model
 from softrobots.export.mjcf import to_mjcf

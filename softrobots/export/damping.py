@@ -1,13 +1,13 @@
-r"""How strongly exported joints are damped: so that a simulation settles, by one stated rule.
+r"""Damping of exported joints: critical in the slowest mode, so that a simulation settles.
 
-A chain of springs without damping swings for ever. With the mass matrix `M` and the stiffness `K` of the elastic joints at
-rest, motors held, its modes have the frequencies `w` of `K v = w^2 M v`. Stiffness-proportional damping
+With the mass matrix `M` and the stiffness `K` of the elastic joints at
+rest, motors held, its modes have the frequencies `w` of `K v = w^2 M v`. The stiffness-proportional damping
 
 .. math:: D = \frac{2}{w_1} K
 
 with the lowest of them, `w_1`, keeps `D` diagonal and leaves the modes as they are. A mode of frequency `w` then follows
 `x'' + 2 (w^2 / w_1) x' + w^2 x = 0`, whose damping ratio is `w / w_1 >= 1`: the slowest mode is critically damped and decays
-like `e^{-w_1 t}`, no mode oscillates, and every one decays at `(w^2 - w \sqrt{w^2 - w_1^2}) / w_1 > w_1 / 2` or faster.
+like `e^{-w_1 t}`, no mode oscillates, and each decays at the rate `(w^2 - w \sqrt{w^2 - w_1^2}) / w_1 > w_1 / 2` or more.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from softrobots.description.urdf_tags import SpringTag
 from softrobots.model.soft_model import SoftModel
 
 DAMPING = ("critical", "file")
-"""Where the damping of the spring joints comes from: the rule of this module, or the description."""
+"""Sources of the damping of spring joints: the rule of this module, or the description."""
 
 
 def mass_matrix(model: SoftModel, q_motors: FloatArray) -> FloatArray:
-    """Mass matrix with the springs relaxed.
+    """Return the mass matrix with relaxed springs.
 
     Args:
         model: A robot without sections of constant strain.
-        q_motors: Motor joints, then muscles (of no effect), shape (n_motors,) [rad, m or N].
+        q_motors: Motor joints, then muscles (without effect), shape (n_motors,) [rad, m or N].
 
     Returns:
         Mass matrix in the order of Pinocchio's velocities, shape (nv, nv) [kg m^2, kg m, kg].
 
     Raises:
-        DescriptionError: If the robot has more joints than Pinocchio's workspace is made for.
+        DescriptionError: If the robot has more joints than Pinocchio supports.
     """
     structure = model.structure
     joints = np.zeros(model.pinocchio.nv)
@@ -47,12 +47,11 @@ def mass_matrix(model: SoftModel, q_motors: FloatArray) -> FloatArray:
     joints[structure.spring_indices] = structure.strain_springs.rest
     pinocchio_model, data = model.workspace(None)
     upper = np.triu(pin.crba(pinocchio_model, data, model.embed(joints)))
-    made: FloatArray = upper + np.triu(upper, 1).T
-    return made
+    return np.asarray(upper + np.triu(upper, 1).T)
 
 
 def lowest_frequency(model: SoftModel, mass: FloatArray) -> float:
-    """Lowest natural frequency of the spring joints, the motors held, without gravity.
+    """Return the lowest natural frequency of the spring joints, motors held, without gravity.
 
     Args:
         model: A robot with spring joints and without sections of constant strain.
@@ -66,16 +65,16 @@ def lowest_frequency(model: SoftModel, mass: FloatArray) -> float:
     """
     springs = model.structure.spring_indices
     root = 1.0 / np.sqrt(model.structure.strain_springs.stiffness)
-    slowest = np.linalg.eigvalsh(root[:, None] * mass[np.ix_(springs, springs)] * root)[-1]  # 1 / w^2, largest: most exact
+    slowest = np.linalg.eigvalsh(root[:, None] * mass[np.ix_(springs, springs)] * root)[-1]  # 1 / w^2
     if not slowest > 0.0:
         raise DescriptionError(
-            f"the springs of {model.pinocchio.name} move no mass, so that nothing swings; give its links mass"
+            f"the springs of {model.pinocchio.name} move no mass, so that no natural frequency exists; give its links mass"
         )
     return float(1.0 / np.sqrt(slowest))
 
 
-def rule_told(frequency: float) -> str:
-    """The rule in words, with the lowest frequency `w_1` [rad/s], for the head of a file."""
+def rule_text(frequency: float) -> str:
+    """Return the rule as text for the head of a file, with the lowest frequency `w_1` [rad/s]."""
     return (
         f"Damping of the springs is 2 k / w1, with the lowest frequency at rest w1 = {frequency!r} rad/s (motors held, "
         "weightless): the slowest mode is critically damped, no mode oscillates."
@@ -83,15 +82,12 @@ def rule_told(frequency: float) -> str:
 
 
 def damped(tree: RigidTree, springs: Mapping[str, SpringTag], frequency: float | None) -> RigidTree:
-    """Damp the spring joints with `2 k / w_1`.
+    """Return the robot with the damping `2 k / w_1` at its spring joints.
 
     Args:
         tree: The robot.
         springs: Spring by joint.
         frequency: Lowest frequency `w_1` [rad/s]; None leaves the damping as it is.
-
-    Returns:
-        The robot with that damping.
     """
     if frequency is None:
         return tree

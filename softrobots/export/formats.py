@@ -1,4 +1,4 @@
-"""Writing a robot into a file of another tool's format."""
+"""The formats by name, and the function that writes a robot into a file."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from softrobots.robots import XacroRobot
 
 
 class Format(NamedTuple):
-    """A format of files."""
+    """A file format."""
 
     suffix: str
-    """How its files end."""
+    """Suffix of its files."""
     write: Callable[..., str]
-    """Makes the text: takes the model, perhaps `q_motors`, and options."""
+    """Returns the text from the model, for some formats `q_motors`, and options."""
     meaning: str
-    """What it is for, in a few words."""
+    """Tools that read it."""
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Names of what `write` takes besides the model."""
+        """Names of the arguments of `write` besides the model."""
         return tuple(inspect.signature(self.write).parameters)[1:]
 
 
@@ -53,16 +53,16 @@ def export_model(
     Args:
         source: A model, or what `load_model` takes: a robot, a path, or text.
         path: The file.
-        format: Name of the format, one of `FORMATS`; guessed from the suffix of the file where only one format has it.
+        format: Name of the format, one of `FORMATS`; by default from the suffix of the file, if only one format has it.
         overwrite: Whether a file that exists may be replaced.
-        options: Passed on to the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `robot`; see `to_mjcf` ...
+        options: For the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `robot`; see `to_mjcf` ...
 
     Returns:
         The path.
 
     Raises:
-        ParameterError: If the format is unknown or cannot be guessed, it has no such option, or the exporter refuses an
-            argument or the robot.
+        ParameterError: If the format is unknown or not determined by the suffix, it has no such option, or the exporter
+            refuses an argument or the robot.
         DescriptionError: If the source cannot be loaded or the exporter refuses the robot.
         NameNotFound: As `load_model`.
         OutputExists: If the file exists and `overwrite` is false, or is a folder.
@@ -74,9 +74,9 @@ def export_model(
     chosen = FORMATS[name]
     for option, value in options.items():
         if option not in chosen.options:
-            having = ", ".join(other for other, row in FORMATS.items() if option in row.options)
-            raise ParameterError(option, value, f"left out for {name}; formats that have it: {having or 'none'}")
-    new_file(path, overwrite=overwrite)  # tells at once
+            available = ", ".join(other for other, row in FORMATS.items() if option in row.options)
+            raise ParameterError(option, value, f"left out for {name}; formats that have it: {available or 'none'}")
+    new_file(path, overwrite=overwrite)
     model = source if isinstance(source, SoftModel) else load_model(source)
     if "robot" in chosen.options and isinstance(source, XacroRobot):
         options = {"robot": source} | options
@@ -84,15 +84,15 @@ def export_model(
 
 
 def guess_format(path: str | os.PathLike[str]) -> str:
-    """Format of a file, from its suffix.
+    """Return the format that has the suffix of a file.
 
     Raises:
         ParameterError: If no format or several have it, or `path` is no path.
     """
     suffix = as_path("path", path).suffix.lower()
-    found = [name for name, row in FORMATS.items() if row.suffix == suffix]
-    if len(found) != 1:
-        told = ", ".join(found) or ", ".join(f"{name} ({row.suffix})" for name, row in FORMATS.items())
+    names = [name for name, row in FORMATS.items() if row.suffix == suffix]
+    if len(names) != 1:
+        candidates = ", ".join(names) or ", ".join(f"{name} ({row.suffix})" for name, row in FORMATS.items())
         given = f"(not given, for {path})"
-        raise ParameterError("format", given, f"said for such a file name, by --format or format=: {told}")
-    return found[0]
+        raise ParameterError("format", given, f"given for this file name, by --format or format=: {candidates}")
+    return names[0]

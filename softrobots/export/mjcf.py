@@ -1,4 +1,4 @@
-"""Robots as MJCF, the format of MuJoCo, with springs, damping, collision exclusions, actuators and a home position."""
+"""Export to MJCF, the format of MuJoCo, with springs, damping, collision exclusions, actuators and a home position."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def to_mjcf(
 ) -> str:
     """Write a robot as MJCF that MuJoCo 3 and 4 read.
 
-    Bodies and joints are called as in the URDF; fixed links stay bodies; a site stands at the tip; all numbers have all their
-    digits. Springs are `stiffness` and `springref`. Neighbours along the chain do not collide (`prepared.neighbours`). Meshes
-    in STL and OBJ are named by their whole path, others are left out.
+    Bodies and joints keep their names of the URDF; fixed links stay bodies; a site marks the tip; numbers have all digits.
+    Springs are `stiffness` and `springref`. Neighbours along the chain do not collide (`prepared.neighbours`). Meshes in STL
+    and OBJ are named by their whole path, others are left out.
 
     Driven motors are position actuators (`softrobots.export.servos`), whose joints have the damping at which the motor just
     reaches its largest speed under its largest torque, unless `damping` is "file". Muscles are fixed tendons, whose `length` is
@@ -56,9 +56,9 @@ def to_mjcf(
 
     Raises:
         ParameterError: If an argument does not fit, or the robot has sections of constant strain, springs that are not linear,
-            or muscles of given length that were to be welded.
-        DescriptionError: If the robot has moving links without mass or moments of inertia, a link with moments that no body
-            has, a link `world` that is not its root, or more joints than Pinocchio's workspace is made for.
+            or muscles of given length with "welded".
+        DescriptionError: If the robot has moving links without mass or moments of inertia, a link with impossible
+            moments, a link `world` that is not its root, or more joints than Pinocchio supports.
     """
     field = checked_gravity(gravity)
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
@@ -68,7 +68,7 @@ def to_mjcf(
     ElementTree.SubElement(root, "compiler", compiler)
     option = ElementTree.SubElement(root, "option", {"gravity": number_text(field)})
     if robot.motors or robot.muscles:
-        option.set("integrator", "implicitfast")  # takes the damping of actuators implicitly, too
+        option.set("integrator", "implicitfast")  # which treats the damping of actuators implicitly, too
     assets = ElementTree.SubElement(root, "asset")
     bodies = _Bodies(robot, limits, damping == "critical", assets)
     bodies.write(ElementTree.SubElement(root, "worldbody"))
@@ -91,7 +91,7 @@ def to_mjcf(
 
 
 class _Bodies:
-    """Writes bodies into each other, and remembers the order of the joints and what became of meshes."""
+    """Writes the nested bodies; records the order of the joints and the meshes left out."""
 
     def __init__(self, robot: PreparedRobot, limits: bool, limit_speed: bool, assets: ElementTree.Element) -> None:
         self._robot, self._limits, self._assets = robot, limits, assets
@@ -101,7 +101,7 @@ class _Bodies:
         self.meshes = MeshFiles()
 
     def write(self, world: ElementTree.Element) -> None:
-        """Write the whole tree; a root that is called world is MuJoCo's world."""
+        """Write the whole tree; a root named world is MuJoCo's world."""
         tree = self._robot.tree
         if tree.root == "world":
             self._inside(world, tree.body("world"))
@@ -119,10 +119,10 @@ class _Bodies:
 
     def _inside(self, element: ElementTree.Element, body: Body) -> None:
         drawn = self.meshes.split(body.visuals, mujoco_reads)
-        felt = self.meshes.split(body.collisions, mujoco_reads)
+        touching = self.meshes.split(body.collisions, mujoco_reads)
         for shape, file in drawn:
             self._geom(element, shape, file, {"group": _DRAWN, "contype": "0", "conaffinity": "0"})
-        for shape, file in felt:  # drawn, too, in place of meshes that cannot be
+        for shape, file in touching:  # visible if no visual could be written
             self._geom(element, shape, file, {"group": _HIDDEN if drawn or not body.visuals else _DRAWN})
         if body.name == self._robot.tip:
             ElementTree.SubElement(element, "site", {"name": body.name})
@@ -131,47 +131,51 @@ class _Bodies:
 
     def _joint(self, element: ElementTree.Element, joint: Joint) -> None:
         self.order.append(joint.name)
-        made = {"name": joint.name, "type": "slide" if joint.kind == "prismatic" else "hinge", "axis": number_text(joint.axis)}
+        attributes = {
+            "name": joint.name,
+            "type": "slide" if joint.kind == "prismatic" else "hinge",
+            "axis": number_text(joint.axis),
+        }
         spring = self._robot.tree.springs.get(joint.name)
         if np.all(np.isfinite(joint.limits)) and (self._limits or spring is None):
-            made["range"] = number_text(joint.limits)
+            attributes["range"] = number_text(joint.limits)
         if spring is not None:
-            made |= {"stiffness": repr(spring.stiffness), "springref": repr(spring.rest)}
+            attributes |= {"stiffness": repr(spring.stiffness), "springref": repr(spring.rest)}
         damping = self._damping.get(joint.name, joint.damping)
         if damping > 0.0:
-            made["damping"] = repr(damping)
-        ElementTree.SubElement(element, "joint", made)
+            attributes["damping"] = repr(damping)
+        ElementTree.SubElement(element, "joint", attributes)
 
     def _geom(self, element: ElementTree.Element, shape: Shape, file: Path | None, options: dict[str, str]) -> None:
-        made = {"type": shape.kind}
+        attributes = {"type": shape.kind}
         if file is not None:
-            made["mesh"] = self._mesh(file, shape.size)
+            attributes["mesh"] = self._mesh(file, shape.size)
         else:
-            halves = (0.5, 0.5, 0.5) if shape.kind == "box" else (1.0, 0.5)  # MuJoCo counts from the centre
-            made["size"] = number_text(half * size for half, size in zip(halves, shape.size, strict=False))
+            halves = (0.5, 0.5, 0.5) if shape.kind == "box" else (1.0, 0.5)  # MuJoCo takes half lengths
+            attributes["size"] = number_text(half * size for half, size in zip(halves, shape.size, strict=False))
         rgba = shape.rgba or _GREY
-        ElementTree.SubElement(element, "geom", {**made, **_where(shape.placement), "rgba": number_text(rgba), **options})
+        ElementTree.SubElement(element, "geom", {**attributes, **_where(shape.placement), "rgba": number_text(rgba), **options})
 
     def _mesh(self, file: Path, scale: tuple[float, ...]) -> str:
         key = (file, scale)
         if key not in self._mesh_names:
             self._mesh_names[key] = f"{file.stem}_{len(self._mesh_names) + 1}"
-            made = {"name": self._mesh_names[key], "file": str(file), "scale": number_text(scale)}
-            ElementTree.SubElement(self._assets, "mesh", made)
+            attributes = {"name": self._mesh_names[key], "file": str(file), "scale": number_text(scale)}
+            ElementTree.SubElement(self._assets, "mesh", attributes)
         return self._mesh_names[key]
 
 
 def _refuse(tree: RigidTree) -> None:
-    """Refuse what MuJoCo refuses: a second world, inertia of no body, and moving bodies without any."""
+    """Refuse what MuJoCo refuses: a link world above the root, impossible inertia, and moving bodies without inertia."""
     if any(body.name == "world" for body in tree.bodies[1:]):
-        raise DescriptionError(f"{tree.name} has a link world that is not its root; MuJoCo has that name for the root alone")
+        raise DescriptionError(f"{tree.name} has a link world that is not its root; MuJoCo reserves that name for the root")
     group, turning = weld_groups(tree), set()
     for body in (body for body in tree.bodies if body.mass > 0.0):
         low, middle, high = np.linalg.eigvalsh(body.inertia_in_body).tolist()
         if low < -_ROUNDING * high or low + middle < high * (1.0 - _ROUNDING):
             raise DescriptionError(
                 f"link {body.name} of {tree.name} has the principal moments of inertia {low:g}, {middle:g}, {high:g} kg m^2, "
-                "which no body has and MuJoCo refuses; none below 0, and none above the sum of the others, is required"
+                "which MuJoCo refuses; each must be at least 0 and at most the sum of the others"
             )
         if low >= _SMALLEST:
             turning.add(group[body.name])
@@ -184,7 +188,7 @@ def _refuse(tree: RigidTree) -> None:
 
 
 def _inertia(body: Body) -> dict[str, str]:
-    """Inertia of a body; by principal moments where rounding alone may break the rules of MuJoCo (plates, rods, points)."""
+    """Return the inertia; as principal moments where rounding could violate MuJoCo's conditions (plates, rods, points)."""
     moments = body.inertia_in_body
     (low, middle, high), axes = np.linalg.eigh(moments)
     if low > _ROUNDING * high and low + middle > high * (1.0 + _ROUNDING):
@@ -197,10 +201,10 @@ def _inertia(body: Body) -> dict[str, str]:
 
 
 def _where(placement: Placement) -> dict[str, str]:
-    made = {"pos": number_text(placement.position)} if np.any(placement.position) else {}
+    attributes = {"pos": number_text(placement.position)} if np.any(placement.position) else {}
     if np.any(placement.rotation != np.eye(3)):
-        made["quat"] = number_text(placement.quaternion)
-    return made
+        attributes["quat"] = number_text(placement.quaternion)
+    return attributes
 
 
 def _write_tendons(tendons: ElementTree.Element, muscles: Sequence[Muscle]) -> None:
@@ -212,22 +216,22 @@ def _write_tendons(tendons: ElementTree.Element, muscles: Sequence[Muscle]) -> N
 
 def _write_actuators(element: ElementTree.Element, robot: PreparedRobot) -> None:
     for motor in robot.motors:
-        made = {"name": motor.joint.name, "joint": motor.joint.name, **_servo(motor.servo)}
-        ElementTree.SubElement(element, "position", made | _range_of(motor))
+        attributes = {"name": motor.joint.name, "joint": motor.joint.name, **_servo(motor.servo)}
+        ElementTree.SubElement(element, "position", attributes | _range_of(motor))
     for muscle in robot.muscles:
         tag = muscle.tag
-        made = {"name": tag.name, "tendon": tag.name}
-        if muscle.servo is None:  # a positive force of MuJoCo lengthens the tendon, a tension shortens it
-            made |= {"gear": "-1.0", "ctrlrange": number_text((-tag.strongest, tag.strongest))}
-            ElementTree.SubElement(element, "motor", made)
+        attributes = {"name": tag.name, "tendon": tag.name}
+        if muscle.servo is None:  # a positive force in MuJoCo lengthens the tendon, a tension shortens it
+            attributes |= {"gear": "-1.0", "ctrlrange": number_text((-tag.strongest, tag.strongest))}
+            ElementTree.SubElement(element, "motor", attributes)
         else:
             reach = number_text((tag.shortest - tag.rest_length, tag.longest - tag.rest_length))
-            ElementTree.SubElement(element, "position", made | _servo(muscle.servo) | {"ctrlrange": reach})
+            ElementTree.SubElement(element, "position", attributes | _servo(muscle.servo) | {"ctrlrange": reach})
 
 
 def _servo(servo: Servo) -> dict[str, str]:
-    made = {"kp": repr(servo.gain), "kv": repr(servo.damping)}
-    return made | ({"forcerange": number_text((-servo.force, servo.force))} if np.isfinite(servo.force) else {})
+    gains = {"kp": repr(servo.gain), "kv": repr(servo.damping)}
+    return gains | ({"forcerange": number_text((-servo.force, servo.force))} if np.isfinite(servo.force) else {})
 
 
 def _range_of(motor: Motor) -> dict[str, str]:

@@ -1,7 +1,7 @@
-"""A robot made ready for a simulator: what is held becomes fixed, and every number that a file needs is chosen.
+"""A robot prepared for a simulator: fixed and driven joints, springs, damping and servos.
 
-Statics holds motors exactly. A simulator either gets a motor joint with an actuator ("driven"), or no joint at all ("welded"):
-the body stands at the given coordinate, and tensions of muscles stand in the springs (`softrobots.export.held`).
+Statics holds motors exactly. In a simulator a motor is a joint with an actuator ("driven"), or a fixed joint at the given
+coordinate ("welded"); then muscle tensions are part of the spring references (`softrobots.export.held`).
 """
 
 from __future__ import annotations
@@ -15,36 +15,36 @@ from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import SpringTag
-from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix, rule_told
+from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix, rule_text
 from softrobots.export.held import ACTUATORS, check_linear, hold, locked_joints, weld
 from softrobots.export.servos import Motor, Muscle, motors_of, muscles_of
 from softrobots.model.soft_model import SoftModel
 
-_LIGHTEST = 1e-15  # [kg]; MuJoCo refuses moving bodies below
+_LIGHTEST = 1e-15  # [kg]; MuJoCo refuses lighter moving bodies
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedRobot:
-    """Bodies, joints and springs as an exporter writes them."""
+    """Bodies, joints and springs to be exported."""
 
     tree: RigidTree
-    """Every body and joint; what is held is a fixed joint; damping and springs are those to be written."""
+    """Every body and joint, with the exported damping and springs; welded and locked joints are fixed."""
     tip: str
     """Body at the tip."""
     motors: tuple[Motor, ...]
-    """Motors whose joints still move, base to tip; none if welded."""
+    """Driven motors, base to tip; none if welded."""
     muscles: tuple[Muscle, ...]
-    """Muscles that still pull; none if welded."""
+    """Driven muscles; none if welded."""
     home: Mapping[str, float]
     """Position of every movable joint with the springs relaxed [rad or m]."""
     frequency: float | None
-    """Lowest frequency at rest that set the damping [rad/s]; None if the description set it."""
+    """Lowest frequency at rest [rad/s], which sets the damping; None if the damping is that of the description."""
     remarks: tuple[str, ...]
-    """What was done, a sentence or two each, for the head of the file."""
+    """Remarks on motors, muscles and damping for the head of the file."""
 
 
 def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damping: str = "critical") -> PreparedRobot:
-    """Hold what is held, shift springs, choose damping and servos.
+    """Fix or drive the actuators, shift spring references, choose damping and servos.
 
     Args:
         model: The robot.
@@ -52,14 +52,11 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
         actuators: "driven" or "welded".
         damping: "critical" or "file", see `softrobots.export.damping`.
 
-    Returns:
-        The robot to write.
-
     Raises:
-        ParameterError: If the model is none, has sections of constant strain or springs that are not linear; a choice is
-            unknown; `q_motors` does not fit the robot or, driven, is beyond the limits of the actuators; or muscles that are
-            given as lengths were to be welded.
-        DescriptionError: If the robot has moving bodies without mass, or more joints than Pinocchio's workspace is made for.
+        ParameterError: If `check_linear` refuses the model; a choice is unknown; `q_motors` does not fit the robot or, driven,
+        is
+            beyond the limits of the actuators; or muscles of given length are to be welded.
+        DescriptionError: If the robot has moving bodies without mass, or more joints than Pinocchio supports.
     """
     checked = check_linear(model)
     choice("actuators", actuators, ACTUATORS)
@@ -90,7 +87,7 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
 
 
 def checked_gravity(gravity: Any) -> tuple[float, ...]:
-    """Gravity, shape (3,) [m/s^2]; zeros for None.
+    """Return gravity, shape (3,) [m/s^2]; zeros for None.
 
     Raises:
         ParameterError: If the shape differs or a number is not finite.
@@ -99,7 +96,7 @@ def checked_gravity(gravity: Any) -> tuple[float, ...]:
 
 
 def weld_groups(tree: RigidTree) -> dict[str, str]:
-    """The lowest body (towards the root) that each body is fixed to, by body name; itself if a movable joint carries it."""
+    """Return by body name the body nearest to the root that it is fixed to; itself if its joint is movable."""
     group = {tree.root: tree.root}
     for joint in tree.joints:
         group[joint.child] = joint.child if joint.movable else group[joint.parent]
@@ -107,17 +104,17 @@ def weld_groups(tree: RigidTree) -> dict[str, str]:
 
 
 def neighbours(tree: RigidTree) -> tuple[tuple[str, str], ...]:
-    """Pairs of bodies that are not to collide, because they are neighbours along the chain.
+    """Return the pairs of neighbours along the chain, which must not collide.
 
-    Simulators let the two bodies of a joint overlap. Our chains have tiny bodies without shapes between those that can collide.
-    So the rule is: each body with a collision shape, and the nearest one below it (towards the root) that has one; bodies that
-    are fixed to each other count as one.
+    Simulators allow the two bodies of a joint to overlap, but these chains have small bodies without shapes between those with
+    shapes. A pair is therefore a body with a collision shape and the nearest one towards the root that has one; bodies fixed
+    to each other count as one.
 
     Args:
         tree: The robot.
 
     Returns:
-        Pairs of body names, the lower body first.
+        Pairs of body names, the one nearer to the root first.
     """
     group = weld_groups(tree)
     shaped: dict[str, list[str]] = {}
@@ -149,34 +146,36 @@ def _refuse_massless(tree: RigidTree) -> None:
     light = [joint.child for joint in tree.joints if joint.movable and not mass[joint.child] > _LIGHTEST]
     if light:
         raise DescriptionError(
-            f"{tree.name} has moving links without mass ({', '.join(light)}), which no simulator can move; give them <inertial>"
+            f"{tree.name} has moving links without mass ({', '.join(light)}), which no simulator can move; add <inertial>"
         )
 
 
 def _tip(tree: RigidTree, name: str) -> str:
-    """The body at a frame, which is a link or the joint that carries it."""
+    """Return the body at a frame, which is named by a link or by the joint of that link."""
     links = (body.name for body in tree.bodies if body.name == name)
     return next(links, next((joint.child for joint in tree.joints if joint.name == name), name))
 
 
 def _home(model: SoftModel, tree: RigidTree, motors: FloatArray) -> dict[str, float]:
     joints = model.coordinates.at(motors, model.rest).joints.tolist()
-    of = model.pinocchio
-    return {joint.name: joints[of.joints[of.getJointId(joint.name)].idx_v] for joint in tree.joints if joint.movable}
+    chain = model.pinocchio
+    return {joint.name: joints[chain.joints[chain.getJointId(joint.name)].idx_v] for joint in tree.joints if joint.movable}
 
 
 def _remarks(model: SoftModel, motors: FloatArray, welded: bool, frequency: float | None) -> tuple[str, ...]:
-    made = []
+    remarks = []
     if model.structure.motor_joints:
-        made.append("Motors are welded: their joints are fixed." if welded else "Motors are driven: their joints move.")
+        remarks.append("Motors are welded: their joints are fixed." if welded else "Motors are driven: their joints move.")
     if model.muscles and welded:
-        made.append("Muscles are welded: their tensions are in the references of the springs, r - A^T t / k, which is exact.")
+        remarks.append(
+            "Muscles are welded: their tensions are in the references of the springs, r - A^T t / k, which is exact."
+        )
     elif model.muscles:
-        made.append(f"Muscles are driven; given are their {'tensions' if model.muscle_input == 'forces' else 'lengths'}.")
+        remarks.append(f"Muscles are driven; given are their {'tensions' if model.muscle_input == 'forces' else 'lengths'}.")
     if model.n_motors:
         at = ", ".join(f"{name} {value!r}" for name, value in zip(model.motor_joints, motors.tolist(), strict=True))
-        made.append(f"{'Held' if welded else 'Home'} at [rad, m or N]: {at}.")
-    made.append("Damping of the joints is that of the description." if frequency is None else rule_told(frequency))
+        remarks.append(f"{'Held' if welded else 'Home'} at [rad, m or N]: {at}.")
+    remarks.append("Damping of the joints is that of the description." if frequency is None else rule_text(frequency))
     if model.spring_groups:
-        made.append("Inflated links wrinkle beyond a moment; the springs here do not.")
-    return tuple(made)
+        remarks.append("Inflated links wrinkle beyond a moment; the springs here do not.")
+    return tuple(remarks)

@@ -1,4 +1,4 @@
-"""Python files as text: literals, tables and templates."""
+"""Text of generated Python files: literals, tables and templates."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WIDTH = 88
 
 
 def literal(value: Any) -> str:
-    """A value as Python source in ASCII: text in double quotes, numbers with all their digits."""
+    """Return a value as Python source in ASCII: text in double quotes, numbers with all digits."""
     if isinstance(value, str):
         quoted = ascii(value)
         return quoted if '"' in quoted else f'"{quoted[1:-1]}"'
@@ -25,33 +25,30 @@ def literal(value: Any) -> str:
 
 
 def assignment(name: str, value: Any, comment: str = "") -> str:
-    """A line that assigns a value."""
+    """Return a line that assigns a value."""
     return f"{name} = {literal(value)}" + (f"  # {comment}" if comment else "")
 
 
 def table(name: str, rows: Mapping[str, Any], comment: str) -> str:
-    """A dictionary under a comment, one entry a line, also those of dictionaries inside."""
+    """Return an assignment of a nested dictionary, with a comment above and one entry per line."""
     if not rows:
         return assignment(name, {}, comment)
     return "\n".join([f"# {comment}", f"{name} = {{", *_entries(rows, "    "), "}"])
 
 
 def block(lines: Iterable[str]) -> str:
-    """Lines that a formatter leaves alone: names can be long."""
+    """Return lines that formatters leave unchanged, as names can be long."""
     return "\n".join(["# fmt: off", *lines, "# fmt: on"])
 
 
 def filled(template: str, *, name: str, description: Iterable[str], **fields: str) -> str:
-    """A template of this folder, filled.
+    """Return a template of this folder with its fields substituted.
 
     Args:
         template: Name of the file.
         name: Name of the robot, for the docstring.
         description: Paragraphs, for the docstring.
-        fields: Text of the other fields, as it is.
-
-    Returns:
-        Text of the file.
+        fields: Text of the other fields, inserted unchanged.
     """
     text = Template(Path(__file__).with_name(template).read_text(encoding="utf-8"))
     paragraphs = "\n\n".join(textwrap.fill(part, _WIDTH, break_long_words=False) for part in description)
@@ -69,5 +66,5 @@ def _entries(rows: Mapping[str, Any], indent: str) -> list[str]:
 
 
 def _in_docstring(text: str) -> str:
-    """Text without what would end a docstring or mean something in it."""
+    """Return text that is safe inside a docstring: ASCII, without quotes and backslashes."""
     return ascii(text)[1:-1].replace("\\n", "\n").replace("\\", "/").replace('"', "'")

@@ -1,4 +1,4 @@
-"""Robots as SDF 1.9, the format of Gazebo, which Drake reads too, with the springs and damping of joints."""
+"""Export to SDF 1.9, the format of Gazebo and Drake, with the springs and damping of joints."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ DRAKE = "http://drake.mit.edu"
 """XML namespace of Drake's tags."""
 
 _WORLD = "world"
-_WORLD_SHAPES = "world_shapes"  # the world of SDF has none of its own
-_STAND_IN = (1e-3, 1e-6)  # [kg], [kg m^2] of a body without mass that is fixed to the world, where it has no effect
+_WORLD_SHAPES = "world_shapes"  # the world of SDF cannot have shapes
+_STAND_IN = (1e-3, 1e-6)  # [kg], [kg m^2], without effect: for massless bodies fixed to the world
 
 
 def to_sdf(
@@ -36,22 +36,22 @@ def to_sdf(
 ) -> str:
     """Write a robot as a model of SDF 1.9.
 
-    Links and joints are called as in the URDF, fixed joints stay fixed joints, the base is fixed to the world; rotations are
-    quaternions, numbers have all their digits. Springs are `spring_stiffness` and `spring_reference`. A moving link without
-    mass becomes a frame, for SDF has no such links; its shapes go to a link that it is fixed to. Meshes are named by their
-    whole path; those to collide are left out unless Drake reads them.
+    Links and joints keep their names of the URDF, fixed joints stay, the base is fixed to the world; rotations are
+    quaternions, numbers have all digits. Springs are `spring_stiffness` and `spring_reference`. A moving link without
+    mass becomes a frame, because SDF has no such links; its shapes are moved to a link that it is fixed to. Meshes are given by
+    absolute path; collision meshes are left out unless Drake reads them.
 
-    Driven motor joints are free joints with their limits of torque: SDF has no actuators, a controller is the user's; Drake
-    makes an actuator of each. Springs have the effort 0, so that Drake makes none of them. SDF has no muscles: with muscles,
-    weld.
+    Driven motor joints are free joints with their torque limits: SDF has no actuators, the user adds a controller, and Drake
+    creates an actuator for each. Spring joints have effort 0, so that Drake creates none for them. SDF has no muscles: use
+    actuators="welded".
 
-    Drake is told not to collide neighbours along the chain (`prepared.neighbours`). Gazebo cannot be told pairs, but collides
-    no two links of a model unless `self_collide` is set. Gravity is the world's in SDF, not the model's.
+    Collisions of neighbours along the chain (`prepared.neighbours`) are excluded for Drake. Gazebo has no such exclusions, but
+    ignores collisions within a model unless `self_collide` is set. In SDF, gravity belongs to the world, not to the model.
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Of driven motors,
-            only the frequency that sets the damping depends on them.
+        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. For driven
+            motors, they only affect the frequency that sets the damping.
         actuators: "driven", or "welded": motor joints become fixed, tensions become shifts of the springs' references.
         damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
@@ -60,25 +60,23 @@ def to_sdf(
         SDF text.
 
     Raises:
-        ParameterError: If an argument does not fit, muscles were to be driven, or the robot has sections of constant strain,
+        ParameterError: If an argument does not fit, muscles are to be driven, or the robot has sections of constant strain,
             springs that are not linear, or muscles of given length.
-        DescriptionError: If the robot has moving links without mass, a link and a joint of one name or one that SDF has for
-            itself, or more joints than Pinocchio's workspace is made for.
+        DescriptionError: If the robot has moving links without mass, a link and a joint of one name or of a name that SDF
+            reserves, or more joints than Pinocchio supports.
     """
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
     if robot.muscles:
-        raise ParameterError("actuators", actuators, '"welded" for a robot with muscles, which SDF has no word for')
+        raise ParameterError("actuators", actuators, '"welded" for a robot with muscles, which SDF does not have')
     tree = robot.tree
     names = [body.name for body in tree.bodies] + [joint.name for joint in tree.joints]
     reserved = [body.name for body in tree.bodies[1:] if body.name == _WORLD]
     reserved += [name for name in names if "::" in name or (name.startswith("__") and name.endswith("__"))]
     if reserved:
-        raise DescriptionError(f"{tree.name} has links or joints called {', '.join(reserved)}; SDF has those names for itself")
+        raise DescriptionError(f"{tree.name} has links or joints named {', '.join(reserved)}; SDF reserves these names")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise DescriptionError(
-            f"{tree.name} has a link and a joint of the name {', '.join(twice)}; SDF wants one name for each"
-        )
+        raise DescriptionError(f"{tree.name} has a link and a joint named {', '.join(twice)}; SDF requires different names")
     ElementTree.register_namespace("drake", DRAKE)
     root = ElementTree.Element("sdf", {"version": "1.9"})
     writer = _Model(ElementTree.SubElement(root, "model", {"name": tree.name or "robot"}), robot, limits)
@@ -87,7 +85,7 @@ def to_sdf(
 
 
 class _Model:
-    """Writes links, frames and joints into a model, and remembers what became of meshes."""
+    """Writes links, frames and joints into a model, and records the meshes left out."""
 
     def __init__(self, element: ElementTree.Element, robot: PreparedRobot, limits: bool) -> None:
         self._element, self._robot, self._limits = element, robot, limits
@@ -112,8 +110,8 @@ class _Model:
                 if body.visuals or body.collisions:
                     links[_WORLD] = self._link(replace(body, name=self._world_shapes), placement, parent)
             elif body.name in self._anchor:
-                made = {"name": body.name, "attached_to": self._anchor[body.name]}
-                _write_pose(ElementTree.SubElement(self._element, "frame", made), placement, parent)
+                attributes = {"name": body.name, "attached_to": self._anchor[body.name]}
+                _write_pose(ElementTree.SubElement(self._element, "frame", attributes), placement, parent)
             else:
                 links[body.name] = self._link(body, placement, parent)
         for body in tree.bodies:
@@ -139,10 +137,10 @@ class _Model:
             mass, moments = _STAND_IN[0], _STAND_IN[1] * np.eye(3)
         inertial = ElementTree.SubElement(link, "inertial")
         _write_pose(inertial, Placement(body.centre.position))
-        _say(inertial, "mass", mass)
+        _write_number(inertial, "mass", mass)
         entries = ElementTree.SubElement(inertial, "inertia")
         for first, second in ("xx", "xy", "xz", "yy", "yz", "zz"):
-            _say(entries, f"i{first}{second}", moments["xyz".index(first), "xyz".index(second)])
+            _write_number(entries, f"i{first}{second}", moments["xyz".index(first), "xyz".index(second)])
         return link
 
     def _shapes(
@@ -160,7 +158,7 @@ class _Model:
                 ElementTree.SubElement(geometry, "size").text = number_text(shape.size)
             else:
                 for name, value in zip(("radius", "length"), shape.size, strict=False):
-                    _say(geometry, name, value)
+                    _write_number(geometry, name, value)
             if kind == "visual" and shape.rgba is not None:
                 material = ElementTree.SubElement(element, "material")
                 for name in ("ambient", "diffuse"):
@@ -179,33 +177,33 @@ class _Model:
         axis = ElementTree.SubElement(self._joint(joint.name, kind, joint.parent, joint.child), "axis")
         ElementTree.SubElement(axis, "xyz").text = number_text(joint.axis)
         dynamics = ElementTree.SubElement(axis, "dynamics")
-        _say(dynamics, "damping", joint.damping)
+        _write_number(dynamics, "damping", joint.damping)
         if spring is not None:
-            _say(dynamics, "spring_stiffness", spring.stiffness)
-            _say(dynamics, "spring_reference", spring.rest)
+            _write_number(dynamics, "spring_stiffness", spring.stiffness)
+            _write_number(dynamics, "spring_reference", spring.rest)
         limit = ElementTree.SubElement(axis, "limit")
         if bounded:
-            _say(limit, "lower", joint.limits[0])
-            _say(limit, "upper", joint.limits[1])
+            _write_number(limit, "lower", joint.limits[0])
+            _write_number(limit, "upper", joint.limits[1])
         for name, value in (("effort", joint.effort if spring is None else 0.0), ("velocity", joint.velocity)):
             if value < LARGEST:
-                _say(limit, name, value)
+                _write_number(limit, name, value)
 
     def _filters(self) -> None:
-        """Tell Drake which pairs do not collide; a pair is a group that ignores itself."""
+        """Exclude collisions of neighbours in Drake; a pair is a group that ignores itself."""
         pairs = (
             (self._anchor.get(first, first), self._anchor.get(second, second)) for first, second in neighbours(self._robot.tree)
         )
         for number, pair in enumerate(dict.fromkeys(pairs), 1):
-            made = {"name": f"neighbours_{number}"}
-            group = ElementTree.SubElement(self._element, f"{{{DRAKE}}}collision_filter_group", made)
-            for name in pair:
-                ElementTree.SubElement(group, f"{{{DRAKE}}}member").text = name if name != _WORLD else self._world_shapes
-            ElementTree.SubElement(group, f"{{{DRAKE}}}ignored_collision_filter_group").text = made["name"]
+            name = f"neighbours_{number}"
+            group = ElementTree.SubElement(self._element, f"{{{DRAKE}}}collision_filter_group", {"name": name})
+            for member in pair:
+                ElementTree.SubElement(group, f"{{{DRAKE}}}member").text = member if member != _WORLD else self._world_shapes
+            ElementTree.SubElement(group, f"{{{DRAKE}}}ignored_collision_filter_group").text = name
 
 
 def _anchors(tree: RigidTree) -> dict[str, str]:
-    """By name of each moving body without mass, the first body with mass that it is fixed to."""
+    """Return by name of each moving body without mass the first body with mass that it is fixed to."""
     group = weld_groups(tree)
     heavy: dict[str, str] = {}
     for body in tree.bodies:
@@ -220,12 +218,12 @@ def _write_pose(element: ElementTree.Element, placement: Placement, relative_to:
     if not relative_to and not np.any(placement.position) and np.array_equal(placement.rotation, np.eye(3)):
         return
     w, x, y, z = placement.quaternion
-    made = {"relative_to": relative_to} if relative_to else {}
-    pose = ElementTree.SubElement(element, "pose", made | {"rotation_format": "quat_xyzw"})
+    attributes = {"relative_to": relative_to} if relative_to else {}
+    pose = ElementTree.SubElement(element, "pose", attributes | {"rotation_format": "quat_xyzw"})
     pose.text = number_text([*placement.position, x, y, z, w])
 
 
-def _say(element: ElementTree.Element, name: str, value: float) -> None:
+def _write_number(element: ElementTree.Element, name: str, value: float) -> None:
     ElementTree.SubElement(element, name).text = repr(float(value))
 
 

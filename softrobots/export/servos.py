@@ -1,13 +1,13 @@
-r"""Position servos that stand for motors and muscles in a simulator.
+r"""Position servos in place of motors and muscles in a simulator.
 
-Statics holds an actuator exactly; a servo gives way. Its gain is its largest force over a small error,
+Statics holds an actuator exactly; a servo is compliant. Its gain is its largest force over a small error,
 
 .. math:: k_p = F / \varepsilon, \qquad k_v = 2 \sqrt{k_p I}
 
-and `k_v` damps it critically with the inertia `I` of the softest motion that moves this actuator by one unit at home: for a
-motor, all that it carries turns about its axis; for a muscle, the springs of its segment share its elongation as
-`K^{-1} A^T`. (A simulator that takes `I` from the inverse of the mass matrix, as MuJoCo's `dampratio` does, finds the body next
-to the motor, behind which the rest hangs on springs: a two-thousandth of it in the inflatable arm.)
+and `k_v` damps it critically with the inertia `I` of the softest motion that moves this actuator by one unit at the home
+position: for a motor, all that it carries turns about its axis; for a muscle, the springs of its segment share its elongation
+as `K^{-1} A^T`. (A simulator that takes `I` from the inverse of the mass matrix, as MuJoCo's `dampratio` does, finds the body
+next to the motor, behind which the rest hangs on springs: a two-thousandth of it in the inflatable arm.)
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.soft_model import SoftModel
 
 ANGLE_ERROR = 1e-2
-"""Error at which the servo of a turning motor gives all its torque [rad]."""
+"""Error at which the servo of a revolute motor reaches its full torque [rad]."""
 
 LENGTH_ERROR = 1e-3
-"""The same of a muscle, as a share of its rest length, and of a sliding motor, as a share of its travel."""
+"""The same for a muscle, as a fraction of its rest length, and for a prismatic motor, as a fraction of its travel."""
 
-_UNLIMITED = 1e3  # gain of a motor whose torque has no limit, per stiffness of the stiffest spring
+_UNLIMITED = 1e3  # gain of a motor without torque limit, over the stiffness of the stiffest spring
 
 
 class Servo(NamedTuple):
@@ -41,43 +41,43 @@ class Servo(NamedTuple):
     damping: float
     """Force per speed [N m s/rad or N s/m]."""
     force: float
-    """Largest force [N m or N]; infinite without a limit."""
+    """Largest force [N m or N]; infinite if unlimited."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motor:
-    """A motor joint that moves."""
+    """A driven motor."""
 
     joint: Joint
     """The joint."""
     position: float
-    """Where it is at home [rad or m]."""
+    """Position at home [rad or m]."""
     servo: Servo
-    """What drives it."""
+    """Its servo."""
 
     @property
     def speed_damping(self) -> float:
-        """Damping with which it just reaches its largest speed under its largest force; at least that of the description."""
+        """Damping at which the largest force gives the largest speed; at least that of the description."""
         fastest, force = self.joint.velocity, self.servo.force
         return max(self.joint.damping, force / fastest if 0.0 < fastest < LARGEST and force < LARGEST else 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Muscle:
-    """A muscle that pulls, whose length is linear in joint coordinates."""
+    """A driven muscle, whose length is linear in joint coordinates."""
 
     tag: MuscleTag
-    """Where it runs, and its limits."""
+    """Its course and limits."""
     arms: Mapping[str, float]
-    """Derivative of its length by joint [m/rad, or 1 at a sliding joint]; joints that do not change it are left out."""
+    """Derivative of its length by joint [m/rad, or 1 at a prismatic joint]; only joints that change it."""
     value: float
     """Its length [m] or tension [N] at home."""
     servo: Servo | None
-    """What drives it to a length; None if its tension is given."""
+    """Its servo if its length is given; None if its tension is given."""
 
 
 def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str, float], mass: FloatArray) -> tuple[Motor, ...]:
-    """Motors with servos.
+    """Return the driven motors with their servos.
 
     Args:
         model: The robot.
@@ -97,7 +97,7 @@ def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str,
 
 
 def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[Muscle, ...]:
-    """Muscles, with servos if their lengths are given.
+    """Return the muscles, with servos if their lengths are given.
 
     Args:
         model: The robot.
@@ -107,7 +107,7 @@ def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[
     Returns:
         The muscles, in the order of the model.
     """
-    structure, made = model.structure, []
+    structure, muscles = model.structure, []
     arms = structure.moment_arms
     springs = structure.spring_indices
     elastic = mass[np.ix_(springs, springs)]
@@ -116,8 +116,8 @@ def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[
         motion /= row @ motion
         gain = tag.strongest / (LENGTH_ERROR * tag.rest_length)
         servo = Servo(gain, 2.0 * math.sqrt(gain * float(motion @ elastic @ motion)), tag.strongest)
-        made.append(Muscle(tag, arms[tag.name], value, servo if model.muscle_input == "lengths" else None))
-    return tuple(made)
+        muscles.append(Muscle(tag, arms[tag.name], value, servo if model.muscle_input == "lengths" else None))
+    return tuple(muscles)
 
 
 def _motor_servo(joint: Joint, stiffest: float, inertia: float) -> Servo:

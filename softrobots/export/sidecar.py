@@ -1,6 +1,6 @@
-"""A robot as JSON beside its URDF: springs, roles, sections and muscles, with unit and source of every number.
+"""Export to JSON beside the URDF: springs, roles, sections and muscles, with unit and source of every number.
 
-For tools that read URDF but not our tags. Every number is an object `{"value", "unit", "source"}`.
+For tools that read URDF but not the tags of this package. Every number is an object `{"value", "unit", "source"}`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from softrobots.robots.xacro_robot import XacroRobot, default_text
 from softrobots.version import __version__
 
 FORMAT = "softrobots sidecar"
-"""What the files call themselves."""
+"""Name of the format in the files."""
 
 VERSION = 1
 """Version of the format."""
@@ -55,20 +55,20 @@ _CONVENTIONS = {
 
 
 def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
-    """Write what a URDF reader misses of a robot as JSON.
+    """Write as JSON what URDF readers ignore: springs, roles, sections and muscles.
 
-    The sources of numbers are the tags of the URDF that they were read from, or what the caller of `load_model` said; given the
-    robot, they are expressions in its parameters, and each parameter has the source that its xacro file gives.
+    The source of a number is the tag of the URDF or the caller of `load_model`; given the robot, it is an expression in the
+    robot's parameters, and each parameter has the source that its xacro file gives.
 
     Args:
         model: The robot.
-        robot: The parameters that it was made from, if it is one of this package.
+        robot: The robot of this package that the model was loaded from, for its parameters.
 
     Returns:
-        JSON text. It holds what `load_model` needs besides the URDF: springs, motors, tip and muscle input.
+        JSON text, with all that `load_model` needs besides the URDF: springs, motors, tip and muscle input.
 
     Raises:
-        ParameterError: If `model` is none, or `robot` is not what it was made from.
+        ParameterError: If `model` is not a `SoftModel`, or was not loaded from `robot`.
     """
     checked = check_model(model)
     rules: Rules = {}
@@ -99,7 +99,7 @@ class _Parts:
         self._tags, self._springs = read_tags(model.urdf), model.spring_table
 
     def all(self) -> dict[str, Any]:
-        """All of them, by kind."""
+        """Return all of them by kind."""
         joints = [joint for joint in read_rigid_tree(self._model.urdf).joints if joint.movable]
         tags = self._tags
         return {
@@ -124,20 +124,20 @@ class _Parts:
 
     def _joint(self, joint: Joint) -> dict[str, Any]:
         position, stiffness, damping = _SLIDING if joint.kind == "prismatic" else _TURNING
-        made: dict[str, Any] = {"name": joint.name, "type": joint.kind, "role": self._role(joint.name)}
-        made |= {"parent": joint.parent, "child": joint.child}
+        entry: dict[str, Any] = {"name": joint.name, "type": joint.kind, "role": self._role(joint.name)}
+        entry |= {"parent": joint.parent, "child": joint.child}
         if joint.kind != "continuous":
             bounds = zip(("lower", "upper"), joint.limits, strict=True)
             for name, value in ((name, value) for name, value in bounds if math.isfinite(value)):  # JSON has no infinity
-                made[name] = self._number(joint.name, name, value, position, "limit")
-        made["damping"] = self._number(joint.name, "damping", joint.damping, damping, "dynamics")
+                entry[name] = self._number(joint.name, name, value, position, "limit")
+        entry["damping"] = self._number(joint.name, "damping", joint.damping, damping, "dynamics")
         if joint.name in self._springs:
             spring = SpringTag(*self._springs[joint.name])
             for name, unit in (("stiffness", stiffness), ("rest", position)):
-                made[name] = self._number(joint.name, name, getattr(spring, name), unit, "softrobots:spring")
+                entry[name] = self._number(joint.name, name, getattr(spring, name), unit, "softrobots:spring")
                 if self._tags.springs.get(joint.name) != spring:
-                    made[name]["source"] = _CALLER
-        return made
+                    entry[name]["source"] = _CALLER
+        return entry
 
     def _role(self, joint: str) -> str:
         structure = self._model.structure
@@ -152,23 +152,23 @@ class _Parts:
         values = {"radius": (tag.radius, "m"), "pressure": (tag.pressure, "Pa")}
         if tag.max_moment is not None:
             values["max_moment"] = (tag.max_moment, "N m")
-        made = {key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()}
+        entry = {key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()}
         moment = wrinkling_moment(tag.pressure, tag.radius)
         source = self._rules.get((name, "wrinkling_moment"), "pi**2 / 4 * pressure * radius**3")
-        return {"springs": list(tag.springs), **made, "wrinkling_moment": {"value": moment, "unit": "N m", "source": source}}
+        return {"springs": list(tag.springs), **entry, "wrinkling_moment": {"value": moment, "unit": "N m", "source": source}}
 
     def _section(self, tag: SectionTag | LumpedSectionTag) -> dict[str, Any]:
-        made: dict[str, Any] = {"name": tag.name, "segment": tag.segment}
+        entry: dict[str, Any] = {"name": tag.name, "segment": tag.segment}
         if isinstance(tag, SectionTag):
-            kind, made["joints"] = "softrobots:section", list(tag.joints)
+            kind, entry["joints"] = "softrobots:section", list(tag.joints)
             values = {"EI": (tag.bending_stiffness, "N m2"), "GJ": (tag.torsional_stiffness, "N m2")}
             values["EA"] = (tag.axial_stiffness, "N")
         else:
-            kind, made["joints"] = "softrobots:lumped_section", dict(tag.joints)
+            kind, entry["joints"] = "softrobots:lumped_section", dict(tag.joints)
             values = {"hinge": (tag.hinge, "m")}
         values |= {"length": (tag.length, "m"), "radius": (tag.radius, "m")}
-        made |= {key: self._number(tag.name, key, *value, kind) for key, value in values.items()}
-        return made | {"rest": self._number(tag.name, "rest", list(tag.rest), "rad/m, rad/m, rad/m, -", kind)}
+        entry |= {key: self._number(tag.name, key, *value, kind) for key, value in values.items()}
+        return entry | {"rest": self._number(tag.name, "rest", list(tag.rest), "rad/m, rad/m, rad/m, -", kind)}
 
     def _muscles(self) -> list[dict[str, Any]]:
         units = {"azimuth": "rad", **dict.fromkeys(("distance", "rest_length", "shortest", "longest"), "m"), "strongest": "N"}
@@ -193,17 +193,17 @@ def _parameters(robot: XacroRobot) -> dict[str, Any]:
 
 
 def _is_default(robot: Any, name: str) -> bool:
-    """Whether a parameter would be the same if it were not given."""
+    """Return whether a parameter has its default value."""
     default = next(field.default for field in dataclasses.fields(robot) if field.name == name)
     try:
-        twin: Any = dataclasses.replace(robot, **{name: default})
-    except SoftRobotsError:  # the default does not go with the other parameters
+        other: Any = dataclasses.replace(robot, **{name: default})
+    except SoftRobotsError:  # the default does not fit the other parameters
         return False
-    return bool(getattr(twin, name) == getattr(robot, name))
+    return bool(getattr(other, name) == getattr(robot, name))
 
 
 def _text(value: Any, indent: str) -> str:
-    """JSON with all digits; what fits into a line stands in one."""
+    """Return JSON with all digits; what fits into a line is on one line."""
     line = json.dumps(value, allow_nan=False)
     if not isinstance(value, dict | list | tuple) or len(indent) + len(line) <= _WIDTH:
         return line

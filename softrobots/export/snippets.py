@@ -1,7 +1,7 @@
-"""Python files that stand alone: a robot with its springs in PyBullet, and on Pinocchio, without this package.
+"""Export to self-contained Python files: a robot with its springs in PyBullet or on Pinocchio, without this package.
 
-Neither tool reads joint springs from a URDF. The files hold the URDF, a table of the springs, and the code that applies them;
-the code is in two templates beside this module.
+Neither tool reads joint springs from a URDF. The files hold the URDF, a table of the springs, and the code that applies them,
+from two templates beside this module.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from softrobots.description.mesh_files import remove_mesh_shapes
 from softrobots.description.rigid_tree import Body, RigidTree, Shape
 from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
 from softrobots.description.urdf_tags import NAMESPACE
-from softrobots.export.damping import lowest_frequency, mass_matrix, rule_told
+from softrobots.export.damping import lowest_frequency, mass_matrix, rule_text
 from softrobots.export.held import HeldRobot, hold
 from softrobots.export.prepared import checked_gravity, prepare
 from softrobots.export.python_text import assignment, block, filled, table
 from softrobots.model.soft_model import SoftModel
 
 MOST_JOINTS = 127
-"""Joints that PyBullet takes in one robot, fixed ones counted; beyond that it cannot tell their states."""
+"""Largest number of joints of a robot in PyBullet, fixed ones included; beyond it, joint states are not available."""
 
 HOLDING_FORCE = 1e6
 """Largest torque [N m] or force [N] with which a driven motor holds its position in PyBullet."""
 
-_TINY_MASS, _TINY_INERTIA = 1e-9, 1e-12  # [kg], [kg m^2], of links without mass: PyBullet would take 1 kg and 1 kg m^2
-_FASTEST = 100.0  # [rad/s or m/s], of a motor without limit
+_TINY_MASS, _TINY_INERTIA = 1e-9, 1e-12  # [kg], [kg m^2], of links without mass, for which PyBullet assumes 1 kg and 1 kg m^2
+_FASTEST = 100.0  # [rad/s or m/s], of a motor without speed limit
 _REST = 2e-5  # [rad or m], motion during the slowest decay time that counts as rest
 
 
@@ -45,19 +45,19 @@ def to_pybullet(
     gravity: Any = None,
     limits: bool = True,
 ) -> str:
-    """Write a robot as a Python file for PyBullet that stands alone: URDF, springs and the code that applies them.
+    """Write a robot as a self-contained Python file for PyBullet: URDF, springs and the code that applies them.
 
     The file has `load(client)`, `drive(robot, positions)`, `apply_springs(robot)`, `step(robot, force, link)` and
-    `settle(robot, force, link)`. Springs are torques by a linearly implicit rule, stable at PyBullet's 240 Hz for light links,
-    too: the docstring of the file has the equations and the limits. Meshes are left out.
+    `settle(robot, force, link)`. Springs are torques by a linearly implicit rule, which is stable at PyBullet's 240 Hz for
+    light links, too: the docstring of the file has the equations and the limits. Meshes are left out.
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Tensions are in the
+        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Tensions shift the
             references of the springs.
         actuators: "driven": PyBullet's position control holds the motors, whatever the load; "welded": their joints are fixed.
         damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
-        gravity: Gravity, shape (3,) [m/s^2], world axes, that the file sets when it is run by itself; None: weightless.
+        gravity: Gravity, shape (3,) [m/s^2], world axes, used when the file is run as a script; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
 
     Returns:
@@ -65,7 +65,7 @@ def to_pybullet(
 
     Raises:
         ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, muscles of given
-            length, springs that are not linear, or more joints than PyBullet takes.
+            length, springs that are not linear, or more joints than PyBullet supports.
         DescriptionError: If a moving link has no mass.
     """
     held = _held(model, q_motors)
@@ -73,12 +73,11 @@ def to_pybullet(
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
     joints = {joint.name: joint for joint in robot.tree.joints}
     if len(joints) > MOST_JOINTS:
-        raise ParameterError(
-            "model",
-            model,
+        requirement = (
             f"a robot of at most {MOST_JOINTS} joints, fixed ones counted, for PyBullet; this one has {len(joints)} (a chain "
-            "has fewer with fewer hinges, torsion=False or extension=False)",
+            "has fewer with fewer hinges, torsion=False or extension=False)"
         )
+        raise ParameterError("model", model, requirement)
     positions = np.array([*held.motors.values(), *held.tensions.values()])
     frequency = robot.frequency or lowest_frequency(model, mass_matrix(model, positions))
     springs = {name: (tag.stiffness, tag.rest, joints[name].damping) for name, tag in held.springs.items()}
@@ -106,7 +105,7 @@ def to_pybullet(
 
 
 def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None) -> str:
-    """Write a robot as a Python file for Pinocchio that stands alone: URDF, springs and a solver for the equilibrium.
+    """Write a robot as a self-contained Python file for Pinocchio: URDF, springs and a solver for the equilibrium.
 
     The file has arrays `STIFFNESS` and `REST` in the order of the velocities of its Pinocchio model, `residual`, `tangent`,
     `solve(q_motors, force, gravity)` by Newton's method, under a world-fixed force at the tip, and `stable`.
@@ -115,7 +114,7 @@ def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None)
         model: The robot.
         q_motors: Motor joints, then muscle tensions, that are the default in the file, shape (n_motors,) [rad, m or N]; relaxed
             by default.
-        gravity: Gravity, shape (3,) [m/s^2], world axes, when the file is run by itself; None: weightless.
+        gravity: Gravity, shape (3,) [m/s^2], world axes, used when the file is run as a script; None: weightless.
 
     Returns:
         Text of the file.
@@ -148,17 +147,17 @@ def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None)
 def _held(model: SoftModel, q_motors: Any) -> HeldRobot:
     held = hold(model, q_motors)
     if not held.springs:
-        raise ParameterError("model", model, "a robot with springs; every tool loads a rigid one from its URDF")
+        raise ParameterError("model", model, "a robot with springs; a rigid robot needs no export beyond its URDF")
     return held
 
 
 def _inside_quotes(text: str) -> str:
-    """XML that three quotes can hold; in attributes they are escaped already."""
+    """Return XML without three quotes in a row; in attributes they are escaped already."""
     return text.replace('"""', "&quot;&quot;&quot;")
 
 
 def _without_meshes(urdf: str) -> str:
-    """The document without comments and without shapes whose files are somewhere else."""
+    """Return the document without comments and mesh shapes."""
     root = parse_xml(urdf, "the URDF")
     remove_mesh_shapes(root)
     ElementTree.register_namespace("softrobots", NAMESPACE)
@@ -167,12 +166,12 @@ def _without_meshes(urdf: str) -> str:
 
 
 def _slowest_decay(frequency: float, springs: Mapping[str, tuple[float, float, float]]) -> float:
-    """Rate at which the slowest motion dies out [1/s]; joints without damping do not count."""
+    """Return the decay rate of the slowest motion [1/s]; joints without damping do not count."""
     return min([0.5 * frequency, *(stiffness / damping for stiffness, _, damping in springs.values() if damping > 0.0)])
 
 
 def _for_pybullet(tree: RigidTree, held: HeldRobot, limits: bool) -> RigidTree:
-    """The tree as PyBullet is to read it: no damping at springs, no meshes, mass everywhere but at the root."""
+    """Return the tree for PyBullet: no damping at springs, no meshes, mass in every body but the root."""
     bodies = []
     for body in tree.bodies:
         solid = replace(body, visuals=_solids(body.visuals), collisions=_solids(body.collisions))
@@ -203,7 +202,7 @@ def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, frequency: fl
     if held.tensions:
         pulls = ", ".join(f"{name} {tension!r}" for name, tension in held.tensions.items())
         lines.append(f"Muscles pull with [N]: {pulls}. That stands in the rest positions, rest - A^T t / k, exactly.")
-    lines.append(rule_told(frequency) if damping == "critical" else "Damping of the springs is that of the description.")
+    lines.append(rule_text(frequency) if damping == "critical" else "Damping of the springs is that of the description.")
     if not limits:
         lines.append("The springs have no limits.")
     if held.locked:

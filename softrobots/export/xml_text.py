@@ -1,4 +1,4 @@
-"""What the XML formats share: a head that says what a file is."""
+"""XML documents with a comment at their head."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ _WIDTH = 110
 
 
 def document(root: ElementTree.Element, head: Iterable[str]) -> str:
-    """A whole document.
+    """Return a document as text.
 
     Args:
         root: Its root element.
-        head: Paragraphs of the comment that it starts with.
-
-    Returns:
-        Text.
+        head: Paragraphs of the comment at its head.
     """
     ElementTree.indent(root)
     paragraphs = (textwrap.wrap(text.replace("--", "- -"), _WIDTH, break_long_words=False) for text in head)
