@@ -23,6 +23,7 @@ from softrobots.core.errors import (
     TargetUnreachable,
     ViewerError,
 )
+from softrobots.core.result_file import load_result, save_result
 from softrobots.description.composition import mount
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
@@ -35,7 +36,7 @@ from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate, estimate_load
 from softrobots.statics.loads import EARTH_GRAVITY, distributed_force
 from softrobots.statics.post_buckling import EquilibriumBranch, post_buckling_branches
-from softrobots.statics.results_io import load_result, save_csv, save_result
+from softrobots.statics.saved_results import save_csv
 from softrobots.statics.sensitivity import compliance, elastostatic_jacobian
 from softrobots.statics.stability import critical_load
 from softrobots.statics.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints

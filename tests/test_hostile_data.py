@@ -24,11 +24,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.core import csv_table, npz_file
+from softrobots.core import csv_table, npz_file, result_file
+from softrobots.core.result_file import KINDS
 from softrobots.helix import ActuatorTable, HelixDesign
 from softrobots.robots.parameter_file import LARGEST_FILE, read_parameters
-from softrobots.statics import results_io
-from softrobots.statics.result_fields import KINDS
 from softrobots.view.live import input as live_input
 from softrobots.view.live.input import Keys, Lines, WatchedFile
 from softrobots.view.live.keys import KeyMoves
@@ -407,7 +406,7 @@ def test_a_small_file_does_not_become_a_large_one(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(npz_file, "LARGEST", 1_000_000)
     refused(sr.load_result, file, "bytes; at most 1000000 are read")
     monkeypatch.setattr(npz_file, "LARGEST", 2**30)
-    monkeypatch.setattr(results_io, "_LARGEST_OF_ONE", 1_000_000)  # an equilibrium has no such arrays
+    monkeypatch.setattr(result_file, "LARGEST_OF_ONE", 1_000_000)  # an equilibrium has no such arrays
     refused(sr.load_result, file, "bytes; at most 1000000 are read")
     small = struct.pack("<I", 1000)
     honest = file.read_bytes()
@@ -476,8 +475,8 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
     robot = tmp_path / "robot.urdf"
     robot.write_text(sr.InflatableArm().urdf(), encoding="utf-8")
     assert sr.load_model(str(robot)).n_springs == 4
-    refused(sr.load_result, saved(tmp_path, "equilibrium", {"urdf": np.array(str(robot))}), "its urdf is no URDF text")
-    refused(sr.load_result, saved(tmp_path, "equilibrium", {"urdf": np.array("/dev/zero")}), "its urdf is no URDF text")
+    refused(sr.load_result, saved(tmp_path, "equilibrium", {"urdf": np.array(str(robot))}), "its urdf is not URDF text")
+    refused(sr.load_result, saved(tmp_path, "equilibrium", {"urdf": np.array("/dev/zero")}), "its urdf is not URDF text")
 
 
 @each_row(
@@ -490,20 +489,20 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("equilibrium", {"q_springs": np.full((1, 4), np.nan)}, "finite"),
         ("equilibrium", {"q_springs": np.full((1, 4), 1e200)}, "at most 1e"),
         ("equilibrium", {"q_springs": np.array([["a", "b", "c", "d"]])}, "finite numbers"),
-        ("equilibrium", {"urdf": np.array(3.0)}, "urdf is no text"),
-        ("equilibrium", {"urdf": np.array(["<robot/>"] * 3)}, "urdf is no text"),
+        ("equilibrium", {"urdf": np.array(3.0)}, "urdf is not a text"),
+        ("equilibrium", {"urdf": np.array(["<robot/>"] * 3)}, "urdf is not a text"),
         ("equilibrium", {"model": np.array("[" * DEEP)}, "not JSON"),
         ("equilibrium", {"model": np.array('{"springs": {"a": [NaN, 0]}}')}, "NaN is not a number"),
         ("equilibrium", {"load": np.array('{"wrenches": {}, "wrenches": {}}')}, "two members"),
-        ("equilibrium", {"iterations": np.array([-1])}, "counts in something else"),
-        ("equilibrium", {"iterations": np.array([1.5])}, "counts in something else"),
+        ("equilibrium", {"iterations": np.array([-1])}, "must be an array of non-negative integers"),
+        ("equilibrium", {"iterations": np.array([1.5])}, "must be an array of non-negative integers"),
         ("equilibrium", {"solver": np.array(["magic"])}, "solver must be one of"),
         ("equilibrium", {"residual": np.array([np.nan])}, "finite"),
         ("load_estimate", {"estimation": np.array("magic")}, "estimation must be one of"),
         ("trajectory", {"following": np.array("x" * 81)}, "following must be 1 to 80 printable"),
-        ("workspace", {"refused": np.array(-1)}, "counts in something else"),
+        ("workspace", {"refused": np.array(-1)}, "must be an array of non-negative integers"),
         ("workspace_map", {"grid_x": np.array([0.8, 0.6])}, "increasing"),
-        ("ik_solution", {"steps": np.array(2.5)}, "counts in something else"),
+        ("ik_solution", {"steps": np.array(2.5)}, "must be an array of non-negative integers"),
     ],
 )
 def test_results_that_claim_what_they_are_not(kind: str, changes: dict[str, Any], message: str, tmp_path: Path) -> None:
@@ -716,7 +715,7 @@ DOORWAYS = {
     "statics.time_law": ("waypoints CSV",),
     "helix.actuators": ("actuator CSV",),
     "helix.design": ("design JSON",),
-    "statics.results_io": ("results NPZ",),
+    "core.result_file": ("results NPZ",),
     "core.checkpoint": ("checkpoint JSON", "checkpoint NPZ"),
     "studies.benchmark.results": ("benchmark JSON",),
     "robots.parameter_file": ("parameters YAML", "parameters JSON"),

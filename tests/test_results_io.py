@@ -227,7 +227,7 @@ def test_files_that_are_not_ours_are_refused(tmp_path: Path) -> None:
 
 
 def test_other_objects_are_refused(arm: sr.SoftModel, results: dict, tmp_path: Path) -> None:
-    with pytest.raises(sr.ParameterError, match="ImposedDisplacement, LoadEstimate, Trajectory, Workspace or WorkspaceMap"):
+    with pytest.raises(sr.ParameterError, match="ImposedDisplacement, LoadEstimate, Trajectory, Workspace, WorkspaceMap"):
         sr.save_result(arm, tmp_path / "a.npz")
     with pytest.raises(sr.ParameterError, match="a Trajectory"):
         sr.save_csv(results["equilibrium"], tmp_path / "a.csv")

@@ -17,13 +17,13 @@ from softrobots.cli.reports.answers import add_json, tell
 from softrobots.core.checks import finite_number
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
+from softrobots.core.result_file import load_result
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate
-from softrobots.statics.results_io import load_result
 from softrobots.statics.trajectory import Trajectory
 from softrobots.view.browser import find_chromium, take_picture
 from softrobots.view.live.input import commands_from

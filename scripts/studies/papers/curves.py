@@ -10,7 +10,7 @@ from softrobots import helix, inflated_beam
 from softrobots.core.files import csv_text, write_text
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_DIAMETER
 from softrobots.inflated_beam import TABLE_3
-from softrobots.statics.results_io import save_csv
+from softrobots.statics.saved_results import save_csv
 from studies.papers.arm_path import movement
 
 

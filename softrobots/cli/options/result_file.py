@@ -8,7 +8,8 @@ from typing import Any
 
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
-from softrobots.statics.results_io import save_csv, save_result
+from softrobots.core.result_file import save_result
+from softrobots.statics.saved_results import save_csv
 
 
 def add_output(parser: argparse.ArgumentParser, told: str) -> None:

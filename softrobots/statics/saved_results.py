@@ -1,21 +1,24 @@
-"""What a file of results holds, kind by kind: results to named arrays, and back.
+"""Results of statics as named arrays, and back, for result files; trajectories as CSV tables.
 
 A file holds the robot (URDF and springs), the load and the coordinates. Everything else is computed again on loading, and a
-file whose coordinates are not in the balance that it claims is refused.
+file whose residual is larger than it claims is refused.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import choice, finite_array, finite_number, increasing, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.files import csv_text, write_text
 from softrobots.core.json_text import parse_json
+from softrobots.core.result_file import KINDS, Kind, counts, label, text
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state, largest_residual
@@ -32,16 +35,13 @@ from softrobots.statics.trajectory import Trajectory
 from softrobots.statics.workspace import Workspace, workspace_at
 from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
 
-Result = Equilibrium | IkSolution | ImposedDisplacement | LoadEstimate | Trajectory | Workspace | WorkspaceMap
-"""What can be saved."""
-
-_LONGEST_WORD = 80  # characters
+_WORKSPACE = ("q_motors", "q_springs", "tip_positions", "manipulability")
 _SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
 
 
 def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
     wrenches = {name: wrench.tolist() for name, wrench in load.wrenches.items()}
-    said = {
+    arguments = {
         "springs": model.spring_table,
         "motors": model.structure.motor_joints,
         "tip": model.tip,
@@ -49,41 +49,20 @@ def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
     }
     return {
         "urdf": np.array(model.urdf),
-        "model": np.array(json.dumps(said)),
+        "model": np.array(json.dumps(arguments)),
         "load": np.array(json.dumps({"wrenches": wrenches, "gravity": load.gravity})),
     }
 
 
 def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
-    said, loaded = (parse_json(_text(fields, name)) for name in ("model", "load"))
-    springs = {str(name): (float(k), float(rest)) for name, (k, rest) in said["springs"].items()}
-    urdf = _text(fields, "urdf")
+    arguments, load = (parse_json(text(fields, name)) for name in ("model", "load"))
+    springs = {str(name): (float(k), float(rest)) for name, (k, rest) in arguments["springs"].items()}
+    urdf = text(fields, "urdf")
     if not urdf.startswith("<"):
-        raise FileFormatError("its urdf is no URDF text")  # but a path, as far as load_model knows
-    model = load_model(urdf, springs=springs, motors=said["motors"], tip=said["tip"], muscles=said.get("muscles", "lengths"))
-    return model, Load.of(model, wrench=loaded["wrenches"], gravity=loaded["gravity"])
-
-
-def _text(fields: Mapping[str, Any], name: str) -> str:
-    """A single text."""
-    if fields[name].shape != () or fields[name].dtype.kind != "U":
-        raise FileFormatError(f"its {name} is no text")
-    return str(fields[name])
-
-
-def _word(fields: Mapping[str, Any], name: str) -> str:
-    """What somebody calls something, on one line."""
-    word = _text(fields, name)
-    if not 0 < len(word) <= _LONGEST_WORD or not word.isprintable():
-        raise FileFormatError(f"its {name} must be 1 to {_LONGEST_WORD} printable characters")
-    return word
-
-
-def _counts(field: Any) -> list[int]:
-    """Integers, zero or above."""
-    if field.dtype.kind not in "iu" or field.ndim != 1 or field.min(initial=0) < 0:
-        raise FileFormatError("it counts in something else than integers, zero or above")
-    return [int(number) for number in field]
+        raise FileFormatError("its urdf is not URDF text")  # load_model would take it for a path
+    muscles = arguments.get("muscles", "lengths")
+    model = load_model(urdf, springs=springs, motors=arguments["motors"], tip=arguments["tip"], muscles=muscles)
+    return model, Load.of(model, wrench=load["wrenches"], gravity=load["gravity"])
 
 
 def _pack_rows(equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
@@ -108,27 +87,27 @@ def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
     motors = finite_array("q_motors", fields["q_motors"], (count, model.n_motors))
     springs = finite_array("q_springs", fields["q_springs"], (count, model.n_springs), "rad")
     residual, tolerance = (finite_array(name, fields[name], (count,), "N m") for name in ("residual", "tolerance"))
-    iterations, solvers = _counts(fields["iterations"]), fields["solver"].tolist()
+    iterations, solvers = counts(fields, "iterations"), fields["solver"].tolist()
     for solver in set(solvers):
         choice("solver", solver, _SOLVERS)
     equilibria = []
     for row in range(count):
         model.checked_motors(motors[row])
         state = elastic_state(model, motors[row], springs[row], load)
-        made = equilibrium_from_state(model, motors[row], load, state, method=solvers[row], iterations=iterations[row])
-        # Rounding differs between machines; a coordinate that was shifted by 1e-9 rad shows up above this.
-        if made.residual > 1.001 * residual[row] + largest_residual(model, state.scale, 1e-12):
+        found = equilibrium_from_state(model, motors[row], load, state, method=solvers[row], iterations=iterations[row])
+        # Rounding differs between machines; a coordinate shifted by 1e-9 rad exceeds this.
+        if found.residual > 1.001 * residual[row] + largest_residual(model, state.scale, 1e-12):
             raise FileFormatError(
-                f"its row {row} claims a residual of {residual[row]:.3g} N m, but it is {made.residual:.3g} N m"
+                f"its row {row} claims a residual of {residual[row]:.3g} N m, but it is {found.residual:.3g} N m"
             )
-        equilibria.append(replace(made, tolerance=float(tolerance[row])))
+        equilibria.append(replace(found, tolerance=float(tolerance[row])))
     return tuple(equilibria)
 
 
 def _pack_solution(solution: IkSolution) -> dict[str, Any]:
     return _pack_rows((solution.equilibrium,)) | {
         "target": solution.target,
-        **({} if solution.orientation is None else {"orientation": solution.orientation}),
+        "orientation": solution.orientation,
         "error": np.array(solution.error),
         "steps": np.array(solution.iterations),
         "alternatives": np.array(solution.alternatives).reshape(-1, len(solution.q_motors)),
@@ -151,7 +130,7 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
         equilibrium=equilibrium,
         error=float(np.linalg.norm(translation)),
         orientation_error=float(np.linalg.norm(turn)),
-        iterations=_counts(fields["steps"].reshape(1))[0],
+        iterations=counts(fields, "steps")[0],
         alternatives=tuple(map(read_only, others)),
     )
 
@@ -166,7 +145,7 @@ def _pack_imposed(result: ImposedDisplacement) -> dict[str, Any]:
             "point": probe.point,
             "direction": probe.direction,
             "origin": probe.origin,
-            **({} if probe.normal is None else {"normal": probe.normal}),
+            "normal": probe.normal,
             "displacement": np.array(result.displacement),
             "reaction": np.array(result.reaction),
         }
@@ -177,22 +156,22 @@ def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
     model, load = _unpack_model(fields)
     point, direction, origin = (read_only(finite_array(name, fields[name], (3,))) for name in ("point", "direction", "origin"))
     normal = read_only(finite_array("normal", fields["normal"], (3,))) if "normal" in fields else None
-    made = imposed_at(
+    result = imposed_at(
         model,
         model.checked_motors(fields["q_motors"][0]),
         load,
-        Probe(_text(fields, "frame"), point, direction, origin, normal),
+        Probe(text(fields, "frame"), point, direction, origin, normal),
         q_springs=finite_array("q_springs", fields["q_springs"][0], (model.n_springs,), "rad"),
         reaction=finite_number("reaction", fields["reaction"], "N"),
         displacement=finite_number("displacement", fields["displacement"], "m"),
-        iterations=_counts(fields["iterations"])[0],
+        iterations=counts(fields, "iterations")[0],
     )
-    claimed = 1.001 * float(fields["residual"][0]) + 1e-2 * made.equilibrium.tolerance
-    if not (made.residual <= claimed and made.gap <= 1e-11 * model.reach):
+    claimed = 1.001 * float(fields["residual"][0]) + 1e-2 * result.equilibrium.tolerance
+    if not (result.residual <= claimed and result.gap <= 1e-11 * model.reach):
         raise FileFormatError(
-            f"its residual is {made.residual:.3g} N m, and the probe is {made.gap:.3g} m from where it claims to be"
+            f"its residual is {result.residual:.3g} N m, and the probe is {result.gap:.3g} m from where it claims to be"
         )
-    return replace(made, equilibrium=replace(made.equilibrium, tolerance=float(fields["tolerance"][0])))
+    return replace(result, equilibrium=replace(result.equilibrium, tolerance=float(fields["tolerance"][0])))
 
 
 def _pack_estimate(estimate: LoadEstimate) -> dict[str, Any]:
@@ -201,7 +180,7 @@ def _pack_estimate(estimate: LoadEstimate) -> dict[str, Any]:
         "frame": np.array(estimate.frame),
         "measured_torques": estimate.measured_torques,
         "estimation": np.array(estimate.method),
-        **({} if estimate.torque_std is None else {"torque_std": estimate.torque_std}),
+        "torque_std": estimate.torque_std,
     }
 
 
@@ -210,11 +189,11 @@ def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
     motors = (equilibrium.model.n_motors,)
     return estimate_at(
         equilibrium,
-        frame=_text(fields, "frame"),
+        frame=text(fields, "frame"),
         motor_torques=finite_array("measured_torques", fields["measured_torques"], motors, "N m"),
         force=finite_array("force", fields["force"], (3,), "N"),
         torque_std=finite_array("torque_std", fields["torque_std"], motors, "N m") if "torque_std" in fields else None,
-        method=choice("estimation", _text(fields, "estimation"), ESTIMATIONS),
+        method=choice("estimation", text(fields, "estimation"), ESTIMATIONS),
     )
 
 
@@ -229,20 +208,18 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
         times=read_only(increasing("times", finite_array("times", fields["times"], (len(equilibria),), "s"), "s")),
         targets=read_only(finite_array("targets", fields["targets"], (len(equilibria), 3), "m")),
         equilibria=equilibria,
-        method=_word(fields, "following"),
+        method=label(fields, "following"),
     )
 
 
 def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
-    names = ("q_motors", "q_springs", "tip_positions", "manipulability")
-    arrays = {name: getattr(workspace, name) for name in names}
+    arrays = {name: getattr(workspace, name) for name in _WORKSPACE}
     return _pack_model(workspace.model, workspace.load) | arrays | {"refused": np.array(workspace.refused)}
 
 
 def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
     model, load = _unpack_model(fields)
-    arrays = {name: fields[name] for name in ("q_motors", "q_springs", "tip_positions", "manipulability")}
-    return workspace_at(model, load, **arrays, refused=_counts(fields["refused"].reshape(1))[0])
+    return workspace_at(model, load, **{name: fields[name] for name in _WORKSPACE}, refused=counts(fields, "refused")[0])
 
 
 def _pack_map(result: WorkspaceMap) -> dict[str, Any]:
@@ -254,13 +231,45 @@ def _unpack_map(fields: Mapping[str, Any]) -> WorkspaceMap:
     return unpacked(model, load.gravity, fields)
 
 
-KINDS: dict[str, tuple[type, Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Result]]] = {
-    "equilibrium": (Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
-    "ik_solution": (IkSolution, _pack_solution, _unpack_solution),
-    "imposed_displacement": (ImposedDisplacement, _pack_imposed, _unpack_imposed),
-    "load_estimate": (LoadEstimate, _pack_estimate, _unpack_estimate),
-    "trajectory": (Trajectory, _pack_trajectory, _unpack_trajectory),
-    "workspace": (Workspace, _pack_workspace, _unpack_workspace),
-    "workspace_map": (WorkspaceMap, _pack_map, _unpack_map),
-}
-"""By name of a kind: its class, and what makes arrays of a result and a result of arrays."""
+KINDS.update(
+    equilibrium=Kind(Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
+    ik_solution=Kind(IkSolution, _pack_solution, _unpack_solution),
+    imposed_displacement=Kind(ImposedDisplacement, _pack_imposed, _unpack_imposed),
+    load_estimate=Kind(LoadEstimate, _pack_estimate, _unpack_estimate),
+    trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True),
+    workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True),
+    workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True),
+)
+
+
+def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Save a trajectory as a CSV table, one line a waypoint, full precision.
+
+    Columns: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z` [m],
+    `tip_error` [m], one for each motor and spring [rad] (`joint_x` where a joint is
+    called `x`), `moment_<i>` [N m] for each inflated link.
+
+    Args:
+        trajectory: The trajectory.
+        path: File to write.
+        overwrite: Replace an existing file.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ParameterError: If it is no trajectory, or the path is none.
+        OutputExists: If the file exists and `overwrite` is false.
+        OutputError: If the file cannot be written.
+    """
+    if not isinstance(trajectory, Trajectory):
+        raise ParameterError("trajectory", trajectory, "a Trajectory")
+    model, moments = trajectory.model, trajectory.link_moments
+    names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error"]
+    names += [f"joint_{name}" if name in names else name for name in (*model.motor_joints, *model.spring_joints)]
+    columns = [trajectory.times[:, None], trajectory.targets, trajectory.tip_positions, trajectory.tip_error[:, None]]
+    columns += [trajectory.q_motors, trajectory.q_springs]
+    if moments is not None:
+        names += [f"moment_{i + 1}" for i in range(moments.shape[1])]
+        columns.append(moments)
+    return write_text(path, csv_text(names, np.hstack(columns).tolist()), overwrite=overwrite)

@@ -1,0 +1,143 @@
+"""Result files: NPZ without pickle, and the table of the kinds of results that can be saved.
+
+A module with result classes adds them to `KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core import npz_file
+from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.files import as_path, new_file, write_atomically
+from softrobots.core.npz_file import check_size, read_arrays
+
+FORMAT = 1
+"""Number of the format, in every file."""
+
+LARGEST_OF_ONE = 2**26
+"""Limit of the arrays of a result with one configuration [bytes]; most of it is for the URDF text."""
+
+_LONGEST_LABEL = 80  # characters
+
+
+class Kind(NamedTuple):
+    """How one kind of results is saved."""
+
+    cls: type
+    """Class of the results."""
+    to_arrays: Callable[[Any], dict[str, Any]]
+    """Return the named arrays of a result; None for one that it does not have."""
+    from_arrays: Callable[[Mapping[str, Any]], Any]
+    """Return the result of named arrays; any exception means that they do not fit."""
+    many: bool = False
+    """Whether a result has any number of configurations, so that only `npz_file.LARGEST` limits it."""
+
+    @property
+    def largest(self) -> int:
+        """Limit of the arrays of a result [bytes]."""
+        return npz_file.LARGEST if self.many else LARGEST_OF_ONE
+
+
+KINDS: dict[str, Kind] = {}
+"""Kinds of results by their name in the file."""
+
+
+def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Save a result as an NPZ file, without pickle.
+
+    The file appears complete or not at all: it is written under another name and renamed.
+
+    Args:
+        result: An equilibrium, imposed displacement, load estimate, IK solution, trajectory, workspace or
+            workspace map.
+        path: File to write; `.npz` is added if it has no suffix.
+        overwrite: Replace an existing file.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ParameterError: If the result is something else, or has more arrays than `load_result` reads, or the path is not one.
+        OutputExists: If the file exists and `overwrite` is false.
+        OutputError: If the file cannot be written.
+    """
+    name = next((name for name, kind in KINDS.items() if isinstance(result, kind.cls)), None)
+    if name is None:
+        raise ParameterError("result", result, f"one of {', '.join(kind.cls.__name__ for kind in KINDS.values())}")
+    path = as_path("path", path)
+    target = new_file(path if path.suffix or path.is_dir() else path.with_suffix(".npz"), overwrite=overwrite)
+    fields = {"format": np.array(FORMAT), "kind": np.array(name), **KINDS[name].to_arrays(result)}
+    arrays = {name: array for name, array in fields.items() if array is not None}
+    check_size("result", arrays, KINDS[name].largest)
+    write_atomically(target, lambda file: np.savez_compressed(file, **arrays), overwrite=overwrite)
+    return target
+
+
+def load_result(path: str | Path) -> Any:
+    """Load a result saved by `save_result`.
+
+    The file may be untrusted: nothing in it is executed, no other file is opened, and it is not unpacked unless its arrays have
+    the size that its directory states, at most 1 GiB (64 MiB for a result of a single configuration).
+
+    Args:
+        path: The NPZ file.
+
+    Returns:
+        The result, with its model.
+
+    Raises:
+        ParameterError: If the path is not one.
+        FileFormatError: If the file cannot be read, is not a result file, or its numbers are not the result that it claims.
+    """
+    path = as_path("path", path)
+    try:
+        head = read_arrays(path, only=("kind", "format"))
+        name = str(head["kind"])
+        if int(head["format"]) != FORMAT or name not in KINDS:
+            raise FileFormatError(
+                f"it holds {name[:60]!r} in format {head['format']}; known: {', '.join(KINDS)} in format {FORMAT}"
+            )
+        return KINDS[name].from_arrays(read_arrays(path, largest=KINDS[name].largest))
+    except Exception as error:  # arrays of another type or shape raise various errors of NumPy
+        reason = f"it has no {error}" if isinstance(error, KeyError) else error
+        raise FileFormatError(f"cannot read a result from {path}: {reason}") from error
+
+
+def text(arrays: Mapping[str, Any], name: str) -> str:
+    """Return an array that holds a single text.
+
+    Raises:
+        FileFormatError: If it holds something else.
+    """
+    if arrays[name].shape != () or arrays[name].dtype.kind != "U":
+        raise FileFormatError(f"its {name} is not a text")
+    return str(arrays[name])
+
+
+def label(arrays: Mapping[str, Any], name: str) -> str:
+    """Return a printable one-line label.
+
+    Raises:
+        FileFormatError: If the array holds something else.
+    """
+    word = text(arrays, name)
+    if not 0 < len(word) <= _LONGEST_LABEL or not word.isprintable():
+        raise FileFormatError(f"its {name} must be 1 to {_LONGEST_LABEL} printable characters")
+    return word
+
+
+def counts(arrays: Mapping[str, Any], name: str) -> list[int]:
+    """Return an array of integers, zero or above, as a list; a single number gives a list of one.
+
+    Raises:
+        FileFormatError: If it holds something else.
+    """
+    array = np.atleast_1d(arrays[name])
+    if array.dtype.kind not in "iu" or array.ndim != 1 or array.min(initial=0) < 0:
+        raise FileFormatError(f"its {name} must be an array of non-negative integers")
+    return [int(number) for number in array]
