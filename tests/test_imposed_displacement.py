@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots import inflated_beam
+from softrobots.statics.displacement_control import Probe
 from softrobots.statics.imposed_displacement import imposed_at
 from softrobots.statics.loads import Load
-from softrobots.statics.probes import Probe
 from tests.support.tables import each_row
 
 K, M = 169.44, 21.76  # [Troise 2021] Table 3 at 50 kPa

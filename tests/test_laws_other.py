@@ -34,8 +34,8 @@ from softrobots.description.renaming import prefix_names, shift_segments, used_n
 from softrobots.model.actuators import Actuators
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.springs import SpringGroup, Springs
+from softrobots.statics.displacement_control import Probe, face_normal, touch
 from softrobots.statics.loads import cross_matrix
-from softrobots.statics.probes import Probe, face_normal, touch
 from softrobots.statics.workspace_map import required_pressures
 from studies.shared.markdown import marked
 from tests.support.laws import law

@@ -14,12 +14,19 @@ import numpy as np
 from softrobots.core.checks import FloatArray, finite_array, finite_number, positive_integer, read_only, unit_vector
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.displacement_control import GAP, DisplacementControl, HeldState, follow, stable_while_held
+from softrobots.statics.displacement_control import (
+    GAP,
+    DisplacementControl,
+    HeldState,
+    Probe,
+    face_normal,
+    follow,
+    stable_while_held,
+)
 from softrobots.statics.elastic_state import TOLERANCE
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state, solve_equilibrium
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
-from softrobots.statics.probes import Probe, face_normal
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.displacement_control import Probe
 from softrobots.statics.elastic_state import elastic_state, largest_residual
 from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
@@ -29,7 +30,6 @@ from softrobots.statics.inverse_kinematics import IkSolution, checked_orientatio
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
 from softrobots.statics.load_estimation import LoadEstimate, estimate_at
 from softrobots.statics.loads import Load
-from softrobots.statics.probes import Probe
 from softrobots.statics.tip_goal import Goal
 from softrobots.statics.trajectory import Trajectory
 from softrobots.statics.workspace import Workspace, workspace_at

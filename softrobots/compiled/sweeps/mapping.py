@@ -31,8 +31,7 @@ from softrobots.core.npz_file import LARGEST
 from softrobots.core.progress import with_progress
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.loads import Load
-from softrobots.statics.target_grid import TargetGrid
-from softrobots.statics.workspace_map import WorkspaceMap
+from softrobots.statics.workspace_map import TargetGrid, WorkspaceMap
 
 BLOCK = 512
 """Targets of a block."""
