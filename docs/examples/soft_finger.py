@@ -1,50 +1,36 @@
 """A pneumatic finger as a robot of one's own: checked parameters that become xacro arguments and URDF text."""
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
-from softrobots.core.checks import positive_integer, positive_number
-from softrobots.description.expansion import expand
-
-XACRO = Path(__file__).with_name("soft_finger.urdf.xacro")
+from softrobots.robots import XacroRobot
+from softrobots.robots.fields import check_parameters, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SoftFinger:
-    """A finger that closes towards +x when its chamber is under pressure. SI units; numbers without a source are assumed."""
+class SoftFinger(XacroRobot):
+    """A finger that closes towards +x when its chamber is under pressure."""
 
-    length: float = 0.1
-    """Length [m]."""
-    radius: float = 0.008
-    """Radius, for inertia and pictures [m]."""
-    chamber_area: float = 1.5e-4
-    """Section of the chamber [m^2]."""
-    chamber_distance: float = 0.008
-    """Distance of the middle of the chamber from the layer that does not stretch [m]."""
-    max_pressure: float = 80e3
-    """Largest gauge pressure [Pa]."""
-    bending_stiffness: float = 4e-3
-    """EI [N m^2]."""
-    torsional_stiffness: float = 3e-3
-    """GJ [N m^2]."""
-    axial_stiffness: float = 5e3
-    """EA [N]."""
-    linear_density: float = 0.4
-    """Mass per length [kg/m]."""
-    hinges: int = 8
-    """Hinges of the chain; best a multiple of 4."""
+    length: float = parameter(0.1, "m", "Length of the finger", "assumed", above=0.0)
+    radius: float = parameter(0.008, "m", "Radius of the finger, for inertia and pictures", "assumed", above=0.0)
+    chamber_area: float = parameter(1.5e-4, "m^2", "Section of the chamber", "assumed", above=0.0)
+    chamber_distance: float = parameter(
+        0.008, "m", "Distance of the middle of the chamber from the layer", "assumed", above=0.0
+    )
+    max_pressure: float = parameter(80e3, "Pa", "Largest gauge pressure", "assumed", above=0.0)
+    bending_stiffness: float = parameter(4e-3, "N m^2", "Bending stiffness EI", "assumed", above=0.0)
+    torsional_stiffness: float = parameter(3e-3, "N m^2", "Torsional stiffness GJ", "assumed", above=0.0)
+    axial_stiffness: float = parameter(5e3, "N", "Axial stiffness EA, of the layer", "assumed", above=0.0)
+    linear_density: float = parameter(0.4, "kg/m", "Mass per length", "assumed", above=0.0)
+    hinges: int = parameter(8, "", "Hinges of the chain; best a multiple of 4", at_least=1)
+
+    XACRO = Path(__file__).with_name("soft_finger.urdf.xacro")
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            positive_number(field.name, getattr(self, field.name))
-        positive_integer("hinges", self.hinges)
-
-    def urdf(self) -> str:
-        """The robot as URDF text: all that softrobots asks of a robot."""
-        return expand(XACRO, {name: repr(value) for name, value in asdict(self).items()})
+        check_parameters(self)
 
     def tension(self, pressure: float) -> float:
-        """What the muscle `chamber` exerts at a gauge pressure [Pa]: minus pressure times section [N]."""
+        """Tension of the muscle `chamber` at a gauge pressure [Pa]: minus pressure times section [N]."""
         return -pressure * self.chamber_area
 
     def closing_angle(self, pressure: float) -> float:

@@ -1,4 +1,4 @@
-"""Three pneumatic fingers on a palm around a cylinder: robots put together by `softrobots.mount`."""
+"""Three pneumatic fingers on a palm around a cylinder, composed by `softrobots.mount`."""
 
 import math
 
@@ -6,9 +6,9 @@ from soft_finger import SoftFinger
 
 import softrobots as sr
 
-AWAY = 0.04  # from the axis of the palm to each finger [m]
-CYLINDER = 0.015  # radius of what is gripped [m]
-FINGERS = {"a_": 0.0, "b_": 2 * math.pi / 3, "c_": -2 * math.pi / 3}  # where each stands around the palm [rad]
+AWAY = 0.04  # distance of each finger from the axis of the palm [m]
+CYLINDER = 0.015  # radius of the gripped object [m]
+FINGERS = {"a_": 0.0, "b_": 2 * math.pi / 3, "c_": -2 * math.pi / 3}  # azimuth of each finger on the palm [rad]
 
 PALM = f"""<robot name="palm">
   <link name="palm">
@@ -26,7 +26,7 @@ PALM = f"""<robot name="palm">
 
 
 def way_to_close(finger: SoftFinger, free_tip: float, cylinder: float = CYLINDER) -> float:
-    """How far the cylinder keeps back a fingertip that would be at x = `free_tip` without it [m]; below 0: no touch."""
+    """Displacement of a fingertip with the free position x = `free_tip` by the cylinder [m]; below 0 without contact."""
     return free_tip - (AWAY - cylinder - finger.radius)
 
 
