@@ -1,4 +1,4 @@
-"""Plots and tables of helices: shapes by contraction and actuator angle, what can be built, and grasp forces.
+"""Plots and tables of helices: shapes by contraction and actuator angle, realisability, and grasp forces.
 
 Without options it covers the tests of [Blumenschein 2018]: tubes of 3.31 cm, actuator angles of 2.5, 5 and 10 degrees,
 contractions of 0.9 to 0.5, and a grasped cylinder of 4.0 cm. Writes pictures after its Figures 5, 7 and 9 and tables (CSV) into
@@ -31,34 +31,34 @@ PICTURES = ("helix_grid", "helix_shapes", "helix_grasp")
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     test = helix.PAPER_CYLINDER
     angles = [float(f"{degrees:.12g}") for degrees in np.degrees(atlas.PAPER_ANGLES)]
 
-    def numbers(option: str, default: Sequence[float], told: str) -> None:
+    def numbers(option: str, default: Sequence[float], help_text: str) -> None:
         shown = " ".join(f"{number:g}" for number in default)
-        made.add_argument(option, type=float, nargs="+", metavar="X", default=list(default), help=f"{told} ({shown})")
+        options.add_argument(option, type=float, nargs="+", metavar="X", default=list(default), help=f"{help_text} ({shown})")
 
     numbers("--angles", angles, "of the actuator to the axis of the tube, up to three [degrees]")
     numbers("--contractions", atlas.PAPER_CONTRACTIONS[::-1], "contracted over original length of the actuator, in (0, 1]")
-    made.add_argument("--diameter", type=float, default=atlas.PAPER_DIAMETER, help="of the tube [m] (%(default)s)")
-    made.add_argument("--length", type=float, default=1.0, help="of the uninflated tubes that are drawn [m] (%(default)s)")
-    numbers("--deflections", test.deflections, "radius of the grasped object less the natural inner radius of the helix [m]")
-    made.add_argument("--pressure", type=float, default=10e3, help="largest gauge pressure of the grasp [Pa] (%(default)g)")
-    made.add_argument("--object-radius", type=float, default=test.object_radius, help="of the grasped object [m] (%(default)s)")
-    made.add_argument("--rise", type=float, default=test.turn_height, help="of the grasp per turn [m] (%(default)s)")
-    made.add_argument("--turns", type=float, default=test.turns, help="of the grasp (%(default)s)")
-    made.add_argument("--output", type=Path, metavar="FOLDER", help="new or empty folder (output/helix_atlas_<time>)")
-    made.add_argument("--no-plots", action="store_true", help="do without the pictures, which need matplotlib")
-    told = "only write the two pictures of the guide into this folder (docs/images), replacing them"
-    made.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FOLDER", help=told)
-    return made
+    options.add_argument("--diameter", type=float, default=atlas.PAPER_DIAMETER, help="of the tube [m] (%(default)s)")
+    options.add_argument("--length", type=float, default=1.0, help="of the uninflated tubes in the picture [m] (%(default)s)")
+    numbers("--deflections", test.deflections, "radius of the grasped object minus the natural inner radius of the helix [m]")
+    options.add_argument("--pressure", type=float, default=10e3, help="largest gauge pressure of the grasp [Pa] (%(default)g)")
+    options.add_argument("--object-radius", type=float, default=test.object_radius, help="of the object [m] (%(default)s)")
+    options.add_argument("--rise", type=float, default=test.turn_height, help="of the grasp per turn [m] (%(default)s)")
+    options.add_argument("--turns", type=float, default=test.turns, help="of the grasp (%(default)s)")
+    options.add_argument("--output", type=Path, metavar="FOLDER", help="new or empty folder (output/helix_atlas_<time>)")
+    options.add_argument("--no-plots", action="store_true", help="leave out the pictures, which need matplotlib")
+    help_text = "only write the two pictures of the guide into this folder (docs/images), replacing them"
+    options.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FOLDER", help=help_text)
+    return options
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Do the whole job."""
+    """Compute, draw and write all results."""
     if not arguments.no_plots:
-        canvas.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # raises at once if it is missing
     if arguments.docs is not None and (arguments.output is not None or arguments.no_plots):
         raise sr.ParameterError("--docs", arguments.docs, "given without --output and --no-plots")
     angles, pressure = np.radians(arguments.angles), positive_number("pressure", arguments.pressure, "Pa")
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
     limits = limit_table(angles)
     forces = force_table(test, pressure)
     figures: list[Any] = []
-    if not arguments.no_plots:  # the quick ones first, so that what is wrong is told at once
+    if not arguments.no_plots:  # the quick ones first, so that errors appear at once
         lines, grasp = helices.radius_and_pitch(angles, arguments.diameter), helices.grasp(test, pressure)
         figures = [helices.grid(arguments.contractions, angles, arguments.diameter, arguments.length), lines, grasp]
     make_folder(folder)
@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def shape_table(contractions: Sequence[float], angles: Any, diameter: float) -> helix.ShapeTable:
-    """Helices of the grid; of the paper's, also the one in two sizes."""
+    """Helices of the grid; for the grid of the paper also its helix in two sizes."""
     same_angles = np.array_equal(np.round(angles, 12), np.round(atlas.PAPER_ANGLES, 12))
     if same_angles and diameter == atlas.PAPER_DIAMETER and sorted(contractions) == sorted(atlas.PAPER_CONTRACTIONS):
         return helix.paper_grid()
@@ -109,20 +109,20 @@ FORCE_COLUMNS = ("pressure [Pa]", "deflection [m]", "unwrapping [N]", "contact [
 
 
 def limit_table(angles: Any) -> list[tuple[float, ...]]:
-    """Angle, exact limit and that of the simple rule."""
+    """Angle, exact limit and limit of the simple rule."""
     columns = (angles, helix.contraction_limit(angles), helix.simple_contraction_limit(angles))
     return list(zip(*(np.asarray(column).tolist() for column in columns), strict=True))
 
 
 def force_table(test: helix.GraspTest, pressure: float) -> list[tuple[float, ...]]:
     """Pressure, deflection, both bounds and the force, for five pressures up to the largest."""
-    found = test.force((np.arange(6) / 5.0 * pressure)[:, None])
-    columns = (found.pressure, found.deflection, found.unwrapping, found.contact, found.force)
+    forces = test.force((np.arange(6) / 5.0 * pressure)[:, None])
+    columns = (forces.pressure, forces.deflection, forces.unwrapping, forces.contact, forces.force)
     return list(zip(*(column.ravel().tolist() for column in columns), strict=True))
 
 
 def table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown."""
+    """Return a table in Markdown."""
     lines = [names, ["---"] * len(names), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
 

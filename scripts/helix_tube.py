@@ -1,9 +1,9 @@
 """Design an inflated tube that becomes a helix: actuator, template, robot description, sag and growth.
 
-Give the actuator (--contraction, --angle), or what the helix is for: an antenna (--antenna), or an object to wrap (--grasp).
-Prints a table, and writes into a new folder: the design (JSON), the robot as URDF (sections and lumped), a template of the
-unrolled tube to print to scale (SVG, whole and on pages) with its positions (CSV), the loaded shape of the lumped robot (NPZ,
-PNG, HTML scene) and the growth as an animated page (HTML).
+Give the actuator (--contraction, --angle), or a requirement: an antenna (--antenna), or an object to wrap (--grasp). Prints a
+table, and writes into a new folder: the design (JSON), the robot as URDF (sections and lumped), a template of the unrolled tube
+to print to scale (SVG, whole and on pages) with its positions (CSV), the loaded shape of the lumped robot (NPZ, PNG, HTML
+scene) and the growth as an animated page (HTML).
 """
 
 from __future__ import annotations
@@ -28,58 +28,58 @@ from softrobots.statics.loads import Load
 from softrobots.view.figures import canvas, loaded_robot
 
 PIECES = {"pinch": "pinches", "tape": "tapes", "stoppers": "gaps"}
-"""What the template counts, by method."""
+"""Names of the repeated marks of the template, by method."""
 
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    what = made.add_mutually_exclusive_group()
-    wish = ("RADIUS", "RISE", "TURNS")
-    told = "helix of a centre line of this radius [m], rise per turn [m] and number of turns"
-    what.add_argument("--antenna", type=float, nargs=3, metavar=wish, help=told)
-    told = "helix around an object of this radius [m], with this rise per turn [m] and number of turns"
-    what.add_argument("--grasp", type=float, nargs=3, metavar=wish, help=told)
-    what.add_argument("--design", type=Path, metavar="FILE", help="a design.json of an earlier run")
-    made.add_argument("--nearest", action="store_true", help="take the nearest helix that can be made if the wish cannot")
-    made.add_argument("--contraction", type=float, help="contracted over original length of the actuator, in (0, 1] (0.66)")
-    made.add_argument("--angle", type=float, metavar="DEG", help="of the actuator to the axis of the tube [degrees] (5)")
-    made.add_argument("--length", type=float, help="of the uninflated tube [m] (1.5)")
-    made.add_argument("--diameter", type=float, help="of the tube [m] (0.0331)")
-    made.add_argument("--squeeze", type=float, help="how much thinner than the object --grasp is made [m] (0)")
-    made.add_argument("--handedness", choices=helix.HANDEDNESS, help="which way the helix winds (right)")
-    made.add_argument("--pressure", type=float, default=10e3, help="gauge pressure [Pa] (%(default)g)")
-    made.add_argument("--upright", choices=("tube", "axis"), default="axis", help="what stands along z (%(default)s)")
-    made.add_argument("--sections", type=int, metavar="N", help="sections, and hinges, of the chains (about 40 degrees each)")
-    add_load(made)
-    told = "force along the tube, e.g. of wind [N/m]"
-    made.add_argument("--wind", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
-    made.add_argument(
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    purpose = options.add_mutually_exclusive_group()
+    names = ("RADIUS", "RISE", "TURNS")
+    help_text = "helix with a centre line of this radius [m], rise per turn [m] and number of turns"
+    purpose.add_argument("--antenna", type=float, nargs=3, metavar=names, help=help_text)
+    help_text = "helix around an object of this radius [m], with this rise per turn [m] and number of turns"
+    purpose.add_argument("--grasp", type=float, nargs=3, metavar=names, help=help_text)
+    purpose.add_argument("--design", type=Path, metavar="FILE", help="a design.json of an earlier run")
+    options.add_argument("--nearest", action="store_true", help="take the nearest realisable helix instead of an error")
+    options.add_argument("--contraction", type=float, help="contracted over original length of the actuator, in (0, 1] (0.66)")
+    options.add_argument("--angle", type=float, metavar="DEG", help="of the actuator to the axis of the tube [degrees] (5)")
+    options.add_argument("--length", type=float, help="of the uninflated tube [m] (1.5)")
+    options.add_argument("--diameter", type=float, help="of the tube [m] (0.0331)")
+    options.add_argument("--squeeze", type=float, help="radius of the object of --grasp minus that of the helix [m] (0)")
+    options.add_argument("--handedness", choices=helix.HANDEDNESS, help="of the helix (right)")
+    options.add_argument("--pressure", type=float, default=10e3, help="gauge pressure [Pa] (%(default)g)")
+    options.add_argument("--upright", choices=("tube", "axis"), default="axis", help="which axis points along z (%(default)s)")
+    options.add_argument("--sections", type=int, metavar="N", help="of the chains, or hinges (one for about 40 degrees)")
+    add_load(options)
+    help_text = "distributed force on the tube, e.g. of wind [N/m]"
+    options.add_argument("--wind", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    options.add_argument(
         "--spacing",
         type=float,
         default=0.02,
-        help="of the pinches along the actuator, changed a little so that whole ones fit [m] (%(default)s)",
+        help="spacing of the pinches along the actuator, adjusted to a whole number [m] (%(default)s)",
     )
-    made.add_argument("--method", choices=helix.METHODS, default="pinch", help="how the actuator is made (%(default)s)")
-    made.add_argument(
+    options.add_argument("--method", choices=helix.METHODS, default="pinch", help="fabrication of the actuator (%(default)s)")
+    options.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder of the results (output/helix_tube_<time>)"
     )
-    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
-    made.add_argument("--meshcat", action="store_true", help="serve the growth on loopback until Ctrl-C")
-    return made
+    options.add_argument("--no-plots", action="store_true", help="leave out the picture, which needs matplotlib")
+    options.add_argument("--meshcat", action="store_true", help="serve the growth on loopback until Ctrl-C")
+    return options
 
 
 def run(arguments: argparse.Namespace) -> Path:
-    """Do the whole job and return the folder of the results."""
+    """Design, solve and write all results; return their folder."""
     gravity = gravity_of(arguments)
     if not arguments.no_plots:
-        canvas.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # raises at once if it is missing
     design = _design(arguments)
     count = {} if arguments.sections is None else {"elastic_sections": arguments.sections, "hinges": arguments.sections}
     tube = sr.HelixTube.from_design(design, pressure=arguments.pressure, upright=arguments.upright, **count)
     refuse_too_large(tube, "--sections", tube.elastic_sections)
     pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method, remainder="respace")
-    # Hinges sag right with far fewer joints than sections, which are too stiff where the tube turns much along one.
+    # Hinges give the right sag with far fewer joints than sections, which are too stiff if the tube turns much along one.
     robots = {"helix_tube": tube, "helix_tube_lumped": dataclasses.replace(tube, chain="lumped")}
     model = sr.load_model(robots["helix_tube_lumped"])
     wind = None if arguments.wind is None else sr.distributed_force(model, arguments.wind)
@@ -124,16 +124,16 @@ def run(arguments: argparse.Namespace) -> Path:
 
 
 def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
-    """The design that the options ask for; options that would have no effect are refused."""
-    wished = arguments.antenna or arguments.grasp
-    source = "--design" if arguments.design else "--antenna" if arguments.antenna else "--grasp" if wished else None
+    """The design for the options; raises ParameterError for options without effect."""
+    required = arguments.antenna or arguments.grasp
+    source = "--design" if arguments.design else "--antenna" if arguments.antenna else "--grasp" if required else None
     idle = {"squeeze": arguments.grasp is None, "contraction": source is not None, "angle": source is not None}
     idle |= {"length": source is not None, "diameter": source == "--design", "handedness": source == "--design"}
     for name, has_no_effect in idle.items():
         if has_no_effect and getattr(arguments, name) is not None:
-            told = f"left out with {source}" if source and name != "squeeze" else "left out without --grasp"
-            raise sr.ParameterError(f"--{name}", getattr(arguments, name), told)
-    if arguments.nearest and not wished:
+            requirement = f"left out with {source}" if source and name != "squeeze" else "left out without --grasp"
+            raise sr.ParameterError(f"--{name}", getattr(arguments, name), requirement)
+    if arguments.nearest and not required:
         raise sr.ParameterError("--nearest", True, "given with --antenna or --grasp")
     if arguments.design is not None:
         return helix.HelixDesign.load(arguments.design)
@@ -143,16 +143,16 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
     diameter = default.diameter if arguments.diameter is None else arguments.diameter
     handedness = arguments.handedness or default.handedness
     given: dict[str, Any] = {"handedness": handedness, "on_unrealisable": "nearest" if arguments.nearest else "error"}
-    if wished:
-        radius, rise, turns = wished
+    if required:
+        radius, rise, turns = required
         given |= {"turns": turns, "diameter": diameter}
         try:
             if arguments.antenna:
                 return helix.design_antenna(radius, rise, **given)
             return helix.design_grasp(radius, rise, squeeze=arguments.squeeze or 0.0, **given)
         except sr.SelfIntersection as error:
-            told = f"{error.contact}; --nearest takes the nearest helix that can be made"
-            raise sr.SelfIntersection(told, contact=error.contact) from error
+            message = f"{error.contact}; --nearest takes the nearest helix that can be made"
+            raise sr.SelfIntersection(message, contact=error.contact) from error
     contraction = default.contraction if arguments.contraction is None else arguments.contraction
     angle = default.angle if arguments.angle is None else math.radians(arguments.angle)
     length = default.length if arguments.length is None else arguments.length
@@ -161,7 +161,7 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
 
 
 def summarise(tube: sr.HelixTube, design: helix.HelixDesign, pattern: helix.Pattern, loaded: sr.Equilibrium) -> dict[str, Any]:
-    """Collect the numbers of the table."""
+    """Return the numbers of the table."""
     model, shape = loaded.model, design.shape
     unloaded = sr.solve_equilibrium(model, ()).tip_position
     wrinkling = model.spring_groups[0].wrinkling_moment
@@ -198,7 +198,7 @@ def summarise(tube: sr.HelixTube, design: helix.HelixDesign, pattern: helix.Patt
 
 
 def table(summary: dict[str, Any]) -> str:
-    """Format the numbers for a person."""
+    """Return the numbers as a table of text."""
 
     def mm(name: str) -> str:
         return f"{1e3 * summary[name]:.1f} mm"
@@ -206,19 +206,19 @@ def table(summary: dict[str, Any]) -> str:
     pieces = f"{summary['pinches']} {PIECES[summary['method']]}"
     rows = [
         ("actuator", f"contraction {summary['contraction']:.4f} at {summary['angle_deg']:.3f} degrees"),
-        ("tube", f"{mm('diameter_m')} wide, {mm('tube_length_m')} long before it is inflated"),
+        ("tube", f"{mm('diameter_m')} wide, {mm('tube_length_m')} long uninflated"),
         (
             "helix",
             f"{summary['handedness']}-handed, {summary['turns']:.2f} turns of {mm('turn_height_m')}, {mm('height_m')} in all",
         ),
         ("radius", f"{mm('inner_radius_m')} inside, {mm('centre_radius_m')} centre line, {mm('outer_radius_m')} outside"),
         ("self-contact", summary["self_contact"]),
-        ("actuator pulls", f"{summary['actuator_tension_N']:.2f} N"),
-        ("wall twists", f"{summary['material_twist_deg_per_m']:.1f} degrees per metre of tube"),
-        ("template", f"{pieces}; their helix is off the smooth one by up to {mm('pattern_error_m')}"),
+        ("actuator tension", f"{summary['actuator_tension_N']:.2f} N"),
+        ("twist of the wall", f"{summary['material_twist_deg_per_m']:.1f} degrees per metre of tube"),
+        ("template", f"{pieces}; deviation from the smooth helix up to {mm('pattern_error_m')}"),
         ("weight", f"{summary['weight_N']:.3f} N, without the base"),
         ("tip under load", "  ".join(f"{value + 0.0:.6f}" for value in summary["tip_m"]) + " m"),
-        ("load moves it by", mm("sag_m")),
+        ("moved by the load", mm("sag_m")),
         (
             "largest moment",
             f"{summary['largest_moment_N_m']:.4f} N m of {summary['wrinkling_moment_N_m']:.4f} N m at the first wrinkle",

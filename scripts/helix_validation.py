@@ -34,22 +34,22 @@ DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--cases", type=int, default=20, help="random actuators, each in every form of the chain (%(default)s)")
-    made.add_argument("--seed", type=int, default=2026, help="seed of the random actuators (%(default)s)")
-    made.add_argument("--no-grid", action="store_true", help="leave out the grid of 120 actuators")
-    told = "largest error that passes, in metres and in radians (%(default)g)"
-    made.add_argument("--tolerance", type=float, default=1e-12, help=told)
-    told = "new or empty folder of the results (output/helix_validation_<time>)"
-    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    told = "write the picture into this folder (docs/images) too, replacing it"
-    made.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FOLDER", help=told)
-    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
-    return made
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--cases", type=int, default=20, help="number of random actuators (%(default)s)")
+    options.add_argument("--seed", type=int, default=2026, help="seed of the random actuators (%(default)s)")
+    options.add_argument("--no-grid", action="store_true", help="leave out the grid of 120 actuators")
+    help_text = "largest error that passes, in metres and in radians (%(default)g)"
+    options.add_argument("--tolerance", type=float, default=1e-12, help=help_text)
+    help_text = "new or empty folder of the results (output/helix_validation_<time>)"
+    options.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
+    help_text = "write the picture into this folder (docs/images) too, replacing it"
+    options.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FOLDER", help=help_text)
+    options.add_argument("--no-plots", action="store_true", help="leave out the picture, which needs matplotlib")
+    return options
 
 
 def run(arguments: argparse.Namespace) -> bool:
-    """Do the whole job; return whether every tube is on its helix."""
+    """Compare all tubes and write the results; return whether every tube is on its helix."""
     for option, value in (("--cases", arguments.cases), ("--seed", arguments.seed)):
         if value < 0:
             raise sr.ParameterError(option, value, "zero or more")
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> bool:
     if arguments.docs is not None and arguments.no_plots:
         raise sr.ParameterError("--docs", arguments.docs, "given without --no-plots")
     if not arguments.no_plots:
-        canvas.require_matplotlib()  # tells at once what is missing
+        canvas.require_matplotlib()  # raises at once if it is missing
     folder = free_folder(arguments.output or Path("output") / f"helix_validation_{datetime.now():%Y%m%d_%H%M%S}")
     cases = [*committed(), *([] if arguments.no_grid else grid()), *drawn(arguments.cases, arguments.seed)]
     rows = [measure(case) for case in tqdm(cases, desc="tubes", unit="tube")]
@@ -67,8 +67,8 @@ def run(arguments: argparse.Namespace) -> bool:
     print(f"\nDistance of the boundaries of the chains from the analytic helix; tolerance {arguments.tolerance:g} m and rad")
     print(f"\n{table(lines)}\n\n{'passed' if passed else 'FAILED: an error exceeds the tolerance'}")
     make_folder(folder)
-    told = {"seed": arguments.seed, "tolerance": arguments.tolerance, "passed": passed, "table": lines}
-    files = [write_text(folder / NAMES[0], json.dumps(told, indent=2) + "\n", overwrite=False)]
+    document = {"seed": arguments.seed, "tolerance": arguments.tolerance, "passed": passed, "table": lines}
+    files = [write_text(folder / NAMES[0], json.dumps(document, indent=2) + "\n", overwrite=False)]
     files.append(write_text(folder / NAMES[1], csv_of(rows), overwrite=False))
     if not arguments.no_plots:
         drawing = figure(rows, arguments.tolerance)
