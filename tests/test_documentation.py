@@ -273,6 +273,7 @@ def test_mathematics_in_docstrings_becomes_markdown(site: Callable[[str], Module
     assert "With $x^2$." in made
     assert "    ```math\n    e\n    ```" in made
     assert "math::" not in made
+    assert site("docstrings").as_markdown("in [0, length] [m]; `a] [m]`") == r"in [0, length] \[m]; `a] [m]`"
 
 
 def test_fields_of_robots_are_described_by_their_facts(site: Callable[[str], ModuleType]) -> None:

@@ -1,9 +1,7 @@
-"""Docstrings for the site: mathematics as Markdown, and fields of robots described by their facts."""
+"""Docstrings for the site: their mathematics as Markdown instead of reStructuredText, and units that are no links."""
 
 from __future__ import annotations
 
-import dataclasses
-import importlib
 import re
 import textwrap
 from typing import Any
@@ -12,34 +10,27 @@ import griffe
 
 BLOCK = re.compile(r"^([ ]*)\.\. math::(.*\n(?:(?:\1[ ]+\S.*)?\n)*)", re.MULTILINE)
 INLINE = re.compile(r":math:`([^`]+)`")
+UNIT = re.compile(r"`[^`]*`|\](\s+)\[")
+"""Code, or the place between two brackets: Markdown takes `in [0, length] [m]` for a link to `m`."""
 
 
 def as_markdown(text: str) -> str:
-    """A docstring whose `.. math::` blocks are fences of `math`, and whose `:math:` roles stand between dollar signs."""
+    """A docstring with `.. math::` blocks as fences of `math`, `:math:` roles between dollar signs, and units escaped."""
 
-    def block(found: re.Match[str]) -> str:
-        first, _, rest = found[2].partition("\n")
+    def block(match: re.Match[str]) -> str:
+        first, _, rest = match[2].partition("\n")
         lines = f"{first.strip()}\n{textwrap.dedent(rest)}".strip()
         fenced = "\n".join(["", "```math", lines, "```", "", ""])
-        return textwrap.indent(fenced, found[1], lambda line: bool(line.strip()))
+        return textwrap.indent(fenced, match[1], lambda line: bool(line.strip()))
 
-    return INLINE.sub(r"$\1$", BLOCK.sub(block, text + "\n")).rstrip()
+    plain = UNIT.sub(lambda match: match[0] if match[1] is None else rf"]{match[1]}\[", text)
+    return INLINE.sub(r"$\1$", BLOCK.sub(block, plain + "\n")).rstrip()
 
 
-class SiteDocstrings(griffe.Extension):
-    """Rewrites the mathematics of docstrings, and writes those of fields with facts."""
+class MathInDocstrings(griffe.Extension):
+    """Rewrites every docstring as it is loaded."""
 
     def on_object(self, *, obj: Any, **_: Any) -> None:
-        """Rewrite the mathematics of one docstring."""
-        if obj.docstring is not None and ("math::" in obj.docstring.value or ":math:" in obj.docstring.value):
+        """Rewrite one."""
+        if obj.docstring is not None:
             obj.docstring.value = as_markdown(obj.docstring.value)
-
-    def on_class(self, *, cls: Any, **_: Any) -> None:
-        """Describe the fields of a robot: meaning, unit, bounds and source; show their defaults as values."""
-        if "parameter(" not in cls.source and "per_part(" not in cls.source:
-            return
-        kind = getattr(importlib.import_module(cls.module.path), cls.name)
-        for field in dataclasses.fields(kind) if dataclasses.is_dataclass(kind) else ():
-            if "facts" in field.metadata and field.name in cls.members:
-                cls.members[field.name].docstring = griffe.Docstring(field.metadata["facts"].description, parent=cls)
-                cls.members[field.name].value = repr(field.default)
