@@ -27,12 +27,42 @@ settings.load_profile("repeatable")
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 
+JOBS = {
+    "study": "of scripts/: the project's own studies, tables and pages",
+    "system": "in a real browser, notebook or documentation site, or with a C compiler",
+}
+"""Marks of tests that run in jobs of their own, and what these tests are."""
+SYSTEM_FIXTURES = {"browser", "site"}
+"""Fixtures that make a test one of the system."""
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    """One thread of linear algebra for each of several test processes, as more only wait for each other; Ctrl-C works."""
+    """Leave out what has a job of its own, unless files or marks are named; one thread of linear algebra a process."""
+    for mark, meaning in JOBS.items():
+        config.addinivalue_line("markers", f"{mark}: {meaning}")
+    if config.args_source != pytest.Config.ArgsSource.ARGS and not config.option.markexpr:
+        config.option.markexpr = f"not ({' or '.join(JOBS)})"
     if getattr(config.option, "numprocesses", None):
         os.environ.setdefault("OMP_NUM_THREADS", "1")  # before the processes start
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's job in the background; ours would inherit it
+    if (
+        signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    ):  # in a shell's background job, from which Ctrl-C tests would inherit it
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Say which tests are left out."""
+    if config.option.markexpr != f"not ({' or '.join(JOBS)})":
+        return None
+    return f"left out: tests marked {' and '.join(JOBS)}, which .ci/run runs; python -m pytest tests runs all"
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest looks at marks
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that use a browser or the site; each test has one mark."""
+    for item in items:
+        if SYSTEM_FIXTURES & set(getattr(item, "fixturenames", ())) and item.get_closest_marker("study") is None:
+            item.add_marker("system")
 
 
 def pytest_collection_finish() -> None:

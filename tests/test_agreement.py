@@ -27,6 +27,8 @@ from tests.support.helix_rods import HelixRod, solve_helix_rod
 from tests.support.muscle_rods import MuscleSegment, solve_muscle_arm
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 FORMS = {"link": ("pseudo-rigid, hinge in the middle", "pseudo-rigid, hinge at l1 = 5 %", "lumped", "sections")}
 FRESH = {
     "inflatable_link_400N": ((4, 8), FORMS["link"]),

@@ -21,6 +21,8 @@ from tests.conftest import CHECKOUT, load_script
 from tests.support import rods
 from tests.support.inflated_rods import InflatedRod, product, solve_inflated_chain, turned
 
+pytestmark = pytest.mark.study
+
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005, "pressure": 50e3}
 MODULUS = 138e6
 ROD = InflatedRod.tube(young_modulus=MODULUS, **TUBE)

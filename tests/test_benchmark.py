@@ -32,6 +32,8 @@ from studies.benchmark.scipy_solvers import solvers
 from tests.conftest import CHECKOUT, load_script, missing
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 SAME = 1e-8
 """[rad]: residuals are below 1e-10 f L, 2e-9 N m, over at least 80 N m/rad, which a load can soften by a few times."""
 RECORDED = CHECKOUT / "docs" / "benchmark.json"

@@ -26,6 +26,8 @@ from tests.conftest import missing
 from tests.support.c_libraries import build_library
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.system
+
 TRIGONOMETRY = "\n\n".join(map(inspect.getsource, trigonometry.FUNCTIONS))
 EVERYTHING = f'''"""All that the language has.
 

@@ -11,6 +11,8 @@ import pytest
 import softrobots as sr
 from studies.shared.clean_checkout import copy_checkout, find_uv, make_environment
 
+pytestmark = pytest.mark.study
+
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:

@@ -19,6 +19,8 @@ from tests.conftest import missing
 from tests.support.c_libraries import build_library
 from tests.support.load_cases import cases, directions
 
+pytestmark = pytest.mark.system
+
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 SAME = 1e-12  # sine and cosine differ from libm's by an ulp; of angles of a radian and lengths of a metre
 Array = ctypes.POINTER(ctypes.c_double)

@@ -19,6 +19,8 @@ from softrobots.view.figures import equilibria, inflated_link
 from tests.conftest import CHECKOUT
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}
 
 

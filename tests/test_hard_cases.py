@@ -30,6 +30,8 @@ from tests.conftest import CHECKOUT, missing
 from tests.support.law_robots import ROBOTS, model
 from tests.support.oracles import central_difference
 
+pytestmark = pytest.mark.study
+
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 LARGEST_FORCE = 1000.0  # [N]
 

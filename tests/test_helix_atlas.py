@@ -21,6 +21,8 @@ from tests.conftest import missing
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 PICTURES = {"helix_grid.png", "helix_shapes.png", "helix_grasp.png"}
 TABLES = {"shapes.csv", "contraction_limits.csv", "grasp_forces.csv"}
 D = 0.0331

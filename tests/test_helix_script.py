@@ -14,6 +14,8 @@ from softrobots.view import animation_frames
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 
 @pytest.fixture(autouse=True)
 def light_pages(monkeypatch: pytest.MonkeyPatch) -> None:

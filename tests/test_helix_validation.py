@@ -17,6 +17,8 @@ from tests.support.helix_rods import actuator_frames
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 
 def test_it_validates_the_shipped_files_and_random_tubes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert (

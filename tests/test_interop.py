@@ -31,6 +31,8 @@ from tests.support.foreign import BRANCHED, INERTIAL, joint
 from tests.support.mujoco_balance import assert_mujoco_balances
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 FILE = urdf_folder() / "inflatable_arm.urdf"
 FILES = [urdf_folder() / f"{name}.urdf" for name in sr.ROBOTS]
 DOUBLE = ("yourdfpy", "MuJoCo", "Drake", "urchin", "ikpy", "roboticstoolbox", "viser")

@@ -24,6 +24,8 @@ from studies.mutation.mutants import (
 from tests.conftest import CHECKOUT, load_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 GENERATED = '''
 from mutmut.mutation.trampoline import wrap_in_trampoline as _mutmut_mutated
 

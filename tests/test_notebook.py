@@ -18,6 +18,8 @@ from softrobots.view.browser import find_chromium, open_browser, show_share
 from tests.conftest import CHECKOUT, missing
 from tests.support.pictures import coloured, pixels
 
+pytestmark = pytest.mark.system
+
 NOTEBOOK = CHECKOUT / "docs" / "tutorial.ipynb"
 VIEWS = ("view", "animation")
 """Cells whose last expression is the viewer."""

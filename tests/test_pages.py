@@ -26,6 +26,8 @@ from tests.conftest import CHECKOUT
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 FOLDER = CHECKOUT / "docs" / "pages"
 LIMITS = {"helix_growth": 3e6, "pcc_arm": 2e6, "inflatable_arm": 0.5e6, "ur5_bench": 2e6}
 """Pages, and how many bytes each may have: they are committed."""

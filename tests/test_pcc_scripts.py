@@ -19,6 +19,8 @@ from tests.support.oracles import central_difference
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 
 

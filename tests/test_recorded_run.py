@@ -11,6 +11,8 @@ import pytest
 import softrobots as sr
 from studies.shared.recorded_run import check_page, write_record
 
+pytestmark = pytest.mark.study
+
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:

@@ -46,6 +46,8 @@ from tests.support.oracles import PRINTED_WRINKLING_MOMENTS, central_difference,
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 Found = dict[str, tuple[Row, ...]]
 
 

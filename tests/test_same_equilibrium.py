@@ -28,6 +28,8 @@ from studies.interop.springs_read import springs_read
 from tests.conftest import CHECKOUT, load_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 ROBOTS = tuple(FORCES)
 STATIC, SIMULATED, SINGLE = 1e-9, 1e-6, 1e-3  # allowed differences [rad or m]
 Tool = Callable[[str], ModuleType]

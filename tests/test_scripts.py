@@ -14,6 +14,8 @@ from softrobots.statics.trajectory import METHODS
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 
 @pytest.mark.parametrize("method", METHODS)
 def test_ik_trajectory_with_every_method(method: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

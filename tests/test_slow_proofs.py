@@ -22,6 +22,8 @@ from tests.conftest import CHECKOUT, load_script
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 
 def test_the_page_names_tests_that_exist() -> None:
     named = re.findall(r"`(test_\w+)::(\w*)`", (CHECKOUT / "docs" / "validation.md").read_text(encoding="utf-8"))

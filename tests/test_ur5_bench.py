@@ -23,6 +23,8 @@ from tests.conftest import missing
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 ROW = TABLE_3[4]  # 50 kPa
 
 

@@ -16,6 +16,8 @@ from tests.conftest import missing
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
+pytestmark = pytest.mark.study
+
 NAME = "ur5_with_soft_arm"
 
 

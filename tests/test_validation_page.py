@@ -10,6 +10,8 @@ import pytest
 
 from tests.conftest import CHECKOUT
 
+pytestmark = pytest.mark.study
+
 FOLDER = CHECKOUT / "docs" / "validation"
 
 
