@@ -46,7 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("OMP_NUM_THREADS", "1")  # before the processes start
     if (
         signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    ):  # in a shell's background job, from which Ctrl-C tests would inherit it
+    ):  # a shell's job in the background; ours would inherit it
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
