@@ -44,9 +44,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.markexpr = f"not ({' or '.join(JOBS)})"
     if getattr(config.option, "numprocesses", None):
         os.environ.setdefault("OMP_NUM_THREADS", "1")  # before the processes start
-    if (
-        signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    ):  # a shell's job in the background; ours would inherit it
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's job in the background; ours would inherit it
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

@@ -100,7 +100,7 @@ def test_lines_and_objects_say_what_is_wanted(line: str, expected: Wanted) -> No
         ("reset 3", "without anything else"),
         ("quit now", "without anything else"),
         ('{"target": [1, 2, 3]', "no JSON object"),
-        ('{"target": [1, 2, NaN]}', "NaN is no number"),
+        ('{"target": [1, 2, NaN]}', "NaN is not a number"),
         ('{"target": "far"}', "target"),
         ('{"target": ["1", "2", "x"]}', "finite numbers"),
         ('{"target": [1, "2", null]}', "target"),
