@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import softrobots as sr
-from softrobots.cli.options.command_line import exit_status, serve
+from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import free_folder, make_folder
 from softrobots.view.served_page import LOOPBACK, tunnel_to
+from studies.command_line import serve
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MARK = ".softrobots-site"

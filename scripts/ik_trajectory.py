@@ -16,11 +16,12 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, serve, tell_written
+from softrobots.cli.options.command_line import add_load, exit_status, gravity_of
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import METHODS
 from softrobots.view.figures import canvas, trajectories
+from studies.command_line import serve, tell_written
 from studies.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 
 LINE = {"start": START, "end": END, "duration": DURATION, "steps": STEPS}

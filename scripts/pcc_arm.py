@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 
 import softrobots as sr
-from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large, serve, tell_written
+from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.robots.pcc_arm import CHAINS
 from softrobots.statics.loads import Load
 from softrobots.view.figures import canvas, loaded_robot
+from studies.command_line import serve, tell_written
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 """The default muscle lengths [m]."""

@@ -12,10 +12,11 @@ import sys
 from pathlib import Path
 
 import softrobots as sr
-from softrobots.cli.options.command_line import exit_status, tell_written
+from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.core.progress import with_progress
 from softrobots.view.figures import canvas
+from studies.command_line import tell_written
 from studies.papers import rendering
 from studies.papers.curves import write_curves
 from studies.papers.pictures import PICTURES

@@ -18,11 +18,12 @@ import numpy as np
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.cli.options.command_line import add_gravity, add_resume, blocks_beside, exit_status, gravity_of
+from softrobots.cli.options.command_line import add_gravity, exit_status, gravity_of
 from softrobots.compiled import sweeps
 from softrobots.core.checks import finite_number, positive_integer, positive_number
 from softrobots.core.files import new_file
 from softrobots.view.figures import canvas, workspaces
+from studies.command_line import add_resume, blocks_beside
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images" / "workspace_map.png"
 CELLS = {"plane": 160, "box": 19}

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.cli.options.command_line import blocks_beside
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace, mapping
 from softrobots.core.checkpoint import CASE, Checkpoint, discard
 from softrobots.statics import workspace
+from studies.command_line import blocks_beside
 from tests.conftest import CHECKOUT
 from tests.support.load_cases import fingerprint
 from tests.support.scripts import run_script

@@ -19,6 +19,7 @@ import softrobots as sr
 from softrobots import export, inflated_beam
 from softrobots.cli.options import command_line
 from softrobots.description import composition
+from studies.command_line import add_resume, serve
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.laws import law
 
@@ -216,7 +217,6 @@ def test_a_table_of_a_trajectory_is_its_way(side: float, height: float, steps: i
     "cli.options.command_line.add_load",
     "cli.options.command_line.add_gravity",
     "cli.options.command_line.gravity_of",
-    "cli.options.command_line.add_resume",
 )
 @settings(max_examples=30)
 @given(
@@ -227,7 +227,7 @@ def test_a_table_of_a_trajectory_is_its_way(side: float, height: float, steps: i
 def test_options_give_back_the_numbers_that_were_typed(numbers: list[float], gravity: str | None, resume: bool) -> None:
     parser = argparse.ArgumentParser()
     command_line.add_load(parser, (0.0, 0.0, -1.0))
-    command_line.add_resume(parser)
+    add_resume(parser)
     other = argparse.ArgumentParser()
     command_line.add_gravity(other)
     typed = [f"{number!r}" for number in numbers]
@@ -254,7 +254,6 @@ class _Page:
     "cli.options.command_line.exit_status",
     "cli.options.command_line.refuse_too_large",
     "cli.options.command_line.address_lines",
-    "cli.options.command_line.serve",
 )
 @settings(max_examples=30)
 @given(st.text(st.characters(categories=["L", "N", "P"]), min_size=1), st.integers(1, 10_000), st.integers(1, 65_535))
@@ -279,4 +278,4 @@ def test_the_exit_status_tells_what_kind_of_end_it_was(text: str, joints: int, p
     lines = command_line.address_lines(page)
     assert page.url in lines[0]
     assert page.tunnel in lines[1]
-    assert command_line.exit_status(lambda: command_line.serve(page)) == 0
+    assert command_line.exit_status(lambda: serve(page)) == 0

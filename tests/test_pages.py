@@ -16,12 +16,13 @@ import pytest
 import softrobots as sr
 from softrobots.robots import HelixTube
 from softrobots.view import browser as view_browser
-from softrobots.view.browser import show_share, take_animation
+from softrobots.view.browser import show_share
 from softrobots.view.meshcat_page.page_commands import RESOLUTION, packed, read_page, tidied, unpacked
 from softrobots.view.meshcat_page.page_text import page_text, scene_of
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.viewer import view
 from studies.gallery.scenes import EXHIBITS
+from studies.moving_picture import take_animation
 from tests.conftest import CHECKOUT
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
