@@ -92,8 +92,8 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
         (["urdf", "inflatable_arm", "--check", "three"], "unrecognized arguments: three\n"),
         (["urdf", "inflatable_arm", "--chekc"], "unrecognized arguments: --chekc (did you mean '--check'?)"),
         (["urdf", "inflatable_arm", "--over"], "unrecognized arguments: --over"),  # options in full
-        (["urdf", "inflatable_arm", "radius=3"], "radius=3; parameters of the robot stand behind --set: --set NAME=VALUE"),
-        (["export", "inflatable_arm", "-o", "arm.xml", "radius=3"], "stand behind --set"),
+        (["urdf", "inflatable_arm", "radius=3"], "radius=3; parameters of the robot follow --set: --set NAME=VALUE"),
+        (["export", "inflatable_arm", "-o", "arm.xml", "radius=3"], "follow --set"),
         (["urdf", "inflatable_arm", "--set", "radius"], "'radius': NAME=VALUE is required"),
         (["urdf", "--set", "radius=3", "inflatable_arm"], "'inflatable_arm': NAME=VALUE is required, and ROBOT before --set"),
         (["urdf", "inflatable_arm", "--set", "=3"], "'=3': NAME=VALUE is required"),

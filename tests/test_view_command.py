@@ -372,7 +372,7 @@ def test_results_that_cannot_be_shown_or_moved(arm: sr.SoftModel, tmp_path: Path
     sr.save_result(sr.follow_trajectory(arm, [(0.8, 0.1, 0.2), (0.8, 0.2, 0.2)]), tmp_path / "path.npz")
     for option in (["--live", "keyboard"], ["--sliders"]):
         assert main(["view", "--result", str(tmp_path / "path.npz"), *option]) == 2
-        assert "no trajectory where" in capsys.readouterr().err
+        assert "no trajectory with" in capsys.readouterr().err
 
 
 def test_no_answer_ends_with_status_one(capsys: pytest.CaptureFixture) -> None:

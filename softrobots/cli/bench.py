@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
+from softrobots.cli.reports.answers import add_json, aligned, print_answer, written_lines
 from softrobots.compiled.run.compiled_model import CompiledModel, compile_model
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file, write_text
@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.output is not None:
         files.append(write_text(arguments.output, json.dumps(answer, indent=1) + "\n", overwrite=arguments.overwrite))
     head = f"{', '.join(f'{name} {value}' for name, value in machine.items())}; compiled by {compiled.backend}"
-    tell(arguments, answer, [head, "", *aligned(table), *written_lines(files)])
+    print_answer(arguments, answer, [head, "", *aligned(table), *written_lines(files)])
 
 
 def prepare_jobs(model: SoftModel, compiled: CompiledModel, count: int) -> Mapping[str, Job]:

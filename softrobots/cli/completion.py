@@ -1,4 +1,4 @@
-"""`softrobots completion`: the script with which a shell completes the command."""
+"""`softrobots completion`: the script that lets a shell complete the command."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from softrobots.robots import ROBOTS
 
 SHELLS = ("bash", "zsh", "tcsh")
-"""The shells that are known."""
+"""The supported shells."""
 
 _EXAMPLES = """examples:
   source <(softrobots completion bash)                                                  bash, this session

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import softrobots
-from softrobots.cli.reports.answers import add_json, aligned, tell
+from softrobots.cli.reports.answers import add_json, aligned, print_answer
 from softrobots.cli.tools.checks import row_problems
 from softrobots.cli.tools.kinematics import KinematicsRow, compare_kinematics
 from softrobots.cli.tools.known_tools import installed_tools
@@ -29,9 +29,9 @@ def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
     parser = subparsers.add_parser(
         "doctor",
-        help="tell what is installed, and whether files and tools agree",
-        description="Tell which packages are installed and which extras are complete, whether the page of the viewer can be "
-        "served (a server is started on loopback, asked for its page and ended), whether the shipped URDF files are what xacro "
+        help="show what is installed, and whether files and tools agree",
+        description="Show which packages are installed and which extras are complete, whether the page of the viewer can be "
+        "served (by a server on loopback that is started and ended), whether the shipped URDF files are what xacro "
         "generates, and how far yourdfpy's kinematics of them is from Pinocchio's. Exit status 0 if all that is required is "
         "fine, 1 if not.",
     )
@@ -41,14 +41,14 @@ def add_parser(subparsers: Any) -> None:
 
 
 class _Report(NamedTuple):
-    """What is found out, step by step."""
+    """The findings so far."""
 
     answer: dict[str, Any]
     """For a machine."""
     lines: list[str]
     """For a person."""
     wrong: list[str]
-    """What is required and not fine."""
+    """Required things that are wrong."""
 
     def add(self, title: str, rows: Sequence[tuple[str, ...]]) -> None:
         """Add a table."""
@@ -57,7 +57,7 @@ class _Report(NamedTuple):
 
 
 def run(arguments: argparse.Namespace) -> bool:
-    """Print the report; return whether all that is required is there and right."""
+    """Print the report; return False if something required is missing or wrong."""
     report = _Report({}, [], [])
     folder = _places(report)
     _packages(report)
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> bool:
         _kinematics(folder, installed_tools() if arguments.all else ("yourdfpy",), report)
     report.answer.update(wrong=report.wrong, ok=not report.wrong)
     end = ["wrong:", *(f"  {text}" for text in report.wrong)] if report.wrong else ["all well"]
-    tell(arguments, report.answer, [*report.lines, "", *end])
+    print_answer(arguments, report.answer, [*report.lines, "", *end])
     return not report.wrong
 
 
@@ -83,16 +83,16 @@ def _places(report: _Report) -> Path | None:
         return None
     browser: str | None = None
     try:
-        browser = told = find_chromium()
+        browser = browser_text = find_chromium()
     except ViewerError as error:
-        told = f"none, so no pictures of the viewer: {error}"
+        browser_text = f"none, so no pictures of the viewer: {error}"
     cache, kept = cache_folder(), cache_is_kept()
     lost = "" if kept else "; for this process alone: the folder for caches cannot be written"
     compiled = f"{cache} (compiled solvers, by {available_backend()}{lost})"
     package = Path(softrobots.__file__).parent
     places = {"package": package, "xacro": xacro, "urdf": urdf, "browser": browser, "cache": cache}
     report.answer.update(places=places, cache_writable=kept, backend=available_backend())
-    report.add("", [(name, str(where)) for name, where in (places | {"browser": told, "cache": compiled}).items()])
+    report.add("", [(name, str(where)) for name, where in (places | {"browser": browser_text, "cache": compiled}).items()])
     return urdf
 
 
@@ -119,7 +119,7 @@ def _packages(report: _Report) -> None:
 
 
 def _page(report: _Report) -> None:
-    """Whether the page of the viewer can be served: start a server, ask it for its page, end it."""
+    """Whether the page of the viewer can be served: start a server, request its page, end it."""
     url, problem = "", ""
     try:
         server, _, url = start_server()
@@ -149,7 +149,7 @@ def _fetch(url: str) -> str:
 
 
 def _files(folder: Path, report: _Report) -> None:
-    """The shipped URDF files against xacro."""
+    """Whether the shipped URDF files are those that xacro generates."""
     from tqdm import tqdm
 
     rows = report.answer["urdf_files"] = []
@@ -162,7 +162,7 @@ def _files(folder: Path, report: _Report) -> None:
 
 
 def _kinematics(folder: Path, tools: Sequence[str], report: _Report) -> None:
-    """Where the tools put the links of the shipped files."""
+    """Where the tools place the links of the shipped files."""
     from tqdm import tqdm
 
     rows: list[KinematicsRow] = []

@@ -8,7 +8,7 @@ from typing import Any
 
 from softrobots.cli.options.command_line import add_gravity, gravity_of
 from softrobots.cli.options.robot_argument import add_model, model_of, motors_of, source_of
-from softrobots.cli.reports.answers import add_json, tell
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.files import new_file
 from softrobots.export.damping import DAMPING
 from softrobots.export.formats import FORMATS, export_model, guess_format
@@ -34,16 +34,16 @@ def add_parser(subparsers: Any) -> None:
     )
     add_model(parser)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="the file to write (required)")
-    told = "; ".join(f"{name} ({row.suffix}): {row.meaning}" for name, row in FORMATS.items())
-    parser.add_argument("--format", choices=FORMATS, help=f"{told}. By default what the suffix of FILE says")
+    help_text = "; ".join(f"{name} ({row.suffix}): {row.meaning}" for name, row in FORMATS.items())
+    parser.add_argument("--format", choices=FORMATS, help=f"{help_text} (by the suffix of FILE)")
     parser.add_argument(
         "--motors", type=float, nargs="+", metavar="Q", help="motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
     )
     parser.add_argument(
         "--welded", action="store_true", help="fix the motors where they are, put tensions of muscles into the springs"
     )
-    told = "of the springs: critical for the slowest mode, or that of the file (critical)"
-    parser.add_argument("--damping", choices=DAMPING, help=told)
+    help_text = "damping of the springs: critical for the slowest mode, or that of the file (critical)"
+    parser.add_argument("--damping", choices=DAMPING, help=help_text)
     add_gravity(parser)
     parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
@@ -51,15 +51,15 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Write the file, and tell what was written."""
+    """Write the file, and print what was written."""
     name = arguments.format or guess_format(arguments.output)
-    given = {
+    chosen = {
         "actuators": "welded" if arguments.welded else None,
         "damping": arguments.damping,
         "gravity": gravity_of(arguments),
     }
-    options = {option: value for option, value in given.items() if value is not None}
-    new_file(arguments.output, overwrite=arguments.overwrite)  # tells at once
+    options = {option: value for option, value in chosen.items() if value is not None}
+    new_file(arguments.output, overwrite=arguments.overwrite)  # refused before the work
     source = source_of(arguments)
     if "robot" in FORMATS[name].options and isinstance(source, XacroRobot):
         options["robot"] = source  # for the sources of its numbers
@@ -73,4 +73,4 @@ def run(arguments: argparse.Namespace) -> None:
     answer = {"files": [path], "robot": model.pinocchio.name, "format": name, **counts, "welded": arguments.welded}
     sections = f"{counts['sections']} sections, " if counts["sections"] else ""
     kept = f"{sections}{counts['springs']} springs, {model.n_motors}{' welded' if arguments.welded else ''} actuators"
-    tell(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])
+    print_answer(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])

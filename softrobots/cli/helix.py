@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 
 from softrobots import helix
-from softrobots.cli.options.plot_option import add_plot, check_plot, write_plot
-from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
-from softrobots.cli.reports.facts import Fact, answer_of, lines_of
-from softrobots.cli.reports.tube_facts import tube_facts
+from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
+from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, lines_of, print_answer, written_lines
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
 from softrobots.helix.template import write_template
@@ -46,17 +44,17 @@ def add_parser(subparsers: Any) -> None:
     forms = parser.add_subparsers(dest="form", metavar="FORM", required=True, title="forms")
 
     forward = _form(forms, "forward", _forward, "actuator -> helix")
-    told = "contracted over original length of the actuator, in (0, 1] [-] (%(default)s)"
-    forward.add_argument("--contraction", type=float, default=HelixTube.contraction, metavar="C", help=told)
-    told = f"of the actuator to the axis of the tube, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
-    forward.add_argument("--angle", type=float, default=HelixTube.angle, metavar="A", help=told)
+    help_text = "contracted over original length of the actuator, in (0, 1] [-] (%(default)s)"
+    forward.add_argument("--contraction", type=float, default=HelixTube.contraction, metavar="C", help=help_text)
+    help_text = f"angle of the actuator to the axis of the tube, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
+    forward.add_argument("--angle", type=float, default=HelixTube.angle, metavar="A", help=help_text)
     _add_diameter(forward)
 
     inverse = _form(forms, "inverse", _inverse, "helix -> actuator")
-    told = "radius of the path opposite the actuator [m] (required)"
-    inverse.add_argument("--outer-radius", type=float, required=True, metavar="R", help=told)
-    told = "radius of the path of the actuator, negative beyond the axis of the helix [m] (required)"
-    inverse.add_argument("--inner-radius", type=float, required=True, metavar="R", help=told)
+    help_text = "radius of the path opposite the actuator [m] (required)"
+    inverse.add_argument("--outer-radius", type=float, required=True, metavar="R", help=help_text)
+    help_text = "radius of the path of the actuator, negative beyond the axis of the helix [m] (required)"
+    inverse.add_argument("--inner-radius", type=float, required=True, metavar="R", help=help_text)
     rise = inverse.add_mutually_exclusive_group(required=True)
     rise.add_argument(
         "--pitch", type=float, metavar="B", help="rise per turn angle [m/rad] (this or --turn-height is required)"
@@ -64,32 +62,32 @@ def add_parser(subparsers: Any) -> None:
     rise.add_argument("--turn-height", type=float, metavar="H", help="rise of a whole turn, 2 pi times the pitch [m]")
 
     measure = _form(forms, "measure", _measure, "lengths of both paths, as a tape measures them -> helix, actuator")
-    told = "length of the path opposite the actuator [m] (required)"
-    measure.add_argument("--outer-arc", type=float, required=True, metavar="L", help=told)
+    help_text = "length of the path opposite the actuator [m] (required)"
+    measure.add_argument("--outer-arc", type=float, required=True, metavar="L", help=help_text)
     measure.add_argument("--inner-arc", type=float, required=True, metavar="L", help="length of the actuator [m] (required)")
     measure.add_argument("--turns", type=float, default=1.0, metavar="N", help="turns that were measured [-] (%(default)g)")
     _add_diameter(measure)
 
-    design = _form(forms, "design", _design, "what the helix is for -> actuator and length of the tube")
-    wish, names = design.add_mutually_exclusive_group(required=True), ("RADIUS", "RISE", "TURNS")
-    told = (
+    design = _form(forms, "design", _design, "purpose of the helix -> actuator and length of the tube")
+    purpose, names = design.add_mutually_exclusive_group(required=True), ("RADIUS", "RISE", "TURNS")
+    help_text = (
         "helix whose centre line has this radius [m], rise per turn [m] and number of turns [-] (this or --grasp is required)"
     )
-    wish.add_argument("--antenna", type=float, nargs=3, metavar=names, help=told)
-    told = "helix around an object of this radius [m], with this rise per turn [m] and number of turns [-]"
-    wish.add_argument("--grasp", type=float, nargs=3, metavar=names, help=told)
-    told = "how much thinner than the object the helix of --grasp is made [m] (0)"
-    design.add_argument("--squeeze", type=float, metavar="S", help=told)
-    told = "take the nearest helix that can be made if the wish cannot (refuse it)"
-    design.add_argument("--nearest", action="store_true", help=told)
+    purpose.add_argument("--antenna", type=float, nargs=3, metavar=names, help=help_text)
+    help_text = "helix around an object of this radius [m], with this rise per turn [m] and number of turns [-]"
+    purpose.add_argument("--grasp", type=float, nargs=3, metavar=names, help=help_text)
+    help_text = "by how much the radius of the helix of --grasp is smaller than that of the object [m] (0)"
+    design.add_argument("--squeeze", type=float, metavar="S", help=help_text)
+    help_text = "take the nearest helix without self-contact if the required one touches itself (an error)"
+    design.add_argument("--nearest", action="store_true", help=help_text)
     _add_diameter(design)
     design.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="save the design in a new file (none)")
-    told = "draw the unrolled tube to scale, with where to pinch it, into a new file (none)"
-    design.add_argument("--template", type=Path, metavar="FILE.svg", help=told)
-    told = "of the pinches along the actuator, changed a little so that whole ones fit [m] (%(default)s)"
-    design.add_argument("--spacing", type=float, default=0.02, metavar="S", help=told)
-    told = "how the actuator is made (%(default)s)"
-    design.add_argument("--method", choices=helix.METHODS, default=helix.METHODS[0], help=told)
+    help_text = "draw the unrolled tube to scale, with where to pinch it, into a new file (none)"
+    design.add_argument("--template", type=Path, metavar="FILE.svg", help=help_text)
+    help_text = "spacing of the pinches along the actuator, adjusted to a whole number of them [m] (%(default)s)"
+    design.add_argument("--spacing", type=float, default=0.02, metavar="S", help=help_text)
+    help_text = "how the actuator is fabricated (%(default)s)"
+    design.add_argument("--method", choices=helix.METHODS, default=helix.METHODS[0], help=help_text)
 
     limit = forms.add_parser(
         "limit",
@@ -98,26 +96,26 @@ def add_parser(subparsers: Any) -> None:
         "the rule that a turn rises by a diameter. It does not depend on the diameter.",
         epilog=_JSON,
     )
-    told = f"of the actuator to the axis of the tube, one or more, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
-    limit.add_argument("--angle", type=float, nargs="+", default=[HelixTube.angle], metavar="A", help=told)
+    help_text = f"angle of the actuator to the axis of the tube, one or more, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
+    limit.add_argument("--angle", type=float, nargs="+", default=[HelixTube.angle], metavar="A", help=help_text)
     _add_diameter(limit)
     add_plot(limit, "radius and pitch over contraction with the limits (up to three angles, above 0 and at most pi/4)")
     add_json(limit)
     limit.set_defaults(run=_limit)
 
 
-def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], told: str) -> argparse.ArgumentParser:
-    """A parser with what all forms have that end in a helix."""
+def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summary: str) -> argparse.ArgumentParser:
+    """Add a form that ends in a helix, with the options that all of them have."""
     parser: argparse.ArgumentParser = forms.add_parser(
-        name, help=told, description=f"Helical actuation in closed form: {told}.", epilog=_JSON
+        name, help=summary, description=f"Helical actuation in closed form: {summary}.", epilog=_JSON
     )
     if name != "design":
-        told = "of the uninflated tube, for turns, height and volume [m] (%(default)s)"
-        parser.add_argument("--length", type=float, default=HelixTube.length, metavar="L", help=told)
-    told = "gauge pressure, for the tension of the actuator [Pa] (%(default)g)"
-    parser.add_argument("--pressure", type=float, default=HelixTube.pressure, metavar="P", help=told)
-    told = "which way the helix winds (%(default)s)"
-    parser.add_argument("--handedness", choices=helix.HANDEDNESS, default=HelixTube.handedness, help=told)
+        help_text = "length of the uninflated tube, for turns, height and volume [m] (%(default)s)"
+        parser.add_argument("--length", type=float, default=HelixTube.length, metavar="L", help=help_text)
+    help_text = "gauge pressure, for the tension of the actuator [Pa] (%(default)g)"
+    parser.add_argument("--pressure", type=float, default=HelixTube.pressure, metavar="P", help=help_text)
+    help_text = "handedness of the helix (%(default)s)"
+    parser.add_argument("--handedness", choices=helix.HANDEDNESS, default=HelixTube.handedness, help=help_text)
     add_plot(parser, "the tube")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -125,8 +123,8 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], told
 
 
 def _add_diameter(parser: argparse.ArgumentParser) -> None:
-    told = "of the tube [m] (%(default)s)"
-    parser.add_argument("--diameter", type=float, default=HelixTube.diameter, metavar="D", help=told)
+    help_text = "diameter of the tube [m] (%(default)s)"
+    parser.add_argument("--diameter", type=float, default=HelixTube.diameter, metavar="D", help=help_text)
 
 
 def _forward(arguments: argparse.Namespace) -> None:
@@ -134,7 +132,7 @@ def _forward(arguments: argparse.Namespace) -> None:
     check_plot(arguments)
     shape = helix.forward(arguments.contraction, arguments.angle, arguments.diameter)
     actuator = helix.Actuator(*map(np.asarray, (arguments.contraction, arguments.angle, arguments.diameter)))
-    _answer(arguments, tube_facts(shape, actuator, arguments.length, arguments.pressure, arguments.handedness))
+    _answer(arguments, _tube_facts(shape, actuator, arguments.length, arguments.pressure, arguments.handedness))
 
 
 def _inverse(arguments: argparse.Namespace) -> None:
@@ -152,16 +150,16 @@ def _measure(arguments: argparse.Namespace) -> None:
 
 
 def _of_shape(arguments: argparse.Namespace, shape: helix.HelixShape) -> None:
-    facts = tube_facts(shape, helix.inverse(shape), arguments.length, arguments.pressure, arguments.handedness)
+    facts = _tube_facts(shape, helix.inverse(shape), arguments.length, arguments.pressure, arguments.handedness)
     _answer(arguments, facts)
 
 
 def _design(arguments: argparse.Namespace) -> None:
-    """A wish to actuator and tube."""
+    """Required helix to actuator and tube."""
     check_plot(arguments)
     for path in (arguments.output, arguments.template):
         if path is not None:
-            new_file(path, overwrite=arguments.overwrite)  # tells at once
+            new_file(path, overwrite=arguments.overwrite)  # refused before the work
     if arguments.squeeze is not None and arguments.grasp is None:
         raise ParameterError("--squeeze", arguments.squeeze, "left out without --grasp")
     design = _designed(arguments)
@@ -169,12 +167,12 @@ def _design(arguments: argparse.Namespace) -> None:
     if arguments.template is not None:
         pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method, remainder="respace")
     actuator = helix.Actuator(*map(np.asarray, (design.contraction, design.angle, design.diameter)))
-    facts = tube_facts(design.shape, actuator, design.tube_length, arguments.pressure, design.handedness)
+    facts = _tube_facts(design.shape, actuator, design.tube_length, arguments.pressure, design.handedness)
     deviation = design.deviation
     if deviation is not None:
-        off = (round(part, 12) + 0.0 for part in deviation[:2])  # rounding is not worth telling
-        told = {"radius_deviation": "radius, less the wish", "turn_height_deviation": "rise of a turn, less the wish"}
-        facts += [Fact(name, part, "m", text) for part, (name, text) in zip(off, told.items(), strict=True)]
+        off = (round(part, 12) + 0.0 for part in deviation[:2])  # without rounding errors
+        labels = {"radius_deviation": "radius, less the required", "turn_height_deviation": "rise of a turn, less the required"}
+        facts += [Fact(name, part, "m", text) for part, (name, text) in zip(off, labels.items(), strict=True)]
     files: list[Path] = []
     if arguments.output is not None:
         files.append(design.save(arguments.output, overwrite=arguments.overwrite))
@@ -188,9 +186,9 @@ def _design(arguments: argparse.Namespace) -> None:
 
 
 def _designed(arguments: argparse.Namespace) -> helix.HelixDesign:
-    """The design that the options ask for."""
+    """The design of --antenna or --grasp."""
     radius, rise, turns = arguments.antenna or arguments.grasp
-    given: dict[str, Any] = {
+    options: dict[str, Any] = {
         "diameter": arguments.diameter,
         "turns": turns,
         "handedness": arguments.handedness,
@@ -198,11 +196,11 @@ def _designed(arguments: argparse.Namespace) -> helix.HelixDesign:
     }
     try:
         if arguments.antenna:
-            return helix.design_antenna(radius, rise, **given)
-        return helix.design_grasp(radius, rise, squeeze=arguments.squeeze or 0.0, **given)
+            return helix.design_antenna(radius, rise, **options)
+        return helix.design_grasp(radius, rise, squeeze=arguments.squeeze or 0.0, **options)
     except SelfIntersection as error:
-        told = f"{error.contact}; --nearest takes the nearest helix that can be made"
-        raise SelfIntersection(told, contact=error.contact) from error
+        message = f"{error.contact}; --nearest takes the nearest helix that does not touch itself"
+        raise SelfIntersection(message, contact=error.contact) from error
 
 
 def _limit(arguments: argparse.Namespace) -> None:
@@ -224,7 +222,7 @@ def _limit(arguments: argparse.Namespace) -> None:
     written = write_plot(arguments, draw)
     rows = [("angle [rad]", "smallest contraction [-]", "by the simple rule [-]")]
     rows += [tuple(f"{number:.6f}" for number in row) for row in zip(arguments.angle, exact, simple, strict=True)]  # type: ignore[misc]
-    tell(arguments, answer_of(facts) | {"files": written}, [*aligned(rows), *written_lines(written)])
+    print_answer(arguments, answer_of(facts) | {"files": written}, [*aligned(rows), *written_lines(written)])
 
 
 def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Path] = ()) -> None:
@@ -238,4 +236,51 @@ def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Pa
         return helices.grid(share, tilt, float(values["diameter"]), values["length"], values["handedness"])
 
     written = [*files, *write_plot(arguments, draw)]
-    tell(arguments, answer_of(facts) | {"files": written}, [*lines_of(facts), *written_lines(written)])
+    print_answer(arguments, answer_of(facts) | {"files": written}, [*lines_of(facts), *written_lines(written)])
+
+
+def _tube_facts(
+    shape: helix.HelixShape, actuator: helix.Actuator, length: float, pressure: float, handedness: str
+) -> list[Fact]:
+    """Facts of a tube of an uninflated length [m] at a gauge pressure [Pa], by its helix and its actuator."""
+    contraction, angle, diameter = actuator
+    turns = helix.turns(shape, angle, length)
+    contact = helix.self_contact(shape, turns)
+    facts = [
+        Fact("contraction", contraction, "-", "contraction of the actuator"),
+        Fact("angle", angle, "rad", "angle of the actuator"),
+        Fact("diameter", diameter, "m", "diameter of the tube"),
+        Fact("length", length, "m", "length of the uninflated tube"),
+        Fact("handedness", handedness, "", "handedness"),
+        Fact("outer_radius", shape.outer_radius, "m", "outer radius of the helix"),
+        Fact("centre_radius", shape.centre_radius, "m", "radius of its centre line"),
+        Fact("inner_radius", shape.inner_radius, "m", "inner radius"),
+        Fact("pitch", shape.pitch, "m/rad", "pitch"),
+        Fact("turn_height", shape.turn_height, "m", "rise of a turn"),
+        Fact("turns", turns, "-", "turns"),
+        Fact("height", helix.height(shape, angle, length), "m", "height"),
+        Fact("centre_length", helix.centre_length(contraction, angle, length), "m", "length of the centre line"),
+        Fact("volume", helix.volume(contraction, angle, diameter, length), "m^3", "volume"),
+    ]
+    for path in ("outer", "centre", "inner"):
+        curvature, torsion = helix.actuator_curvature_torsion(contraction, angle, diameter, path, handedness)
+        facts += [
+            Fact(f"{path}_curvature", curvature, "1/m", f"curvature of the {path} path"),
+            Fact(f"{path}_torsion", torsion, "1/m", f"torsion of the {path} path"),
+        ]
+    return [
+        *facts,
+        Fact("material_twist", helix.material_twist(contraction, angle, diameter, handedness), "rad/m", "twist of the wall"),
+        Fact("pressure", pressure, "Pa", "gauge pressure"),
+        Fact(
+            "actuator_tension",
+            helix.actuator_tension(contraction, angle, diameter, pressure),
+            "N",
+            "tension of the actuator",
+        ),
+        Fact(
+            "contraction_limit", helix.contraction_limit(angle), "-", "smallest contraction without self-contact, endless tube"
+        ),
+        Fact("touches", contact.touches, "", "runs into itself"),
+        Fact("contact", contact.describe(), "", "self-contact"),
+    ]

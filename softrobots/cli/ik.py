@@ -9,10 +9,9 @@ from typing import Any
 import pinocchio as pin
 
 from softrobots.cli.options.load_argument import add_loads, loads_of
-from softrobots.cli.options.plot_option import add_plot, check_plot, shape_figure, write_plot
-from softrobots.cli.options.result_file import add_output, check_output, save
+from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, shape_figure, write_plot
 from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
-from softrobots.cli.reports.answers import add_json, tell, written_lines
+from softrobots.cli.reports.answers import add_json, print_answer, written_lines
 from softrobots.cli.reports.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
@@ -39,36 +38,36 @@ def add_parser(subparsers: Any) -> None:
         "ik",
         help="find motors that put the loaded tip at a target, or along a path",
         description="Find motor coordinates at which the loaded, deformed tip is at a target, or follows waypoints. Of the "
-        "solutions found it tells the one that changes the start least, and the others. Exit status 0 if every target is "
+        "solutions found it prints the one that changes the start least, and the others. Exit status 0 if every target is "
         "reached, 1 if not, 2 after bad input.",
         epilog=_EXAMPLES,
     )
     add_model(parser)
     what = parser.add_mutually_exclusive_group(required=True)
-    told = "position of the loaded tip, world axes [m] (this or --waypoints is required)"
-    what.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
-    told = "CSV file of positions of the loaded tip, columns t, x, y, z [s, m]; without t 0.05 s apart"
-    what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=told)
+    help_text = "position of the loaded tip, world axes [m] (this or --waypoints is required)"
+    what.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    help_text = "CSV file of positions of the loaded tip, columns t, x, y, z [s, m]; without t 0.05 s apart"
+    what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=help_text)
     how = parser.add_mutually_exclusive_group()
-    told = "direction of the tip's z axis at --target, of any length [-] (any direction)"
-    how.add_argument("--orientation", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
-    told = "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)"
-    how.add_argument("--rpy", type=float, nargs=3, metavar=("R", "P", "Y"), help=told)
+    help_text = "direction of the tip's z axis at --target, of any length [-] (any direction)"
+    how.add_argument("--orientation", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    help_text = "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)"
+    how.add_argument("--rpy", type=float, nargs=3, metavar=("R", "P", "Y"), help=help_text)
     add_loads(parser)
-    told = "where the search starts: motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
-    parser.add_argument("--start", type=float, nargs="+", metavar="Q", help=told)
-    told = (
+    help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+    parser.add_argument("--start", type=float, nargs="+", metavar="Q", help=help_text)
+    help_text = (
         "side of the last motor joint, above or below the line from the first one to the tip; of a path at its start (either)"
     )
-    parser.add_argument("--elbow", choices=ELBOWS, help=told)
-    told = "how springs settle: newton, or fixed_point, the paper's; paper: its closed loop, for --waypoints (%(default)s)"
-    parser.add_argument("--method", choices=METHODS, default="newton", help=told)
-    told = f"largest distance of the tip from a target [m] ({POSITION_TOLERANCE:g}); not for --method paper"
-    parser.add_argument("--tolerance", type=float, metavar="D", help=told)
+    parser.add_argument("--elbow", choices=ELBOWS, help=help_text)
+    help_text = "newton, fixed_point of the paper, or paper: its closed loop, for --waypoints (%(default)s)"
+    parser.add_argument("--method", choices=METHODS, default="newton", help=help_text)
+    help_text = f"largest distance of the tip from a target [m] ({POSITION_TOLERANCE:g}); not for --method paper"
+    parser.add_argument("--tolerance", type=float, metavar="D", help=help_text)
     parser.add_argument("--starts", type=int, metavar="N", help=f"number of searches for --target [-] ({_STARTS})")
     parser.add_argument("--gain", type=float, metavar="K", help=f"gain of --method paper [1/s] ({_GAIN:g})")
-    told = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
-    parser.add_argument("--allow-jumps", action="store_true", help=told)
+    help_text = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
+    parser.add_argument("--allow-jumps", action="store_true", help=help_text)
     add_output(parser, "the solution or trajectory as NPZ, for softrobots.load_result, or a trajectory as a .csv table")
     add_plot(parser, "the loaded shape, or the poses along the path")
     add_json(parser)
@@ -76,7 +75,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Solve and tell."""
+    """Solve and print the answer."""
     _refuse_contradictions(arguments)
     check_output(arguments, ".npz", *([".csv"] if arguments.waypoints is not None else []))
     check_plot(arguments)
@@ -93,7 +92,7 @@ def run(arguments: argparse.Namespace) -> None:
         _reach(arguments, model, options)
         return
     gain = _GAIN if arguments.gain is None else arguments.gain
-    found = follow_trajectory(
+    trajectory = follow_trajectory(
         model,
         path.positions,
         **options,
@@ -102,24 +101,24 @@ def run(arguments: argparse.Namespace) -> None:
         allow_jumps=arguments.allow_jumps,
         progress="waypoints",
     )
-    files = save(arguments, found) + write_plot(arguments, lambda: _path_figure(found))
-    lines = [*trajectory_lines(found), *written_lines(files)]
-    tell(arguments, {**trajectory_answer(found), "files": files}, lines)
+    files = save(arguments, trajectory) + write_plot(arguments, lambda: _path_figure(trajectory))
+    lines = [*trajectory_lines(trajectory), *written_lines(files)]
+    print_answer(arguments, {**trajectory_answer(trajectory), "files": files}, lines)
 
 
 def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, Any]) -> None:
-    wanted = arguments.orientation
+    orientation = arguments.orientation
     if arguments.rpy is not None:
-        wanted = pin.rpy.rpyToMatrix(*finite_array("--rpy", arguments.rpy, (3,), "rad"))
+        orientation = pin.rpy.rpyToMatrix(*finite_array("--rpy", arguments.rpy, (3,), "rad"))
     starts = _STARTS if arguments.starts is None else arguments.starts
-    found = solve_ik(model, arguments.target, orientation=wanted, starts=starts, **options)
-    files = save(arguments, found) + write_plot(arguments, lambda: shape_figure(found.equilibrium))
-    lines = [*solution_lines(found), *written_lines(files)]
-    tell(arguments, {**solution_answer(found), "files": files}, lines)
+    solution = solve_ik(model, arguments.target, orientation=orientation, starts=starts, **options)
+    files = save(arguments, solution) + write_plot(arguments, lambda: shape_figure(solution.equilibrium))
+    lines = [*solution_lines(solution), *written_lines(files)]
+    print_answer(arguments, {**solution_answer(solution), "files": files}, lines)
 
 
 def _refuse_contradictions(arguments: argparse.Namespace) -> None:
-    """Refuse options that the other options leave without effect."""
+    """Refuse options that have no effect with the others."""
     single = arguments.target is not None
     paper = arguments.method == "paper"
     given = {
@@ -137,7 +136,7 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
             raise ParameterError(option, value, f"given with {requirement}")
 
 
-def _path_figure(found: Trajectory) -> Any:
+def _path_figure(trajectory: Trajectory) -> Any:
     from softrobots.view.figures import trajectories
 
-    return trajectories.poses(found)
+    return trajectories.poses(trajectory)

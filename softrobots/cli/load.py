@@ -1,4 +1,4 @@
-"""`softrobots load`: the force at the tip from what the motors feel."""
+"""`softrobots load`: the force at the tip from motor torques."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.options.command_line import add_gravity, gravity_of
-from softrobots.cli.options.result_file import add_output, check_output, save
+from softrobots.cli.options.output_files import add_output, check_output, save
 from softrobots.cli.options.robot_argument import add_model, check_one_each, motors_of, statics_model_of
-from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
-from softrobots.cli.reports.coordinate_units import load_units, motor_units, together
+from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, formatted, print_answer, written_lines
+from softrobots.cli.reports.coordinate_units import joined_units, load_units, motor_units
 from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines
-from softrobots.cli.reports.facts import Fact, answer_of, spoken
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load
 
 _EXAMPLES = """examples:
@@ -34,12 +33,12 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EXAMPLES,
     )
     add_model(parser)
-    told = "motor joints, then muscles, base to tip [rad or m] (relaxed)"
-    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=told)
-    told = "load on each motor, minus what it exerts, as motor_torques in the answer of softrobots solve [N m or N] (required)"
-    parser.add_argument("--torques", type=float, nargs="+", metavar="TAU", required=True, help=told)
-    told = "standard deviation of the torques, one for all or one for each [N m or N]: tells that of the force (unknown)"
-    parser.add_argument("--torque-std", type=float, nargs="+", metavar="S", help=told)
+    help_text = "motor joints, then muscles, base to tip [rad or m] (relaxed)"
+    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=help_text)
+    help_text = "load on each motor, the negative of what it exerts, as motor_torques of softrobots solve [N m or N] (required)"
+    parser.add_argument("--torques", type=float, nargs="+", metavar="TAU", required=True, help=help_text)
+    help_text = "standard deviation of the torques, one for all or one for each [N m or N], for that of the force (unknown)"
+    parser.add_argument("--torque-std", type=float, nargs="+", metavar="S", help=help_text)
     parser.add_argument("--frame", metavar="LINK", help="where the force acts (the tip)")
     add_gravity(parser)
     parser.add_argument(
@@ -53,7 +52,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Estimate and tell."""
+    """Estimate and print the answer."""
     check_output(arguments, ".npz")
     model = statics_model_of(arguments)
     check_feels(model)
@@ -62,7 +61,7 @@ def run(arguments: argparse.Namespace) -> None:
     check_one_each("--torques", arguments.torques, model.motor_joints, units)
     if noise is not None and len(noise) > 1:
         check_one_each("--torque-std", noise, model.motor_joints, units)
-    found = estimate_load(
+    estimate = estimate_load(
         model,
         motors,
         arguments.torques,
@@ -72,42 +71,42 @@ def run(arguments: argparse.Namespace) -> None:
         torque_std=noise[0] if noise is not None and len(noise) == 1 else noise,
         max_iterations=arguments.max_iterations,
     )
-    files = save(arguments, found)
-    lines = [*equilibrium_lines(found.equilibrium), "", *_lines(found), *written_lines(files)]
-    tell(arguments, {**_answer(found), "files": files}, lines)
+    files = save(arguments, estimate)
+    lines = [*equilibrium_lines(estimate.equilibrium), "", *_lines(estimate), *written_lines(files)]
+    print_answer(arguments, {**_answer(estimate), "files": files}, lines)
 
 
-def _answer(found: LoadEstimate) -> dict[str, Any]:
-    units = together(load_units(motor_units(found.equilibrium.model)))
+def _answer(estimate: LoadEstimate) -> dict[str, Any]:
+    units = joined_units(load_units(motor_units(estimate.equilibrium.model)))
     facts = [
-        Fact("force", found.force, "N", ""),
-        Fact("force_std", _deviations(found), "N", ""),
-        Fact("covariance", found.covariance, "N^2", ""),
-        Fact("singular_values", found.singular_values, "m", ""),
-        Fact("condition_number", found.condition_number, "-", ""),
-        Fact("unobservable_directions", found.unobservable_directions, "-", ""),
-        Fact("measured_torques", found.measured_torques, units, ""),
-        Fact("torque_std", found.torque_std, units, ""),
-        Fact("residual", found.residual, units, ""),
-        Fact("iterations", found.iterations, "-", ""),
-        Fact("frame", found.frame, "", ""),
-        Fact("method", found.method, "", ""),
+        Fact("force", estimate.force, "N"),
+        Fact("force_std", _deviations(estimate), "N"),
+        Fact("covariance", estimate.covariance, "N^2"),
+        Fact("singular_values", estimate.singular_values, "m"),
+        Fact("condition_number", estimate.condition_number, "-"),
+        Fact("unobservable_directions", estimate.unobservable_directions, "-"),
+        Fact("measured_torques", estimate.measured_torques, units),
+        Fact("torque_std", estimate.torque_std, units),
+        Fact("residual", estimate.residual, units),
+        Fact("iterations", estimate.iterations, "-"),
+        Fact("frame", estimate.frame),
+        Fact("method", estimate.method),
     ]
-    return {**answer_of(facts), "equilibrium": equilibrium_answer(found.equilibrium)}
+    return {**answer_of(facts), "equilibrium": equilibrium_answer(estimate.equilibrium)}
 
 
-def _deviations(found: LoadEstimate) -> Any:
+def _deviations(estimate: LoadEstimate) -> Any:
     """Standard deviation of each component of the force, over the observable directions [N]; None without noise."""
-    return None if found.covariance is None else np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    return None if estimate.covariance is None else np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
 
 
-def _lines(found: LoadEstimate) -> list[str]:
-    deviations = _deviations(found)
-    rows = [(f"force on {found.frame}", f"{spoken(found.force)} N")]
+def _lines(estimate: LoadEstimate) -> list[str]:
+    deviations = _deviations(estimate)
+    rows = [(f"force on {estimate.frame}", f"{formatted(estimate.force)} N")]
     if deviations is not None:
-        rows.append(("  standard deviation", f"{spoken(deviations)} N"))
-    rows += [("singular values", f"{spoken(found.singular_values)} m (condition number {found.condition_number:.3g})")]
-    unfelt = [("NOT FELT along", spoken(direction)) for direction in found.unobservable_directions]
-    rows += unfelt or [("not felt along", "no direction")]
-    rows.append(("torques unexplained", f"{found.residual:.2g} N m, {found.iterations} iterations by {found.method}"))
+        rows.append(("  standard deviation", f"{formatted(deviations)} N"))
+    rows += [("singular values", f"{formatted(estimate.singular_values)} m (condition number {estimate.condition_number:.3g})")]
+    directions = [("NOT FELT along", formatted(direction)) for direction in estimate.unobservable_directions]
+    rows += directions or [("not felt along", "no direction")]
+    rows.append(("torques unexplained", f"{estimate.residual:.2g} N m, {estimate.iterations} iterations by {estimate.method}"))
     return aligned(rows)

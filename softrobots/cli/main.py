@@ -1,4 +1,4 @@
-"""The command `softrobots`: one subcommand a job, each in a module of `softrobots.cli`."""
+"""The command `softrobots` and its subcommands, each a module of `softrobots.cli`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import Any
 
 from softrobots.cli import bench, completion, doctor, export, helix, ik, load, pcc, solve, urdf, view
 from softrobots.cli.options.command_line import exit_status, take_negative_numbers
-from softrobots.cli.options.option_names import told_by_option
 from softrobots.core.errors import ParameterError
 from softrobots.version import __version__
 
@@ -20,8 +19,32 @@ COMMANDS = (urdf, export, solve, load, ik, pcc, helix, view, bench, doctor, comp
 """Modules of the subcommands, in the order of the help."""
 
 
+_ALIASES = {
+    "model": "robot",
+    "springs": "spring",
+    "q_motors": "motors",
+    "q_motors0": "start",
+    "motor_torques": "torques",
+    "direction": "critical_load",
+    "orientation": "direction",
+    "segment_lengths": "rest",
+    "muscle_distance": "distance",
+    "muscle_azimuths": "azimuths",
+    "muscle_contraction": "contraction",
+    "muscle_extension": "extension",
+    "offset": "offsets",
+    "length": "arcs",
+    "bending": "arcs",
+    "azimuth": "arcs",
+}
+"""Arguments of the library whose option has another name, where a command has that option."""
+
+_SPELLED = {"robot": "ROBOT", "lengths": "L", "arcs": "--arc"}
+"""Options whose spelling is not their name with dashes before it."""
+
+
 class Formatter(argparse.RawDescriptionHelpFormatter):
-    """Help whose paragraphs are filled, and whose examples keep their lines unless one is too long."""
+    """Help with filled paragraphs, and examples that keep their lines unless one is too long."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         return "\n\n".join(
@@ -33,14 +56,14 @@ class Formatter(argparse.RawDescriptionHelpFormatter):
 
 
 def _examples(text: str, width: int) -> str:
-    """Examples that fit: comments stand above where they do not fit beside, and long commands go on as a shell reads them."""
+    """Wrap examples to a width: comments move above the command, long commands continue after a backslash."""
     head, *lines = text.split("\n")
     if all(len(line) <= width for line in lines):
         return text
-    told = [head]
+    shown = [head]
     for line in lines:
         command, *comment = re.split(r" {3,}", line.strip())
-        told += [f"  # {words}" for words in comment]
+        shown += [f"  # {words}" for words in comment]
         parts = [f"  {command}"]
         if len(parts[0]) > width:
             parts = [""]
@@ -50,48 +73,48 @@ def _examples(text: str, width: int) -> str:
                     parts[-1] = longer
                 else:
                     parts.append(f"      {words}")
-        told.append(" \\\n".join(parts))
-    return "\n".join(told)
+        shown.append(" \\\n".join(parts))
+    return "\n".join(shown)
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that takes -1e-3 for a number, wants options in full, and tells the nearest word for one it does not know."""
+    """A parser that reads -1e-3 as a number, takes no abbreviated options, and suggests the nearest word for an unknown one."""
 
     def __init__(self, **options: Any) -> None:
-        """Make a parser; those of its subcommands are of the same kind."""
+        """Build a parser; those of its subcommands are of the same class."""
         super().__init__(**(options | {"allow_abbrev": False, "formatter_class": Formatter}))
         take_negative_numbers(self)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Parse words, and refuse those that are left over."""
+        """Parse words; refuse unknown ones with a hint."""
         arguments, rest = super().parse_known_args(args, namespace)
         if rest:
             hint = _nearest(rest[0].partition("=")[0], self._option_string_actions)
             if hasattr(arguments, "parameters") and any("=" in word for word in rest if not word.startswith("-")):
-                hint = "; parameters of the robot stand behind --set: --set NAME=VALUE"
+                hint = "; parameters of the robot follow --set: --set NAME=VALUE"
             self.error(f"unrecognized arguments: {' '.join(rest)}{hint}")
         return arguments, rest
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             names = [str(name) for name in action.choices]
-            told = f"invalid choice: {value!r}{_nearest(str(value), names)}; choose from {', '.join(names)}"
-            raise argparse.ArgumentError(action, told)
+            message = f"invalid choice: {value!r}{_nearest(str(value), names)}; choose from {', '.join(names)}"
+            raise argparse.ArgumentError(action, message)
 
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = Parser(
+    command_parser = Parser(
         prog="softrobots",
         description="Soft robots as robot descriptions that robotics tools can load, with certified statics.",
         epilog="`softrobots COMMAND --help` explains a command.",
     )
-    made.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    made.set_defaults(whole=made)  # for `softrobots completion`
-    subparsers = made.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
+    command_parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    command_parser.set_defaults(whole=command_parser)  # for `softrobots completion`
+    subparsers = command_parser.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
     for command in COMMANDS:
         command.add_parser(subparsers)
-    return made
+    return command_parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -101,18 +124,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: Words of the command line; by default those of the process.
 
     Returns:
-        The exit status, as `command_line.exit_status` tells.
+        The exit status; see `command_line.exit_status`.
     """
     return exit_status(lambda: _run(argv))
 
 
 def _run(argv: Sequence[str] | None) -> object:
-    """Run a subcommand; what is wrong with an option is told by its name."""
+    """Run a subcommand; a ParameterError names the option instead of the library's argument."""
     arguments = parser().parse_args(argv)
     try:
         return arguments.run(arguments)
     except ParameterError as error:
-        raise told_by_option(error, arguments) from error
+        raise _naming_option(error, arguments) from error
+
+
+def _naming_option(error: ParameterError, arguments: argparse.Namespace) -> ParameterError:
+    """The error with the option in place of the library's argument, or the same error if no option of the command is meant."""
+    given = vars(arguments)
+    field = error.field.partition("[")[0]  # without the key of an item
+    name = field if field in given else _ALIASES.get(field, "")
+    if name not in given or str(error) != str(ParameterError(error.field, error.value, error.requirement)):
+        return error
+    value = given[name] if name in _SPELLED else error.value
+    return ParameterError(_SPELLED.get(name, f"--{name.replace('_', '-')}"), value, error.requirement)
 
 
 def _nearest(word: str, names: Iterable[str]) -> str:

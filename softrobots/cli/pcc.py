@@ -10,9 +10,8 @@ import numpy as np
 
 from softrobots import constant_curvature
 from softrobots.cli.options.command_line import refuse_too_large
-from softrobots.cli.options.plot_option import add_plot, check_plot, write_plot
-from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
-from softrobots.cli.reports.facts import Fact, answer_of
+from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
+from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, print_answer, written_lines
 from softrobots.constant_curvature import Arc
 from softrobots.constant_curvature.poses import FRAMES
 from softrobots.core.checks import FloatArray, positive_array
@@ -22,7 +21,7 @@ from softrobots.robots import PccArm
 from softrobots.statics.inverse_kinematics import solve_ik
 
 REST = float(PccArm.segment_lengths[0])
-"""Rest length of a segment if nothing is said [m]."""
+"""Default rest length of a segment [m]."""
 
 _EXAMPLES = """examples:
   softrobots pcc forward 0.50 0.53 0.55  0.54 0.51 0.52            muscle lengths of two segments -> arcs, poses
@@ -43,7 +42,7 @@ the tip, linear rows first; null without --jacobian), target and error with reac
 
 
 class Chain(NamedTuple):
-    """Segments with all that describes them."""
+    """A chain of segments."""
 
     lengths: FloatArray
     """Muscle lengths, shape (S, N) [m]."""
@@ -72,54 +71,62 @@ def add_parser(subparsers: Any) -> None:
     forms = parser.add_subparsers(dest="form", metavar="FORM", required=True, title="forms")
 
     forward = _form(forms, "forward", _forward, "muscle lengths -> arcs and poses")
-    told = "muscle lengths, segment by segment from the base, as many a segment as --azimuths has [m]"
-    forward.add_argument("lengths", type=float, nargs="+", metavar="L", help=told)
-    told = "largest miss of more than three muscles from those of an arc [m] (%(default)g)"
-    forward.add_argument("--tolerance", type=float, default=1e-6, metavar="T", help=told)
+    help_text = "muscle lengths, segment by segment from the base, as many a segment as --azimuths has [m]"
+    forward.add_argument("lengths", type=float, nargs="+", metavar="L", help=help_text)
+    help_text = "largest difference of more than three muscle lengths from those of an arc [m] (%(default)g)"
+    forward.add_argument("--tolerance", type=float, default=1e-6, metavar="T", help=help_text)
 
     inverse = _form(forms, "inverse", _inverse, "arcs -> muscle lengths and poses")
-    told = "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once a segment, base to tip"
-    told += " (required)"
+    help_text = (
+        "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once a segment, base to tip"
+    )
+    help_text += " (required)"
     names = ("LENGTH", "BENDING", "AZIMUTH")
-    inverse.add_argument("--arc", type=float, nargs=3, action="append", required=True, dest="arcs", metavar=names, help=told)
+    inverse.add_argument(
+        "--arc", type=float, nargs=3, action="append", required=True, dest="arcs", metavar=names, help=help_text
+    )
 
     reach = _form(forms, "reach", _reach, "position of the tip -> muscle lengths, without load")
     reach.description = f"{reach.description} The lengths that differ least from --start, of segments that bend by less than "
     reach.description += "170 degrees. Exit status 1 if the tip cannot get there."
     for axis in "xyz":
         reach.add_argument(axis, type=float, metavar=axis.upper(), help=f"position of the tip along {axis} [m]")
-    told = "number of segments (as many as --rest has, else %(const)s)"
-    reach.add_argument("--segments", type=int, metavar="N", help=told % {"const": len(PccArm.segment_lengths)})
-    told = "direction in which the tip points, any length but zero [-] (any direction)"
-    reach.add_argument("--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
-    told = "muscle lengths to change least, as in forward [m] (rest)"
-    reach.add_argument("--start", type=float, nargs="+", metavar="L", help=told)
+    help_text = "number of segments (as many as --rest has, else %(const)s)"
+    reach.add_argument("--segments", type=int, metavar="N", help=help_text % {"const": len(PccArm.segment_lengths)})
+    help_text = "direction in which the tip points, any length but zero [-] (any direction)"
+    reach.add_argument("--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    help_text = "muscle lengths to change least, as in forward [m] (rest)"
+    reach.add_argument("--start", type=float, nargs="+", metavar="L", help=help_text)
     for name, default in (("contraction", PccArm.muscle_contraction), ("extension", PccArm.muscle_extension)):
-        told = f"largest {name} of a muscle, relative to its rest length [-] (%(default)s)"
-        reach.add_argument(f"--{name}", type=float, default=default, metavar="C", help=told)
+        help_text = f"largest {name} of a muscle, relative to its rest length [-] (%(default)s)"
+        reach.add_argument(f"--{name}", type=float, default=default, metavar="C", help=help_text)
 
 
-def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], told: str) -> argparse.ArgumentParser:
-    """A parser with what all forms have."""
+def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summary: str) -> argparse.ArgumentParser:
+    """Add a form, with the options that all of them have."""
     parser: argparse.ArgumentParser = forms.add_parser(
-        name, help=told, description=f"Constant curvature in closed form: {told}.", epilog=_JSON
+        name, help=summary, description=f"Constant curvature in closed form: {summary}.", epilog=_JSON
     )
-    told = f"distance of the muscles from the backbone, one number or one a segment [m] ({PccArm.muscle_distance})"
-    parser.add_argument("--distance", type=float, nargs="+", default=[PccArm.muscle_distance], metavar="D", help=told)
+    help_text = f"distance of the muscles from the backbone, one number or one a segment [m] ({PccArm.muscle_distance})"
+    parser.add_argument("--distance", type=float, nargs="+", default=[PccArm.muscle_distance], metavar="D", help=help_text)
     azimuths = " ".join(f"{azimuth:.4f}".rstrip("0").rstrip(".") for azimuth in constant_curvature.AZIMUTHS)
-    told = f"azimuths of the muscles of a segment in its base frame, from x towards y, three or more [rad] ({azimuths})"
-    parser.add_argument("--azimuths", type=float, nargs="+", default=list(constant_curvature.AZIMUTHS), metavar="A", help=told)
-    told = "turn about the backbone before each segment, one a segment [rad] (0, then pi/3 each)"
-    parser.add_argument("--offsets", type=float, nargs="+", metavar="A", help=told)
-    told = f"rest length of a segment and its muscles, one number or one a segment [m] ({REST})"
-    parser.add_argument("--rest", type=float, nargs="+", metavar="L", help=told)
+    help_text = f"azimuths of the muscles of a segment in its base frame, from x towards y, three or more [rad] ({azimuths})"
+    parser.add_argument(
+        "--azimuths", type=float, nargs="+", default=list(constant_curvature.AZIMUTHS), metavar="A", help=help_text
+    )
+    help_text = "turn about the backbone before each segment, one a segment [rad] (0, then pi/3 each)"
+    parser.add_argument("--offsets", type=float, nargs="+", metavar="A", help=help_text)
+    help_text = f"rest length of a segment and its muscles, one number or one a segment [m] ({REST})"
+    parser.add_argument("--rest", type=float, nargs="+", metavar="L", help=help_text)
     if name == "reach":
         parser.set_defaults(frame=FRAMES[0])
     else:
-        told = "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
-        parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=told)
-    told = "also the Jacobian of the tip with respect to muscle lengths [m/m, rad/m] (not told)"
-    parser.add_argument("--jacobian", action="store_true", help=told)
+        help_text = (
+            "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
+        )
+        parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=help_text)
+    help_text = "also the Jacobian of the tip with respect to muscle lengths [m/m, rad/m] (left out)"
+    parser.add_argument("--jacobian", action="store_true", help=help_text)
     add_plot(parser, "the smooth backbone with its muscles")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -168,33 +175,33 @@ def _reach(arguments: argparse.Namespace) -> None:
     )
     refuse_too_large(robot, "--segments", count)
     target = (arguments.x, arguments.y, arguments.z)
-    found = solve_ik(load_model(robot), target, orientation=arguments.direction, q_motors0=arguments.start)
-    lengths = found.q_motors.reshape(count, -1)
+    solution = solve_ik(load_model(robot), target, orientation=arguments.direction, q_motors0=arguments.start)
+    lengths = solution.q_motors.reshape(count, -1)
     arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths)
     chain = _chain(arguments, lengths, arcs, distance)
     tip = constant_curvature.chain_transform(arcs, chain.offsets)[:3, 3]
     facts = [
-        Fact("target", found.target, "m", "target"),
-        Fact("error", float(np.linalg.norm(tip - found.target)), "m", "distance of the tip from it"),
+        Fact("target", solution.target, "m", "target"),
+        Fact("error", float(np.linalg.norm(tip - solution.target)), "m", "distance of the tip from it"),
     ]
     _answer(arguments, chain, facts)
 
 
 def _chain(arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, distance: FloatArray) -> Chain:
-    """The segments with the other options."""
+    """The chain of segments with the frame, offsets and rest lengths of the options."""
     rest = _per_segment("--rest", arguments.rest or [REST], len(lengths))
     return Chain(lengths, arcs, distance, arguments.azimuths, arguments.offsets, rest, arguments.frame)
 
 
 def _per_segment(name: str, values: Sequence[float], count: int) -> FloatArray:
-    """One positive number for each segment, of one for all or one for each."""
+    """One positive number for each segment, from one for all or one for each."""
     if len(values) not in (1, count):
         raise ParameterError(name, values, f"one number, or one for each of the {count} segments [m]")
     return np.array(np.broadcast_to(positive_array(name, values, "m"), (count,)))
 
 
 def _answer(arguments: argparse.Namespace, chain: Chain, facts: list[Fact]) -> None:
-    """Print what there is to know of the segments, and draw them."""
+    """Print the facts of the segments, and draw them."""
     transforms = constant_curvature.chain_transforms(chain.arcs, chain.offsets, chain.frame)
     jacobian = None
     if arguments.jacobian:
@@ -228,7 +235,7 @@ def _answer(arguments: argparse.Namespace, chain: Chain, facts: list[Fact]) -> N
         return segments.arm(chain.arcs, chain.distance, chain.azimuths, chain.offsets, chain.frame)
 
     written = write_plot(arguments, draw)
-    tell(arguments, answer_of(facts) | {"files": written}, [*_lines(facts), *written_lines(written)])
+    print_answer(arguments, answer_of(facts) | {"files": written}, [*_lines(facts), *written_lines(written)])
 
 
 def _lines(facts: list[Fact]) -> list[str]:
@@ -237,15 +244,15 @@ def _lines(facts: list[Fact]) -> list[str]:
     arcs = zip(values["arc_length"], values["arc_bending"], values["arc_azimuth"], strict=True)
     rows: list[tuple[str, ...]] = [("segment", "backbone [m]", "bending [rad]", "azimuth [rad]")]
     rows += [(str(number), *map(_six, arc)) for number, arc in enumerate(arcs, start=1)]
-    told: list[tuple[str, ...]] = [("segment", "muscle lengths [m] (extension)")]
+    muscle_rows: list[tuple[str, ...]] = [("segment", "muscle lengths [m] (extension)")]
     for number, (lengths, shares) in enumerate(zip(values["muscle_lengths"], values["muscle_extension"], strict=True), start=1):
         muscles = (f"{length:.6f} ({100 * share:+.1f} %)" for length, share in zip(lengths, shares, strict=True))
-        told.append((str(number), "  ".join(muscles)))
+        muscle_rows.append((str(number), "  ".join(muscles)))
     pose = values["transforms"][-1]
     lines = [
         *aligned(rows),
         "",
-        *aligned(told),
+        *aligned(muscle_rows),
         "",
         f"pose of the tip in the base, {values['frame'].replace('_', '-')} frames [-, m]",
     ]

@@ -6,12 +6,10 @@ import argparse
 from typing import Any
 
 from softrobots.cli.options.load_argument import add_loads, loads_of
-from softrobots.cli.options.plot_option import add_plot, check_plot, shape_figure, write_plot
-from softrobots.cli.options.result_file import add_output, check_output, save
+from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, shape_figure, write_plot
 from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
-from softrobots.cli.reports.answers import add_json, aligned, tell, written_lines
+from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer, written_lines
 from softrobots.cli.reports.equilibrium_report import coordinate_lines, equilibrium_answer, summary_lines
-from softrobots.cli.reports.facts import spoken
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import NeutralEquilibrium, NoCriticalLoad
 from softrobots.model.soft_model import SoftModel
@@ -42,22 +40,24 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EXAMPLES,
     )
     add_model(parser)
-    told = "motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
-    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=told)
+    help_text = "motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=help_text)
     add_loads(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="newton", help="the solver; fixed_point is the paper's (%(default)s)"
     )
-    told = "springs where the descent starts, in the order of the answer [rad or m] (relaxed)"
-    parser.add_argument("--start", type=float, nargs="+", metavar="Y", help=told)
-    told = f"largest residual, relative to the size of the load [-] ({TOLERANCE:g})"
-    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="T", help=told)
-    told = "most evaluations [-] (200 for newton, 1000 for fixed_point)"
-    parser.add_argument("--max-iterations", type=int, metavar="N", help=told)
-    told = "tell the motion of the tip per wrench added there, 6 by 6 [m/N, m/(N m); rad/N, rad/(N m)] (not told)"
-    parser.add_argument("--compliance", action="store_true", help=told)
-    told = "tell the smallest force [N] in this direction that buckles the robot, at --frame, with --gravity alone (not told)"
-    parser.add_argument("--critical-load", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
+    help_text = "elastic coordinates where the descent starts, in the order of the answer [rad or m] (relaxed)"
+    parser.add_argument("--start", type=float, nargs="+", metavar="Y", help=help_text)
+    help_text = f"largest residual, relative to the size of the load [-] ({TOLERANCE:g})"
+    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="T", help=help_text)
+    help_text = "most evaluations [-] (200 for newton, 1000 for fixed_point)"
+    parser.add_argument("--max-iterations", type=int, metavar="N", help=help_text)
+    help_text = "also the motion of the tip per wrench added there, 6 by 6 [m/N, m/(N m); rad/N, rad/(N m)] (left out)"
+    parser.add_argument("--compliance", action="store_true", help=help_text)
+    help_text = (
+        "also the smallest force [N] in this direction that buckles the robot, at --frame, with --gravity alone (left out)"
+    )
+    parser.add_argument("--critical-load", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
     add_output(parser, "the equilibrium as NPZ, for softrobots.load_result")
     add_plot(parser, "the loaded shape")
     add_json(parser)
@@ -65,13 +65,13 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Solve and tell."""
+    """Solve and print the answer."""
     check_output(arguments, ".npz")
     check_plot(arguments)
     model = statics_model_of(arguments)
     motors = motors_of(model, arguments.motors)
     start = None if arguments.start is None else finite_array("--start", arguments.start, (model.n_springs,), "rad or m")
-    found = solve_equilibrium(
+    equilibrium = solve_equilibrium(
         model,
         motors,
         **loads_of(arguments, model),
@@ -80,21 +80,21 @@ def run(arguments: argparse.Namespace) -> None:
         tolerance=arguments.tolerance,
         max_iterations=arguments.max_iterations,
     )
-    answer, lines = equilibrium_answer(found), coordinate_lines(found)
-    told = summary_lines(found)
+    answer, lines = equilibrium_answer(equilibrium), coordinate_lines(equilibrium)
+    summary = summary_lines(equilibrium)
     if arguments.compliance:
-        _add_compliance(model, found, answer, lines)
+        _add_compliance(model, equilibrium, answer, lines)
     if arguments.critical_load is not None:
-        _add_critical_load(model, found, arguments, answer, told)
-    files = save(arguments, found) + write_plot(arguments, lambda: shape_figure(found))
+        _add_critical_load(model, equilibrium, arguments, answer, summary)
+    files = save(arguments, equilibrium) + write_plot(arguments, lambda: shape_figure(equilibrium))
     answer["files"] = files
-    tell(arguments, answer, [*lines, "", *told, *written_lines(files)])
+    print_answer(arguments, answer, [*lines, "", *summary, *written_lines(files)])
 
 
-def _add_compliance(model: SoftModel, found: Equilibrium, answer: dict[str, Any], lines: list[str]) -> None:
+def _add_compliance(model: SoftModel, equilibrium: Equilibrium, answer: dict[str, Any], lines: list[str]) -> None:
     answer["units"]["compliance"] = "m/N, m/(N m); rad/N, rad/(N m)"
     try:
-        matrix = answer["compliance"] = compliance(model, found)
+        matrix = answer["compliance"] = compliance(model, equilibrium)
     except NeutralEquilibrium as error:
         answer["compliance"] = None
         lines += ["", f"compliance  none: {error}"]
@@ -109,15 +109,15 @@ _WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
 
 
 def _add_critical_load(
-    model: SoftModel, found: Equilibrium, arguments: argparse.Namespace, answer: dict[str, Any], told: list[str]
+    model: SoftModel, equilibrium: Equilibrium, arguments: argparse.Namespace, answer: dict[str, Any], summary: list[str]
 ) -> None:
     answer["units"] |= {"critical_load": "N", "stable_up_to": "N"}
-    direction, gravity = arguments.critical_load, found.load.gravity
+    direction, gravity = arguments.critical_load, equilibrium.load.gravity
     try:
-        force = critical_load(model, found.q_motors, direction, frame=arguments.frame, gravity=gravity)
+        force = critical_load(model, equilibrium.q_motors, direction, frame=arguments.frame, gravity=gravity)
     except NoCriticalLoad as error:
         answer |= {"critical_load": None, "stable_up_to": error.max_force}
-        told.append(f"critical load  none: {error}")
+        summary.append(f"critical load  none: {error}")
         return
     answer |= {"critical_load": force, "stable_up_to": force}
-    told.append(f"critical load  {spoken(force)} N along {spoken(direction)}")
+    summary.append(f"critical load  {formatted(force)} N along {formatted(direction)}")

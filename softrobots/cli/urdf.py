@@ -12,7 +12,7 @@ from typing import Any
 
 from softrobots.cli.options.robot_argument import add_robot, robot_file, source_of
 from softrobots.cli.options.robot_parameters import first_sentence, robot_parameters, xacro_parameters
-from softrobots.cli.reports.answers import add_json, aligned, tell
+from softrobots.cli.reports.answers import add_json, aligned, print_answer
 from softrobots.cli.tools.checks import check_description
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file, write_text
@@ -22,7 +22,7 @@ from softrobots.robots import ROBOTS, Robot
 from softrobots.robots.parameter_file import write_parameters
 
 SHOWN = 8
-"""Problems of one kind that are told one by one."""
+"""Largest number of problems of one kind that are listed."""
 
 _EXAMPLES = """examples:
   softrobots urdf --list                                       the robots
@@ -50,8 +50,10 @@ def add_parser(subparsers: Any) -> None:
     add_robot(parser, optional=True)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the URDF there instead of printing it")
     parser.add_argument("--overwrite", action="store_true", help="allow files to be replaced")
-    told = "write all parameters of the robot to a file that --parameters reads, YAML or JSON, instead of printing the URDF"
-    parser.add_argument("--save-parameters", type=Path, metavar="FILE", help=told)
+    help_text = (
+        "write all parameters of the robot to a file that --parameters reads, YAML or JSON, instead of printing the URDF"
+    )
+    parser.add_argument("--save-parameters", type=Path, metavar="FILE", help=help_text)
     parser.add_argument("--check", action="store_true", help="check the description; exit with status 1 if anything is wrong")
     parser.add_argument("--list", action="store_true", help="list the robots, or the parameters of ROBOT")
     add_json(parser)
@@ -59,35 +61,35 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> bool:
-    """Do what the arguments ask for; return whether a check, if one is asked for, finds all well."""
+    """List, check, generate or translate; return False if a check finds something wrong."""
     _refuse_contradictions(arguments)
     if arguments.list:
         _list(arguments)
         return True
     source = source_of(arguments)
     if isinstance(source, Path) and (arguments.output is not None or not arguments.check):
-        requirement = "a robot, a xacro, MJCF or SDF file; a URDF file can only be checked, with --check"
+        requirement = "a robot, or a xacro, MJCF or SDF file; a URDF file can only be checked, with --check"
         raise ParameterError("ROBOT", str(source), requirement)
     if arguments.save_parameters is not None and arguments.robot not in ROBOTS:
         raise ParameterError("--save-parameters", str(arguments.save_parameters), f"given for one of {', '.join(ROBOTS)}")
     for file in (arguments.output, arguments.save_parameters):
         if file is not None:
-            new_file(file, overwrite=arguments.overwrite)  # tells at once
+            new_file(file, overwrite=arguments.overwrite)  # refused before the work
     findings = check_description(source) if arguments.check else ()
-    well = all(finding.ok for finding in findings)
+    all_ok = all(finding.ok for finding in findings)
     lines, answer = _report(findings), _answer(findings) if arguments.check else {}
-    if well:
+    if all_ok:
         answer |= _write(arguments, source)
     lines += [f"{file}: written" for file in answer.get("files", ())]
     if answer:
-        tell(arguments, answer, lines)
+        print_answer(arguments, answer, lines)
     else:
         sys.stdout.write(read_source(source)[0])
-    return well
+    return all_ok
 
 
 def _write(arguments: argparse.Namespace, source: Robot | Path | str) -> dict[str, list[Path]]:
-    """Write the files that are asked for; which ones, if any."""
+    """Write the files of -o and --save-parameters; return their paths under "files"."""
     files = []
     if arguments.output is not None:
         files.append(write_text(arguments.output, read_source(source)[0], overwrite=arguments.overwrite))
@@ -101,7 +103,7 @@ def _write(arguments: argparse.Namespace, source: Robot | Path | str) -> dict[st
 
 
 def _shortest(robot: Any, name: str) -> Any:
-    """A parameter of a robot: one value where all its parts have the same and the robot takes one."""
+    """A parameter of a robot, as one value if all parts have the same and the robot accepts one."""
     value = getattr(robot, name)
     if isinstance(value, tuple) and value and all(item == value[0] for item in value):
         with contextlib.suppress(ParameterError):
@@ -113,22 +115,22 @@ def _shortest(robot: Any, name: str) -> Any:
 def _answer(findings: Sequence[Finding]) -> dict[str, Any]:
     return {
         "ok": all(finding.ok for finding in findings),
-        "findings": [{**found._asdict(), "ok": found.ok} for found in findings],
+        "findings": [{**finding._asdict(), "ok": finding.ok} for finding in findings],
         "files": [],
     }
 
 
 def _report(findings: Sequence[Finding]) -> list[str]:
     """Findings, a line each."""
-    told = []
+    report = []
     for finding in findings:
         lines = [f"wrong  {finding.what}: {text}" for text in finding.problems]
         if not lines and len(finding.remarks) == 1:
             lines = [f"ok     {finding.what}: {finding.remarks[0]}"]
         else:
             lines = [*(lines or [f"ok     {finding.what}"]), *(f"       {text}" for text in finding.remarks)]
-        told += lines[:SHOWN] + ([f"       {len(lines) - SHOWN} more like these"] if len(lines) > SHOWN else [])
-    return told
+        report += lines[:SHOWN] + ([f"       {len(lines) - SHOWN} more like these"] if len(lines) > SHOWN else [])
+    return report
 
 
 def _refuse_contradictions(arguments: argparse.Namespace) -> None:
@@ -144,12 +146,12 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
 
 
 def _list(arguments: argparse.Namespace) -> None:
-    """Tell names and meanings of the robots, or of the parameters of one."""
+    """Print names and meanings of the robots, or of the parameters of one."""
     if arguments.robot is None:
         robots = {name: first_sentence(name) for name in ROBOTS}
-        tell(arguments, {"robots": robots}, aligned(robots.items()))
+        print_answer(arguments, {"robots": robots}, aligned(robots.items()))
         return
     known = arguments.robot in ROBOTS
     parameters = robot_parameters(arguments.robot) if known else xacro_parameters(robot_file(arguments.robot))
     lines = [line for parameter in parameters for line in (f"{parameter.name}={parameter.default}", f"    {parameter.text}")]
-    tell(arguments, {"robot": arguments.robot, "parameters": [parameter._asdict() for parameter in parameters]}, lines)
+    print_answer(arguments, {"robot": arguments.robot, "parameters": [parameter._asdict() for parameter in parameters]}, lines)

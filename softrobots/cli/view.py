@@ -13,7 +13,7 @@ from typing import Any
 from softrobots.cli.options.command_line import Served, address_lines
 from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.robot_argument import add_model, model_of, motors_of, source_of
-from softrobots.cli.reports.answers import add_json, tell
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import finite_number
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
@@ -47,6 +47,7 @@ _NOT_WITH = {
     "--sliders": ("--live",),
     "--live": ("--json",),
 }
+_SWITCHES = "motors target result growth live sliders html picture at overwrite open port json"
 _ONLY_WITH = {"--overwrite": ("--html", "--picture"), "--at": ("--picture",)}
 
 
@@ -60,23 +61,25 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EXAMPLES,
     )
     add_model(parser, optional=True)
-    told = "motor joints, then muscles, base to tip [rad, m or N]; with --target, where the search starts (relaxed)"
-    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=told)
+    help_text = "motor joints, then muscles, base to tip [rad, m or N]; with --target, where the search starts (relaxed)"
+    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=help_text)
     add_loads(parser)
-    told = "put the loaded tip there by inverse kinematics [m] (no target)"
-    parser.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=told)
-    told = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
-    parser.add_argument("--result", type=Path, metavar="FILE.npz", help=told)
+    help_text = "put the loaded tip there by inverse kinematics [m] (no target)"
+    parser.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    help_text = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
+    parser.add_argument("--result", type=Path, metavar="FILE.npz", help=help_text)
     parser.add_argument("--growth", action="store_true", help="show how a helical tube grows, without load")
-    told = "follow commands (none): `keyboard`, single keys of a terminal or lines of a pipe (? lists them), or a watched file"
-    parser.add_argument("--live", metavar="keyboard|FILE", help=told)
+    help_text = (
+        "follow commands (none): `keyboard`, single keys of a terminal or lines of a pipe (? lists them), or a watched file"
+    )
+    parser.add_argument("--live", metavar="keyboard|FILE", help=help_text)
     parser.add_argument(
         "--sliders", action="store_true", help="a page with sliders for motors and load (needs viser, extra viser)"
     )
     parser.add_argument("--html", type=Path, metavar="FILE", help="write the page instead of serving it (served)")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="take a picture of the page with Chromium (served)")
-    told = "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)"
-    parser.add_argument("--at", type=float, metavar="SHARE", help=told)
+    help_text = "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)"
+    parser.add_argument("--at", type=float, metavar="SHARE", help=help_text)
     parser.add_argument("--overwrite", action="store_true", help="allow --html and --picture to replace files")
     parser.add_argument("--open", action="store_true", help="open the page in the browser of this machine")
     parser.add_argument("--port", type=int, metavar="N", help="port of the page (the first free one from 7000; sliders: 8080)")
@@ -85,13 +88,13 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Show the robot until Ctrl-C, or write what is asked for."""
+    """Show the robot until Ctrl-C, or write a page or a picture."""
     _refuse_contradictions(arguments)
     if arguments.picture is not None and arguments.picture.suffix.lower() != ".png":
         raise ParameterError("--picture", str(arguments.picture), "a file name that ends in .png")
     for file in (arguments.html, arguments.picture):
         if file is not None:
-            new_file(file, overwrite=arguments.overwrite)  # tells at once
+            new_file(file, overwrite=arguments.overwrite)  # refused before the work
     if arguments.picture is not None:
         find_chromium()
     if arguments.growth:
@@ -100,13 +103,15 @@ def run(arguments: argparse.Namespace) -> None:
     result = _result(arguments)
     if isinstance(result, Trajectory):
         if arguments.live is not None or arguments.sliders:
-            raise ParameterError("--result", str(arguments.result), "no trajectory where --live or --sliders move the robot")
+            raise ParameterError(
+                "--result", str(arguments.result), "no trajectory with --live or --sliders, which move the robot"
+            )
         with view(result.model, result, port=arguments.port) as viewer:
             _show(arguments, viewer, result.model, f"a trajectory of {len(result.times)} waypoints")
         return
     equilibrium = result.equilibrium if isinstance(result, IkSolution) else result
     if arguments.live is not None or arguments.sliders:
-        tip_force(equilibrium)  # tells at once
+        tip_force(equilibrium)  # refused before the work
     if arguments.sliders:
         _slide(arguments, equilibrium)
         return
@@ -118,7 +123,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Trajectory:
-    """What is to be shown: a saved result, or the loaded robot."""
+    """The saved result, or the solution for the load or target of the arguments."""
     if arguments.result is None:
         model = model_of(arguments)
         load, motors = loads_of(arguments, model), motors_of(model, arguments.motors)
@@ -137,10 +142,10 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Traject
 
 
 def _grow(arguments: argparse.Namespace) -> None:
-    """Show how a tube grows."""
+    """Show the growth of a tube."""
     tube = source_of(arguments)
     if not isinstance(tube, HelixTube) or tube.chain != "sections":
-        raise ParameterError("ROBOT", arguments.robot, "helix_tube, with chain=sections, where it is to grow")
+        raise ParameterError("ROBOT", arguments.robot, "helix_tube, with chain=sections, for --growth")
     model = model_of(arguments, tube)
     with Viewer(model, port=arguments.port) as viewer:
         viewer.animate_growth(tube)
@@ -161,10 +166,10 @@ def _slide(arguments: argparse.Namespace, equilibrium: Equilibrium) -> None:
         _serve(arguments, page, state_line(equilibrium))
 
 
-def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, told: str) -> None:
+def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, state: str) -> None:
     """Serve a page, or write it and take its picture."""
     if arguments.html is None and arguments.picture is None:
-        _serve(arguments, viewer, told)
+        _serve(arguments, viewer, state)
         return
     with tempfile.TemporaryDirectory() as folder:
         file = arguments.html or Path(folder) / "page.html"
@@ -172,71 +177,51 @@ def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, told:
         if arguments.picture is not None:
             take_picture(page, arguments.picture, share=arguments.at or 0.0)
     files = [file for file in (arguments.html, arguments.picture) if file is not None]
-    tell(arguments, {"files": files}, [told, *(f"{file}: written" for file in files)])
+    print_answer(arguments, {"files": files}, [state, *(f"{file}: written" for file in files)])
 
 
-def _serve(arguments: argparse.Namespace, page: Served, told: str) -> None:
-    """Tell where a page is, and serve it until Ctrl-C."""
+def _serve(arguments: argparse.Namespace, page: Served, state: str) -> None:
+    """Print the address of a page, and serve it until Ctrl-C."""
     with contextlib.suppress(KeyboardInterrupt):
-        _tell_address(arguments, page, told)
+        _print_address(arguments, page, state)
         page.wait()
 
 
 def _follow(arguments: argparse.Namespace, viewer: Viewer, live: LiveView) -> None:
     """Follow commands until they end, or Ctrl-C."""
     with contextlib.suppress(KeyboardInterrupt):
-        _tell_address(arguments, viewer, state_line(live.equilibrium))
-        with commands_from(arguments.live, live, _tell) as commands:
-            follow(live, commands, _tell, _complain)
+        _print_address(arguments, viewer, state_line(live.equilibrium))
+        with commands_from(arguments.live, live, _print_line) as commands:
+            follow(live, commands, _print_line, _print_error)
 
 
-def _tell_address(arguments: argparse.Namespace, page: Served, told: str) -> None:
+def _print_address(arguments: argparse.Namespace, page: Served, state: str) -> None:
     answer = {"url": page.url, "port": page.port, "tunnel": page.tunnel}
-    tell(arguments, answer, [told, *address_lines(page)])
+    print_answer(arguments, answer, [state, *address_lines(page)])
     if arguments.open and not webbrowser.open(page.url):
-        _complain("no browser of this machine could be opened")
+        _print_error("no browser of this machine could be opened")
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 
 
-def _complain(line: str) -> None:
+def _print_error(line: str) -> None:
     sys.stderr.write(f"{line}\n")
     sys.stderr.flush()
 
 
 def _refuse_contradictions(arguments: argparse.Namespace) -> None:
-    """Refuse options that do not go together, and values out of range."""
+    """Refuse options that contradict each other, and values out of range."""
     given = {
         "ROBOT": arguments.robot is not None,
         "--set": bool(arguments.parameters),
         "--parameters": arguments.parameter_file is not None,
         "--spring": bool(arguments.spring),
         "--tip": arguments.tip is not None,
-        "a load": any(arguments.force)
-        or bool(arguments.wrench)
-        or arguments.moment is not None
-        or arguments.gravity is not None,
-        **{
-            f"--{name}": getattr(arguments, name) not in (None, False)
-            for name in (
-                "motors",
-                "target",
-                "result",
-                "growth",
-                "live",
-                "sliders",
-                "html",
-                "picture",
-                "at",
-                "overwrite",
-                "open",
-            )
-        },
-        "--port": arguments.port is not None,
-        "--json": arguments.json,
+        "a load": any(arguments.force) or bool(arguments.wrench) or (arguments.moment, arguments.gravity) != (None, None),
+        **{f"--{name}": getattr(arguments, name) not in (None, False) for name in _SWITCHES.split()},
     }
     if not given["ROBOT"] and not given["--result"]:
         raise ParameterError("ROBOT", "(nothing)", "a robot or a file, or a saved --result given instead")

@@ -1,4 +1,4 @@
-"""What pulls on the robot of a command: `--force`, `--moment`, `--frame`, `--wrench`, `--gravity`."""
+"""Loads of a command: `--force`, `--moment`, `--frame`, `--wrench`, `--gravity`."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ _WORDS = ("LINK", "FX", "FY", "FZ", "MX", "MY", "MZ")
 
 
 def add_loads(parser: argparse.ArgumentParser) -> None:
-    """Give a parser the options of a load; see `loads_of`. Loads are dead: they keep their direction in the world."""
+    """Add the options of a load; see `loads_of`. Loads are dead: they keep their direction in the world."""
     add_load(parser)
-    told = "moment on the tip, world axes [N m] (0 0 0)"
-    parser.add_argument("--moment", type=float, nargs=3, metavar=("MX", "MY", "MZ"), help=told)
-    parser.add_argument("--frame", metavar="LINK", help="where --force and --moment act (the tip)")
-    told = "another force [N] and moment [N m] at the origin of a link, world axes; may be given several times (none)"
-    parser.add_argument("--wrench", nargs=7, action="append", default=[], metavar=_WORDS, help=told)
+    help_text = "moment on the tip, world axes [N m] (0 0 0)"
+    parser.add_argument("--moment", type=float, nargs=3, metavar=("MX", "MY", "MZ"), help=help_text)
+    parser.add_argument("--frame", metavar="LINK", help="link on which --force and --moment act (the tip)")
+    help_text = "another force [N] and moment [N m] at the origin of a link, world axes; may be given several times (none)"
+    parser.add_argument("--wrench", nargs=7, action="append", default=[], metavar=_WORDS, help=help_text)
 
 
 def loads_of(arguments: argparse.Namespace, model: SoftModel) -> dict[str, Any]:
-    """What `--force` and the others ask for, as arguments of `solve_equilibrium` and `solve_ik`.
+    """Return the load of the options as keyword arguments of `solve_equilibrium` and `solve_ik`.
 
     Args:
-        arguments: Arguments of a parser that `add_loads` has seen.
+        arguments: Arguments of a parser with `add_loads`.
         model: The robot.
 
     Raises:
-        ParameterError: If what follows a link is no finite number, or the moment is not finite.
+        ParameterError: If the six values after a link are not finite numbers, or the moment is not finite.
     """
     wrenches: dict[str, Any] = {}
     for link, *words in arguments.wrench:

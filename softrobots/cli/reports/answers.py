@@ -1,4 +1,4 @@
-"""How a command answers: lines for a person, or with `--json` one object for a machine."""
+"""Answers of a command: facts with units, as lines for a person or, with `--json`, as one object for a machine."""
 
 from __future__ import annotations
 
@@ -8,23 +8,46 @@ import math
 import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 
+class Fact(NamedTuple):
+    """One value of an answer."""
+
+    name: str
+    """Its name in the library and in JSON."""
+    value: Any
+    """A number, a truth value, a text, None, or an array of numbers."""
+    unit: str = ""
+    """Its unit; "-" for a pure number, empty for what is no number."""
+    label: str = ""
+    """What it is, for a person."""
+
+
+def answer_of(facts: Sequence[Fact]) -> dict[str, Any]:
+    """Return the values by name, and under `units` the units of those that have one."""
+    return {fact.name: plain(fact.value) for fact in facts} | {"units": {fact.name: fact.unit for fact in facts if fact.unit}}
+
+
+def lines_of(facts: Sequence[Fact]) -> list[str]:
+    """Return one line for each fact: label, value and unit."""
+    return aligned((fact.label, f"{formatted(fact.value)} {fact.unit.strip('-')}".strip()) for fact in facts)
+
+
 def add_json(parser: argparse.ArgumentParser) -> None:
-    """Give a parser `--json`; see `tell`."""
-    told = "print one JSON object instead of text: names as in the library, SI units and radians; what is infinite is null"
-    parser.add_argument("--json", action="store_true", help=told)
+    """Add `--json`; see `print_answer`."""
+    help_text = "print one JSON object instead of text: names as in the library, SI units and radians; what is infinite is null"
+    parser.add_argument("--json", action="store_true", help=help_text)
 
 
-def tell(arguments: argparse.Namespace, answer: Mapping[str, Any], lines: Iterable[str]) -> None:
+def print_answer(arguments: argparse.Namespace, answer: Mapping[str, Any], lines: Iterable[str]) -> None:
     """Print an answer: as JSON if `--json` is given, else as lines.
 
     Args:
-        arguments: Arguments of a parser that `add_json` has seen.
-        answer: The answer for a machine: numbers, texts, truths, None, arrays, paths, and mappings and sequences of them.
+        arguments: Arguments of a parser with `add_json`.
+        answer: The answer for a machine; see `plain` for what it may hold.
         lines: The same for a person.
     """
     if arguments.json:
@@ -37,9 +60,9 @@ def tell(arguments: argparse.Namespace, answer: Mapping[str, Any], lines: Iterab
 
 
 def plain(value: Any) -> Any:
-    """What JSON can hold of a value: arrays become nested lists, paths texts, mappings and sequences item by item.
+    """Return a value as JSON can hold it: arrays as nested lists, paths as text, mappings and sequences item by item.
 
-    What is infinite becomes None: JSON has no such number.
+    Infinity becomes None: JSON has no such number.
     """
     if isinstance(value, Mapping):
         return {str(name): plain(item) for name, item in value.items()}
@@ -54,13 +77,25 @@ def plain(value: Any) -> Any:
     return value
 
 
+def formatted(value: Any) -> str:
+    """Return numbers with six digits, truth values as yes or no, None as none, text as it is."""
+    value = plain(value)
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
+    return "  ".join(f"{number:.6g}" for number in np.ravel(value) + 0.0)
+
+
 def written_lines(files: Sequence[Path]) -> list[str]:
-    """What is said at the end of the files that were written; nothing without files."""
+    """Return the last lines of an answer: the files that were written, after an empty line; nothing without files."""
     return ["", *(f"{file}: written" for file in files)] if files else []
 
 
 def aligned(rows: Iterable[tuple[str, ...]], *, indent: str = "", right: Collection[int] = ()) -> list[str]:
-    """Lines of a table with aligned columns.
+    """Return the lines of a table with aligned columns.
 
     Args:
         rows: Cells of each row.

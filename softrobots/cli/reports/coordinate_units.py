@@ -1,4 +1,4 @@
-"""Units of what moves a robot and of what bends in it, for answers: angles, distances and tensions lie side by side."""
+"""Units of actuator and elastic coordinates, which may be angles, lengths and tensions side by side."""
 
 from __future__ import annotations
 
@@ -25,6 +25,6 @@ def load_units(units: Sequence[str]) -> tuple[str, ...]:
     return tuple(LOAD_UNITS[unit] for unit in units)
 
 
-def together(units: Sequence[str]) -> str:
+def joined_units(units: Sequence[str]) -> str:
     """The units of a row of numbers as one text: one unit if all have it, else one for each."""
     return units[0] if len(set(units)) == 1 else ", ".join(units)

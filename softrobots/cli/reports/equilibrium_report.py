@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.cli.reports.answers import aligned
-from softrobots.cli.reports.coordinate_units import load_units, motor_units, spring_units, together
-from softrobots.cli.reports.facts import Fact, answer_of, spoken
+from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
+from softrobots.cli.reports.coordinate_units import joined_units, load_units, motor_units, spring_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
@@ -20,26 +19,26 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     model = equilibrium.model
     load = equilibrium.load
     facts = [
-        Fact("q_motors", equilibrium.q_motors, together(motor_units(model)), ""),
-        Fact("motor_torques", equilibrium.motor_torques, together(load_units(motor_units(model))), ""),
-        Fact("q_springs", equilibrium.q_springs, together(spring_units(model)), ""),
-        Fact("spring_torques", equilibrium.spring_torques, together(load_units(spring_units(model))), ""),
-        Fact("tip_position", equilibrium.tip_position, "m", ""),
-        Fact("transform_tip_to_world", equilibrium.transform_tip_to_world.homogeneous, "m", ""),
-        Fact("link_moments", equilibrium.link_moments, "N m", ""),
-        Fact("wrinkling_moments", wrinkling_moments(model), "N m", ""),
-        Fact("wrinkling_margins", wrinkling_margins(equilibrium), "-", ""),
-        Fact("wrinkled", equilibrium.wrinkled, "", ""),
-        Fact("saturated", list(equilibrium.saturated), "", ""),
-        Fact("muscle_lengths", equilibrium.muscle_lengths, "m", ""),
-        Fact("muscle_forces", equilibrium.muscle_forces, "N", ""),
-        Fact("stable", equilibrium.stable, "", ""),
-        Fact("conservative", equilibrium.conservative, "", ""),
-        Fact("within_limits", equilibrium.within_limits, "", ""),
-        Fact("residual", equilibrium.residual, "N m", ""),
-        Fact("tolerance", equilibrium.tolerance, "N m", ""),
-        Fact("iterations", equilibrium.iterations, "-", ""),
-        Fact("method", equilibrium.method, "", ""),
+        Fact("q_motors", equilibrium.q_motors, joined_units(motor_units(model))),
+        Fact("motor_torques", equilibrium.motor_torques, joined_units(load_units(motor_units(model)))),
+        Fact("q_springs", equilibrium.q_springs, joined_units(spring_units(model))),
+        Fact("spring_torques", equilibrium.spring_torques, joined_units(load_units(spring_units(model)))),
+        Fact("tip_position", equilibrium.tip_position, "m"),
+        Fact("transform_tip_to_world", equilibrium.transform_tip_to_world.homogeneous, "m"),
+        Fact("link_moments", equilibrium.link_moments, "N m"),
+        Fact("wrinkling_moments", wrinkling_moments(model), "N m"),
+        Fact("wrinkling_margins", wrinkling_margins(equilibrium), "-"),
+        Fact("wrinkled", equilibrium.wrinkled),
+        Fact("saturated", list(equilibrium.saturated)),
+        Fact("muscle_lengths", equilibrium.muscle_lengths, "m"),
+        Fact("muscle_forces", equilibrium.muscle_forces, "N"),
+        Fact("stable", equilibrium.stable),
+        Fact("conservative", equilibrium.conservative),
+        Fact("within_limits", equilibrium.within_limits),
+        Fact("residual", equilibrium.residual, "N m"),
+        Fact("tolerance", equilibrium.tolerance, "N m"),
+        Fact("iterations", equilibrium.iterations, "-"),
+        Fact("method", equilibrium.method),
     ]
     names = {"motor_joints": model.motor_joints, "spring_joints": model.spring_joints, "tip": model.tip}
     return {"robot": model.pinocchio.name, **names, "load": load_answer(load), **answer_of(facts)}
@@ -51,7 +50,7 @@ def load_answer(load: Load) -> dict[str, Any]:
 
 
 def equilibrium_lines(equilibrium: Equilibrium) -> list[str]:
-    """The same for a person: tables of motors, springs and inflated links, then where the tip is and what is certified."""
+    """The same for a person: tables of motors, springs and inflated links, then pose of the tip and certificates."""
     return [*coordinate_lines(equilibrium), "", *summary_lines(equilibrium)]
 
 
@@ -65,15 +64,18 @@ def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
 
 
 def summary_lines(equilibrium: Equilibrium) -> list[str]:
-    """Where the tip is and what is certified."""
+    """Return lines with the pose of the tip and the certificates."""
     pose, margins = equilibrium.transform_tip_to_world, wrinkling_margins(equilibrium)
     known = [margin for margin in margins if margin is not None]
     least = f", at least {100.0 * min(known):.1f} % of the wrinkling moment is left" if known else ""
     links = [("wrinkled", "YES: linear springs no longer hold" if equilibrium.wrinkled else f"no{least}")] if margins else []
     steps = f"{equilibrium.iterations} iteration{'s' * (equilibrium.iterations != 1)} by {equilibrium.method}"
     rows = [
-        ("tip position", f"{spoken(equilibrium.tip_position)} m"),
-        ("tip roll, pitch, yaw", f"{spoken(np.where(abs(rpy := pin.rpy.matrixToRpy(pose.rotation)) < 1e-15, 0.0, rpy))} rad"),
+        ("tip position", f"{formatted(equilibrium.tip_position)} m"),
+        (
+            "tip roll, pitch, yaw",
+            f"{formatted(np.where(abs(rpy := pin.rpy.matrixToRpy(pose.rotation)) < 1e-15, 0.0, rpy))} rad",
+        ),
         ("stable", "yes, certified" if equilibrium.stable else "NO: not certified"),
         ("within limits", "yes" if equilibrium.within_limits else "NO: a motor, a muscle or a spring is beyond its limits"),
         *links,
@@ -89,19 +91,19 @@ def wrinkling_moments(model: SoftModel) -> list[float]:
 
 
 def wrinkling_margins(equilibrium: Equilibrium) -> list[float | None]:
-    """Share of the wrinkling moment that is left in each inflated link [-]; None of a link without pressure."""
+    """Share of the wrinkling moment that is left in each inflated link [-]; None for a link without pressure."""
     pairs = zip(equilibrium.link_moments.tolist(), wrinkling_moments(equilibrium.model), strict=True)
     return [1.0 - moment / limit if limit > 0.0 else None for moment, limit in pairs]
 
 
 def head_lines(model: SoftModel, load: Load) -> list[str]:
-    """The robot, and what pulls on it, a line each."""
+    """Return a line for the robot, one for each load, and one for gravity."""
     rows = []
     for frame, wrench in load.wrenches.items():
         if wrench.any():
-            moment = f", moment {spoken(wrench[3:])} N m" if wrench[3:].any() else ""
-            rows.append((f"load on {frame}", f"force {spoken(wrench[:3])} N{moment}"))
-    gravity = "none" if load.gravity is None else f"{spoken(np.array(load.gravity))} m/s^2"
+            moment = f", moment {formatted(wrench[3:])} N m" if wrench[3:].any() else ""
+            rows.append((f"load on {frame}", f"force {formatted(wrench[:3])} N{moment}"))
+    gravity = "none" if load.gravity is None else f"{formatted(np.array(load.gravity))} m/s^2"
     return aligned(
         [("robot", f"{model.pinocchio.name} (tip: {model.tip})"), *(rows or [("load", "none")]), ("gravity", gravity)]
     )

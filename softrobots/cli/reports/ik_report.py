@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.reports.answers import aligned
-from softrobots.cli.reports.coordinate_units import load_units, motor_units, spring_units, together
+from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
+from softrobots.cli.reports.coordinate_units import joined_units, load_units, motor_units, spring_units
 from softrobots.cli.reports.equilibrium_report import (
     coordinate_lines,
     equilibrium_answer,
@@ -17,7 +17,6 @@ from softrobots.cli.reports.equilibrium_report import (
     wrinkling_margins,
     wrinkling_moments,
 )
-from softrobots.cli.reports.facts import Fact, answer_of, spoken
 from softrobots.core.checks import FloatArray
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.trajectory import Trajectory
@@ -25,58 +24,58 @@ from softrobots.statics.trajectory import Trajectory
 
 def solution_answer(solution: IkSolution) -> dict[str, Any]:
     """A solution by the names of its attributes, with `units`."""
-    units = together(motor_units(solution.equilibrium.model))
+    units = joined_units(motor_units(solution.equilibrium.model))
     facts = [
-        Fact("q_motors", solution.q_motors, units, ""),
-        Fact("target", solution.target, "m", ""),
-        Fact("orientation", solution.orientation, "-", ""),
-        Fact("error", solution.error, "m", ""),
-        Fact("orientation_error", solution.orientation_error, "rad", ""),
-        Fact("iterations", solution.iterations, "-", ""),
-        Fact("alternatives", solution.alternatives, units, ""),
+        Fact("q_motors", solution.q_motors, units),
+        Fact("target", solution.target, "m"),
+        Fact("orientation", solution.orientation, "-"),
+        Fact("error", solution.error, "m"),
+        Fact("orientation_error", solution.orientation_error, "rad"),
+        Fact("iterations", solution.iterations, "-"),
+        Fact("alternatives", solution.alternatives, units),
     ]
     return {**answer_of(facts), "equilibrium": equilibrium_answer(solution.equilibrium)}
 
 
 def solution_lines(solution: IkSolution) -> list[str]:
     """The same for a person."""
-    rows = [("target", f"{spoken(solution.target)} m")]
+    rows = [("target", f"{formatted(solution.target)} m")]
     turned = f", {solution.orientation_error:.2g} rad" if solution.orientation is not None else ""
     rows.append(("tip error", f"{solution.error:.2g} m{turned}, {solution.iterations} steps"))
-    rows.append(("motors", f"{spoken(solution.q_motors)} {together(motor_units(solution.equilibrium.model))}"))
-    rows += [("another solution", spoken(other)) for other in solution.alternatives]
+    rows.append(("motors", f"{formatted(solution.q_motors)} {joined_units(motor_units(solution.equilibrium.model))}"))
+    rows += [("another solution", formatted(other)) for other in solution.alternatives]
     return [*coordinate_lines(solution.equilibrium), "", *summary_lines(solution.equilibrium), "", *aligned(rows)]
 
 
-def trajectory_answer(found: Trajectory) -> dict[str, Any]:
+def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
     """A trajectory by the names of its attributes, one row a waypoint, with `units`."""
-    model, equilibria = found.model, found.equilibria
+    model, equilibria = trajectory.model, trajectory.equilibria
     facts = [
-        Fact("times", found.times, "s", ""),
-        Fact("targets", found.targets, "m", ""),
-        Fact("tip_positions", found.tip_positions, "m", ""),
-        Fact("tip_error", found.tip_error, "m", ""),
-        Fact("q_motors", found.q_motors, together(motor_units(model)), ""),
-        Fact("motor_torques", _motor_torques(found), together(load_units(motor_units(model))), ""),
-        Fact("q_springs", found.q_springs, together(spring_units(model)), ""),
-        Fact("link_moments", found.link_moments, "N m", ""),
-        Fact("wrinkling_moments", wrinkling_moments(model), "N m", ""),
-        Fact("wrinkling_margin", _margin(found), "-", ""),
-        Fact("required_pressure", found.required_pressure, "Pa", ""),
-        Fact("wrinkled", [equilibrium.wrinkled for equilibrium in equilibria], "", ""),
-        Fact("stable", [equilibrium.stable for equilibrium in equilibria], "", ""),
-        Fact("within_limits", [equilibrium.within_limits for equilibrium in equilibria], "", ""),
-        Fact("residual", [equilibrium.residual for equilibrium in equilibria], "N m", ""),
-        Fact("method", found.method, "", ""),
+        Fact("times", trajectory.times, "s"),
+        Fact("targets", trajectory.targets, "m"),
+        Fact("tip_positions", trajectory.tip_positions, "m"),
+        Fact("tip_error", trajectory.tip_error, "m"),
+        Fact("q_motors", trajectory.q_motors, joined_units(motor_units(model))),
+        Fact("motor_torques", _motor_torques(trajectory), joined_units(load_units(motor_units(model)))),
+        Fact("q_springs", trajectory.q_springs, joined_units(spring_units(model))),
+        Fact("link_moments", trajectory.link_moments, "N m"),
+        Fact("wrinkling_moments", wrinkling_moments(model), "N m"),
+        Fact("wrinkling_margin", _margin(trajectory), "-"),
+        Fact("required_pressure", trajectory.required_pressure, "Pa"),
+        Fact("wrinkled", [equilibrium.wrinkled for equilibrium in equilibria]),
+        Fact("stable", [equilibrium.stable for equilibrium in equilibria]),
+        Fact("within_limits", [equilibrium.within_limits for equilibrium in equilibria]),
+        Fact("residual", [equilibrium.residual for equilibrium in equilibria], "N m"),
+        Fact("method", trajectory.method),
     ]
     names = {"motor_joints": model.motor_joints, "spring_joints": model.spring_joints, "tip": model.tip}
     return {"robot": model.pinocchio.name, **names, "load": load_answer(equilibria[0].load), **answer_of(facts)}
 
 
-def trajectory_lines(found: Trajectory) -> list[str]:
-    """The same for a person: what each motor does and feels, and the worst of every waypoint."""
-    model, equilibria = found.model, found.equilibria
-    motors, torques = found.q_motors, _motor_torques(found)
+def trajectory_lines(trajectory: Trajectory) -> list[str]:
+    """The same for a person: range and largest load of each motor, and the worst of all waypoints."""
+    model, equilibria = trajectory.model, trajectory.equilibria
+    motors, torques = trajectory.q_motors, _motor_torques(trajectory)
     rows: list[tuple[str, ...]] = [("motor", "first", "last", "least", "largest", "", "largest load", "")]
     for place, (name, unit, load) in enumerate(
         zip(model.motor_joints, motor_units(model), load_units(motor_units(model)), strict=True)
@@ -84,32 +83,32 @@ def trajectory_lines(found: Trajectory) -> list[str]:
         column = motors[:, place]
         ends = (f"{value:.6f}" for value in (column[0], column[-1], column.min(), column.max()))
         rows.append((name, *ends, unit, f"{np.abs(torques[:, place]).max():.6f}", load))
-    count, worst = len(equilibria), int(np.argmax(found.tip_error))
+    count, worst = len(equilibria), int(np.argmax(trajectory.tip_error))
     summary = [
-        ("waypoints", f"{count}, {found.times[-1] - found.times[0]:g} s, by {found.method}"),
-        ("largest tip error", f"{found.tip_error[worst]:.2g} m at waypoint {worst + 1}"),
+        ("waypoints", f"{count}, {trajectory.times[-1] - trajectory.times[0]:g} s, by {trajectory.method}"),
+        ("largest tip error", f"{trajectory.tip_error[worst]:.2g} m at waypoint {worst + 1}"),
         ("stable", _everywhere([equilibrium.stable for equilibrium in equilibria])),
         ("within limits", _everywhere([equilibrium.within_limits for equilibrium in equilibria])),
     ]
-    if found.link_moments is not None:
-        largest, margin = found.link_moments.max(axis=0), _margin(found)
+    if trajectory.link_moments is not None:
+        largest, margin = trajectory.link_moments.max(axis=0), _margin(trajectory)
         left = "" if margin is None else f", {100.0 * margin:.1f} % of the wrinkling moment is left"
         summary += [
             ("not wrinkled", _everywhere([not equilibrium.wrinkled for equilibrium in equilibria])),
-            ("largest moment", f"{spoken(largest)} N m by link{left}"),
-            ("required pressure", f"{spoken(found.required_pressure)} Pa"),
+            ("largest moment", f"{formatted(largest)} N m by link{left}"),
+            ("required pressure", f"{formatted(trajectory.required_pressure)} Pa"),
         ]
     return [*head_lines(model, equilibria[0].load), "", *aligned(rows, right=(1, 2, 3, 4, 6)), "", *aligned(summary)]
 
 
-def _motor_torques(found: Trajectory) -> FloatArray:
+def _motor_torques(trajectory: Trajectory) -> FloatArray:
     """Load on each motor, shape (n, n_motors)."""
-    return np.array([equilibrium.motor_torques for equilibrium in found.equilibria])
+    return np.array([equilibrium.motor_torques for equilibrium in trajectory.equilibria])
 
 
-def _margin(found: Trajectory) -> float | None:
-    """Share of the wrinkling moment that is left at the worst waypoint and link; None without one."""
-    margins = [margin for equilibrium in found.equilibria for margin in wrinkling_margins(equilibrium)]
+def _margin(trajectory: Trajectory) -> float | None:
+    """Least share of the wrinkling moment that is left at any waypoint and link; None without pressure or links."""
+    margins = [margin for equilibrium in trajectory.equilibria for margin in wrinkling_margins(equilibrium)]
     known = [margin for margin in margins if margin is not None]
     return min(known) if known and len(known) == len(margins) else None
 

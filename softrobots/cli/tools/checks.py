@@ -1,4 +1,4 @@
-"""A look at one robot: its tags, the rules of portable URDF, and yourdfpy's kinematics against Pinocchio's."""
+"""Checks of a robot description: its tags, the rules of portable URDF, and yourdfpy's kinematics against Pinocchio's."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[F
         count: Number of random configurations at which yourdfpy is compared with Pinocchio.
 
     Returns:
-        What was looked at, and what is wrong with it. After what makes the rest impossible nothing follows.
+        What was checked and what is wrong with it, up to a defect that makes further checks impossible.
 
     Raises:
         ParameterError: If `source` is something else, or `count` is not positive.
@@ -47,14 +47,14 @@ def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[F
 
 
 def kinematics_finding(source: Robot | Path | str, count: int = 20) -> Finding:
-    """Whether yourdfpy places every link where Pinocchio does.
+    """Compare yourdfpy's kinematics of every link with Pinocchio's.
 
     Args:
         source: A robot of this package, the path of a URDF file, or URDF text.
         count: Number of random configurations.
 
     Returns:
-        What is wrong, or how near they are.
+        What is wrong, or the largest difference.
     """
     try:
         (row,) = compare_kinematics(source, ["yourdfpy"], count=count)
@@ -64,13 +64,13 @@ def kinematics_finding(source: Robot | Path | str, count: int = 20) -> Finding:
 
 
 def row_text(row: KinematicsRow) -> str:
-    """What a tool did, in a line."""
-    told = f"within {row.position_error:.1e} m and {row.rotation_error:.1e} rad of Pinocchio"
-    return f"{told}, {row.joints} of {row.joints_in_file} joints, {row.links} of {row.links + len(row.lost_links)} links"
+    """Return the errors of a tool on one line."""
+    errors = f"within {row.position_error:.1e} m and {row.rotation_error:.1e} rad of Pinocchio"
+    return f"{errors}, {row.joints} of {row.joints_in_file} joints, {row.links} of {row.links + len(row.lost_links)} links"
 
 
 def row_problems(row: KinematicsRow) -> list[str]:
-    """What is wrong with a comparison; empty if the tool agrees."""
+    """Return what is wrong with a comparison; empty if the tool agrees."""
     if row.problem:
         return [f"{row.tool} refuses the file: {row.problem}"]
     return [] if row.agrees else [f"{row.tool} is {row_text(row)}; all of them within {row.precision:g} are required"]

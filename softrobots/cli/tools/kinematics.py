@@ -58,7 +58,7 @@ class KinematicsRow:
     limits: str
     """What the tool cannot do with a URDF file."""
     problem: str = ""
-    """What the tool said when it refused the file; empty if it did not."""
+    """Error of the tool if it refused the file, else empty."""
 
     @property
     def agrees(self) -> bool:
@@ -119,7 +119,7 @@ def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow
     try:
         with open_in(tool.name, file) as robot:
             loaded = time.perf_counter()
-            found = [robot.poses(values) for values in truth.values]
+            placed = [robot.poses(values) for values in truth.values]
             finished = time.perf_counter()
     except SoftRobotsError:
         raise
@@ -127,8 +127,8 @@ def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow
         facts |= {"joints": 0, "links": 0, "lost_links": tuple(truth.poses[0]), "position_error": 0.0, "rotation_error": 0.0}
         problem = f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else 'no reason given'}"
         return KinematicsRow(**facts, load_time=time.perf_counter() - start, pose_time=0.0, problem=problem)
-    kept = [link for link in truth.poses[0] if link in found[0]]
-    pairs = [(here[link], there[link]) for here, there in zip(found, truth.poses, strict=True) for link in kept]
+    kept = [link for link in truth.poses[0] if link in placed[0]]
+    pairs = [(here[link], there[link]) for here, there in zip(placed, truth.poses, strict=True) for link in kept]
     errors = np.array([pose_error(one, other) for one, other in pairs]).reshape(-1, 2)
     broken = not np.all(np.isfinite(errors))
     position, rotation = (0.0, 0.0) if broken or not len(errors) else errors.max(axis=0).tolist()

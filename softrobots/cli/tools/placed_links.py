@@ -91,8 +91,8 @@ def _urchin(urchin: Any, file: Path) -> Iterator[LoadedRobot]:
     names = tuple(joint.name for joint in robot.actuated_joints)
 
     def poses(values: Mapping[str, float]) -> Poses:
-        found = robot.link_fk(cfg={name: values[name] for name in names if name in values}, use_names=True)
-        return {str(name): np.asarray(pose) for name, pose in found.items()}
+        placed = robot.link_fk(cfg={name: values[name] for name in names if name in values}, use_names=True)
+        return {str(name): np.asarray(pose) for name, pose in placed.items()}
 
     yield LoadedRobot((*names, *_mimicking(file)), poses)
 
@@ -187,11 +187,11 @@ def _pybullet(pybullet: Any, file: Path) -> Iterator[LoadedRobot]:
         def poses(values: Mapping[str, float]) -> Poses:
             for name, place in moving.items():
                 pybullet.resetJointState(robot, place, values.get(name, 0.0), physicsClientId=client)
-            found = {root: np.eye(4)}
+            placed = {root: np.eye(4)}
             for name, place in links.items():
                 state = pybullet.getLinkState(robot, place, computeForwardKinematics=True, physicsClientId=client)
-                found[name] = _homogeneous(pybullet.getMatrixFromQuaternion(state[5]), state[4])
-            return found
+                placed[name] = _homogeneous(pybullet.getMatrixFromQuaternion(state[5]), state[4])
+            return placed
 
         yield LoadedRobot(tuple(moving), poses)
     finally:
@@ -211,8 +211,8 @@ def _ikpy(chains: Any, file: Path) -> Iterator[LoadedRobot]:
 
     def poses(values: Mapping[str, float]) -> Poses:
         coordinates = [0.0, *(values.get(name, 0.0) for name in names)]
-        found = chain.forward_kinematics(coordinates, full_kinematics=True)
-        return dict(zip((root, *(link_of[name] for name in names)), found, strict=True))
+        placed = chain.forward_kinematics(coordinates, full_kinematics=True)
+        return dict(zip((root, *(link_of[name] for name in names)), placed, strict=True))
 
     yield LoadedRobot(tuple(link.name for link in chain.links[1:] if link.joint_type != "fixed"), poses)
 
@@ -230,8 +230,8 @@ def _roboticstoolbox(roboticstoolbox: Any, file: Path) -> Iterator[LoadedRobot]:
         q = np.zeros(robot.n)
         for joint, place in joints.items():
             q[place] = values.get(joint, 0.0)
-        found = robot.fkine_all(q)
-        return {link.name: found[link.number].A for link in robot.links}
+        placed = robot.fkine_all(q)
+        return {link.name: placed[link.number].A for link in robot.links}
 
     yield LoadedRobot(tuple(joints), poses)
 

@@ -1,0 +1,102 @@
+"""`-o FILE` and `--plot FILE.png` of a command: refused before the work if they cannot be written, written at the end."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from softrobots.core.errors import ParameterError
+from softrobots.core.files import new_file
+from softrobots.core.result_file import save_result
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.saved_results import save_csv
+
+
+def add_output(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add `-o`, which saves `what`; `--overwrite` comes with `add_plot`."""
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"save {what} (not saved)")
+
+
+def check_output(arguments: argparse.Namespace, *endings: str) -> None:
+    """Refuse a file of `-o` that cannot be written.
+
+    Raises:
+        ParameterError: If its name has none of the endings.
+        OutputExists: If it exists and `--overwrite` is not given, or it is a folder.
+        OutputError: If its folder cannot be created.
+    """
+    if arguments.output is not None:
+        _check("-o", arguments.output, endings, arguments.overwrite)
+
+
+def save(arguments: argparse.Namespace, result: Any) -> list[Path]:
+    """Save the result of a solver if `-o` is given; return the files written.
+
+    Raises:
+        OutputExists: If the file exists by now.
+        OutputError: If it cannot be written.
+    """
+    if arguments.output is None:
+        return []
+    write = save_csv if arguments.output.suffix.lower() == ".csv" else save_result
+    return [write(result, arguments.output, overwrite=arguments.overwrite)]
+
+
+def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add `--plot`, which draws `what`, and `--overwrite`."""
+    help_text = f"draw {what} into this new PNG file (none; needs matplotlib, extra plot)"
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help=help_text)
+    parser.add_argument("--overwrite", action="store_true", help="allow files to be replaced")
+
+
+def check_plot(arguments: argparse.Namespace) -> None:
+    """Refuse a picture of `--plot` that cannot be drawn or written.
+
+    Raises:
+        ParameterError: If the file name does not end in .png.
+        OutputExists: If the file exists and `--overwrite` is not given, or it is a folder.
+        OutputError: If its folder cannot be created.
+        MissingDependency: If matplotlib is not installed.
+    """
+    if arguments.plot is None:
+        return
+    from softrobots.view.figures.canvas import require_matplotlib
+
+    _check("--plot", arguments.plot, (".png",), arguments.overwrite, require_matplotlib)
+
+
+def write_plot(arguments: argparse.Namespace, draw: Callable[[], Any]) -> list[Path]:
+    """Write the figure that `draw` returns if `--plot` is given; return the files written.
+
+    Raises:
+        OutputExists: If the file exists by now.
+        OutputError: If it cannot be written.
+    """
+    if arguments.plot is None:
+        return []
+    from softrobots.view.figures.canvas import write_png
+
+    return [write_png(draw(), arguments.plot, overwrite=arguments.overwrite)]
+
+
+def shape_figure(equilibrium: Equilibrium) -> Any:
+    """Return the figure of a loaded robot; matplotlib is imported only now.
+
+    Raises:
+        MissingDependency: If matplotlib is not installed.
+    """
+    from softrobots.view.figures.loaded_robot import loaded_shape
+
+    return loaded_shape(equilibrium)
+
+
+def _check(
+    option: str, file: Path, endings: tuple[str, ...], overwrite: bool, require: Callable[[], object] | None = None
+) -> None:
+    if file.suffix.lower() not in endings:
+        raise ParameterError(option, str(file), f"a file name that ends in {' or '.join(endings)}")
+    if require is not None:
+        require()
+    new_file(file, overwrite=overwrite)
