@@ -26,7 +26,7 @@ from softrobots.cli.options.command_line import add_load, exit_status, gravity_o
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.view.figures import canvas, loaded_robot
-from studies.command_line import serve, tell_written
+from studies.shared.command_line import serve, tell_written
 
 PIECES = {"pinch": "pinches", "tape": "tapes", "stoppers": "gaps"}
 """Names of the repeated marks of the template, by method."""

@@ -21,8 +21,8 @@ from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import METHODS
 from softrobots.view.figures import canvas, trajectories
-from studies.command_line import serve, tell_written
 from studies.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
+from studies.shared.command_line import serve, tell_written
 
 LINE = {"start": START, "end": END, "duration": DURATION, "steps": STEPS}
 """The default path."""

@@ -10,8 +10,8 @@ from pathlib import Path
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import new_file
 from softrobots.view.browser import take_picture
+from studies.gallery.moving_picture import take_animation
 from studies.gallery.scenes import EXHIBITS
-from studies.moving_picture import take_animation
 
 PICTURES = ("inflatable_arm", "pcc_arm", "helix_tube", "helix_growth", "ur5_bench", "ur5_with_soft_arm")
 """Exhibits of which there is a picture."""

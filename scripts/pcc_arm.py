@@ -21,7 +21,7 @@ from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.robots.pcc_arm import CHAINS
 from softrobots.statics.loads import Load
 from softrobots.view.figures import canvas, loaded_robot
-from studies.command_line import serve, tell_written
+from studies.shared.command_line import serve, tell_written
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 """The default muscle lengths [m]."""

@@ -28,7 +28,7 @@ from softrobots.core.checks import non_negative_number, positive_integer
 from softrobots.core.files import csv_text, free_folder, make_folder, write_text
 from softrobots.inflated_beam import CharacterisationRow, fit_characterisation
 from softrobots.view.figures import canvas
-from studies.command_line import serve, tell_written
+from studies.shared.command_line import serve, tell_written
 from studies.ur5 import bench_plots
 from studies.ur5.bench import UR5_JOINTS, UR5Bench
 from studies.ur5.bench_run import BenchRun, Measurement, push_link

@@ -21,7 +21,7 @@ from softrobots.core.checks import finite_array, non_negative_number, positive_i
 from softrobots.core.files import free_folder, make_folder, write_text
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.view.figures import canvas, trajectories
-from studies.command_line import serve, tell_written
+from studies.shared.command_line import serve, tell_written
 from studies.ur5.soft_arm import PAYLOAD, Load, compensate, follow_line, mounted, soft_arm, within_limits
 from studies.ur5.soft_arm_report import summarise, table
 

@@ -23,7 +23,7 @@ from softrobots.compiled import sweeps
 from softrobots.core.checks import finite_number, positive_integer, positive_number
 from softrobots.core.files import new_file
 from softrobots.view.figures import canvas, workspaces
-from studies.command_line import add_resume, blocks_beside
+from studies.shared.command_line import add_resume, blocks_beside
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images" / "workspace_map.png"
 CELLS = {"plane": 160, "box": 19}

@@ -19,7 +19,7 @@ import softrobots as sr
 from softrobots import export, inflated_beam
 from softrobots.cli.options import command_line
 from softrobots.description import composition
-from studies.command_line import add_resume, serve
+from studies.shared.command_line import add_resume, serve
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.laws import law
 

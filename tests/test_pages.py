@@ -21,8 +21,8 @@ from softrobots.view.meshcat_page.page_commands import RESOLUTION, packed, read_
 from softrobots.view.meshcat_page.page_text import page_text, scene_of
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.viewer import view
+from studies.gallery.moving_picture import take_animation
 from studies.gallery.scenes import EXHIBITS
-from studies.moving_picture import take_animation
 from tests.conftest import CHECKOUT
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
