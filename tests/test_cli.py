@@ -440,7 +440,7 @@ def test_export_answers_machines(told, tmp_path: Path) -> None:
     [
         (["inflatable_arm", "--motors", "1", "2"], "--motors must be 3 numbers: motor_1 [rad], motor_2 [rad], motor_3 [rad]"),
         (["pcc_arm", "--motors", "1"], "--motors must be 6 numbers: muscle_1_1 [m], "),
-        (["helix_tube", "--motors", "1"], "--motors must be left out: it has no motors"),
+        (["helix_tube", "--motors", "1"], "--motors must be left out: the robot has no motors"),
         (["inflatable_arm", "--motors", "0", "0", "nan"], "--motors must be an array of shape (3,) of finite numbers [rad]"),
         (["inflatable_arm", "--spring", "motor_1=3", "--spring", "motor_1=4"], "--spring must be given once for each joint"),
         (["a" * 5000], "no robot or file is called"),

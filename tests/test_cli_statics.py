@@ -480,7 +480,7 @@ REFUSED = [
     (("solve", "inflatable_arm", "--motors", "1"), "--motors must be 3 numbers: motor_1 [rad], motor_2 [rad], motor_3 [rad]"),
     (("solve", "inflatable_arm", "--motors", "1", "2", "inf"), "--motors must be an array of shape (3,) of finite numbers"),
     (("solve", "inflatable_arm", "--motors", "1", "2", "x"), "invalid float value: 'x'"),
-    (("solve", "helix_tube", "--motors", "1"), "--motors must be left out: it has no motors"),
+    (("solve", "helix_tube", "--motors", "1"), "--motors must be left out: the robot has no motors"),
     (("solve", "inflatable_arm", "--force", "1", "2"), "expected 3 arguments"),
     (("solve", "inflatable_arm", "--force", "1", "2", "nan"), "force must be an array of shape (3,) of finite numbers [N]"),
     (("solve", "inflatable_arm", "--moment", "1", "2", "1e40"), "at most 1e+30 in size"),
