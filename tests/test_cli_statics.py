@@ -465,7 +465,7 @@ def test_ik_jumps_only_if_told(told: Told, answer, tmp_path: Path) -> None:
     words = ("ik", "inflatable_arm", "--waypoints", str(path), "--set", "motor_limit=2.0", "--elbow", "up")
     status, out, err = told(*words)
     assert (status, out) == (1, "")
-    assert "no continuous motion leads there" in err
+    assert "no continuous motion reaches it" in err
     assert max(answer(*words, "--allow-jumps")["tip_error"]) <= 1e-9
 
 

@@ -217,7 +217,7 @@ def test_an_orientation_out_of_reach_is_said() -> None:
     """Upside down at the height of a straight arm: the position alone is easy."""
     arm = model(elastic_sections=2)
     assert sr.solve_ik(arm, (0, 0, 1.0)).error <= POSITION
-    with pytest.raises(sr.TargetUnreachable, match=r"in the wanted orientation.* and .* rad") as caught:
+    with pytest.raises(sr.TargetUnreachable, match=r"in the target orientation.* and .* rad") as caught:
         sr.solve_ik(arm, (0, 0, 1.0), orientation=(0, 0, -1), starts=3)
     best = caught.value.best
     pointing = best.equilibrium.transform_tip_to_world.rotation[:, 2]

@@ -33,31 +33,31 @@ from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load, cross_matrix
 
 GAP = 1e-12
-"""Largest distance of a probe from where it is meant to be, relative to the reach."""
+"""Tolerance of the displacement of a probe, relative to the reach."""
 
 _FLAT = 1e-3  # least cosine between the probe's line and the normal of the face
 _SAME = 1e-9  # numbers of two probes that differ by no more are the same [m or -]
 _LARGEST_STEP = 0.5  # [rad], norm of one Newton step
 _NEWTON_STEPS = 20
-_SHORTEST = 1e-6  # share of the way that is not halved again
-_SMALL_MOVE = 0.01  # [rad or m] of a spring: so near that no other path is meant
+_SHORTEST = 1e-6  # least share of the displacement in one step
+_SMALL_MOVE = 0.01  # [rad or m] of a spring: other paths are farther away
 _STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the springs' own stiffness
 
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """A probe on a robot: where it touches, and the line that it moves along."""
+    """A frictionless probe: its contact with the robot and the line along which it moves."""
 
     frame: str
-    """Frame of the robot that is touched."""
+    """Frame of the robot that it touches."""
     point: FloatArray
-    """The point that is touched, in that frame, shape (3,) [m]."""
+    """The point that it touches, in that frame, shape (3,) [m]."""
     direction: FloatArray
     """Direction of the line, shape (3,), world axes, of length 1."""
     origin: FloatArray
     """Where the line starts: the point without the probe, shape (3,) [m], world axes."""
     normal: FloatArray | None
-    """Normal of the face that the probe slides on, in the frame, shape (3,), of length 1; None: it holds to the point."""
+    """Normal of the face that the probe slides on, in the frame, shape (3,), of length 1; None: it touches the point."""
 
     def same_as(self, other: Probe) -> bool:
         """Whether another probe touches the same place and moves along the same line."""
@@ -74,19 +74,19 @@ class Contact(NamedTuple):
     """A probe on the robot in one pose."""
 
     displacement: float
-    """Where the probe is on its line [m]."""
+    """Position of the probe along its line [m]."""
     place: FloatArray
-    """The same as a point of the world, shape (3,); of a probe that holds to its point, that point."""
+    """Point of contact, shape (3,) [m], world axes."""
     wrench: FloatArray
     """Wrench on the frame for a reaction of 1 N along the line, shape (6,) [N, N m]."""
     gradient: FloatArray
     """Derivative of the displacement with respect to the elastic coordinates, shape (n,)."""
     turning: FloatArray
-    """What the dead wrench leaves out of the second derivative of the displacement, shape (n, n)."""
+    """Second derivative of the displacement beyond that of a dead wrench, shape (n, n)."""
 
 
 def touch(probe: Probe, pose: Any, jacobian: FloatArray) -> Contact:
-    """Bring a probe to the robot.
+    """Evaluate the contact of a probe at one pose of the robot.
 
     Args:
         probe: The probe.
@@ -111,7 +111,7 @@ def touch(probe: Probe, pose: Any, jacobian: FloatArray) -> Contact:
     force, arm = m / slope, lever + displacement * n - offset  # arm: from the frame to the probe
     wrench = np.concatenate([force, cross_matrix(arm) @ force])
     gradient = wrench @ jacobian
-    turned = -cross_matrix(m) @ angular  # how the normal moves
+    turned = -cross_matrix(m) @ angular  # derivative of the normal
     force_turned = turned / slope - np.outer(m, n @ turned) / slope**2
     arm_moved = np.outer(n, gradient) - linear
     moment_turned = cross_matrix(force).T @ arm_moved + cross_matrix(arm) @ force_turned
@@ -121,12 +121,12 @@ def touch(probe: Probe, pose: Any, jacobian: FloatArray) -> Contact:
 
 
 def face_normal(line: FloatArray, axis: FloatArray, along: Any) -> FloatArray:
-    """Normal of the face that holds an axis and is turned most towards a line.
+    """Normal of the face that contains an axis and faces a line most.
 
     Args:
         line: Direction of the line in the frame, shape (3,), of length 1.
         axis: The axis in the frame, shape (3,), of length 1.
-        along: What the caller gave for it, for the error.
+        along: The argument as given, for the error.
 
     Returns:
         The normal in the frame, shape (3,), of length 1.
@@ -141,22 +141,22 @@ def face_normal(line: FloatArray, axis: FloatArray, along: Any) -> FloatArray:
     return np.asarray(across / length)
 
 
-class HeldState(NamedTuple):
+class ProbedState(NamedTuple):
     """The robot and the probe at given springs and reaction."""
 
     state: ElasticState
     """The robot under load and reaction."""
     contact: Contact
-    """Where the probe touches it."""
+    """The contact with the probe."""
     reaction: float
     """Force along the line of the probe [N]."""
     tangent: FloatArray
-    """Tangent stiffness, shape (n, n) [N m/rad or N/m]: with the force turning as the robot does."""
+    """Tangent stiffness, shape (n, n) [N m/rad or N/m]: including the change of direction of the reaction."""
 
     def step(self, torque: FloatArray, way: float) -> FloatArray | None:
-        """Change of springs and reaction that takes up a torque, shape (n,) [N m or N], and moves the probe by a way [m].
+        """Newton step of springs and reaction for a torque, shape (n,) [N m or N], and a change of displacement [m].
 
-        Shape (n + 1,); None where the path turns back.
+        Shape (n + 1,); None where the matrix is singular (the path turns back).
         """
         n = len(torque)
         matrix: FloatArray = np.zeros((n + 1, n + 1))
@@ -169,7 +169,7 @@ class HeldState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class DisplacementControl:
-    """What stays the same while one displacement is sought."""
+    """A robot, its load and a probe: the equations of one imposed displacement."""
 
     model: SoftModel
     """The robot."""
@@ -184,27 +184,27 @@ class DisplacementControl:
 
     @property
     def largest_gap(self) -> float:
-        """Largest distance of the probe from where it is meant to be [m]."""
+        """Tolerance of the displacement [m]."""
         return GAP * self.model.reach
 
-    def at(self, q_springs: FloatArray, reaction: float) -> HeldState:
+    def at(self, q_springs: FloatArray, reaction: float) -> ProbedState:
         """Evaluate at springs, shape (n_springs,), and a reaction [N]."""
         point = self.model.coordinates.at(self.motors, q_springs)
         q = self.model.embed(point.joints)
         jacobian = point.columns(frame_jacobian(self.model, q, self.probe.frame))[1]
         contact = touch(self.probe, frame_placement(self.model, q, self.probe.frame), jacobian)
         state = elastic_state(self.model, self.motors, q_springs, self.load.plus(self.probe.frame, reaction * contact.wrench))
-        return HeldState(state, contact, reaction, state.tangent - reaction * contact.turning)
+        return ProbedState(state, contact, reaction, state.tangent - reaction * contact.turning)
 
-    def newton(self, here: HeldState, wanted: float, most: int) -> tuple[HeldState | None, int]:
-        """Newton to a displacement from nearby, and the evaluations spent; None where it does not converge in `most`."""
+    def newton(self, here: ProbedState, wanted: float, most: int) -> tuple[ProbedState | None, int]:
+        """Newton to a displacement nearby; the state, None if it does not converge in `most`, and the evaluations spent."""
         n = self.model.n_springs
         for iteration in range(1, most + 1):
             gap = wanted - here.contact.displacement
             if not math.isfinite(here.state.error) or not math.isfinite(gap):
                 return None, iteration
-            settled = here.state.error <= largest_residual(self.model, here.state.scale, self.tolerance)
-            if settled and abs(gap) <= self.largest_gap:
+            balanced = here.state.error <= largest_residual(self.model, here.state.scale, self.tolerance)
+            if balanced and abs(gap) <= self.largest_gap:
                 return here, iteration
             step = here.step(-here.state.residual, gap)
             if step is None or not np.linalg.norm(step[:n]) <= _LARGEST_STEP:
@@ -213,17 +213,17 @@ class DisplacementControl:
         return None, most
 
 
-def follow(problem: DisplacementControl, here: HeldState, wanted: float, most: int) -> tuple[HeldState, int]:
-    """Go to a displacement along the path, in one step if possible.
+def follow(problem: DisplacementControl, here: ProbedState, wanted: float, most: int) -> tuple[ProbedState, int]:
+    """Follow the path to a displacement, in one step if possible.
 
     Args:
-        problem: What stays the same.
+        problem: Robot, load and probe.
         here: A point of the path.
         wanted: The displacement [m].
         most: Most evaluations.
 
     Returns:
-        The farthest point that was reached, and the evaluations spent.
+        The farthest point reached, and the evaluations spent.
     """
     origin = here.contact.displacement
     reached, step, spent = 0.0, 1.0, 0
@@ -240,17 +240,17 @@ def follow(problem: DisplacementControl, here: HeldState, wanted: float, most: i
     return here, spent
 
 
-def _same_path(problem: DisplacementControl, here: HeldState, there: HeldState) -> bool:
-    """Whether a step is sure to have stayed on the path: a short one, or one that went about where the path points.
+def _same_path(problem: DisplacementControl, here: ProbedState, there: ProbedState) -> bool:
+    """Whether a step stayed on the path: a short step, or one close to the prediction along the path.
 
-    A long one that ends unstable where it began stable is not: beyond the knee of a link, Newton finds the path on which a
-    second one goes limp, too, as easily as the one on which that unloads.
+    A long step from a stable to an unstable state did not: beyond the knee of a link, Newton finds the path on which a
+    second link yields, too, as easily as the one on which it unloads.
     """
     moved = there.state.q_springs - here.state.q_springs
     if np.abs(moved).max() <= _SMALL_MOVE:
         return True
     model = problem.model
-    stable = [stable_while_held(model, held.tangent, held.contact.gradient) for held in (here, there)]
+    stable = [stable_under_constraint(model, probed.tangent, probed.contact.gradient) for probed in (here, there)]
     if stable[0] and not stable[1]:
         return False
     predicted = here.step(np.zeros(len(moved)), there.contact.displacement - here.contact.displacement)
@@ -260,13 +260,13 @@ def _same_path(problem: DisplacementControl, here: HeldState, there: HeldState) 
     return bool(missed <= max(0.5 * expected, _SMALL_MOVE))
 
 
-def stable_while_held(model: SoftModel, tangent: FloatArray, gradient: FloatArray) -> bool:
-    """Whether a symmetric tangent stiffness is positive definite on the motions that a constraint leaves free.
+def stable_under_constraint(model: SoftModel, tangent: FloatArray, gradient: FloatArray) -> bool:
+    """Whether a symmetric tangent stiffness is positive definite on the null space of a constraint.
 
     Args:
         model: The robot.
         tangent: Tangent stiffness, shape (n, n) [N m/rad or N/m].
-        gradient: Derivative of what is constrained, shape (n,) [m/rad or -].
+        gradient: Derivative of the constrained quantity, shape (n,) [m/rad or -].
     """
     softness = 1.0 / np.sqrt(model.stiffness)
     free = np.linalg.qr((softness * gradient)[:, None], mode="complete")[0][:, 1:]

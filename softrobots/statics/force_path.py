@@ -1,8 +1,7 @@
-r"""Equilibria under a force of any size along a line: points of a path, Newton with conditions, and following by its length.
+r"""Paths of equilibria under a force of variable size: points, Newton with constraints, and pseudo-arclength continuation.
 
-Springs `y` and force `F` are unknowns together, :math:`r(y) - F J^T d = 0`, so that a path can be followed where the force
-falls (pseudo-arclength continuation). Places on it are seen from a reference point, `(y - y_c, F / F_c - 1)`: a change of the
-force by `F_c` counts as much as a radian.
+Springs `y` and force `F` are the unknowns of :math:`r(y) - F J^T d = 0`, so that a path can be followed where the force falls.
+Places on it are relative to a reference point, `(y - y_c, F / F_c - 1)`: a change of the force by `F_c` counts as a radian.
 """
 
 from __future__ import annotations
@@ -23,10 +22,10 @@ TOLERANCE = 1e-12
 """Largest residual of a point, relative to the scale of the load."""
 
 _NEWTON_STEPS = 15
-_GAP = 1e-12  # by which a condition may be missed [rad]
+_GAP = 1e-12  # tolerance of a constraint [rad]
 _LONGEST = 1.0  # Newton step [rad]
 _SHORTEST = 1e-5  # step along a path [rad]
-_BEHIND = 1e-3  # step along a path behind a knee [rad]
+_BEHIND = 1e-3  # first step along a path behind a knee [rad]
 _TURN = 0.95  # least cosine between the directions of two steps
 _MOST_POINTS = 2000
 
@@ -41,7 +40,7 @@ class PathPoint(NamedTuple):
     push: FloatArray
     """Derivative of the elastic loads with respect to it, shape (n_springs,) [m]."""
     across: float = 0.0
-    """Torque that holds the robot in a direction, where one is given [N m]."""
+    """Torque that keeps the robot in a direction, if one is given [N m]."""
 
     @property
     def springs(self) -> FloatArray:
@@ -51,7 +50,7 @@ class PathPoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ForcePath:
-    """What stays the same along a path."""
+    """The path of a robot under one direction of the force."""
 
     model: SoftModel
     """The robot."""
@@ -60,7 +59,7 @@ class ForcePath:
     constant: Load
     """The load without the force."""
     frame: str
-    """Where the force acts."""
+    """Frame at which the force acts."""
     unit: FloatArray
     """Its direction, shape (3,)."""
     springs: FloatArray
@@ -69,7 +68,7 @@ class ForcePath:
     """Force of the reference point, above zero [N]."""
 
     def load(self, force: float) -> Load:
-        """The load with a force [N]."""
+        """Return the load with a force [N]."""
         return self.constant.plus(self.frame, np.concatenate([force * self.unit, np.zeros(3)]))
 
     def point(self, springs: FloatArray, force: float) -> PathPoint:
@@ -81,42 +80,42 @@ class ForcePath:
         return PathPoint(state, force, self.unit @ columns)
 
     def place(self, point: PathPoint) -> FloatArray:
-        """A point as seen from the reference point, shape (n_springs + 1,)."""
+        """Return the place of a point relative to the reference point, shape (n_springs + 1,)."""
         return np.append(point.springs - self.springs, point.force / self.force - 1.0)
 
     def at(self, place: FloatArray) -> PathPoint:
-        """The robot at such a place, in balance or not."""
+        """Evaluate the robot at a place, in equilibrium or not."""
         return self.point(self.springs + place[:-1], self.force * (1.0 + float(place[-1])))
 
     def tangent(self, point: PathPoint) -> FloatArray:
-        """Direction in which the path leaves a point whose tangent stiffness is regular, the force growing."""
+        """Return the direction of the path under growing force at a point of regular tangent stiffness."""
         return np.append(self.force * np.linalg.solve(point.state.tangent, point.push), 1.0)
 
     def newton(
         self, start: FloatArray, rows: FloatArray, aims: FloatArray, across: FloatArray | None = None
     ) -> PathPoint | None:
-        """Newton on springs and force, and on torques across directions.
+        """Newton for springs and force, and for torques along `across`.
 
         Args:
             start: Place to start from, shape (n_springs + 1,).
-            rows: Conditions on the place, shape (1 + m, n_springs + 1).
-            aims: What rows times place must be, shape (1 + m,).
-            across: Directions in which torques hold the robot, shape (m, n_springs); none by default.
+            rows: Constraints on the place, shape (1 + m, n_springs + 1).
+            aims: Required value of rows times place, shape (1 + m,).
+            across: Directions in which torques keep the robot, shape (m, n_springs); none by default.
 
         Returns:
-            The point, or None where it does not converge.
+            The point; None if Newton does not converge.
         """
-        n, held = len(self.springs), np.zeros((0, len(self.springs))) if across is None else across
-        here, torques = self.at(start), np.zeros(len(held))
+        n, guides = len(self.springs), np.zeros((0, len(self.springs))) if across is None else across
+        here, torques = self.at(start), np.zeros(len(guides))
         for _ in range(_NEWTON_STEPS):
             if not math.isfinite(here.state.error):
                 return None
-            residual, gap = here.state.residual + torques @ held, aims - rows @ self.place(here)
+            residual, gap = here.state.residual + torques @ guides, aims - rows @ self.place(here)
             balanced = np.linalg.norm(residual) <= largest_residual(self.model, here.state.scale, TOLERANCE)
             if balanced and np.abs(gap).max() <= _GAP:
                 return here._replace(across=float(torques[0]) if len(torques) else 0.0)
-            matrix = np.zeros((n + len(rows), n + 1 + len(held)))
-            matrix[:n, :n], matrix[:n, n], matrix[:n, n + 1 :] = here.state.tangent, -self.force * here.push, held.T
+            matrix = np.zeros((n + len(rows), n + 1 + len(guides)))
+            matrix[:n, :n], matrix[:n, n], matrix[:n, n + 1 :] = here.state.tangent, -self.force * here.push, guides.T
             matrix[n:, : n + 1] = rows
             try:
                 step = np.linalg.solve(matrix, np.concatenate([-residual, gap]))
@@ -131,19 +130,19 @@ class ForcePath:
     def follow(
         self, first: list[PathPoint], way: FloatArray, largest_force: float, largest_step: float
     ) -> tuple[list[PathPoint], str]:
-        """Follow the path on from its first points.
+        """Follow the path from its first points.
 
         Args:
             first: One point, or more.
-            way: Direction in which it goes on from the last, shape (n_springs + 1,).
-            largest_force: Where it ends [N].
+            way: Direction of the path at the last of them, shape (n_springs + 1,).
+            largest_force: Force at which the path ends [N].
             largest_step: Largest distance between two points [rad].
 
         Returns:
-            All points; and why it ends: "largest force", "zero force", "end of range", "points" or "lost".
+            All points; and why the path ends: "largest force", "zero force", "end of range", "points" or "lost".
         """
         points, step, way = list(first), largest_step, way / np.linalg.norm(way)
-        knee = 0  # points at the last one
+        knee = 0  # number of points at the last knee
         while len(points) < _MOST_POINTS:
             here = self.place(points[-1])
             there = self.newton(here + step * way, way[None], np.array([way @ here + step]))
@@ -169,10 +168,10 @@ class ForcePath:
         return points, "points"
 
     def _behind_knee(self, here: PathPoint, way: FloatArray) -> FloatArray | None:
-        """Direction of the path where a link comes onto the plateau of its moment, or off it; None where none does.
+        """Direction of the path behind the knee of a link, at either end of its plateau; None if there is no knee.
 
-        The tangent stiffness jumps there. The direction is the one in which the new one needs no torque, and in which the link
-        bends on as before.
+        The tangent stiffness jumps there. The direction is in the null space behind the knee, with the link bending on as
+        before.
         """
         law, beyond = self.model.springs, here.springs + 10.0 * _SHORTEST * way[:-1]
         places = sorted(law.saturated(here.springs) ^ law.saturated(beyond))

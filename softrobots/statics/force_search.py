@@ -1,4 +1,4 @@
-"""Search for the force at the tip that explains motor torques; whoever settles the springs."""
+"""Damped Newton search for the tip force; independent of the solver."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ OBSERVABLE = 1e-3
 """A direction counts as unobservable when its singular value is below this share of the reach."""
 
 HIDDEN = 0.05
-"""Share of the motor torques that may stay unexplained where the motors do not feel every direction of the force."""
+"""Share of the motor torques that may stay unexplained where a direction of the force is unobservable."""
 
-_FIRST_DAMPING = 0.03  # of the first step, relative to the reach: keeps the force small where it is barely felt
+_FIRST_DAMPING = 0.03  # of the first step, relative to the reach: keeps the force small where it is barely observable
 _LAST_DAMPING = 1e-7
 
 State = TypeVar("State")
-"""A robot in equilibrium, as a measurement knows it."""
+"""A robot in equilibrium, as the solver represents it."""
 
 
 class Directions(NamedTuple):
@@ -32,17 +32,17 @@ class Directions(NamedTuple):
     right: FloatArray
     """Directions of the force, in rows, shape (3, 3)."""
     observable: Any
-    """Which singular values are large enough for the direction to be felt, truth values."""
+    """Which directions are observable by their singular value, truth values."""
 
     @classmethod
     def of(cls, slope: FloatArray, reach: float) -> Directions:
-        """Decompose the slope of a robot of a given reach [m]."""
+        """Decompose the torque slope of a robot with a given reach [m]."""
         left, values, right = np.linalg.svd(slope)
         return cls(left, values, right, values > OBSERVABLE * reach)
 
 
 class Measurement(Protocol[State]):
-    """Motor torques that were measured, and a robot that tells what a force would make of them."""
+    """Measured motor torques, and a robot on which forces are tried."""
 
     @property
     def reach(self) -> float:
@@ -53,17 +53,17 @@ class Measurement(Protocol[State]):
         """Largest part of the torques that may stay unexplained [N m]."""
 
     def equilibrium(self, force: FloatArray, near: State) -> State | None:
-        """The robot in equilibrium under a force, from a state near to it; None if it does not settle."""
+        """Solve for the equilibrium under a force, from a nearby state; None if it does not converge."""
 
     def unexplained(self, state: State) -> FloatArray:
-        """Measured torques minus those of a state, shape (n_motors,)."""
+        """Return measured torques minus those of a state, shape (n_motors,)."""
 
     def directions(self, state: State) -> Directions:
-        """How the torques follow the force."""
+        """Decompose the derivative of the torques with respect to the force."""
 
 
 def torque_tolerance(torques: FloatArray) -> float:
-    """Largest part of motor torques that may stay unexplained [N m]."""
+    """Return the norm of motor torques that may stay unexplained [N m]."""
     return TOLERANCE * max(float(np.linalg.norm(torques)), MOMENT_FLOOR)
 
 
@@ -71,12 +71,12 @@ def search_force(problem: Measurement[State], state: State, most: int) -> tuple[
     """Levenberg-Marquardt on the torque equation, in the observable directions of each step.
 
     Args:
-        problem: What was measured.
-        state: The robot without a force.
+        problem: The measurement.
+        state: The robot without the force.
         most: Most steps.
 
     Returns:
-        The force, shape (3,) [N], the robot under it, and the steps.
+        The force, shape (3,) [N], the robot under it, and the number of steps.
     """
     force, reach = np.zeros(3), problem.reach
     damping, spent = _FIRST_DAMPING * reach, 0

@@ -1,7 +1,7 @@
-"""A robot that a probe displaces by a given way, as a certified result: the force follows.
+"""Equilibrium of a robot that a probe displaces by a given distance; the reaction force is part of the result.
 
-A dead moment cannot hold a link on the plateau of its moment, and a dead force only where the link has turned out of its way; a
-probe can. The equations and the solver are in `softrobots.statics.displacement_control`.
+A displacement can be imposed where no dead load has an equilibrium: a link on the plateau of its moment. The equations and the
+solver are in `softrobots.statics.displacement_control`.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.displacement_control import (
     GAP,
     DisplacementControl,
-    HeldState,
     Probe,
+    ProbedState,
     face_normal,
     follow,
-    stable_while_held,
+    stable_under_constraint,
 )
 from softrobots.statics.elastic_state import TOLERANCE
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state, solve_equilibrium
@@ -31,29 +31,29 @@ from softrobots.statics.loads import Load
 
 @dataclass(frozen=True, eq=False)
 class ImposedDisplacement:
-    """A robot that a probe holds displaced; can be saved with `softrobots.save_result`."""
+    """Equilibrium of a robot that a probe displaces; can be saved with `softrobots.save_result`."""
 
     probe: Probe
     """The probe."""
     displacement: float
-    """How far along its line the probe is [m]."""
+    """Position of the probe along its line [m]."""
     reaction: float
-    """Force on the robot along that line [N], what a load cell behind the probe reads; negative: it would have to pull."""
+    """Force on the robot along that line [N], the reading of a load cell behind the probe; negative: it would have to pull."""
     load: Load
     """The load without the probe."""
     equilibrium: Equilibrium
-    """The robot with the reaction as a wrench at the probe's frame. *Its* certificate is about that wrench as a dead load;
-    under the imposed displacement `stable` counts."""
+    """The robot with the reaction as a wrench at the probe's frame. *Its* certificate is for that wrench as a dead load;
+    `stable` is for the imposed displacement."""
     force: FloatArray
     """Force on the robot at `contact`, shape (3,) [N], world axes; a frictionless probe has no moment there."""
     contact: FloatArray
-    """Where the probe is, shape (3,) [m], world axes."""
+    """Point of contact, shape (3,) [m], world axes."""
     tangent_stiffness: FloatArray
-    """Derivative of the out-of-balance torque at constant reaction, which turns with a face, shape (n_springs, n_springs)."""
+    """Derivative of the residual at constant reaction, which turns with a face, shape (n_springs, n_springs)."""
     gradient: FloatArray
     """Derivative of the displacement with respect to the springs, shape (n_springs,) [m/rad or m/m]."""
     gap: float
-    """Distance of the probe from where it is meant to be [m]."""
+    """Error of the displacement [m]."""
     stable: bool
     """Certified: the tangent stiffness is positive definite on the motions of the springs that do not move the probe."""
 
@@ -92,21 +92,21 @@ def solve_imposed_displacement(
     tolerance: float = TOLERANCE,
     max_iterations: int = 400,
 ) -> ImposedDisplacement:
-    """Find the springs and the force of a frictionless probe that displaces a point of the robot by a given way.
+    """Find the springs and the reaction of a frictionless probe that displaces a point of the robot by a given distance.
 
     The displacement is counted from the equilibrium without the probe. It is imposed at once, or in steps where Newton does not
-    follow: the answer is on the path from there, or from `start`.
+    converge: the result is on the path from that equilibrium, or from `start`.
 
     Args:
         model: The robot, with at least one spring.
         q_motors: Motor coordinates, shape (n_motors,) [rad or m].
-        displacement: How far the probe has moved along its line [m].
+        displacement: Distance that the probe has moved along its line [m].
         direction: Direction of that line, shape (3,), any length but zero, world axes.
-        frame: Frame that is touched; the tip by default.
-        point: The point that is touched, in the axes of the frame, shape (3,) [m]; the origin of the frame by default.
+        frame: Frame that the probe touches; the tip by default.
+        point: The point that the probe touches, in the axes of the frame, shape (3,) [m]; the origin of the frame by default.
         along: Axis of the frame, shape (3,), any length but zero, along which the probe slides on the robot: on the face that
-            holds this axis and, without the probe, is turned most towards the line. None: the probe holds to its point,
-            which is free to move across the line.
+            contains this axis and, without the probe, faces the line most. None: the probe stays at its point, which is free
+            to move across the line.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         start: A solution with the same model, motors, probe and load to start from, e.g. the last one of a sequence.
         tolerance: Largest residual, relative to `max(|f| reach + |g|, 1e-3 N m)`.
@@ -159,25 +159,25 @@ def solve_imposed_displacement(
     )
 
 
-def _result(problem: DisplacementControl, held: HeldState, wanted: float, iterations: int) -> ImposedDisplacement:
-    """Make the result object."""
-    model, probe, contact = problem.model, problem.probe, held.contact
-    pressed = problem.load.plus(probe.frame, held.reaction * contact.wrench)
+def _result(problem: DisplacementControl, probed: ProbedState, wanted: float, iterations: int) -> ImposedDisplacement:
+    """Result at one state of robot and probe."""
+    model, probe, contact = problem.model, problem.probe, probed.contact
+    pressed = problem.load.plus(probe.frame, probed.reaction * contact.wrench)
     equilibrium = equilibrium_from_state(
-        model, problem.motors, pressed, held.state, method="newton", iterations=iterations, tolerance=problem.tolerance
+        model, problem.motors, pressed, probed.state, method="newton", iterations=iterations, tolerance=problem.tolerance
     )
     return ImposedDisplacement(
         probe=probe,
         displacement=wanted,
-        reaction=held.reaction,
+        reaction=probed.reaction,
         load=problem.load,
         equilibrium=equilibrium,
-        force=read_only(held.reaction * contact.wrench[:3]),
+        force=read_only(probed.reaction * contact.wrench[:3]),
         contact=read_only(contact.place),
-        tangent_stiffness=read_only(held.tangent),
+        tangent_stiffness=read_only(probed.tangent),
         gradient=read_only(contact.gradient),
         gap=abs(contact.displacement - wanted),
-        stable=stable_while_held(model, held.tangent, contact.gradient),
+        stable=stable_under_constraint(model, probed.tangent, contact.gradient),
     )
 
 
@@ -192,7 +192,7 @@ def imposed_at(
     displacement: float,
     iterations: int,
 ) -> ImposedDisplacement:
-    """Make a result anew from its unknowns; what a saved one is loaded with.
+    """Compute a result from its unknowns, as saved in a file.
 
     Args:
         model: The robot.
@@ -201,11 +201,11 @@ def imposed_at(
         probe: The probe.
         q_springs: Spring coordinates, shape (n_springs,) [rad or m].
         reaction: Force along the probe's line [N].
-        displacement: Where the probe is meant to be [m].
-        iterations: Evaluations that were spent.
+        displacement: Displacement of the probe [m].
+        iterations: Evaluations spent.
 
     Returns:
-        The result, whether or not it is in balance.
+        The result, whether or not it is in equilibrium.
     """
     problem = DisplacementControl(model, q_motors, load, probe, TOLERANCE)
     return _result(problem, problem.at(q_springs, reaction), displacement, iterations)

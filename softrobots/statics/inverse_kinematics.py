@@ -1,6 +1,7 @@
 """Elastostatic inverse kinematics: actuator coordinates that put the loaded, deformed tip at a target.
 
-The search from one start is in `softrobots.statics.tip_search`; here are the starts and the choice among what they find.
+This module has the starts and the choice among the solutions; the search from one start is in
+`softrobots.statics.tip_search`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from softrobots.statics.tip_search import POSITION_TOLERANCE, SAME, LocalSolutio
 ELBOWS = ("up", "down")
 """Choices of `solve_ik(elbow=...)`."""
 
-_SEED = 20210312  # of the random starts: the day the paper appeared
+_SEED = 20210312  # of the random starts
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,18 +35,18 @@ class IkSolution:
     target: FloatArray
     """The target, shape (3,) [m]."""
     orientation: FloatArray | None
-    """Wanted orientation of the tip, shape (3, 3), or direction of its z axis, shape (3,); None: any."""
+    """Target orientation of the tip, shape (3, 3), or direction of its z axis, shape (3,); None: any."""
     equilibrium: Equilibrium
     """The loaded robot at these motor coordinates."""
     error: float
     """Distance of the tip from the target [m]."""
     orientation_error: float
-    """Angle between the tip and the wanted orientation [rad]; 0 if none is wanted."""
+    """Angle between the tip and its target orientation [rad]; 0 without one."""
     iterations: int
-    """Steps from the start that led here."""
+    """Steps from the start of the search."""
     alternatives: tuple[FloatArray, ...]
     """Actuator coordinates of the other solutions found, each shape (n_motors,), by their distance from the start; whole turns
-    of a motor do not make another solution."""
+    of a motor count as the same solution."""
 
     @property
     def q_motors(self) -> FloatArray:
@@ -71,22 +72,22 @@ def solve_ik(
     """Find actuator coordinates (motor angles, muscle lengths) that put the loaded tip at a target position.
 
     Searches from `q_motors0` and from random coordinates within the limits (always the same ones), and returns, of the
-    solutions found, the one that changes `q_motors0` least. A robot with more actuators than the target has conditions moves as
-    little as it can; if it has muscles, the first search that arrives decides.
+    solutions found, the one that changes `q_motors0` least. Of a robot with more actuators than the target has
+    conditions the change is minimal; if it has muscles, the first search that succeeds decides.
 
     Args:
         model: The robot, with at least one actuator.
         target: Target of the tip, shape (3,) [m], world axes.
         force: Force at `frame`, shape (3,) [N], world axes.
-        orientation: How the tip must stand, for robots with the freedom: a rotation matrix (tip axes in world axes), shape
-            (3, 3), or the direction of the tip's z axis, shape (3,), any length but zero; None: anyhow.
+        orientation: Target orientation, for robots with enough actuators: a rotation matrix (tip axes in world axes), shape
+            (3, 3), or the direction of the tip's z axis, shape (3,), any length but zero; None: any.
         wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
         frame: Frame of `force` and `wrench`; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-        q_motors0: Where to start, shape (n_motors,) [rad, m or N]; `SoftModel.relaxed_motors` by default.
+        q_motors0: Start of the search, shape (n_motors,) [rad, m or N]; `SoftModel.relaxed_motors` by default.
         elbow: "up" or "down": only solutions whose last motor joint lies above or below the line from the first motor joint
             to the tip; None: any.
-        method: How the springs settle, "newton" or "fixed_point".
+        method: Solver of the springs, "newton" or "fixed_point".
         tolerance: Largest distance of the tip from the target [m].
         starts: Number of searches, the one from `q_motors0` included.
 
@@ -97,8 +98,8 @@ def solve_ik(
         ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has no actuators, or not
             enough of them for an orientation.
         NameNotFound: If a frame does not exist.
-        TargetUnreachable: If no search arrives; the error names the nearest point that the best one reached and carries it.
-        EquilibriumNotFound: If the springs settle at none of the starts.
+        TargetUnreachable: If no search succeeds; the error names the nearest point reached and carries that solution.
+        EquilibriumNotFound: If none of the starts has an equilibrium.
     """
     check_model(model)
     goal = Goal(finite_array("target", target, (3,), "m"), checked_orientation(orientation))
@@ -128,7 +129,7 @@ def solve_ik(
             if model.muscles and freedom > goal.rows and local.arrived(tolerance) and allowed(local):
                 break
     if not ended:
-        _raise_unsettled(model, first, load, method, starts)
+        _raise_unsolved(model, first, load, method, starts)
     sided = [local for local in ended if allowed(local)]
     found: list[LocalSolution[ElasticState]] = []
     for local in sorted(sided, key=lambda local: float(np.linalg.norm((local.q_motors - first) / model.motor_scale))):
@@ -146,15 +147,15 @@ def solve_ik(
     )
     if not found:
         side = (f" with the elbow {elbow}" if elbow else "") + (
-            " in the wanted orientation" if goal.rotation is not None else ""
+            " in the target orientation" if goal.rotation is not None else ""
         )
-        unsettled = sum(local.unsettled for local in ended)
+        unsolved = sum(local.unsolved for local in ended)
         raise TargetUnreachable(
             f"the tip cannot reach {goal.position.tolist()} m{side}: the nearest of {starts} starts (seed {_SEED}) comes "
             f"within {best.error:.6g} m{'' if goal.rotation is None else f' and {best.angle:.6g} rad'}, "
             f"at {solution.equilibrium.tip_position.round(9).tolist()} m with motors {best.q_motors.round(6).tolist()}"
             + ("" if sided else ", with the elbow on the other side")
-            + (f"; the springs did not settle by {method!r} at {unsettled} of the motor angles tried" if unsettled else ""),
+            + (f"; {method!r} found no equilibrium at {unsolved} of the motor coordinates tried" if unsolved else ""),
             best=solution,
             residual=best.error,
             iterations=best.iterations,
@@ -163,7 +164,7 @@ def solve_ik(
 
 
 def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
-    """Check where a search starts: relaxed, or as near to it as the limits allow, if nothing is said.
+    """Check the start of a search; by default relaxed, or as near to it as the limits allow.
 
     Raises:
         ParameterError: If the robot has no actuators, or the start has the wrong shape, is not finite or beyond the limits.
@@ -180,7 +181,7 @@ def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
 
 
 def checked_orientation(value: Any) -> FloatArray | None:
-    """Return a wanted orientation of the tip, a direction with length 1.
+    """Return a target orientation of the tip, a direction with length 1.
 
     Args:
         value: A rotation matrix, shape (3, 3), a direction, shape (3,), or None.
@@ -228,18 +229,18 @@ def _has_elbow(model: SoftModel) -> bool:
 
 
 def _same_pose(model: SoftModel, one: LocalSolution[ElasticState], other: LocalSolution[ElasticState]) -> bool:
-    """Whether two solutions are one, up to whole turns of a motor."""
+    """Whether two solutions are the same, up to whole turns of a motor."""
     apart = one.q_motors - other.q_motors
     apart = np.where(model.actuators.turning, apart - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)), apart)
     return float(np.abs(apart / model.motor_scale).max()) <= SAME
 
 
-def _raise_unsettled(model: SoftModel, motors: FloatArray, load: Load, method: str, starts: int) -> NoReturn:
+def _raise_unsolved(model: SoftModel, motors: FloatArray, load: Load, method: str, starts: int) -> NoReturn:
     state, spent, _ = solve_springs(model, motors, load, model.rest, method=method)
     best = equilibrium_from_state(model, motors, load, state, method=method, iterations=spent)
-    hint = "; method='newton' settles larger loads" if method == "fixed_point" else ""
+    hint = "; method='newton' converges for larger loads" if method == "fixed_point" else ""
     raise EquilibriumNotFound(
-        f"the springs do not settle under this load by {method!r} at any of {starts} starts{hint}",
+        f"no equilibrium under this load by {method!r} at any of {starts} starts{hint}",
         best=best,
         residual=best.residual,
         iterations=spent,
@@ -248,11 +249,11 @@ def _raise_unsettled(model: SoftModel, motors: FloatArray, load: Load, method: s
 
 def _starts(model: SoftModel, first: FloatArray, count: int) -> list[FloatArray]:
     random = np.random.default_rng(_SEED)
-    made = [first]
-    for _ in range(20 * count):  # some lengths fit together nowhere, or bend too far
-        if len(made) == count:
+    starts = [first]
+    for _ in range(20 * count):  # some muscle lengths are inconsistent, or bend a segment too far
+        if len(starts) == count:
             break
         start = model.actuators.draw(random)
         if start is not None:
-            made.append(start)
-    return made
+            starts.append(start)
+    return starts

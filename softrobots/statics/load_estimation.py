@@ -1,8 +1,8 @@
-"""The force at the tip, and the shape of the robot, from what the motors feel.
+"""Estimation of the force at the tip, and of the shape of the robot, from motor torques.
 
 Given motor coordinates and motor torques `tau_m = J_m^T f - g_m` with no moment at the tip, find the force `f` and the
-springs `y` together. Where the tip hardly moves with the motors in some direction (elbow straight, tip on the axis of the
-first motor) the force along that direction cannot be felt: that is part of the answer.
+springs `y` together. A force is unobservable along a direction in which the motors hardly move the tip (elbow straight, tip on
+the axis of the first motor); the result names such directions.
 """
 
 from __future__ import annotations
@@ -26,38 +26,37 @@ from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import motor_torque_slope
 
 METHODS = ("newton", "alternation")
-"""The solvers of `estimate_load`; "alternation" is the paper's."""
+"""The solvers of `estimate_load`; "alternation" is that of [Troise 2021]."""
 
-_INNER = 1e-12  # tolerance of the equilibria on the way
+_INNER = 1e-12  # tolerance of the equilibria during the search
 
 
 @dataclass(frozen=True, eq=False)
 class LoadEstimate:
-    """A force explained by motor torques, with what can be said about it; can be saved with `softrobots.save_result`."""
+    """A tip force estimated from motor torques, with its observability; can be saved with `softrobots.save_result`."""
 
     force: FloatArray
-    """The force, shape (3,) [N], world axes. Its part along unobservable directions is what the damped search leaves there:
-    small, and not to be trusted."""
+    """The force, shape (3,) [N], world axes. Its part along unobservable directions is small and meaningless."""
     equilibrium: Equilibrium
-    """The robot under that force: its pose, its springs, its stability."""
+    """The robot under that force."""
     frame: str
-    """Where the force acts."""
+    """Frame at which the force acts."""
     measured_torques: FloatArray
-    """The motor torques that came in, shape (n_motors,) [N m]."""
+    """The measured motor torques, shape (n_motors,) [N m]."""
     torque_std: FloatArray | None
     """Their standard deviation, shape (n_motors,) [N m]; None if none was given."""
     method: str
     """The solver."""
     singular_values: FloatArray
-    """How strongly the motors feel a force along each principal direction, descending, shape (3,) [m]."""
+    """Singular values of the derivative of the motor torques with respect to the force, descending, shape (3,) [m]."""
     unobservable_directions: FloatArray
     """Unit directions whose singular value is below `OBSERVABLE` times the reach, shape (k, 3); k may be 0."""
     covariance: FloatArray | None
-    """Covariance of the force for the given torque noise, shape (3, 3) [N^2], over the observable directions; None if no
-    noise was given."""
+    """Covariance of the force for the given torque noise, shape (3, 3) [N^2], over the observable directions; None without
+    `torque_std`."""
     residual: float
-    """Norm of the motor torques that the force does not explain [N m]; rounding, unless a direction is unobservable or more
-    than three motors disagree."""
+    """Norm of the motor torques that the force does not explain [N m]: rounding, unless a direction is unobservable or more
+    than three motors are fitted."""
     iterations: int
     """Steps of the solver."""
 
@@ -92,8 +91,8 @@ def estimate_load(
     With more than three motors the fit is least squares; with fewer the force is the one that the damped search finds from
     zero, close to the smallest.
 
-    Where a link has a largest moment, several forces may give the same torques, with the link on its plateau or not, and
-    "newton" returns the one that it comes to from zero, or none where the plateau bars the way.
+    Where a link has a largest moment, several forces may give the same torques, with the link on its plateau or not;
+    "newton" returns the one that it reaches from zero, or fails at the plateau.
 
     Args:
         model: The robot, with at least one motor.
@@ -103,8 +102,8 @@ def estimate_load(
         method: "newton" or "alternation".
         frame: Frame at which the force acts; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-        torque_std: Standard deviation of the torque noise, one number or shape (n_motors,) [N m], for the covariance; up to
-            five times it may then stay unexplained.
+        torque_std: Standard deviation of the torque noise, one number or shape (n_motors,) [N m], for the covariance; five
+            times it may then stay unexplained.
         max_iterations: Most steps; 100 for "newton", 1000 for "alternation" by default.
 
     Returns:
@@ -114,7 +113,7 @@ def estimate_load(
         ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has no motors.
         NameNotFound: If the frame does not exist.
         LoadNotFound: If no force explains the torques; carries the best estimate.
-        NeutralEquilibrium: If the search comes upon a load at which the robot is about to buckle.
+        NeutralEquilibrium: If the search meets a load at which the tangent stiffness is singular.
     """
     check_model(model)
     choice("method", method, METHODS)
@@ -154,7 +153,7 @@ def check_feels(model: SoftModel) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """The measurement and what is known of the load."""
+    """Measured torques and the known part of the load; a `force_search.Measurement`."""
 
     model: SoftModel
     motors: FloatArray
@@ -174,62 +173,62 @@ class _Problem:
         return self.base.plus(self.frame, np.concatenate([force, np.zeros(3)]))
 
     def equilibrium(self, force: FloatArray, near: ElasticState) -> ElasticState | None:
-        """Springs in equilibrium under a force; None if there is none to be found."""
+        """Solve for the equilibrium under a force, from a nearby state; None if it does not converge."""
         return self.balanced(force, near.q_springs)
 
     def balanced(self, force: FloatArray, start: FloatArray) -> ElasticState | None:
-        """The same from given springs."""
+        """Solve for the equilibrium under a force, from given springs; None if it does not converge."""
         return balanced_state(self.model, self.motors, self.load(force), start, tolerance=_INNER)
 
     def unexplained(self, state: ElasticState) -> FloatArray:
-        """Motor torques minus those of a state."""
+        """Return the measured torques minus those of a state."""
         return np.asarray(self.torques - state.load.motors)
 
     def directions(self, state: ElasticState) -> Directions:
-        """How the torques follow the force."""
+        """Decompose the derivative of the torques with respect to the force."""
         motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
         return Directions.of(motor_torque_slope(motors, springs, state.tangent, state.load.coupling), self.model.reach)
 
 
 def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None) -> bool:
-    """Whether what a force leaves of the torques is rounding, noise, or hidden.
+    """Whether the unexplained torques are rounding, noise, or from unobservable directions.
 
-    In a pose that shows every direction nothing but rounding or noise may be left. In a singular pose, what a force that the
-    motors hardly feel may give: a twentieth of the torques, or `OBSERVABLE` of the stiffest spring. What more than three
-    motors measure beyond three components may be anything as long as nothing is known of the noise: a least-squares fit.
+    Where every direction is observable only rounding or noise may be left; in a singular pose also `HIDDEN` of the torques and
+    `OBSERVABLE` of the stiffest spring. With more than three motors the residual of the least-squares fit may have any size
+    if the noise is unknown.
     """
     left, values, _, keep = problem.directions(state)
     missing = left.T @ problem.unexplained(state)
     scatter = 0.0 if noise is None else 5.0 * float(np.linalg.norm(noise))
     hidden = HIDDEN * float(np.linalg.norm(problem.torques)) + OBSERVABLE * problem.model.stiffest
-    felt, surplus = missing[: len(values)], missing[len(values) :]
+    seen, surplus = missing[: len(values)], missing[len(values) :]
     allowed = max(problem.tolerance, scatter) if keep.all() else hidden + scatter
-    return bool(np.linalg.norm(felt) <= allowed and (noise is None or np.linalg.norm(surplus) <= max(allowed, scatter)))
+    return bool(np.linalg.norm(seen) <= allowed and (noise is None or np.linalg.norm(surplus) <= max(allowed, scatter)))
 
 
 def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
     """Damped Newton, see `softrobots.statics.force_search`."""
-    model, none = problem.model, np.zeros(3)
-    state = problem.balanced(none, model.rest) or elastic_state(model, problem.motors, model.rest, problem.load(none))
+    rest, none = problem.model.rest, np.zeros(3)
+    state = problem.balanced(none, rest) or elastic_state(problem.model, problem.motors, rest, problem.load(none))
     return search_force(problem, state, most)
 
 
 def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
-    """The paper's recursion, [Troise 2021] Figure 5, until springs and motors are in balance."""
+    """Recursion of [Troise 2021] Figure 5, until springs and motors are in equilibrium."""
     model = problem.model
     force, springs = np.zeros(3), np.array(model.rest)
     state = elastic_state(model, problem.motors, springs, problem.base)
     for iteration in range(1, most + 1):
         by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, problem.frame)[:3])
         unloaded = elastic_state(model, problem.motors, springs, problem.base).load
-        found = np.asarray(np.linalg.lstsq(by_motors.T, problem.torques - unloaded.motors, rcond=None)[0], dtype=np.float64)
-        springs = model.rest + (unloaded.elastic + by_springs.T @ found) / model.stiffness
-        trial = elastic_state(model, problem.motors, springs, problem.load(found))
+        estimate = np.asarray(np.linalg.lstsq(by_motors.T, problem.torques - unloaded.motors, rcond=None)[0], dtype=np.float64)
+        springs = model.rest + (unloaded.elastic + by_springs.T @ estimate) / model.stiffness
+        trial = elastic_state(model, problem.motors, springs, problem.load(estimate))
         if not trial.point.valid:  # a section beyond its range: the recursion diverges
             return force, state, iteration
-        force, state = found, trial
-        still = state.error <= largest_residual(model, state.scale, TOLERANCE)
-        if still and float(np.linalg.norm(problem.unexplained(state))) <= problem.tolerance:
+        force, state = estimate, trial
+        balanced = state.error <= largest_residual(model, state.scale, TOLERANCE)
+        if balanced and float(np.linalg.norm(problem.unexplained(state))) <= problem.tolerance:
             return force, state, iteration
     return force, state, most
 
@@ -238,14 +237,14 @@ def _estimate(
     problem: _Problem, force: FloatArray, state: ElasticState, method: str, iterations: int, noise: FloatArray | None
 ) -> LoadEstimate:
     left, values, right, keep = problem.directions(state)
-    felt = right[: len(values)][keep]
+    observable = right[: len(values)][keep]
     singular_values = np.zeros(3)
     singular_values[: len(values)] = values
     covariance = None
     if noise is not None:
-        inverse = felt.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
+        inverse = observable.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
         covariance = read_only(inverse @ np.diag(noise**2) @ inverse.T)
-    unfelt = np.concatenate([right[: len(values)][~keep], right[len(values) :]])
+    unobservable = np.concatenate([right[: len(values)][~keep], right[len(values) :]])
     equilibrium = equilibrium_from_state(
         problem.model, problem.motors, problem.load(force), state, method=method, iterations=iterations
     )
@@ -257,7 +256,7 @@ def _estimate(
         torque_std=None if noise is None else read_only(noise),
         method=method,
         singular_values=read_only(singular_values),
-        unobservable_directions=read_only(unfelt),
+        unobservable_directions=read_only(unobservable),
         covariance=covariance,
         residual=float(np.linalg.norm(problem.unexplained(state))),
         iterations=iterations,
@@ -273,11 +272,11 @@ def estimate_at(
     torque_std: FloatArray | None,
     method: str,
 ) -> LoadEstimate:
-    """Make a load estimate anew from its equilibrium and what was measured; what a saved estimate is loaded with.
+    """Compute a load estimate from its equilibrium and the measurement, as saved in a file.
 
     Args:
         equilibrium: The robot under the estimated force.
-        frame: Where the force acts.
+        frame: Frame at which the force acts.
         motor_torques: Measured torques, shape (n_motors,) [N m].
         force: The estimated force, shape (3,) [N], part of the equilibrium's load.
         torque_std: Standard deviation of the torques, shape (n_motors,) [N m], or None.

@@ -1,4 +1,4 @@
-"""When to be where: point-to-point motion on a straight line, and waypoints from a file."""
+"""Paths in time: point-to-point motion on a straight line, and waypoints from a file."""
 
 from __future__ import annotations
 
@@ -100,9 +100,9 @@ def read_waypoints(path: str | Path) -> Path3D:
         The path.
 
     Raises:
-        ParameterError: If the path is none.
+        ParameterError: If the path is not one.
         FileFormatError: If the file cannot be read or is too large, lacks a column, has fewer than two waypoints, times that do
-            not increase, or (naming the line) a cell that is no finite number, or more or fewer cells than the first line.
+            not increase, or (naming the line) a cell that is not a finite number, or more or fewer cells than the first line.
     """
     path = as_path("path", path)
     table = read_table(path, ("x", "y", "z"), ("t",))

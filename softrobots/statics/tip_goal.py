@@ -1,4 +1,4 @@
-"""Where the tip must be, and the robot on Pinocchio that is searched for it by `softrobots.statics.tip_search`."""
+"""Goal of the tip, and a robot on Pinocchio under a load, for the search in `softrobots.statics.tip_search`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from softrobots.statics.tip_search import LEVER, LocalSolution
 
 
 class Goal(NamedTuple):
-    """Where the tip must be, and perhaps how it must stand there."""
+    """Target position of the tip, and optionally its orientation or direction."""
 
     position: FloatArray
     """Position, shape (3,) [m], world axes."""
@@ -32,7 +32,7 @@ class Goal(NamedTuple):
         return 3 if self.rotation is None else 5 if self.rotation.ndim == 1 else 6
 
     def missing(self, model: SoftModel, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Way from the tip to the goal: translation, shape (3,) [m], and rotation vector, shape (3,) [rad], world axes."""
+        """Return translation [m] and rotation vector [rad] from the tip to the goal, shape (3,) each, world axes."""
         pose = frame_placement(model, q, model.tip)
         return self.position - pose.translation, self._turn(pose.rotation)
 
@@ -46,10 +46,10 @@ class Goal(NamedTuple):
         sine, cosine = float(np.linalg.norm(axis)), float(pointing @ self.rotation)
         if sine > 0.0:
             return np.asarray(axis * (np.arctan2(sine, cosine) / sine))
-        return np.zeros(3) if cosine > 0.0 else np.pi * rotation[:, 0]  # opposite: any way round
+        return np.zeros(3) if cosine > 0.0 else np.pi * rotation[:, 0]  # opposite: any axis
 
     def jacobian(self, model: SoftModel, q: FloatArray) -> FloatArray:
-        """Derivative of what `missing` is measured by, per joint, shape (3 or 6, nv), turns times the lever [m/rad]."""
+        """Return the tip Jacobian in the components of the goal, shape (3 or 6, nv), rotations times the lever [m/rad]."""
         columns = frame_jacobian(model, q, model.tip)
         if self.rotation is None:
             return columns[:3]
@@ -62,7 +62,7 @@ class Goal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LoadedTip:
-    """A robot under a load, and the goal of its tip."""
+    """A robot under a load, and the goal of its tip; a `tip_search.SoughtTip`."""
 
     model: SoftModel
     """The robot."""
@@ -71,19 +71,19 @@ class LoadedTip:
     load: Load
     """The load."""
     method: str = "newton"
-    """How the springs settle."""
+    """Solver of the springs, one of `elastostatics.METHODS`."""
 
     @property
     def rows(self) -> int:
-        """Number of conditions."""
+        """Number of conditions of the goal."""
         return self.goal.rows
 
     def towards(self, position: FloatArray) -> LoadedTip:
-        """The same robot with the tip to go to another position, shape (3,) [m], anyhow."""
+        """Return a copy with another target position, shape (3,) [m], and no orientation target."""
         return replace(self, goal=Goal(position))
 
-    def settle(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ElasticState] | None:
-        """Elastic coordinates in equilibrium and the distance of the tip; None if they do not settle."""
+    def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ElasticState] | None:
+        """Solve for the elastic coordinates from a start, shape (n_springs,); None if they do not converge."""
         if not self.model.actuators.admit(q_motors):
             return None
         state = balanced_state(self.model, q_motors, self.load, start, method=self.method)
@@ -93,13 +93,13 @@ class LoadedTip:
         return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)))
 
     def missing(self, state: ElasticState) -> FloatArray:
-        """Way from the tip to the goal, shape (3 or 6,), turns times the lever [m]."""
+        """Return the difference from the tip to the goal, shape (3 or 6,), rotations times the lever [m]."""
         translation, turn = self.goal.missing(self.model, state.q)
         if self.goal.rotation is None:
             return translation
         return np.concatenate([translation, LEVER * self.model.reach * turn])
 
     def motion(self, state: ElasticState) -> tuple[FloatArray, FloatArray]:
-        """How tip and elastic coordinates follow the actuators; see `softrobots.statics.sensitivity.tip_motion`."""
+        """Return the derivatives of tip and elastic coordinates by the actuators; see `sensitivity.tip_motion`."""
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
         return tip_motion(motors, springs, state.tangent, state.load.coupling)

@@ -16,27 +16,27 @@ from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
 
 POSITION_TOLERANCE = 1e-9
-"""Default distance of the tip from its target [m]."""
+"""Default tolerance of the position of the tip [m]."""
 
 ANGLE_TOLERANCE = 1e-9
-"""Angle between the tip and a wanted orientation [rad]."""
+"""Tolerance of the orientation of the tip [rad]."""
 
 SAME = 1e-6
-"""Actuator coordinates closer than this, over their scale, are one [rad]."""
+"""Actuator coordinates closer than this, relative to their scale, are the same [rad]."""
 
 LEVER = 0.2
-"""Distance that a radian of orientation counts for, relative to the reach."""
+"""Weight of a radian of orientation as a distance, relative to the reach."""
 
 _FIRST_DAMPING = 0.03  # of the first step, relative to the reach
 _LAST_DAMPING = 1e-8
 _WARM_DAMPING = 1e-6  # of the first step of a search that starts from a prediction
 _HALVINGS = 6  # of the way between two waypoints
 _LARGEST_STEP = 0.5  # [rad], norm of one step over the scale of the actuators
-_STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as no slope: nothing nearer is near
-_NEAR = 0.02  # distance from the goal, relative to the reach, that the way home may cost for a step
+_STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as zero: a local minimum
+_NEAR = 0.02  # distance from the goal, relative to the reach, that a step home may cost
 
 
-class Settled(Protocol):
+class ElasticRobot(Protocol):
     """A robot in equilibrium."""
 
     @property
@@ -44,12 +44,12 @@ class Settled(Protocol):
         """Elastic coordinates, shape (n_springs,) [rad or m]."""
 
 
-State = TypeVar("State", bound=Settled)
+State = TypeVar("State", bound=ElasticRobot)
 
 
 @dataclass(frozen=True, eq=False)
 class LocalSolution(Generic[State]):
-    """Where a local search ended."""
+    """End of a local search."""
 
     q_motors: FloatArray
     """Actuator coordinates, shape (n_motors,)."""
@@ -58,23 +58,23 @@ class LocalSolution(Generic[State]):
     error: float
     """Distance of the tip from the target [m]."""
     angle: float = 0.0
-    """Angle between the tip and the wanted orientation [rad]; 0 if none is wanted."""
+    """Angle between the tip and its target orientation [rad]; 0 without one."""
     iterations: int = 0
     """Steps."""
-    unsettled: int = 0
-    """Actuator coordinates tried at which the robot did not settle."""
+    unsolved: int = 0
+    """Number of actuator coordinates tried without an equilibrium."""
 
     def arrived(self, tolerance: float) -> bool:
-        """Whether the tip is within `tolerance` [m] of the target, and stands as wanted."""
+        """Whether the tip is within `tolerance` [m] of the target, in the target orientation."""
         return self.error <= tolerance and self.angle <= ANGLE_TOLERANCE
 
     def miss(self, model: SoftModel) -> float:
-        """Distance and angle as one distance [m]."""
+        """Return distance and angle as one distance [m]."""
         return float(np.hypot(self.error, LEVER * model.reach * self.angle))
 
 
 class SoughtTip(Protocol[State]):
-    """A robot under a load and the goal of its tip, whoever settles the springs."""
+    """A robot under a load and the goal of its tip; independent of the solver."""
 
     @property
     def model(self) -> SoftModel:
@@ -85,19 +85,21 @@ class SoughtTip(Protocol[State]):
         """Number of conditions: 3 for a position, up to 6 with an orientation."""
 
     def towards(self, position: FloatArray) -> SoughtTip[State]:
-        """The same robot with the tip to go to another position, shape (3,) [m]."""
+        """Return a copy with another target position, shape (3,) [m], and no orientation target."""
 
-    def settle(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[State] | None:
-        """Let the elastic coordinates settle from a start, shape (n_springs,); None if they do not."""
+    def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[State] | None:
+        """Solve for the elastic coordinates from a start, shape (n_springs,); None if they do not converge."""
 
     def missing(self, state: State) -> FloatArray:
-        """Way from the tip to the goal, shape (rows,) [m]."""
+        """Return the difference from the tip to the goal, shape (rows,) [m]."""
 
     def motion(self, state: State) -> tuple[FloatArray, FloatArray]:
-        """How tip and elastic coordinates follow the actuators, shapes (rows, n_motors) and (n_springs, n_motors).
+        """Return the derivatives of tip and elastic coordinates by the actuators.
+
+        Shapes (rows, n_motors) and (n_springs, n_motors).
 
         Raises:
-            NeutralEquilibrium: If they do not: the robot is about to buckle.
+            NeutralEquilibrium: If the tangent stiffness is singular.
         """
 
 
@@ -117,23 +119,23 @@ def search(
         tip: The robot and its goal.
         q_motors: Start of the actuators, shape (n_motors,), within the limits.
         q_springs: Start of the elastic coordinates, shape (n_springs,).
-        home: Actuator coordinates to stay near to where there is freedom (more actuators than conditions); None: `q_motors`.
+        home: Actuator coordinates to stay near where there are more actuators than conditions; None: `q_motors`.
         tolerance: Distance at which the search ends [m].
         damping: Damping of the first step, relative to the reach; small for starts near the solution.
         max_iterations: Most steps.
 
     Returns:
-        Where the search ended, at the goal or not; None if the start itself has no equilibrium.
+        The end of the search, at the goal or not; None if the start has no equilibrium.
     """
-    here = tip.settle(q_motors, q_springs)
+    here = tip.solve(q_motors, q_springs)
     if here is None:
         return None
     model, basis = tip.model, tip.model.actuators.basis
     inverse = np.linalg.pinv(basis)
-    mu, redundant, unsettled, pace = damping * model.reach, basis.shape[1] > tip.rows, 0, 1.0
+    mu, redundant, unsolved, pace = damping * model.reach, basis.shape[1] > tip.rows, 0, 1.0
     home = q_motors if home is None else home
-    last: tuple[FloatArray, FloatArray] | None = None  # step and drift that led here
-    reached: LocalSolution[State] | None = None  # the last place on the way home that is at the goal
+    last: tuple[FloatArray, FloatArray] | None = None  # last step and drift
+    reached: LocalSolution[State] | None = None  # the last solution at the goal
     for iteration in range(1, max_iterations + 1):
         missing = tip.missing(here.state)
         try:
@@ -147,7 +149,7 @@ def search(
         homeward = inverse @ (home - here.q_motors) if going_home else np.zeros(basis.shape[1])
         towards, drift, free = _step(model, here.q_motors, slope, missing, mu, homeward)
         if arrived and float(np.abs(drift).max()) <= SAME:
-            return replace(here, iterations=iteration - 1, unsettled=unsettled)
+            return replace(here, iterations=iteration - 1, unsolved=unsolved)
         pace = pace if last is None else _pace(*last, drift)
         miss, last = here.miss(model), None
         if not arrived and float(np.linalg.norm(free @ (slope.T @ missing))) <= _STATIONARY * model.reach * miss:
@@ -156,9 +158,9 @@ def search(
         step *= min(1.0, _LARGEST_STEP / max(float(np.linalg.norm(step)), 1e-300))
         moved = model.actuators.go(here.q_motors, basis @ step)
         guess = here.state.q_springs + follow @ (moved - here.q_motors)
-        there = tip.settle(moved, guess)
-        unsettled += there is None
-        # Drifting home costs distance in second order, which the next step makes good.
+        there = tip.solve(moved, guess)
+        unsolved += there is None
+        # Drifting home costs distance in second order, which the next step corrects.
         drifted = pace * float(np.linalg.norm(drift))
         allowed = max(10.0 * tolerance, model.reach * min(4.0 * drifted**2, _NEAR)) if going_home else 0.0
         if there is not None and (there.miss(model) < miss or there.miss(model) <= allowed):
@@ -170,7 +172,7 @@ def search(
             if mu > 1e6 * model.reach:
                 break
     ended = here if reached is None or here.arrived(tolerance) else reached
-    return replace(ended, iterations=iteration, unsettled=unsettled)
+    return replace(ended, iterations=iteration, unsolved=unsolved)
 
 
 def advance(
@@ -181,15 +183,15 @@ def advance(
     tolerance: float = POSITION_TOLERANCE,
     halvings: int = _HALVINGS,
 ) -> LocalSolution[State] | None:
-    """Go from one waypoint to the next by its linear prediction and a search, over waypoints between if need be.
+    """Move from one waypoint to the next by linear prediction and a search, halving the distance if necessary.
 
     Args:
-        tip: The robot; its goal does not matter.
-        last: The waypoint before, shape (3,) [m].
+        tip: The robot; its goal is ignored.
+        last: The previous waypoint, shape (3,) [m].
         target: The waypoint, shape (3,) [m].
-        here: The robot at the waypoint before.
+        here: The robot at the previous waypoint.
         tolerance: Distance at which a search ends [m].
-        halvings: How often the way may be halved.
+        halvings: How often the distance may be halved.
 
     Returns:
         The robot at the waypoint; None if no continuous motion leads there.
@@ -197,7 +199,7 @@ def advance(
     there = tip.towards(target)
     try:
         slope, follow = there.motion(here.state)
-    except NeutralEquilibrium:  # about to buckle: no linear prediction leads on
+    except NeutralEquilibrium:  # about to buckle: there is no linear prediction
         return None
     actuators = tip.model.actuators
     step = np.linalg.pinv(slope @ actuators.basis, rcond=1e-6) @ there.missing(here.state)
@@ -215,12 +217,12 @@ def advance(
 
 
 def _apart(model: SoftModel, one: FloatArray, other: FloatArray) -> float:
-    """Largest change of an actuator over its scale [rad]."""
+    """Largest difference of an actuator relative to its scale [rad]."""
     return float(np.abs((one - other) / model.motor_scale).max())
 
 
 def _pace(step: FloatArray, last_drift: FloatArray, drift: FloatArray) -> float:
-    """How far to go along the drift: the step length of Barzilai and Borwein, for valleys in which a plain one creeps."""
+    """Length of the drift: the step length of Barzilai and Borwein, which converges in narrow valleys, too."""
     bent = float(step @ (last_drift - drift))
     return float(np.clip(float(step @ step) / bent, 0.1, 100.0)) if bent > 0.0 else 100.0 if step.any() else 1.0
 
@@ -228,24 +230,24 @@ def _pace(step: FloatArray, last_drift: FloatArray, drift: FloatArray) -> float:
 def _step(
     model: SoftModel, motors: FloatArray, slope: FloatArray, missing: FloatArray, damping: float, homeward: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Step towards the goal, and the part of the way home that does not move the tip, without pressing against limits.
+    """Step towards the goal, and the part of the step home that does not move the tip, within the limits.
 
-    Limits that are reached and that the step would press against are held, one set after the other.
+    Reached limits that the step would violate are constrained, one set after the other.
 
     Returns:
-        Both parts, shape (n,), and the projector on the steps that are left free, shape (n, n).
+        Both parts, shape (n,), and the projector on the unconstrained steps, shape (n, n).
     """
     basis = model.actuators.basis
     normals, bends = (rows @ basis for rows in model.actuators.active_limits(motors))
     pull = normals @ (slope.T @ missing) / np.maximum((normals * normals).sum(axis=1), 1e-300)
-    held = np.zeros(len(normals), dtype=bool)
+    constrained = np.zeros(len(normals), dtype=bool)
     while True:
-        rows, free, open_slope, whole = normals[held], np.eye(basis.shape[1]), slope, slope
+        rows, free, open_slope, whole = normals[constrained], np.eye(basis.shape[1]), slope, slope
         if len(rows):
             free -= np.linalg.pinv(rows) @ rows
             open_slope = slope @ free
-            # Going along a curved limit costs what the pull against it times its curvature gives: rows of their own.
-            curved = np.sqrt(np.maximum(pull[held], 0.0))[:, None] * bends[held] @ free
+            # A step along a curved limit costs the pull against it times its curvature: additional rows.
+            curved = np.sqrt(np.maximum(pull[constrained], 0.0))[:, None] * bends[constrained] @ free
             whole = np.concatenate([open_slope, curved[curved.any(axis=1)]])
         towards = free @ _damped_step(
             whole, np.concatenate([missing, np.zeros(len(whole) - len(missing))]), damping, 1e-12 * model.reach
@@ -253,14 +255,14 @@ def _step(
         drift = homeward
         if homeward.any():
             drift = free @ (homeward - np.linalg.pinv(open_slope, rcond=1e-9) @ (open_slope @ homeward))
-        pressed = ~held & (normals @ (towards + drift) > 1e-12)
+        pressed = ~constrained & (normals @ (towards + drift) > 1e-12)
         if not pressed.any():
             return towards, drift, free
-        held |= pressed
+        constrained |= pressed
 
 
 def _damped_step(slope: FloatArray, missing: FloatArray, damping: float, negligible: float) -> FloatArray:
-    """Levenberg-Marquardt step; directions that do not move the tip at all are left alone."""
+    """Levenberg-Marquardt step; directions that do not move the tip are zero."""
     left, values, right = np.linalg.svd(slope, full_matrices=False)
     gains = np.where(values > negligible, values, 0.0) / np.maximum(values**2 + damping**2, negligible**2)
     return np.asarray(right.T @ (gains * (left.T @ missing)))

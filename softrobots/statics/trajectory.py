@@ -26,8 +26,8 @@ from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_search import POSITION_TOLERANCE, LocalSolution, advance
 
 METHODS = ("newton", "fixed_point", "paper")
-"""How `follow_trajectory` follows: exact steps with the springs settled by Newton or by the paper's recursion, or the paper's
-closed-loop inverse kinematics."""
+"""Methods of `follow_trajectory`: exact steps with the springs by Newton or by the recursion of [Troise 2021], or the
+closed-loop inverse kinematics of that paper."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Trajectory:
     equilibria: tuple[Equilibrium, ...]
     """The loaded robot at each waypoint."""
     method: str
-    """How the path was followed: a method of `follow_trajectory`, or a word of whoever made it otherwise."""
+    """Method of `follow_trajectory`, or a label of the caller for a trajectory from elsewhere."""
 
     @property
     def model(self) -> SoftModel:
@@ -85,7 +85,7 @@ class Trajectory:
 
     @property
     def wrinkling_margin(self) -> float | None:
-        """Share of the wrinkling moment that is left at the worst waypoint and link [-]; negative: a link wrinkles.
+        """Remaining share of the wrinkling moment at the worst waypoint and link [-]; negative: a link wrinkles.
 
         None without inflated links.
 
@@ -133,7 +133,7 @@ def follow_trajectory(
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         q_motors0: Motor coordinates near the first waypoint, shape (n_motors,) [rad or m]. By default the solution nearest to
             zero, or, where a motor limit then blocks the path, the next one from which the whole path can be followed.
-        elbow: "up" or "down" at the first waypoint; None: whatever changes `q_motors0` least.
+        elbow: "up" or "down" at the first waypoint; None: the one that changes `q_motors0` least.
         method: "newton", "fixed_point" or "paper".
         tolerance: Largest distance of the tip from a target [m]; not for "paper".
         times: Increasing times of the waypoints, shape (n,) [s]; required by "paper".
@@ -148,8 +148,8 @@ def follow_trajectory(
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range.
         NameNotFound: If a frame does not exist.
-        TargetUnreachable: If a waypoint cannot be reached, or not without a jump; names it and how near the tip came.
-        EquilibriumNotFound: If the springs do not settle on the way.
+        TargetUnreachable: If a waypoint cannot be reached, or not without a jump; names it and the distance that remains.
+        EquilibriumNotFound: If a waypoint has no equilibrium.
     """
     check_model(model)
     choice("method", method, METHODS)
@@ -191,16 +191,16 @@ def follow_trajectory(
     except TargetUnreachable as error:
         if q_motors0 is not None or error.residual > tolerance:  # the start was chosen, or the waypoint is out of reach
             raise
-        for motors in begin.alternatives:  # the same tip, another shoulder or elbow: perhaps no limit is in the way
+        for motors in begin.alternatives:  # the same tip, another shoulder or elbow: perhaps no limit blocks the path
             with contextlib.suppress(TargetUnreachable):
                 return follow_from(solve_ik(model, points[0], q_motors0=motors, starts=1, **options).equilibrium)
         raise
 
 
 def _named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachable:
-    """The error with the number of its waypoint, counted from 1."""
-    told = f"waypoint {number} of {total}: {error}"
-    return TargetUnreachable(told, best=error.best, residual=error.residual, iterations=error.iterations)
+    """Return the error with the number of its waypoint, counted from 1."""
+    message = f"waypoint {number} of {total}: {error}"
+    return TargetUnreachable(message, best=error.best, residual=error.residual, iterations=error.iterations)
 
 
 def _exact_steps(
@@ -212,12 +212,15 @@ def _exact_steps(
     for number, (last, target) in enumerate(pairwise(points), start=2):
         reached = advance(tip, last, target, here, tolerance)
         if reached is None:
-            reached = _jump(model, target, load, here, method, tolerance, number, len(points))
+            try:
+                reached = _jump(tip, target, here, tolerance)
+            except TargetUnreachable as error:
+                raise _named(error, number, len(points)) from error
             if not allow_jumps:
                 apart = reached.q_motors - here.q_motors
                 solution = equilibrium_from_state(model, reached.q_motors, load, reached.state, method=method, iterations=0)
                 raise TargetUnreachable(
-                    f"waypoint {number} of {len(points)}: no continuous motion leads there from the last one; the nearest "
+                    f"waypoint {number} of {len(points)}: no continuous motion reaches it from the previous one; the nearest "
                     f"solution is a jump of the motors by {apart.round(4).tolist()} rad (allow_jumps=True takes it)",
                     best=IkSolution(target, None, solution, reached.error, 0.0, reached.iterations, ()),
                     residual=reached.error,
@@ -228,31 +231,16 @@ def _exact_steps(
 
 
 def _jump(
-    model: SoftModel,
-    target: FloatArray,
-    load: Load,
-    here: LocalSolution[ElasticState],
-    method: str,
-    tolerance: float,
-    number: int,
-    total: int,
+    tip: LoadedTip, target: FloatArray, here: LocalSolution[ElasticState], tolerance: float
 ) -> LocalSolution[ElasticState]:
-    """Search a waypoint from everywhere when the way from the last one is blocked."""
-    try:
-        found = solve_ik(
-            model,
-            target,
-            wrench=dict(load.wrenches),
-            gravity=load.gravity,
-            q_motors0=here.q_motors,
-            method=method,
-            tolerance=tolerance,
-        )
-    except TargetUnreachable as error:
-        raise _named(error, number, total) from error
-    solution = found.equilibrium
-    state = elastic_state(model, solution.q_motors, solution.q_springs, load)
-    return LocalSolution(solution.q_motors, state, found.error, iterations=found.iterations)
+    """Solution for a waypoint from any start, where the path from the previous one is blocked."""
+    model, load = tip.model, tip.load
+    wrench = dict(load.wrenches)
+    ik = solve_ik(
+        model, target, wrench=wrench, gravity=load.gravity, q_motors0=here.q_motors, method=tip.method, tolerance=tolerance
+    )
+    state = elastic_state(model, ik.equilibrium.q_motors, ik.equilibrium.q_springs, load)
+    return LocalSolution(ik.equilibrium.q_motors, state, ik.error, iterations=ik.iterations)
 
 
 def _paper_steps(

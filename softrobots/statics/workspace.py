@@ -1,4 +1,4 @@
-"""What a robot can reach: random actuator coordinates within the limits, the tip there, and its manipulability."""
+"""Workspace by random sampling: actuator coordinates within their limits, tip positions and manipulability."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import tip_motion
 from softrobots.version import __version__
 
-_BLOCK = 250  # samples that are kept together
+_BLOCK = 250  # samples in one block of a checkpoint
 _FIELDS = ("q_motors", "q_springs", "tip_positions", "manipulability")
 
 
@@ -43,11 +43,11 @@ class Workspace:
     manipulability: FloatArray
     r"""Manipulability of the loaded tip, shape (n,) [m^3/rad^3].
 
-    :math:`\sqrt{\det(J J^T)}` with the elastostatic Jacobian `J` of the position, each actuator measured by
+    :math:`\sqrt{\det(J J^T)}` with the elastostatic Jacobian `J` of the position, each actuator scaled by
     `SoftModel.motor_scale` (for muscles: their distance from the backbone). 0: the tip cannot move in some direction.
     """
     refused: int
-    """Samples left out: lengths that no shape of the robot has, or no stable equilibrium."""
+    """Number of samples without a shape (inconsistent muscle lengths) or without a stable equilibrium."""
 
 
 def sample_workspace(
@@ -62,10 +62,10 @@ def sample_workspace(
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | str = False,
 ) -> Workspace:
-    """Sample what the tip can reach.
+    """Sample the positions that the tip can reach.
 
-    Actuator coordinates are uniform within their limits (muscle lengths of a segment that must fit together are made to).
-    At each the robot is brought to equilibrium under the load.
+    Actuator coordinates are uniform within their limits (muscle lengths of a segment are projected to consistent ones), with
+    the robot in equilibrium under the load at each.
 
     Args:
         model: The robot, with at least one actuator.
@@ -75,25 +75,25 @@ def sample_workspace(
         frame: Frame of `force` and `wrench`; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         seed: Seed of the samples.
-        checkpoint: Folder that keeps the finished samples. After an interruption, even a killed process, the same call goes on
-            from there, to the same bytes. Delete the folder when the workspace is saved. None: nothing is kept.
+        checkpoint: Folder for finished samples. After an interruption, even a killed process, the same call continues from
+            there, with identical results. Delete the folder when the workspace is saved. None: no checkpoint.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
         The samples that are stable equilibria.
 
     Raises:
-        ParameterError: If an argument has the wrong shape or is out of range, the robot has no actuators, no sample is left, or
-            the samples that are kept are those of another case.
+        ParameterError: If an argument has the wrong shape or is out of range, the robot has no actuators, no sample is a
+            stable equilibrium, or the checkpoint belongs to another case.
         NameNotFound: If a frame does not exist.
-        FileFormatError, OutputExists: If the folder of finished samples is no such folder.
-        OutputError: If samples cannot be kept; those before them stay.
+        FileFormatError, OutputExists: If the checkpoint folder is not one.
+        OutputError: If samples cannot be written; earlier ones remain.
     """
     check_model(model)
     if model.n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor or muscle")
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
-    most = LARGEST // (8 * (model.n_motors + model.n_springs + 5))  # as can be saved
+    most = LARGEST // (8 * (model.n_motors + model.n_springs + 5))  # so that `save_result` accepts them
     count = positive_integer("samples", samples, most)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ParameterError("seed", seed, "a whole number, zero or above")
@@ -109,7 +109,7 @@ def sample_workspace(
 
 
 def _identity(model: SoftModel, load: Load, count: int, seed: int) -> dict[str, Any]:
-    """What the samples depend on."""
+    """Everything that the samples depend on."""
     return {
         "job": "sample_workspace",
         "version": __version__,
@@ -128,7 +128,7 @@ def _identity(model: SoftModel, load: Load, count: int, seed: int) -> dict[str, 
 def _answers(
     model: SoftModel, load: Load, count: int, seed: int, kept: Checkpoint | None, progress: bool | str
 ) -> list[dict[str, Any]]:
-    """The samples in blocks: those that are kept, and the others; rows that are not stable are zero."""
+    """The samples in blocks, from the checkpoint or new; rows that are not stable are zero."""
     sizes = [min(_BLOCK, count - first) for first in range(0, count, _BLOCK)]
     found = [None if kept is None else kept.block(number, _arrays(model, size)) for number, size in enumerate(sizes)]
     answers = [
@@ -137,7 +137,7 @@ def _answers(
     ]
 
     def drawn() -> Iterator[tuple[int, int, FloatArray | None]]:
-        """Block, row and motors of what is left; the samples that are kept are drawn, too, or the others would differ."""
+        """Block, row and motors of the missing samples; the others are drawn, too, to keep the random sequence."""
         random = np.random.default_rng(seed)
         for number, size in enumerate(sizes):
             motors = [model.actuators.draw(random) for _ in range(size)]
@@ -168,7 +168,7 @@ def _arrays(model: SoftModel, count: int) -> dict[str, tuple[type, tuple[int, ..
 
 
 def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
-    """Motors, springs, tip and manipulability of a sample; None where there is no stable equilibrium."""
+    """Motors, springs, tip and manipulability of a sample; None without a stable equilibrium."""
     state = balanced_state(model, motors, load, model.rest)
     if state is None or not is_stable(model, state.tangent, symmetric=load.conservative):
         return None
@@ -185,7 +185,7 @@ def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArra
 def workspace_at(
     model: SoftModel, load: Load, q_motors: Any, q_springs: Any, tip_positions: Any, manipulability: Any, refused: int
 ) -> Workspace:
-    """Make a workspace of arrays that were computed before; what a saved one is loaded with.
+    """Check the arrays of a workspace, as saved in a file.
 
     Args:
         model: The robot.
@@ -194,13 +194,13 @@ def workspace_at(
         q_springs: Elastic coordinates, shape (n, n_springs).
         tip_positions: Tip positions, shape (n, 3) [m].
         manipulability: Manipulability, shape (n,).
-        refused: Samples left out.
+        refused: Number of samples left out.
 
     Returns:
         The workspace.
 
     Raises:
-        ParameterError: If shapes do not fit, or a sample (a hundred are tried) is not what it claims.
+        ParameterError: If shapes do not fit, or one of a hundred samples, computed again, differs.
     """
     motors = finite_array("q_motors", q_motors, (None, model.n_motors))
     count = len(motors)

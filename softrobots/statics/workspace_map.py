@@ -1,4 +1,4 @@
-"""Maps of what the loaded arm reaches, carries, and which pressure it needs, over a grid of targets and loads."""
+"""Maps of reach, payload and required pressure of a loaded arm over a grid of targets and loads."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from softrobots.statics.equilibrium import equilibrium_from_state
 from softrobots.statics.loads import Load
 
 CLOSE = 1e-3
-"""Missing pressure that counts as none [Pa]."""
+"""Missing pressure that is neglected [Pa]."""
 
 BoolArray = NDArray[np.bool_]
 
 _ARRAYS = ("direction", "loads", "reached", "required_pressure", "payload", "q_motors", "q_springs")
-_CHECKED = 100  # cases of a map from a file that are computed again
+_CHECKED = 100  # cases of a map from a file that are recomputed
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def _centres(reach: float, cells: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceMap:
-    """What the arm reaches and carries; can be saved with `softrobots.save_result`.
+    """Reach, payload and required pressure of an arm; can be saved with `softrobots.save_result`.
 
     The first three axes of every array are those of the grid, `grid.shape`.
     """
@@ -120,17 +120,17 @@ class WorkspaceMap:
     model: SoftModel
     """The arm."""
     grid: TargetGrid
-    """Where the tip is to be."""
+    """Target positions of the tip."""
     direction: FloatArray
     """Unit vector of the load, world axes, shape (3,)."""
     loads: FloatArray
     """Sizes of the load, increasing, shape (n_loads,) [N]."""
     gravity: tuple[float, float, float] | None
-    """Gravity that the arm itself feels, world axes [m/s^2]; None: weightless."""
+    """Gravity on the arm itself, world axes [m/s^2]; None: weightless."""
     tolerance: float
     """Largest distance of the tip from a target that counts as reached [m]."""
     reached: BoolArray
-    """Whether the loaded tip gets to the target, stable and within the limits of motors and springs, shape (..., n_loads)."""
+    """Whether the loaded tip reaches the target, stable and within the limits of motors and springs, shape (..., n_loads)."""
     required_pressure: FloatArray
     """Smallest gauge pressure at which no link wrinkles, in the best posture found, shape (..., n_loads) [Pa].
 
@@ -139,7 +139,7 @@ class WorkspaceMap:
     payload: FloatArray
     """Largest load up to which the target is reached and no link wrinkles at its own pressure, shape (...) [N].
 
-    In one posture, whole turns of a motor aside. At most the last of `loads`; 0 where not even the first one is carried.
+    In one posture, up to whole turns of a motor. At most the last of `loads`; 0 where not even the first one is carried.
     """
     q_motors: FloatArray
     """Motor angles of the posture that needs the least pressure, shape (..., n_loads, 3) [rad]; 0 where not reached."""
@@ -153,7 +153,7 @@ class WorkspaceMap:
 
     @property
     def reached_load(self) -> FloatArray:
-        """Largest of `loads` up to which the target is reached at every one, shape (...) [N]; -1 where at none."""
+        """Largest of `loads` up to which the target is reached at every one, shape (...) [N]; -1 if at none."""
         levels = np.cumprod(self.reached, axis=-1).sum(axis=-1)
         return np.asarray(np.where(levels > 0, self.loads[levels - 1], -1.0))
 
@@ -161,8 +161,8 @@ class WorkspaceMap:
     def wrinkled(self) -> BoolArray:
         """Whether the target is reached with a link that needs more than its own pressure, shape (..., n_loads).
 
-        In the posture that is kept, which needs the least pressure. Where links differ in pressure, another posture may still
-        carry the load: `payload` counts that one.
+        In the stored posture, which needs the least pressure. Where links differ in pressure, another posture may still
+        carry the load: `payload` includes that one.
         """
         own = np.array([group.pressure for group in self.model.spring_groups])
         springs = self.q_springs.reshape(-1, self.model.n_springs)
@@ -186,13 +186,13 @@ def required_pressures(model: SoftModel, q_springs: FloatArray) -> FloatArray:
 
 
 def packed(result: WorkspaceMap) -> dict[str, Any]:
-    """The arrays of a map by name, without its robot; what `unpacked` takes."""
+    """Return the arrays of a map by name, without its robot, for `unpacked`."""
     grid = {f"grid_{axis}": getattr(result.grid, axis) for axis in "xyz"}
     return grid | {name: getattr(result, name) for name in _ARRAYS} | {"tolerance": np.array(result.tolerance)}
 
 
 def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, fields: Mapping[str, Any]) -> WorkspaceMap:
-    """Make a map of arrays that were computed before.
+    """Check the arrays of a map, as saved in a file.
 
     Args:
         model: The arm.
@@ -203,7 +203,7 @@ def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, field
         The map.
 
     Raises:
-        ParameterError: If shapes do not fit, or a case (a hundred are tried) is not what it claims.
+        ParameterError: If shapes do not fit, or one of a hundred cases, computed again, differs.
     """
     grid = TargetGrid(*(fields[f"grid_{axis}"] for axis in "xyz"))
     direction, loads = unit_vector("direction", fields["direction"]), finite_array("loads", fields["loads"], (None,), "N")
@@ -221,7 +221,7 @@ def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, field
         raise ParameterError("payload", payload, f"between 0 and {loads[-1]} N")
     if ((loads <= payload[..., None]) & ~reached)[payload > 0.0].any():
         raise ParameterError("payload", payload, "0, or such that the target is reached at every load up to it")
-    made = WorkspaceMap(
+    result = WorkspaceMap(
         model=model,
         grid=grid,
         direction=direction,
@@ -236,27 +236,27 @@ def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, field
     )
     places = np.argwhere(reached)
     for number in np.unique(np.linspace(0, len(places) - 1, min(len(places), _CHECKED)).astype(int)):
-        _check_case(made, tuple(places[number].tolist()))
-    return made
+        _check_case(result, tuple(places[number].tolist()))
+    return result
 
 
-def _check_case(made: WorkspaceMap, place: tuple[int, ...]) -> None:
-    """Compute a reached case again, on Pinocchio.
+def _check_case(result: WorkspaceMap, place: tuple[int, ...]) -> None:
+    """Recompute a reached case on Pinocchio.
 
     Raises:
         ParameterError: If it is not in balance, its tip is elsewhere, or it needs another pressure.
     """
-    model, (x, y, z, level) = made.model, place
-    load = Load.of(model, made.direction * made.loads[level], gravity=made.gravity)
-    state = elastic_state(model, made.q_motors[place], made.q_springs[place], load)
+    model, (x, y, z, level) = result.model, place
+    load = Load.of(model, result.direction * result.loads[level], gravity=result.gravity)
+    state = elastic_state(model, result.q_motors[place], result.q_springs[place], load)
     if state.error > largest_residual(model, state.scale, 1e-9):
-        raise ParameterError("q_springs", made.q_springs[place], f"in balance; case {place} is not")
-    equilibrium = equilibrium_from_state(model, made.q_motors[place], load, state, method="newton", iterations=0)
-    off = np.linalg.norm(equilibrium.tip_position - (made.grid.x[x], made.grid.y[y], made.grid.z[z]))
-    if off > made.tolerance + 1e-12 * model.reach:
+        raise ParameterError("q_springs", result.q_springs[place], f"in balance; case {place} is not")
+    equilibrium = equilibrium_from_state(model, result.q_motors[place], load, state, method="newton", iterations=0)
+    off = np.linalg.norm(equilibrium.tip_position - (result.grid.x[x], result.grid.y[y], result.grid.z[z]))
+    if off > result.tolerance + 1e-12 * model.reach:
         raise ParameterError(
-            "q_motors", made.q_motors[place], f"such that the tip is at the target; in case {place} it is {off:.3g} m away"
+            "q_motors", result.q_motors[place], f"such that the tip is at the target; in case {place} it is {off:.3g} m away"
         )
     needed = max(map(required_pressure, equilibrium.link_moments.tolist(), (group.radius for group in model.spring_groups)))
-    if abs(needed - made.required_pressure[place]) > 1e-9 * needed + 1e-6:
-        raise ParameterError("required_pressure", made.required_pressure[place], f"{needed} Pa in case {place}")
+    if abs(needed - result.required_pressure[place]) > 1e-9 * needed + 1e-6:
+        raise ParameterError("required_pressure", result.required_pressure[place], f"{needed} Pa in case {place}")

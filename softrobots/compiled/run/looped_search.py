@@ -274,7 +274,7 @@ class _SoughtTip:
     def towards(self, position: FloatArray) -> _SoughtTip:
         return replace(self, target=position)
 
-    def settle(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ChainState] | None:
+    def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ChainState] | None:
         if not self.model.actuators.admit(q_motors):
             return None
         status, state = self.chain.settle(q_motors, self.force, self.gravity, start)
