@@ -81,6 +81,7 @@ PAGES = {
         "leaves it out, since it would hide the builtin.",
         (
             *(f"softrobots.compiled.run.compiled_model.{name}" for name in ("compile_model", "CompiledModel")),
+            "softrobots.compiled.run.compiled_statics.CompiledStatics",
             "softrobots.compiled.statuses.Status",
             *(f"softrobots.compiled.run.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
             *(f"softrobots.compiled.run.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),

@@ -42,13 +42,13 @@ SHORT_STEP = 0.1 * LARGEST_STEP
 ARMIJO = elastostatics.ARMIJO
 """Share of the predicted fall of the energy that a step must reach."""
 
-ROUNDING = elastic_state.ENERGY_ROUNDING
+ENERGY_ROUNDING = elastic_state.ENERGY_ROUNDING
 """Energies this close, relative to their terms, cannot be told apart."""
 
-LANES = 16
+MAX_LANES = 16
 """Most cases that are worked on side by side."""
 
-FEWEST_LANES = 8
+MIN_LANES = 8
 """Fewest: two vectors of four numbers, so that one is computed while the other waits."""
 
 LANE_MEMORY = 65_536

@@ -8,58 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array, fabs, sqrt
-from softrobots.compiled.settings import (
-    ARMIJO,
-    DESCENT_STEPS,
-    LARGE_PIVOT_SHIFT,
-    LARGEST_NUMBER,
-    LARGEST_POSITION,
-    LARGEST_STEP,
-    NEWTON_TOLERANCE,
-    PASSES,
-    POSITIVE_PIVOT,
-    SHORT_STEP,
-    SMALL_PIVOT_SHIFT,
-    TOLERANCE,
-)
-
-# Made for each robot: statuses, places in the workspace, counts, tolerances, and straight-line code.
-CERTIFIED: int
-UNSTABLE: int
-UNSETTLED: int
-OUT_OF_RANGE: int
-NOT_A_NUMBER: int
-START: int
-UNKNOWN: int
-STEP: int
-LINE_ORIGIN: int
-LINE_DIRECTION: int
-ENERGY: int
-SLOPE: int
-ERROR: int
-LENGTH: int
-SIZE: int
-FORCE: int
-GRAVITY: int
-MIN_PIVOT: int
-N_NEGATIVE_PIVOTS: int
-RANGE_MARGIN: int
-MODE: int
-ROUNDING: int
-PIVOT_SHIFT: int
-ITERATIONS: int
-N: int
-N_MOTORS: int
-N_CONSTRAINTS: int
-SPRING_ROUNDING: float
-SOFTNESS: tuple[float, ...]
-GROUP: tuple[int, ...]
-REST: tuple[float, ...]
-first_pass: Callable[[Array], None]
-newton_pass: Callable[[Array], None]
-prepare: Callable[[Array], None]
-evaluate: Callable[[Array], None]
+from softrobots.compiled.settings import *
 
 
 def is_usable(w: Array) -> bool:

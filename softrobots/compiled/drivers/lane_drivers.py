@@ -14,26 +14,15 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from softrobots.compiled.drivers.equilibrium_drivers import go_to_start, settle_from
+from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array, zeros
 from softrobots.compiled.drivers.motor_drivers import estimate, estimated, reach, within_limits
-from softrobots.compiled.settings import FORCE_PASSES, PASSES
+from softrobots.compiled.settings import *
 
 Rows: TypeAlias = "tuple[Any, ...]"
 """Arrays of floats with one row a case."""
 Places: TypeAlias = "tuple[int, ...]"
 """Places in the workspace."""
-
-# Declared in the generated module.
-CERTIFIED: int
-MODE: int
-LANES: int
-LANE_SIZE: int
-WORKSPACE_SIZE: int
-first_pass_lanes: Callable[[Array], None]
-newton_pass_lanes: Callable[[Array], None]
-first_force_pass_lanes: Callable[[Array], None]
-force_pass_lanes: Callable[[Array], None]
-target_pass_lanes: Callable[[Array], None]
 
 
 def running(w: Array) -> bool:
@@ -49,10 +38,10 @@ def load_block(w: Array, inputs: Rows, places: Places, first: int, last: int) ->
     """Write the cases from `first` on into the lanes; behind the last case it is repeated."""
     for k in range(len(places)):
         values = inputs[k]
-        for lane in range(LANES):
-            row = min(first + lane, last - 1, values.shape[0] - 1)
-            for j in range(values.shape[1]):
-                w[(places[k] + j) * LANES + lane] = values[row, j]
+        end = min(last, values.shape[0]) - 1
+        for j in range(values.shape[1]):
+            for lane in range(LANES):
+                w[(places[k] + j) * LANES + lane] = values[min(first + lane, end), j]
 
 
 def load_case(w: Array, inputs: Rows, places: Places, case: int) -> None:
@@ -64,18 +53,21 @@ def load_case(w: Array, inputs: Rows, places: Places, case: int) -> None:
             w[places[k] + j] = values[row, j]
 
 
-def copy_lane(w: Array, lanes: Array, lane: int) -> None:
-    """Copy a lane into the workspace of a single case."""
-    for j in range(LANE_SIZE):
-        w[j] = lanes[j * LANES + lane]
-
-
-def store_results(w: Array, stride: int, lane: int, outputs: Rows, places: Places, row: int) -> None:
-    """Read the results of a case out of a lane, or with `stride` 1 and `lane` 0 out of a workspace of its own."""
+def store_block(w: Array, outputs: Rows, places: Places, first: int, last: int) -> None:
+    """Read the results of the cases from `first` on out of the lanes."""
     for k in range(len(places)):
         values = outputs[k]
         for j in range(values.shape[1]):
-            values[row, j] = w[(places[k] + j) * stride + lane]
+            for lane in range(min(LANES, last - first)):
+                values[first + lane, j] = w[(places[k] + j) * LANES + lane]
+
+
+def store_case(w: Array, outputs: Rows, places: Places, case: int) -> None:
+    """Read the results of one case out of a workspace of its own."""
+    for k in range(len(places)):
+        values = outputs[k]
+        for j in range(values.shape[1]):
+            values[case, j] = w[places[k] + j]
 
 
 def is_solved(w: Array, lane: int) -> bool:
@@ -96,16 +88,14 @@ def settle_batch(
             if not running(lanes):
                 break
             newton_pass_lanes(lanes)
+        store_block(lanes, outputs, result_places, begin, last)
         for lane in range(min(LANES, last - begin)):
-            row = begin + lane
-            if is_solved(lanes, lane):
-                statuses[row] = CERTIFIED
-                store_results(lanes, LANES, lane, outputs, result_places, row)
-            else:
-                load_case(case, inputs, places, row)
+            statuses[begin + lane] = CERTIFIED
+            if not is_solved(lanes, lane):
+                load_case(case, inputs, places, begin + lane)
                 go_to_start(case)
-                statuses[row] = settle_from(case)
-                store_results(case, 1, 0, outputs, result_places, row)
+                statuses[begin + lane] = settle_from(case)
+                store_case(case, outputs, result_places, begin + lane)
 
 
 def estimate_batch(
@@ -121,14 +111,14 @@ def estimate_batch(
             if not running(lanes):
                 break
             force_pass_lanes(lanes)
+        store_block(lanes, outputs, result_places, begin, last)
         for lane in range(min(LANES, last - begin)):
-            row = begin + lane
-            copy_lane(case, lanes, lane)
-            if is_solved(lanes, lane):
-                statuses[row] = estimated(case)
-            else:
-                statuses[row] = estimate(case)
-            store_results(case, 1, 0, outputs, result_places, row)
+            case[OBSERVED] = lanes[OBSERVED * LANES + lane]
+            statuses[begin + lane] = estimated(case)
+            if not is_solved(lanes, lane):
+                load_case(case, inputs, places, begin + lane)
+                statuses[begin + lane] = estimate(case)
+                store_case(case, outputs, result_places, begin + lane)
 
 
 def reach_batch(
@@ -145,18 +135,27 @@ def reach_batch(
             if not running(lanes):
                 break
             target_pass_lanes(lanes)
+        store_block(lanes, outputs, result_places, begin, last)
         for lane in range(min(LANES, last - begin)):
-            row = begin + lane
-            copy_lane(case, lanes, lane)
-            statuses[row] = CERTIFIED
+            for j in range(N_MOTORS):
+                case[j] = lanes[j * LANES + lane]
+            statuses[begin + lane] = CERTIFIED
             if not is_solved(lanes, lane) or within_limits(case, 0) != CERTIFIED:
-                load_case(case, inputs, places, row)
-                statuses[row] = reach(case)
-            store_results(case, 1, 0, outputs, result_places, row)
+                load_case(case, inputs, places, begin + lane)
+                statuses[begin + lane] = reach(case)
+                store_case(case, outputs, result_places, begin + lane)
 
 
-FUNCTIONS: tuple[Callable[..., object], ...] = (running, load_block, load_case, store_results, is_solved, settle_batch)
+FUNCTIONS: tuple[Callable[..., object], ...] = (
+    running,
+    load_block,
+    load_case,
+    store_block,
+    store_case,
+    is_solved,
+    settle_batch,
+)
 """Equilibria, each behind those that it uses."""
 
-MOTOR_FUNCTIONS: tuple[Callable[..., object], ...] = (copy_lane, estimate_batch, reach_batch)
+MOTOR_FUNCTIONS: tuple[Callable[..., object], ...] = (estimate_batch, reach_batch)
 """Load estimation and inverse kinematics."""

@@ -9,51 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from softrobots.compiled.drivers.equilibrium_drivers import descend, go_to_start, is_usable
+from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array
-from softrobots.compiled.settings import (
-    FORCE_PASSES,
-    HIDDEN,
-    LARGEST_SIZE,
-    LEAST_SIZE,
-    OBSERVABLE,
-    PASSES,
-    SEARCH_STEPS,
-    TOLERANCE,
-)
-
-# Made for each robot.
-CERTIFIED: int
-UNSTABLE: int
-NOT_A_NUMBER: int
-UNOBSERVABLE: int
-NOT_REACHED: int
-BEYOND_LIMITS: int
-UNKNOWN: int
-ERROR: int
-FORCE: int
-MODE: int
-MISSING: int
-OBSERVED: int
-DAMPING: int
-TOLERATED: int
-TORQUES: int
-TARGET: int
-NEXT_TARGET: int
-NEXT_POINT: int
-PREVIOUS: int
-N: int
-N_MOTORS: int
-N_VARIED: int
-REACH: float
-LOWER: tuple[float, ...]
-UPPER: tuple[float, ...]
-prepare: Callable[[Array], None]
-prepare_force: Callable[[Array], None]
-first_force_pass: Callable[[Array], None]
-force_pass: Callable[[Array], None]
-look_for_force: Callable[[Array], None]
-target_step: Callable[[Array], None]
-look_for_target: Callable[[Array], None]
+from softrobots.compiled.settings import *
 
 
 def look(w: Array, varied: int) -> None:

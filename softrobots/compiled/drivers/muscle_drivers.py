@@ -7,15 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array
-
-# Made for each robot.
-MUSCLE_PLACE: int
-MUSCLE_REST: tuple[float, ...]
-MUSCLE_BASE: tuple[float, ...]
-MUSCLE_SLOPE: tuple[float, ...]
-N: int
-N_MUSCLES: int
 
 
 def put_muscles(w: Array, muscles: Array) -> None:

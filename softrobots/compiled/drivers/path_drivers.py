@@ -4,26 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array, fabs, where
 from softrobots.compiled.drivers.motor_drivers import go_back, keep_point, reach, step_to_target
-
-# Made for each robot.
-CERTIFIED: int
-NOT_REACHED: int
-UNKNOWN: int
-ERROR: int
-MODE: int
-MISSING: int
-TARGET: int
-NEXT_TARGET: int
-NEXT_POINT: int
-PREVIOUS: int
-PREDICTED: int
-CORRECTION: int
-N: int
-N_MOTORS: int
-N_VARIED: int
-target_step: Callable[[Array], None]
 
 
 def is_near(w: Array, place: int) -> bool:

@@ -96,8 +96,8 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
 
 def _lanes(size: int) -> int:
     """How many cases are worked on side by side: so many that their workspaces stay in the cache of a core."""
-    count = settings.LANES
-    while count > settings.FEWEST_LANES and count * size * 8 > settings.LANE_MEMORY:
+    count = settings.MAX_LANES
+    while count > settings.MIN_LANES and count * size * 8 > settings.LANE_MEMORY:
         count //= 2
     return count
 
@@ -111,31 +111,14 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
     chain, strains = unknowns.chain, unknowns.strains
     min_pivot = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
     group = {strain: row for row, one in enumerate(chain.held) for strain in one}
-    made: dict[str, object] = dict(layout.constants())
-    made |= {
+    numbers = {name: value for name, value in vars(settings).items() if name.isupper()}
+    values: dict[str, object] = numbers | layout.constants()
+    values |= {
         "WORKSPACE_SIZE": size,
         "LANE_SIZE": lane_size,
         "LANES": _lanes(lane_size),
         "N_CONSTRAINTS": len(chain.held),
         **{status.name: status.value for status in Status},
-        "TOLERANCE": settings.TOLERANCE,
-        "NEWTON_TOLERANCE": settings.NEWTON_TOLERANCE,
-        "POSITIVE_PIVOT": settings.POSITIVE_PIVOT,
-        "SMALL_PIVOT_SHIFT": settings.SMALL_PIVOT_SHIFT,
-        "LARGE_PIVOT_SHIFT": settings.LARGE_PIVOT_SHIFT,
-        "LARGEST_STEP": settings.LARGEST_STEP,
-        "SHORT_STEP": settings.SHORT_STEP,
-        "ARMIJO": settings.ARMIJO,
-        "PASSES": settings.PASSES,
-        "FORCE_PASSES": settings.FORCE_PASSES,
-        "DESCENT_STEPS": settings.DESCENT_STEPS,
-        "SEARCH_STEPS": settings.SEARCH_STEPS,
-        "LEAST_SIZE": settings.LEAST_SIZE,
-        "OBSERVABLE": settings.OBSERVABLE,
-        "HIDDEN": settings.HIDDEN,
-        "LARGEST_SIZE": settings.LARGEST_SIZE,
-        "LARGEST_NUMBER": settings.LARGEST_NUMBER,
-        "LARGEST_POSITION": settings.LARGEST_POSITION,
         "REACH": float(chain.reach),
         "N_VARIED": max(layout.motors, 3),
         "LOWER": tuple(np.maximum(chain.limits[: layout.motors, 0], -1e300).tolist()),
@@ -146,7 +129,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "GROUP": tuple(group.get(strain, -1) for strain in strains),
     }
     # A table has at least one number, also where nothing reads it: without motor joints, or without springs.
-    return "\n".join(f"{name} = {(0.0,) if value == () else value!r}" for name, value in (made | tables).items())
+    return "\n".join(f"{name} = {(0.0,) if value == () else value!r}" for name, value in (values | tables).items())
 
 
 def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.settings import ARMIJO, LARGEST_STEP, NEWTON_TOLERANCE, POSITIVE_PIVOT, ROUNDING
+from softrobots.compiled.settings import ARMIJO, ENERGY_ROUNDING, LARGEST_STEP, NEWTON_TOLERANCE, POSITIVE_PIVOT
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
 
@@ -41,7 +41,7 @@ def point_numbers(
         "error": error,
         "length": length,
         "size": load,
-        "rounding": (square_root(load) + absolute(elastic) * 2.0 + absolute(energy)) * ROUNDING,
+        "rounding": (square_root(load) + absolute(elastic) * 2.0 + absolute(energy)) * ENERGY_ROUNDING,
         "min_pivot": min_pivot,
         "n_negative_pivots": n_negative_pivots,
         "range_margin": range_margin,

@@ -88,6 +88,8 @@ def fail(statuses: Any, bad: Any, errors: Sequence[FloatArray], others: Sequence
     """
     statuses[bad] = Status.NOT_A_NUMBER
     failed = np.flatnonzero(statuses)
+    if len(failed) == 0:
+        return
     for error in errors:
         error[bad] = np.inf
         error[failed] = np.nan_to_num(error[failed], nan=np.inf, posinf=np.inf)

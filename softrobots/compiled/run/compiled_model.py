@@ -1,37 +1,26 @@
-"""Compiled solvers of a robot: equilibria, loads and inverse kinematics without Pinocchio in the loop.
-
-`softrobots.compile(model)` traces the robot's own placements into straight-line code (`CompiledModel.source` prints it). It is
-opt-in: nothing else calls it.
-"""
+"""Compiled load estimation and inverse kinematics of a robot, on top of its compiled equilibria; `softrobots.compile`."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.program.generated_module import make_program
-from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.backends import BACKENDS, available_backend, make_run
-from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, statuses_of, unusable, without
+from softrobots.compiled.run.backends import BACKENDS, available_backend
+from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, statuses_of, unusable, without
+from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE, CompiledStatics
 from softrobots.compiled.run.looped_search import LoopedSearch
-from softrobots.compiled.run.results import CompiledEquilibrium, CompiledLoadEstimate, EquilibriumBatch, LoadBatch, MotorBatch
+from softrobots.compiled.run.results import CompiledLoadEstimate, LoadBatch, MotorBatch
 from softrobots.compiled.run.unrolled_search import UnrolledSearch
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import choice, finite_array, positive_number, read_only
-from softrobots.core.errors import EquilibriumNotFound, LoadNotFound, ParameterError, TargetUnreachable
+from softrobots.core.errors import LoadNotFound, ParameterError, TargetUnreachable
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
 from softrobots.statics.load_estimation import check_feels
 from softrobots.statics.tip_search import POSITION_TOLERANCE
-
-_NO_FORCE = read_only(np.zeros(3))
-_DOUBLE = np.dtype(np.float64)
-_THREE = (3,)
 
 
 def compile_model(model: SoftModel, *, backend: str | None = None, locked_strains: tuple[str, ...] = ()) -> CompiledModel:
@@ -40,17 +29,17 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
     Args:
         model: A robot that is one serial chain from base to tip, with linear springs, sections of constant strain, or both.
         backend: "numba" (extra `fast`) or "python", which needs nothing else; by default numba if it is installed.
-        locked_strains: Strains of sections that stay as they are at rest, of "bend_x", "bend_y", "twist", "stretch":
+        locked_strains: Strains of sections that keep their rest values, of "bend_x", "bend_y", "twist", "stretch":
             `("twist", "stretch")` leaves bending only.
 
     Returns:
-        Its solvers. Code is made for each job when it is first asked for.
+        Its solvers. numba compiles each of them on its first call.
 
     Raises:
-        ParameterError: If the model is none, the back end is unknown, or strains cannot be locked.
-        NameNotFound: If a strain to lock is none.
-        DescriptionError: If the robot is no serial chain with linear springs.
-        MissingDependency: If numba is asked for and not installed.
+        ParameterError: If the model is not a SoftModel, the back end is unknown, or strains cannot be locked.
+        NameNotFound: If a strain to lock does not exist.
+        DescriptionError: If the robot is not a serial chain with linear springs.
+        MissingDependency: If `backend` is "numba" and numba is not installed.
     """
     check_model(model)
     chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
@@ -59,174 +48,25 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
     return CompiledModel(model, chosen, tuple(locked_strains))
 
 
-class CompiledModel:
+class CompiledModel(CompiledStatics):
     """Compiled solvers of a robot, for single cases and for batches; made by `softrobots.compile`.
 
-    Loads are a dead force on the tip and gravity, in world axes. All angles, signs and tolerances are those of
-    `softrobots.solve_equilibrium`, and so are the answers; of several equilibria it is the one that descent from rest finds.
-    Safe to share between threads.
+    Loads are a dead force on the tip and gravity, in world axes. Angles, signs and tolerances are those of
+    `softrobots.solve_equilibrium`; of several equilibria the result is the one that descent from rest reaches. Safe to share
+    between threads.
     """
 
     def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
-        """Prepare the solvers; call `softrobots.compile` instead."""
-        self._model, self._backend = model, backend
-        self._chain = model.chain()
-        self._unknowns = Unknowns(self._chain, locked_strains)
-        self._actuation = Actuation(model, self._unknowns)
-        self._runs: dict[bool, Any] = {}
-        self._shape = (model.n_motors,)
-        self._motors = model.n_motors
-        run = self._run(False)
-        self._settle, self._estimate = run.settle, run.estimate
-        self._size, self._layout, self._torques = run.program.size, run.layout, run.layout.torques
-        # What arrays of the right kind go straight into; everything else is checked first.
-        self._plain = len(self._chain.muscle_rest) == 0 and backend == "numba"
-        self._feels = self._plain and self._unknowns.moved_by_motors
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle as the robot and what was said about it; the other process compiles it again, or finds what is kept."""
-        return CompiledModel, (self._model, self._backend, self._unknowns.locked)
-
-    def __repr__(self) -> str:
-        """The robot and the back end."""
-        return f"CompiledModel({self._chain.name!r}, backend={self._backend!r})"
-
-    @property
-    def model(self) -> SoftModel:
-        """The robot."""
-        return self._model
-
-    @property
-    def backend(self) -> str:
-        """The back end: "numba" or "python"."""
-        return self._backend
-
-    def source(self, *, gravity: bool = False, lanes: bool = False) -> str:
-        """The generated code, as Python runs it.
-
-        Args:
-            gravity: That for robots with weight.
-            lanes: What is added to work on many cases side by side, too.
-        """
-        program = self._run(gravity).program
-        return str(program.text + ("\n\n" + program.lane_text if lanes else ""))
-
-    def c_source(self, *, gravity: bool = False, prefix: str = "softrobots") -> str:
-        """The generated code as freestanding C99: one file without libraries, allocation or state, for a control loop.
-
-        Every function works on an array of doubles that the caller owns; the head of the file is its manual: what comes in and
-        out, where it stands, in which unit, and what a status says. Equilibria are there for every robot; `estimate`, `reach`
-        and `follow` for chains that are traced in one straight line.
-
-        Args:
-            gravity: That for robots with weight.
-            prefix: Begins every name, with an underscore behind it.
-
-        Raises:
-            ParameterError: If the prefix is no name.
-        """
-        from softrobots.compiled.c.source import to_c
-
-        if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
-            raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
-        program = self._run(gravity).program
-        return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
-
-    def equilibrium(
-        self, q_motors: Any, force: Any = _NO_FORCE, *, gravity: Any = None, q_springs0: Any = None
-    ) -> CompiledEquilibrium:
-        """Find the equilibrium under a force on the tip.
-
-        Args:
-            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N]; quickest as an array of float64.
-            force: Force on the tip, shape (3,) [N], world axes.
-            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-            q_springs0: Where to start, shape (n_springs,) [rad or m]; at rest by default.
-
-        Returns:
-            The equilibrium, certified stable.
-
-        Raises:
-            ParameterError: If a shape differs, a number is not finite, or no shape of the robot has such muscle lengths.
-            EquilibriumNotFound: If no stable equilibrium is found; carries the best point.
-        """
-        if (
-            self._plain
-            and gravity is None
-            and q_springs0 is None
-            and type(q_motors) is np.ndarray
-            and type(force) is np.ndarray
-            and q_motors.dtype is _DOUBLE
-            and force.dtype is _DOUBLE
-            and q_motors.shape == self._shape
-            and force.shape == _THREE
-        ):
-            w = np.zeros(self._size)
-            w[: self._motors] = q_motors
-            w[self._motors : self._motors + 3] = force
-            if self._settle(w) == 0:
-                return CompiledEquilibrium(w, self._layout, self._actuation)
-        return self._checked_equilibrium(q_motors, force, gravity, q_springs0)
-
-    def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:
-        run = self._run(gravity is not None)
-        motors = self._actuation.checked(q_motors)
-        w = run.workspace()
-        run.put(w, run.layout.force, finite_array("force", force, (3,), "N"))
-        run.put(w, run.layout.gravity, gravity_vector(gravity))
-        self._actuation.put(run, w, motors)
-        if q_springs0 is None:
-            status = run.settle(w)
-        else:
-            springs = finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
-            run.put(w, run.layout.unknown, self._actuation.unknowns(motors, springs))
-            status = run.settle_from(w)
-        found = CompiledEquilibrium(w, run.layout, self._actuation, motors)
-        if status != Status.CERTIFIED:
-            raise EquilibriumNotFound(
-                f"no certified equilibrium at motors {motors.tolist()} under {found.force.tolist()} N: "
-                f"{Status(status).explanation}; {found.residual:.3g} N m are out of balance",
-                best=found,
-                residual=found.residual,
-                iterations=int(w[run.layout.single("iterations")]),
-            )
-        return found
-
-    def equilibria(self, q_motors: Any, forces: Any, *, gravity: Any = None, threads: int = 1) -> EquilibriumBatch:
-        """Find the equilibria of many cases, each from rest.
-
-        Args:
-            q_motors: Actuator coordinates, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N].
-            forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes.
-            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-            threads: Threads to use; more than one help numba only.
-
-        Returns:
-            One row a case. A case that fails says so in its status and touches no other.
-
-        Raises:
-            ParameterError: If a shape differs, gravity is not finite, or the number of threads is not positive.
-        """
-        run = self._run(gravity is not None)
-        motors, loads = batch_rows(q_motors=(q_motors, self._model.n_motors), forces=(forces, 3))
-        down = gravity_vector(gravity)
-        bad = unusable(motors, loads) | self._actuation.unsuited(motors)
-        motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)
-        layout = run.layout
-        inputs = [(layout.force, loads), (layout.gravity, down[None]), *self._actuation.rows(motors, layout)]
-        results = [(layout.unknown, layout.unknowns), (layout.tip, 3), (layout.single("error"), 1)]
-        (found, tips, squares), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
-        residuals = root(squares)
-        fail(statuses, bad, [residuals], [found, tips])
-        return EquilibriumBatch(
-            read_only(self._actuation.elastic(found)), statuses_of(statuses), read_only(residuals), read_only(tips)
-        )
+        """Generate and load the code; call `softrobots.compile` instead."""
+        super().__init__(model, backend, locked_strains)
+        self._estimate, self._torques = self._run(False).estimate, self._layout.torques
+        self._plain_estimate = self._plain and self._unknowns.moved_by_motors
 
     def estimate_load(self, q_motors: Any, motor_torques: Any, *, gravity: Any = None) -> CompiledLoadEstimate:
         """Find the force on the tip from the motor torques.
 
-        Near poses in which the motors hardly feel one direction of the force, several forces can explain the same torques, and
-        this finds another one than `softrobots.estimate_load` in a few cases of a thousand; see `observability` of the answer.
+        Near poses in which one direction of the force is hardly observable, several forces can explain the same torques, and
+        the result differs from that of `softrobots.estimate_load` in a few cases of a thousand; see its `observability`.
 
         Args:
             q_motors: Motor coordinates, shape (n_motors,) [rad or m].
@@ -238,16 +78,16 @@ class CompiledModel:
 
         Raises:
             ParameterError: If a shape differs, a number is not finite, the robot has no actuators or muscles of given
-                tension, or no shape of it has such muscle lengths.
-            LoadNotFound: If no force is found that explains the torques, or the motors do not feel every direction of it.
+                tension, or no shape of it has these muscle lengths.
+            LoadNotFound: If no force is found that explains the torques, or a direction of it is unobservable.
         """
         if (
-            self._feels
+            self._plain_estimate
             and gravity is None
             and type(q_motors) is np.ndarray
             and type(motor_torques) is np.ndarray
-            and q_motors.dtype is _DOUBLE
-            and motor_torques.dtype is _DOUBLE
+            and q_motors.dtype is DOUBLE
+            and motor_torques.dtype is DOUBLE
             and q_motors.shape == self._shape
             and motor_torques.shape == self._shape
         ):
@@ -264,16 +104,16 @@ class CompiledModel:
         motors = self._actuation.checked(q_motors)
         torques = finite_array("motor_torques", motor_torques, self._shape, "N m")
         status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
-        found = CompiledLoadEstimate(w, run.layout, self._actuation, motors)
+        estimate = CompiledLoadEstimate(w, run.layout, self._actuation, motors)
         if status != Status.CERTIFIED:
             raise LoadNotFound(
                 f"no unique force explains the motor torques {torques.tolist()} N m: {Status(status).explanation}; "
-                f"{found.unexplained:.3g} N m remain (softrobots.estimate_load tells which directions are not felt)",
-                best=found,
-                residual=found.unexplained,
+                f"{estimate.unexplained:.3g} N m remain (softrobots.estimate_load returns the unobservable directions)",
+                best=estimate,
+                residual=estimate.unexplained,
                 iterations=int(w[run.layout.single("iterations")]),
             )
-        return found
+        return estimate
 
     def estimate_loads(self, q_motors: Any, motor_torques: Any, *, gravity: Any = None, threads: int = 1) -> LoadBatch:
         """Find the forces of many cases from their motor torques.
@@ -282,7 +122,7 @@ class CompiledModel:
             q_motors: Motor coordinates, shape (n, n_motors), or (n_motors,) for all cases [rad or m].
             motor_torques: Load on each motor, shape (n, n_motors) [N m or N].
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-            threads: Threads to use; more than one help numba only.
+            threads: Number of threads; more than one speeds up numba only.
 
         Returns:
             One row a case.
@@ -312,7 +152,7 @@ class CompiledModel:
     def inverse_kinematics(
         self,
         targets: Any,
-        forces: Any = _NO_FORCE,
+        forces: Any = NO_FORCE,
         *,
         q_motors0: Any = None,
         q_springs0: Any = None,
@@ -322,7 +162,7 @@ class CompiledModel:
     ) -> MotorBatch:
         """Find motors that put the loaded tip at targets, each case from its own start.
 
-        A search from one start finds a solution near it, or none; `softrobots.solve_ik` looks everywhere.
+        A search from one start finds a solution near it, or none; `softrobots.solve_ik` searches from many.
 
         Args:
             targets: Targets of the tip, shape (n, 3) [m], world axes.
@@ -331,7 +171,7 @@ class CompiledModel:
             q_springs0: Elastic coordinates to start from, shape (n, n_springs) [rad or m]; at rest by default.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             tolerance: Largest distance of the tip from its target [m].
-            threads: Threads to use; more than one help numba only.
+            threads: Number of threads; more than one speeds up numba only.
 
         Returns:
             One row a target.
@@ -369,7 +209,7 @@ class CompiledModel:
     def follow(
         self,
         targets: Any,
-        force: Any = _NO_FORCE,
+        force: Any = NO_FORCE,
         *,
         q_motors0: Any = None,
         gravity: Any = None,
@@ -417,12 +257,6 @@ class CompiledModel:
         return batch
 
     def _search(self, run: Any) -> UnrolledSearch | LoopedSearch:
-        """Who does load estimation and inverse kinematics: generated code, or searches in Python on top of it."""
+        """Return the searches for forces and motors: generated code, or Python on top of it."""
         kind = UnrolledSearch if self._unknowns.is_unrolled else LoopedSearch
         return kind(self._model, self._actuation, run)
-
-    def _run(self, weight: bool) -> Any:
-        run = self._runs.get(weight)
-        if run is None:
-            run = self._runs[weight] = make_run(make_program(self._unknowns, weight=weight), self._backend)
-        return run

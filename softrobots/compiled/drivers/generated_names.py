@@ -1,0 +1,89 @@
+"""Names that a generated module declares before the text of the drivers: types only, for the type checker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from softrobots.compiled.drivers.intrinsics import Array
+
+# Values of `softrobots.compiled.statuses.Status`.
+CERTIFIED: int
+UNSTABLE: int
+UNSETTLED: int
+OUT_OF_RANGE: int
+NOT_A_NUMBER: int
+UNOBSERVABLE: int
+NOT_REACHED: int
+BEYOND_LIMITS: int
+
+# Counts of the robot, and sizes of workspaces.
+N: int
+N_MOTORS: int
+N_CONSTRAINTS: int
+N_MUSCLES: int
+N_VARIED: int
+LANES: int
+LANE_SIZE: int
+WORKSPACE_SIZE: int
+
+# Places in the workspace, see `softrobots.compiled.chain.layout`.
+CORRECTION: int
+DAMPING: int
+ENERGY: int
+ERROR: int
+FORCE: int
+GRAVITY: int
+ITERATIONS: int
+LENGTH: int
+LINE_DIRECTION: int
+LINE_ORIGIN: int
+MIN_PIVOT: int
+MISSING: int
+MODE: int
+MUSCLE_PLACE: int
+NEXT_POINT: int
+NEXT_TARGET: int
+N_NEGATIVE_PIVOTS: int
+OBSERVED: int
+PIVOT_SHIFT: int
+PREDICTED: int
+PREVIOUS: int
+RANGE_MARGIN: int
+ROUNDING: int
+SIZE: int
+SLOPE: int
+START: int
+STEP: int
+TARGET: int
+TOLERATED: int
+TORQUES: int
+UNKNOWN: int
+
+# Numbers of the robot: spring rounding [N m], reach [m], tables by unknown, motor or muscle.
+GROUP: tuple[int, ...]
+LOWER: tuple[float, ...]
+MUSCLE_BASE: tuple[float, ...]
+MUSCLE_REST: tuple[float, ...]
+MUSCLE_SLOPE: tuple[float, ...]
+REACH: float
+REST: tuple[float, ...]
+SOFTNESS: tuple[float, ...]
+SPRING_ROUNDING: float
+UPPER: tuple[float, ...]
+
+# Straight-line functions.
+evaluate: Callable[[Array], None]
+first_force_pass: Callable[[Array], None]
+first_force_pass_lanes: Callable[[Array], None]
+first_pass: Callable[[Array], None]
+first_pass_lanes: Callable[[Array], None]
+force_pass: Callable[[Array], None]
+force_pass_lanes: Callable[[Array], None]
+look_for_force: Callable[[Array], None]
+look_for_target: Callable[[Array], None]
+newton_pass: Callable[[Array], None]
+newton_pass_lanes: Callable[[Array], None]
+prepare: Callable[[Array], None]
+prepare_force: Callable[[Array], None]
+target_pass_lanes: Callable[[Array], None]
+target_step: Callable[[Array], None]

@@ -1,0 +1,141 @@
+"""Straight-line functions of a looped program around its loops: preparation, start and end of the passes, the Newton step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import Load, constants, vector
+from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.recursion_layout import RecursionLayout
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.unrolled_chain import place_base
+from softrobots.compiled.program.passes import decide, dot, go_on, point_numbers
+from softrobots.compiled.settings import LEAST_SIZE
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Scalar, larger
+
+
+def looped_frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, count: int, *, weight: bool) -> list[Block]:
+    """Trace the straight-line functions around the loops.
+
+    Args:
+        unknowns: The chain.
+        layout: The places in the workspace.
+        recursion: Places of the sums that elements hand on.
+        count: Number of steps of a loop.
+        weight: Whether there is gravity.
+
+    Returns:
+        The functions.
+    """
+    return [
+        _prepare(unknowns, layout, recursion, count),
+        _start_outward(recursion),
+        _start_inward(unknowns, recursion, weight=weight),
+        _finish(unknowns, layout, recursion, weight=weight),
+        _decide(unknowns, layout, recursion),
+        _advance(layout, recursion),
+        _start(layout),
+        _relax(unknowns, layout),
+    ]
+
+
+def _prepare(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, count: int) -> Block:
+    block = Block("prepare", "Compute what depends on motors and load only.")
+    leading = [
+        unknowns.traced(row, lambda motor: block.load(motor), lambda _: 0.0, lambda _: 0.0)
+        for row in range(unknowns.leading_motors)
+    ]
+    axes, origin = place_base(leading)
+    for place, load in ((0, layout.force), (3, layout.gravity)):
+        block.store_all(recursion.force + place, (axes.T @ vector(block.loads(load, 3))).tolist())
+    block.store_all(recursion.base, [*axes.ravel().tolist(), *origin.tolist()])
+    block.store_all(recursion.end + 1, [0.0, float(count)])
+    return block
+
+
+def _start_outward(recursion: RecursionLayout) -> Block:
+    block = Block("start_outward", "Start the outward pass at the base.")
+    block.store_all(recursion.axes, constants(np.eye(3)).ravel().tolist())
+    return block
+
+
+def _start_inward(unknowns: Unknowns, recursion: RecursionLayout, *, weight: bool) -> Block:
+    block = Block("start_inward", "Start the inward pass at the tip, and clear all sums.")
+    axes = vector(block.loads(recursion.axes, 9)).reshape(3, 3)
+    lever = (axes @ constants(unknowns.chain.tip_translation)).tolist()
+    block.store_all(recursion.lever, [*lever, 0.0, 0.0, 0.0] if weight else lever)
+    block.store_all(recursion.matrix, [0.0] * 6)
+    block.store_all(recursion.column, [0.0] * 3)
+    block.store_all(recursion.turn, [0.0] * 3)
+    block.store_all(recursion.sums, [0.0, 0.0, 1.0, 1.0, 0.0])
+    block.store_all(recursion.steps, [0.0, 0.0, 0.0])
+    return block
+
+
+def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, *, weight: bool) -> Block:
+    block = Block("finish", "Compute energy, residual, step and tip from the sums of the passes.")
+    sums, steps = block.loads(recursion.sums, 5), block.loads(recursion.steps, 3)
+    levers, forces = block.loads(recursion.lever, 6), block.loads(recursion.force, 6)
+    loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0), Load(vector(forces[3:]), vector(levers[3:]), 0.0)]
+    energy: Scalar = sums[0] - sum((one.force @ one.lever for one in loads[: 2 if weight else 1]), 0.0)
+    force = block.loads(layout.force, 3)
+    load = dot(force, force) * unknowns.chain.reach**2 + sums[1]
+    if unknowns.pulled:
+        pull = block.loads(layout.pull, layout.unknowns)
+        load = load + dot(pull, pull)
+    numbers = point_numbers(
+        slope=steps[0],
+        error=steps[1],
+        length=steps[2],
+        energy=energy,
+        elastic=sums[0],
+        load=larger(load, LEAST_SIZE**2),
+        range_margin=sums[2],
+        min_pivot=sums[3],
+        n_negative_pivots=sums[4],
+    )
+    for name, value in numbers.items():
+        block.store(layout.single(name), value)
+    base = block.loads(recursion.base, 12)
+    block.store_all(layout.tip, (vector(base[9:]) + vector(base[:9]).reshape(3, 3) @ loads[0].lever).tolist())
+    return block
+
+
+def _decide(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout) -> Block:
+    block = Block("decide", "Decide whether the case goes on.")
+    names = ("energy", "slope", "error", "length", "size", "rounding", "min_pivot", "n_negative_pivots", "range_margin")
+    point: dict[str, Scalar] = {name: block.load(layout.single(name)) for name in names}
+    _, share = decide(
+        block,
+        layout,
+        point,
+        n_constraints=len(unknowns.chain.held),
+        spring_rounding=unknowns.spring_rounding,
+        mode=block.load(layout.single("mode")),
+        bound=block.load(layout.single("bound")),
+    )
+    block.store(recursion.end, share)
+    return block
+
+
+def _advance(layout: Layout, recursion: RecursionLayout) -> Block:
+    block = Block("advance", "Take the step of one unknown, if the case goes on.", ("i",))
+    unknown, step = block.load(layout.unknown, "i"), block.load(layout.step, "i")
+    share, mode = block.load(recursion.end), block.load(layout.single("mode"))
+    block.store(layout.unknown, go_on(mode, unknown, share, step), "i")
+    return block
+
+
+def _start(layout: Layout) -> Block:
+    block = Block("start", "Start a case.")
+    for name, value in (("mode", 0.0), ("bound", 1e300), ("pivot_shift", 0.0)):
+        block.store(layout.single(name), value)
+    return block
+
+
+def _relax(unknowns: Unknowns, layout: Layout) -> Block:
+    block = Block("relax", "Put an unknown where its spring is relaxed.", ("i",))
+    rest = {float(unknowns.chain.rest[strain]) for strain in unknowns.strains}
+    block.store(layout.unknown, rest.pop() if len(rest) == 1 else block.table("REST", 0, "i"), "i")
+    return block

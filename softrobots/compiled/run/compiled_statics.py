@@ -1,0 +1,192 @@
+"""Compiled equilibria of a robot without Pinocchio in the loop, and the generated code that finds them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.program.generated_module import make_program
+from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.backends import make_run
+from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, statuses_of, unusable, without
+from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import finite_array, read_only
+from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.model.soft_model import SoftModel
+
+NO_FORCE = read_only(np.zeros(3))
+"""No force on the tip [N]."""
+DOUBLE = np.dtype(np.float64)
+"""Type of the numbers of generated code."""
+_THREE = (3,)
+
+
+class CompiledStatics:
+    """Compiled equilibria of a robot, for single cases and for batches, and their generated code.
+
+    See `softrobots.compiled.run.compiled_model.CompiledModel`, which adds load estimation and inverse kinematics.
+    """
+
+    def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
+        """Generate and load the code; call `softrobots.compile` instead."""
+        self._model, self._backend = model, backend
+        self._chain = model.chain()
+        self._unknowns = Unknowns(self._chain, locked_strains)
+        self._actuation = Actuation(model, self._unknowns)
+        self._runs: dict[bool, Any] = {}
+        self._shape = (model.n_motors,)
+        self._motors = model.n_motors
+        run = self._run(False)
+        self._settle, self._size, self._layout = run.settle, run.program.size, run.layout
+        # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
+        self._plain = len(self._chain.muscle_rest) == 0 and backend == "numba"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle as the robot and its options; the other process compiles it again, or finds the code in its cache."""
+        return type(self), (self._model, self._backend, self._unknowns.locked)
+
+    def __repr__(self) -> str:
+        """The robot and the back end."""
+        return f"{type(self).__name__}({self._chain.name!r}, backend={self._backend!r})"
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self._model
+
+    @property
+    def backend(self) -> str:
+        """The back end: "numba" or "python"."""
+        return self._backend
+
+    def source(self, *, gravity: bool = False, lanes: bool = False) -> str:
+        """Return the generated code as Python runs it.
+
+        Args:
+            gravity: Return the code for robots with weight.
+            lanes: Append the functions for batches.
+        """
+        program = self._run(gravity).program
+        return str(program.text + ("\n\n" + program.lane_text if lanes else ""))
+
+    def c_source(self, *, gravity: bool = False, prefix: str = "softrobots") -> str:
+        """Return the generated code as freestanding C99: one file without libraries, allocation or state, for a control loop.
+
+        Every function works on an array of doubles that the caller owns. The comment at the head of the file lists inputs and
+        results with their places and units, and the meaning of each status. `settle` finds equilibria of every robot;
+        `estimate`, `reach` and `follow` exist for unrolled chains.
+
+        Args:
+            gravity: Return the code for robots with weight.
+            prefix: Beginning of every name, before an underscore.
+
+        Raises:
+            ParameterError: If the prefix is not an identifier of C.
+        """
+        from softrobots.compiled.c.source import to_c
+
+        if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
+            raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
+        program = self._run(gravity).program
+        return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
+
+    def equilibrium(
+        self, q_motors: Any, force: Any = NO_FORCE, *, gravity: Any = None, q_springs0: Any = None
+    ) -> CompiledEquilibrium:
+        """Find the equilibrium under a force on the tip.
+
+        Args:
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N]; fastest as an array of float64.
+            force: Force on the tip, shape (3,) [N], world axes.
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+            q_springs0: Start of the search, shape (n_springs,) [rad or m]; at rest by default.
+
+        Returns:
+            The equilibrium, certified stable.
+
+        Raises:
+            ParameterError: If a shape differs, a number is not finite, or no shape of the robot has these muscle lengths.
+            EquilibriumNotFound: If no stable equilibrium is found; the error carries the best point.
+        """
+        if (
+            self._plain
+            and gravity is None
+            and q_springs0 is None
+            and type(q_motors) is np.ndarray
+            and type(force) is np.ndarray
+            and q_motors.dtype is DOUBLE
+            and force.dtype is DOUBLE
+            and q_motors.shape == self._shape
+            and force.shape == _THREE
+        ):
+            w = np.zeros(self._size)
+            w[: self._motors] = q_motors
+            w[self._motors : self._motors + 3] = force
+            if self._settle(w) == 0:
+                return CompiledEquilibrium(w, self._layout, self._actuation)
+        return self._checked_equilibrium(q_motors, force, gravity, q_springs0)
+
+    def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:
+        run = self._run(gravity is not None)
+        motors = self._actuation.checked(q_motors)
+        w = run.workspace()
+        run.put(w, run.layout.force, finite_array("force", force, (3,), "N"))
+        run.put(w, run.layout.gravity, gravity_vector(gravity))
+        self._actuation.put(run, w, motors)
+        if q_springs0 is None:
+            status = run.settle(w)
+        else:
+            springs = finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
+            run.put(w, run.layout.unknown, self._actuation.unknowns(motors, springs))
+            status = run.settle_from(w)
+        equilibrium = CompiledEquilibrium(w, run.layout, self._actuation, motors)
+        if status != Status.CERTIFIED:
+            raise EquilibriumNotFound(
+                f"no certified equilibrium at motors {motors.tolist()} under {equilibrium.force.tolist()} N: "
+                f"{Status(status).explanation}; {equilibrium.residual:.3g} N m are out of balance",
+                best=equilibrium,
+                residual=equilibrium.residual,
+                iterations=int(w[run.layout.single("iterations")]),
+            )
+        return equilibrium
+
+    def equilibria(self, q_motors: Any, forces: Any, *, gravity: Any = None, threads: int = 1) -> EquilibriumBatch:
+        """Find the equilibria of many cases, each from rest.
+
+        Args:
+            q_motors: Actuator coordinates, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N].
+            forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes.
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+            threads: Number of threads; more than one speeds up numba only.
+
+        Returns:
+            One row a case. The status tells which cases failed; a failed case does not affect others.
+
+        Raises:
+            ParameterError: If a shape differs, gravity is not finite, or the number of threads is not positive.
+        """
+        run = self._run(gravity is not None)
+        motors, loads = batch_rows(q_motors=(q_motors, self._model.n_motors), forces=(forces, 3))
+        down = gravity_vector(gravity)
+        bad = unusable(motors, loads) | self._actuation.unsuited(motors)
+        motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)
+        layout = run.layout
+        inputs = [(layout.force, loads), (layout.gravity, down[None]), *self._actuation.rows(motors, layout)]
+        results = [(layout.unknown, layout.unknowns), (layout.tip, 3), (layout.single("error"), 1)]
+        (unknowns, tips, squares), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
+        residuals = root(squares)
+        fail(statuses, bad, [residuals], [unknowns, tips])
+        return EquilibriumBatch(
+            read_only(self._actuation.elastic(unknowns)), statuses_of(statuses), read_only(residuals), read_only(tips)
+        )
+
+    def _run(self, weight: bool) -> Any:
+        """Return the code with or without gravity, generated on first use."""
+        run = self._runs.get(weight)
+        if run is None:
+            run = self._runs[weight] = make_run(make_program(self._unknowns, weight=weight), self._backend)
+        return run
