@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, load_case, map_workspace, mapping, scheduling
+from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, arm_solver, map_workspace, mapping, scheduling
 from softrobots.compiled.sweeps.scheduling import run_blocks
 from softrobots.view.figures import workspaces
 from tests.support.laws import law
@@ -352,10 +352,8 @@ def test_an_error_in_a_block_comes_out(threads: int) -> None:
 
 
 def test_another_version_of_softrobots_is_refused(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(load_case, "__version__", "0.0.0")
-    case = mapping.SweepCase.of(
-        arm, direction=DOWN, loads=np.array(LOADS), gravity=None, tolerance=1e-9, backend="python", version="9.9.9"
-    )
+    monkeypatch.setattr(arm_solver, "__version__", "0.0.0")
+    case = mapping.SweepCase.of(arm, DOWN, np.array(LOADS), gravity=None, tolerance=1e-9, backend="python", version="9.9.9")
     with pytest.raises(sr.ParameterError, match=r"version of softrobots = '0\.0\.0'"):
         mapping.solve_block(case, GRID.targets[:1])
 

@@ -1,9 +1,9 @@
-"""One block of a sweep: some targets with all loads, solved by themselves.
+"""One block of a sweep: some targets with all loads.
 
-A block depends on nothing but its case and its targets. Whoever solves it, and after which others, its numbers are the same.
+The numbers of a block depend on its case and targets only, not on the worker or on the order of blocks.
 
-For each target and branch of postures (a *lane*) the load grows level by level; each search starts from the motor angles of the
-level before. A lane that is lost at a load is not looked for at larger ones.
+For each target and branch of postures (a *lane*) the load grows level by level; each search starts from the pose of the level
+before. A lane that fails at a load after it was solved is not searched at larger loads.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from softrobots.statics.workspace_map import BoolArray
 
 
 class BlockResult(NamedTuple):
-    """Answers of a block; of its n targets, the best posture for each load."""
+    """Results of a block of n targets; the best posture for each load."""
 
     reached: BoolArray
     """Whether the loaded tip reaches the target, shape (n, n_loads)."""
@@ -36,7 +36,7 @@ class BlockResult(NamedTuple):
 
     @staticmethod
     def arrays(case: SweepCase, count: int) -> dict[str, tuple[type, tuple[int, ...]]]:
-        """Type of numbers and shape of each array, for a number of targets."""
+        """Return data type and shape of each array, for a number of targets."""
         cases = (count, len(case.loads))
         return {
             "reached": (np.bool_, cases),
@@ -55,10 +55,10 @@ def solve_block(case: SweepCase, targets: FloatArray) -> BlockResult:
         targets: Targets of the tip, shape (n, 3) [m].
 
     Returns:
-        The answers.
+        The results.
 
     Raises:
-        ParameterError: If the case comes from another version of softrobots.
+        ParameterError: If the case was made by another version of softrobots.
         MissingDependency: If the back end of the case is not installed.
     """
     arm = solver(case)
@@ -83,14 +83,11 @@ def solve_block(case: SweepCase, targets: FloatArray) -> BlockResult:
     carried = payloads(arm.search, goals, levels, excess, poses)
     best = required.reshape(n_branches, len(near), count).argmin(axis=0)
     chosen = best * len(near) + np.arange(len(near))[:, None], np.arange(count)  # lane and level
-    answer = BlockResult(
-        np.zeros((len(targets), count), dtype=bool),
-        np.full((len(targets), count), np.inf),
-        np.zeros(len(targets)),
-        np.zeros((len(targets), count, n_motors)),
-        np.zeros((len(targets), count, arm.model.n_springs)),
+    result = BlockResult(
+        **{name: np.zeros(shape, kind) for name, (kind, shape) in BlockResult.arrays(case, len(targets)).items()}
     )
-    answer.reached[near], answer.required_pressure[near] = reached[chosen], required[chosen]
-    answer.payload[near] = carried.reshape(n_branches, len(near)).max(axis=0)
-    answer.q_motors[near], answer.q_springs[near] = poses[chosen][..., :n_motors], poses[chosen][..., n_motors:]
-    return answer
+    result.required_pressure.fill(np.inf)
+    result.reached[near], result.required_pressure[near] = reached[chosen], required[chosen]
+    result.payload[near] = carried.reshape(n_branches, len(near)).max(axis=0)
+    result.q_motors[near], result.q_springs[near] = poses[chosen][..., :n_motors], poses[chosen][..., n_motors:]
+    return result

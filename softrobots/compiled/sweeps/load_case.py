@@ -1,9 +1,10 @@
-"""What every block of a sweep needs to know, as plain data that crosses to another process."""
+"""Robot, loads and options of a sweep, as plain data that can be sent to another process."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 from xml.dom import minidom
 
 from softrobots.core.checks import FloatArray
@@ -17,7 +18,7 @@ _FREE = 6.0 * math.pi  # [rad]
 
 @dataclass(frozen=True)
 class SweepCase:
-    """The robot, its loads, and how they are solved; equal ones make equal solvers."""
+    """Robot, loads and options of the solver; equal cases make equal solvers."""
 
     urdf: str
     """Description of the robot."""
@@ -36,43 +37,23 @@ class SweepCase:
     tolerance: float
     """Largest distance of the tip from its target [m]."""
     backend: str
-    """Back end of the compiled solver: the same one everywhere, because their last digits differ."""
-    version: str
+    """Back end of the compiled solver: the same one on all workers, because the last digits differ."""
+    version: str = __version__
     """Version of softrobots that made the case."""
 
     @classmethod
-    def of(
-        cls,
-        model: SoftModel,
-        *,
-        direction: FloatArray,
-        loads: FloatArray,
-        gravity: tuple[float, float, float] | None,
-        tolerance: float,
-        backend: str,
-        version: str,
-    ) -> SweepCase:
+    def of(cls, model: SoftModel, direction: FloatArray, loads: FloatArray, **fields: Any) -> SweepCase:
         """Take the robot from a model; the other arguments are the fields."""
         x, y, z = direction.tolist()
-        return cls(
-            model.urdf,
-            tuple((name, *tag) for name, tag in model.spring_table.items()),
-            model.motor_joints,
-            model.tip,
-            (x, y, z),
-            tuple(loads.tolist()),
-            gravity,
-            tolerance,
-            backend,
-            version,
-        )
+        springs = tuple((name, *tag) for name, tag in model.spring_table.items())
+        return cls(model.urdf, springs, model.motor_joints, model.tip, (x, y, z), tuple(loads.tolist()), **fields)
 
     def model(self) -> SoftModel:
         """The robot."""
         return self._load(self.urdf)
 
     def free_model(self) -> SoftModel:
-        """The same robot with motors that turn several times either way."""
+        """The robot with motor limits of several turns either way."""
         document = minidom.parseString(self.urdf)
         for joint in (part for robot in children(document) for part in children(robot)):
             if joint.tagName == "joint" and joint.getAttribute("name") in self.motors:
@@ -84,8 +65,3 @@ class SweepCase:
     def _load(self, urdf: str) -> SoftModel:
         springs = {name: (stiffness, rest) for name, stiffness, rest in self.springs}
         return load_model(urdf, springs=springs, motors=self.motors, tip=self.tip)
-
-
-def package_version() -> str:
-    """Version of the package, which is known only when all of it is imported."""
-    return __version__

@@ -1,4 +1,4 @@
-"""Mapping what the loaded arm reaches, carries, and which pressure it needs: the blocks of a sweep put together."""
+"""Maps of reach, payload and required pressure of the loaded arm, computed block by block."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from softrobots.compiled.run.compiled_model import compile_model
 from softrobots.compiled.sweeps.block import BlockResult, solve_block
-from softrobots.compiled.sweeps.load_case import SweepCase, package_version
+from softrobots.compiled.sweeps.load_case import SweepCase
 from softrobots.compiled.sweeps.postures import check_arm
 from softrobots.compiled.sweeps.scheduling import run_blocks
 from softrobots.core.checkpoint import Checkpoint
@@ -37,7 +37,7 @@ BLOCK = 512
 """Targets of a block."""
 
 DOWN = (0.0, 0.0, -1.0)
-"""Direction of a weight."""
+"""Direction of a weight, world axes."""
 
 
 def map_workspace(
@@ -54,10 +54,10 @@ def map_workspace(
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | str = False,
 ) -> WorkspaceMap:
-    """Find out, for every target and load, whether the loaded arm gets there, and the pressure that it needs.
+    """Map reach, payload and required pressure of the loaded arm over a grid of targets and loads.
 
-    The targets are cut into blocks of `BLOCK`. A block is solved by the compiled solvers and by itself, so that threads and
-    clusters give the same bytes as a single thread (on processors of one kind).
+    The targets are cut into blocks of `BLOCK`, each solved by itself with the compiled solvers, so that threads and clusters
+    give the same bytes as a single thread (on processors of one kind).
 
     Args:
         model: An arm with three motors, the first about the vertical through the base, and two inflated links.
@@ -68,51 +68,47 @@ def map_workspace(
         tolerance: Largest distance of the tip from a target that is reached [m].
         backend: Back end of `softrobots.compile`.
         threads: Threads of this process, without a scheduler.
-        scheduler: Address of a Dask scheduler that has the work done; None: this process. Its workers need the same version of
-            softrobots.
-        checkpoint: Folder that keeps the finished blocks. After an interruption, even a killed process, the same call goes on
-            from there, to the same bytes. Delete the folder when the maps are saved. None: nothing is kept.
+        scheduler: Address of a Dask scheduler, whose workers need the same version of softrobots; None: this process.
+        checkpoint: Folder for finished blocks. After an interruption, even a killed process, the same call resumes from
+            there, with the same bytes as result. Delete the folder when the maps are saved. None: blocks are not kept.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
         The maps.
 
     Raises:
-        ParameterError: If an argument is out of range, the robot is no such arm, or the blocks are those of another case.
-        DescriptionError: If the robot is no serial chain with linear springs.
-        FileFormatError, OutputExists: If the folder of blocks is no such folder.
-        OutputError: If a block cannot be written; those before it stay.
+        ParameterError: If an argument is out of range, the robot is not such an arm, or the blocks belong to another case.
+        DescriptionError: If the robot is not a serial chain with linear springs.
+        FileFormatError, OutputExists: If `checkpoint` is not a folder of blocks.
+        OutputError: If a block cannot be written; earlier blocks are kept.
         MissingDependency: If the back end or distributed is not installed.
-        ClusterError: If the cluster does not do the work.
+        ClusterError: If the cluster fails.
     """
     check_arm(check_model(model))
     if not isinstance(grid, TargetGrid):
         raise ParameterError("grid", grid, "a TargetGrid")
     sizes = increasing("loads", non_negative_array("loads", finite_array("loads", loads, (None,), "N"), "N"), "N")
     positive_integer("number of loads", len(sizes), 100_000)
-    most = LARGEST // (10 + 8 * (model.n_motors + model.n_springs))  # as can be saved
+    most = LARGEST // (10 + 8 * (model.n_motors + model.n_springs))  # that can be saved
     positive_integer("number of cases", math.prod(grid.shape) * len(sizes), most)
     along = unit_vector("direction", direction)
     weight = Load.of(model, gravity=gravity).gravity
     case = SweepCase.of(
         model,
-        direction=along,
-        loads=sizes,
+        along,
+        sizes,
         gravity=weight,
         tolerance=positive_number("tolerance", tolerance, "m"),
         backend=compile_model(model, backend=backend).backend,
-        version=package_version(),
     )
     positive_integer("threads", threads)
     kept = None if checkpoint is None else Checkpoint(checkpoint, _identity(case, grid))
-    targets, shape = grid.targets, grid.shape
-    cases = (len(targets), len(sizes))
-    reached, required, payload = np.zeros(cases, dtype=bool), np.zeros(cases), np.zeros(len(targets))
-    motors, springs = np.zeros((*cases, model.n_motors)), np.zeros((*cases, model.n_springs))
-    for number, answer in _answers(case, targets, kept, threads, scheduler, progress):
-        rows = slice(number * BLOCK, number * BLOCK + len(answer.payload))
-        reached[rows], required[rows], payload[rows] = answer.reached, answer.required_pressure, answer.payload
-        motors[rows], springs[rows] = answer.q_motors, answer.q_springs
+    targets = grid.targets
+    kinds = BlockResult.arrays(case, len(targets))
+    arrays: dict[str, Any] = {name: np.zeros(shape, kind) for name, (kind, shape) in kinds.items()}
+    for number, block in _results(case, targets, kept, threads, scheduler, progress):
+        for name, values in block._asdict().items():
+            arrays[name][number * BLOCK : number * BLOCK + len(values)] = values
     return WorkspaceMap(
         model=model,
         grid=grid,
@@ -120,37 +116,33 @@ def map_workspace(
         loads=sizes,
         gravity=weight,
         tolerance=case.tolerance,
-        reached=reached.reshape(*shape, -1),
-        required_pressure=required.reshape(*shape, -1),
-        payload=payload.reshape(shape),
-        q_motors=motors.reshape(*shape, len(sizes), -1),
-        q_springs=springs.reshape(*shape, len(sizes), -1),
+        **{name: values.reshape(*grid.shape, *values.shape[1:]) for name, values in arrays.items()},
     )
 
 
 def _identity(case: SweepCase, grid: TargetGrid) -> dict[str, Any]:
-    """What the answers depend on."""
+    """Return all inputs of the results."""
     axes = {axis: getattr(grid, axis).tolist() for axis in "xyz"}
     return {"job": "map_workspace", "targets of a block": BLOCK, **axes, **dataclasses.asdict(case)}
 
 
-def _answers(
+def _results(
     case: SweepCase, targets: FloatArray, kept: Checkpoint | None, threads: int, scheduler: str | None, progress: bool | str
 ) -> Iterator[tuple[int, BlockResult]]:
-    """Number and answer of every block: those that are kept, and then the others as they come."""
+    """Yield number and result of every block: first those in the checkpoint, then the others as they are finished."""
     blocks = [targets[first : first + BLOCK] for first in range(0, len(targets), BLOCK)]
     left = []
     for number, block in enumerate(blocks):
-        found = None if kept is None else kept.block(number, BlockResult.arrays(case, len(block)))
-        if found is None:
+        stored = None if kept is None else kept.block(number, BlockResult.arrays(case, len(block)))
+        if stored is None:
             left.append(number)
         else:
-            yield number, BlockResult(**found)
+            yield number, BlockResult(**stored)
     if not left:
         return
-    answers = run_blocks(partial(solve_block, case), [blocks[number] for number in left], threads=threads, scheduler=scheduler)
+    results = run_blocks(partial(solve_block, case), [blocks[number] for number in left], threads=threads, scheduler=scheduler)
     done = len(blocks) - len(left)
-    for place, answer in with_progress(answers, progress, label="targets", unit="block", total=len(blocks), done=done):
+    for place, result in with_progress(results, progress, label="targets", unit="block", total=len(blocks), done=done):
         if kept is not None:
-            kept.keep(left[place], answer._asdict())
-        yield left[place], answer
+            kept.keep(left[place], result._asdict())
+        yield left[place], result

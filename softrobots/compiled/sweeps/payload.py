@@ -1,8 +1,8 @@
 """The largest load that is carried without wrinkling, between the levels of a sweep.
 
-A lane (one target, one branch of postures) carries a load while its tip is at the target and no link lacks pressure. Levels are
-scanned upwards; between the last level that is carried and the next one the payload is found by regula falsi (Illinois) on the
-missing pressure, or by halving where the arm does not get to the target at the larger load.
+A lane (one target, one branch of postures) carries a load if its tip is at the target and no link lacks pressure. Between the
+last level that is carried and the next one the payload is found by regula falsi (Illinois) on the missing pressure, or by
+bisection where the arm does not reach the target at the larger load.
 """
 
 from __future__ import annotations
@@ -11,31 +11,31 @@ from collections.abc import Callable
 
 import numpy as np
 
-from softrobots.compiled.sweeps.arm_solver import Found
+from softrobots.compiled.sweeps.arm_solver import SearchResult
 from softrobots.core.checks import FloatArray
 from softrobots.statics.workspace_map import CLOSE
 
 ROUNDS = 10
-"""Searches between two levels; by halving alone they narrow a step down to a thousandth."""
+"""Searches between two levels; bisection alone narrows a step down to a thousandth."""
 
-Search = Callable[[FloatArray, FloatArray, FloatArray], Found]
-"""Search for targets (n, 3), loads (n,) and starts (n, n_motors + n_springs)."""
+Search = Callable[[FloatArray, FloatArray, FloatArray], SearchResult]
+"""Search for poses at targets (n, 3) under loads (n,) from starts (n, n_motors + n_springs)."""
 
 
 def payloads(search: Search, targets: FloatArray, levels: FloatArray, excess: FloatArray, poses: FloatArray) -> FloatArray:
     """Find the payload of each lane.
 
     Args:
-        search: Searches poses.
+        search: Search for poses.
         targets: Targets, shape (n, 3) [m].
         levels: Loads of the sweep, shape (n_loads,), increasing [N].
-        excess: Pressure that is missing at each level, shape (n, n_loads) [Pa]; infinite where the target is not reached.
+        excess: Missing pressure at each level, shape (n, n_loads) [Pa]; infinite where the target is not reached.
         poses: Motor angles and springs at each level, shape (n, n_loads, n_motors + n_springs) [rad].
 
     Returns:
-        Payloads, shape (n,) [N]: 0 where not even the first level is carried, the last level where all are.
+        Payloads, shape (n,) [N]: 0 where the first level is not carried, the last level where all are.
     """
-    carried = np.cumprod(excess <= CLOSE, axis=1).sum(axis=1)  # how many levels, from the first on
+    carried = np.cumprod(excess <= CLOSE, axis=1).sum(axis=1)  # number of levels, from the first on
     answer = np.where(carried > 0, levels[np.maximum(carried - 1, 0)], 0.0)
     lanes = np.flatnonzero((carried > 0) & (carried < len(levels)))
     last = carried[lanes] - 1

@@ -1,7 +1,7 @@
-"""Postures to start inverse kinematics from: the unloaded arm at a table of motor angles, by elbow and by side.
+"""Start postures of inverse kinematics: the unloaded arm at a table of motor angles, by elbow and by side.
 
-The same point is reached with the elbow up or down, and forwards or over the back. Each of these is a branch of its own, and a
-search that starts on one of them stays there as a rule, so every branch gets its own start.
+The same point is reached with the elbow up or down, and forwards or over the back. A search that starts on one of these
+branches stays there as a rule, so every branch has starts of its own.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from softrobots.model.soft_model import SoftModel
 if TYPE_CHECKING:
     from softrobots.compiled.run.compiled_model import CompiledModel
 
-_SHOULDER, _ELBOW = 64, 48  # angles in the table: a start is within a few hundredths of the reach of its target
+_SHOULDER, _ELBOW = 64, 48  # angles in the table: starts are within a few hundredths of the reach from their targets
 _FREE = 1e6  # [rad], instead of no limit
-_ROUND_OFF = 1e-9  # [rad], how far beyond its limit a motor may end
+_ROUND_OFF = 1e-9  # [rad], by which a motor may end beyond its limit
 
 
 class Branch(NamedTuple):
-    """Postures of one kind at zero angle of motor 1, and where they put the tip."""
+    """Postures of one kind at zero angle of motor 1, and the tip positions."""
 
     q_motors: FloatArray
     """Motor angles, shape (n, 3) [rad]."""
@@ -37,25 +37,25 @@ class Branch(NamedTuple):
     """Angle of the tip about the axis of motor 1, shape (n,) [rad]."""
 
     def starts(self, targets: FloatArray) -> FloatArray:
-        """The posture whose tip is nearest to each target, turned towards it, shape (n_targets, 3) [rad].
+        """Return the posture whose tip is nearest to each target, turned towards it, shape (n_targets, 3) [rad].
 
-        Motor 1 may end up beyond its limits.
+        Motor 1 may be beyond its limits.
         """
         radius, height = np.hypot(targets[:, 0], targets[:, 1]), targets[:, 2]
         apart = (radius[:, None] - self.radius) ** 2 + (height[:, None] - self.height) ** 2
         nearest = apart.argmin(axis=1)
-        made = self.q_motors[nearest]
-        made[:, 0] = np.arctan2(targets[:, 1], targets[:, 0]) - self.azimuth[nearest]
-        return np.asarray(made)
+        postures = self.q_motors[nearest]
+        postures[:, 0] = np.arctan2(targets[:, 1], targets[:, 0]) - self.azimuth[nearest]
+        return np.asarray(postures)
 
 
 def check_arm(model: SoftModel) -> None:
-    """Refuse robots that are no arm of inflated links with three motors.
+    """Require an arm of inflated links with three motors.
 
     Raises:
-        ParameterError: If the robot has not three turning motors, the first about the vertical through the base, or not every
-            spring belongs to an inflated link.
-        DescriptionError: If it is no serial chain.
+        ParameterError: If the robot does not have three turning motors, the first about the vertical through the base, or a
+            spring belongs to no inflated link.
+        DescriptionError: If it is not a serial chain.
     """
     springs = sorted(place for group in model.spring_groups for place in group.springs)
     if model.n_motors != 3 or model.muscles or not springs or springs != list(range(model.n_springs)):
@@ -69,15 +69,15 @@ def check_arm(model: SoftModel) -> None:
 def branches(model: SoftModel, compiled: CompiledModel) -> tuple[Branch, ...]:
     """Tables of postures within the motor limits: elbow bent up or down, tip before or behind the axis of motor 1.
 
-    An arm whose motors turn all round and whose springs rest at zero stands over its back exactly as it stands forwards, so it
-    has two branches rather than four.
+    An arm whose motors turn all round and whose springs rest at zero is over its back in the same postures as forwards, so it
+    has two branches instead of four.
 
     Args:
         model: An arm that `check_arm` accepts.
         compiled: Its compiled form.
 
     Returns:
-        The branches that have any posture.
+        The branches that have postures.
     """
     limits = np.clip(model.motor_limits, -np.pi, np.pi)
     same_behind = not model.rest.any() and bool(np.all(limits[:, 0] <= -np.pi) and np.all(limits[:, 1] >= np.pi))
@@ -86,17 +86,17 @@ def branches(model: SoftModel, compiled: CompiledModel) -> tuple[Branch, ...]:
     tips = compiled.equilibria(motors, np.zeros((len(motors), 3))).tip_positions
     radius, azimuth = np.hypot(tips[:, 0], tips[:, 1]), np.arctan2(tips[:, 1], tips[:, 0])
     before = np.abs(azimuth) <= 0.5 * np.pi
-    found = []
+    tables = []
     for side in (before,) if same_behind else (before, ~before):
         for bent in (motors[:, 2] < 0.0, motors[:, 2] >= 0.0):
             kept = side & bent
             if kept.any():
-                found.append(Branch(motors[kept], radius[kept], tips[kept, 2], azimuth[kept]))
-    return tuple(found)
+                tables.append(Branch(motors[kept], radius[kept], tips[kept, 2], azimuth[kept]))
+    return tuple(tables)
 
 
 def starts(model: SoftModel, tables: Sequence[Branch], targets: FloatArray) -> FloatArray:
-    """Poses to start from: the relaxed arm, for each branch and target, within the motor limits.
+    """Return start poses: the relaxed arm, for each branch and target, within the motor limits.
 
     Args:
         model: The arm.
@@ -127,5 +127,5 @@ def within_turns(model: SoftModel, q_motors: FloatArray) -> tuple[FloatArray, ND
 
 
 def _between(limits: FloatArray, count: int) -> FloatArray:
-    """Centres of `count` equal intervals between two limits."""
+    """Return the centres of `count` equal intervals between two limits."""
     return np.asarray(limits[0] + (np.arange(count) + 0.5) * ((limits[1] - limits[0]) / count))

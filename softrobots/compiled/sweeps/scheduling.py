@@ -1,6 +1,6 @@
-"""Blocks of work, in this process or on a Dask cluster: the same blocks, the same answers.
+"""Run blocks of work in this process or on a Dask cluster, with the same results.
 
-A Dask scheduler gives the blocks of a worker that is lost to another one. Nothing of an answer depends on who computed it.
+A Dask scheduler gives the blocks of a lost worker to another one.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pkgutil import resolve_name
 from typing import Any, TypeVar
 
-from softrobots.compiled.sweeps.load_case import package_version
 from softrobots.core.errors import ClusterError, MissingDependency, ParameterError, SoftRobotsError
+from softrobots.version import __version__
 
 Block = TypeVar("Block")
 Answer = TypeVar("Answer")
@@ -22,7 +22,7 @@ _PATIENCE = 30  # [s], for a scheduler to answer, and for its first worker
 def run_blocks(
     work: Callable[[Block], Answer], blocks: Sequence[Block], *, threads: int = 1, scheduler: str | None = None
 ) -> Iterator[tuple[int, Answer]]:
-    """Do some work on blocks, in any order.
+    """Apply a function to blocks, in any order.
 
     Args:
         work: Function of a block; for a cluster, one that pickles.
@@ -31,13 +31,13 @@ def run_blocks(
         scheduler: Address of a Dask scheduler, e.g. "tcp://127.0.0.1:8786"; None: in this process.
 
     Yields:
-        Number of a block and its answer, in the order in which they come.
+        Number of a block and its result, in the order of completion.
 
     Raises:
         MissingDependency: If a scheduler is given and distributed is not installed.
-        ParameterError: If the address of the scheduler is none.
-        ClusterError: If the scheduler does not answer, has no workers, or gives a block up.
-        SoftRobotsError: What `work` raises.
+        ParameterError: If the address of the scheduler is not valid.
+        ClusterError: If the scheduler does not answer, has no workers, or gives up a block.
+        SoftRobotsError: Errors of `work`.
     """
     if scheduler is not None:
         return _on_cluster(work, blocks, scheduler)
@@ -63,7 +63,7 @@ def _on_cluster(work: Callable[[Block], Answer], blocks: Sequence[Block], addres
         raise MissingDependency("distributed", "cluster") from error
     try:
         parse_host_port(address)
-    except (AttributeError, TypeError, ValueError) as error:  # a client of such an address takes a minute to go
+    except (AttributeError, TypeError, ValueError) as error:  # a client of such an address takes a minute to close
         raise ParameterError("scheduler", address, "an address with a port, e.g. 'tcp://127.0.0.1:8786'") from error
     client: Any = None
     try:
@@ -75,20 +75,19 @@ def _on_cluster(work: Callable[[Block], Answer], blocks: Sequence[Block], addres
             yield numbers[future], future.result()
     except SoftRobotsError:
         raise
-    except Exception as error:  # connections, time-outs, workers that die at one block again and again, what they cannot import
-        raise ClusterError(f"the Dask scheduler {address} does not do the work: {type(error).__name__}: {error}") from error
+    except Exception as error:  # connections, time-outs, blocks that kill workers, failed imports
+        raise ClusterError(f"the Dask scheduler {address} failed: {type(error).__name__}: {error}") from error
     finally:
         if client is not None:
             client.close()
 
 
 def _check_versions(client: Any) -> None:
-    """Refuse workers that do not have this version of softrobots; what they cannot import would make them restart for ever.
+    """Require this version of softrobots on all workers; a failed import would make them restart forever.
 
     Raises:
         ClusterError: If a worker has another version, or none.
     """
-    ours = package_version()
     for worker, theirs in client.run(resolve_name, "softrobots:__version__", on_error="return").items():
-        if theirs != ours:
-            raise ClusterError(f"the Dask worker {worker} needs softrobots {ours}; what it has: {theirs}")
+        if theirs != __version__:
+            raise ClusterError(f"the Dask worker {worker} needs softrobots {__version__}; it has {theirs}")
