@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import softrobots as sr
 from softrobots.compiled import Status
-from softrobots.compiled.run import compiled_model
+from softrobots.compiled.run import compiled_statics
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
 from tests.support.foreign import BRANCHED
@@ -717,7 +717,7 @@ def test_nothing_else_compiles_silently(arm: sr.SoftModel, monkeypatch: pytest.M
     def refuse(*_: Any, **__: Any) -> None:
         raise AssertionError("compiled without being asked")
 
-    monkeypatch.setattr(compiled_model, "make_program", refuse)
+    monkeypatch.setattr(compiled_statics, "make_program", refuse)
     monkeypatch.setattr(compiled_model, "make_run", refuse)
     settled = sr.solve_equilibrium(arm, (0.1, 0.2, 0.3), (0.0, 5.0, -5.0))
     sr.estimate_load(arm, settled.q_motors, settled.motor_torques)
