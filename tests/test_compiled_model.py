@@ -718,7 +718,7 @@ def test_nothing_else_compiles_silently(arm: sr.SoftModel, monkeypatch: pytest.M
         raise AssertionError("compiled without being asked")
 
     monkeypatch.setattr(compiled_statics, "make_program", refuse)
-    monkeypatch.setattr(compiled_model, "make_run", refuse)
+    monkeypatch.setattr(compiled_statics, "make_run", refuse)
     settled = sr.solve_equilibrium(arm, (0.1, 0.2, 0.3), (0.0, 5.0, -5.0))
     sr.estimate_load(arm, settled.q_motors, settled.motor_torques)
     sr.solve_ik(arm, (0.8, 0.1, 0.2), (0.0, 5.0, -5.0))
