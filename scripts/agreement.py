@@ -38,18 +38,18 @@ PAGE = "agreement.md"
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told = "robots, of %(choices)s (all)"
-    made.add_argument("--robot", nargs="+", choices=list(STUDIES), default=list(STUDIES), metavar="ROBOT", help=told)
-    made.add_argument("--cases", type=int, default=100, help="random loads of the steel rod (%(default)s)")
-    made.add_argument("--seed", type=int, default=2026, help="seed of these loads (%(default)s)")
-    made.add_argument("--no-mujoco", action="store_true", help="do without MuJoCo")
-    made.add_argument("--json", action="store_true", help="print the numbers as one JSON object instead of tables")
-    told = "new or empty folder for agreement.json, agreement.md and agreement.png (none)"
-    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    told = "write docs/agreement.md, docs/validation/agreement.json and docs/images/agreement.png of this checkout"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    help_text = "robots, of %(choices)s (all)"
+    result.add_argument("--robot", nargs="+", choices=list(STUDIES), default=list(STUDIES), metavar="ROBOT", help=help_text)
+    result.add_argument("--cases", type=int, default=100, help="random loads of the steel rod (%(default)s)")
+    result.add_argument("--seed", type=int, default=2026, help="seed of these loads (%(default)s)")
+    result.add_argument("--no-mujoco", action="store_true", help="do without MuJoCo")
+    result.add_argument("--json", action="store_true", help="print the numbers as one JSON object instead of tables")
+    help_text = "new or empty folder for agreement.json, agreement.md and agreement.png (none)"
+    result.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
+    help_text = "write docs/agreement.md, docs/validation/agreement.json and docs/images/agreement.png of this checkout"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -70,8 +70,8 @@ def run(arguments: argparse.Namespace) -> None:
     for robot in dict.fromkeys(arguments.robot):
         for name, study in STUDIES[robot](arguments.cases, arguments.seed).items():
             results[name] = compare(study, partial(tqdm, desc=name, unit="model"), mujoco=not arguments.no_mujoco)
-    told = {"cases": arguments.cases, "seed": arguments.seed, "studies": results}
-    text, shown = json.dumps(told, indent=1, allow_nan=False), table(results)
+    record = {"cases": arguments.cases, "seed": arguments.seed, "studies": results}
+    text, shown = json.dumps(record, indent=1, allow_nan=False), table(results)
     if folder is not None:
         make_folder(folder)
         write_text(folder / "agreement.json", text + "\n", overwrite=False)
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.docs is not None:
         canvas.write_png(figure(results), arguments.docs / "docs" / "images" / "agreement.png", overwrite=True)
         command = command_of("agreement", parser(), arguments, "cases", "seed")
-        write_record(arguments.docs, "agreement", shown, told, command=command, page=PAGE)
+        write_record(arguments.docs, "agreement", shown, record, command=command, page=PAGE)
     print(text if arguments.json else f"\n{shown}")
 
 

@@ -43,15 +43,15 @@ DIGITS = 6
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--cases", type=int, default=400, help="postures and forces of the arm (%(default)s)")
-    made.add_argument("--seed", type=int, default=2026, help="seed of these (%(default)s)")
-    made.add_argument("--json", action="store_true", help="print the numbers as one JSON object instead of tables")
-    told = f"new or empty folder for beam_validity.json, beam_validity.md and {' and '.join(PICTURES)} (none)"
-    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    told = "write docs/agreement.md, docs/validation/beam_validity.json and the pictures of a checkout (this one)"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--cases", type=int, default=400, help="postures and forces of the arm (%(default)s)")
+    result.add_argument("--seed", type=int, default=2026, help="seed of these (%(default)s)")
+    result.add_argument("--json", action="store_true", help="print the numbers as one JSON object instead of tables")
+    help_text = f"new or empty folder for beam_validity.json, beam_validity.md and {' and '.join(PICTURES)} (none)"
+    result.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
+    help_text = "write docs/agreement.md, docs/validation/beam_validity.json and the pictures of a checkout (this one)"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def rounded(value: Any) -> Any:

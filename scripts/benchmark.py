@@ -5,7 +5,7 @@ else is said, ratios are taken within a round, and what is printed are medians. 
 solve_equilibrium and its like before anything is timed. What needs a package that is not installed is named as skipped.
 Nothing fails because it is slow: the table says which targets are met.
 
-Takes minutes; with --cpp one more, for g++ to compile Pinocchio's forward kinematics (needs g++ and libeigen3-dev).
+Takes minutes.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import make_folder, new_file, write_text
 from softrobots.view.figures import canvas
+from studies.benchmark.comparison import Settings, quick_settings
 from studies.benchmark.jobs import JOBS, measure
 from studies.benchmark.pictures import PICTURES, picture
-from studies.benchmark.race import Settings, quick_settings
 from studies.benchmark.results import Results, as_json, machine_text, read_results, require_whole, table
 from studies.shared.markdown import marked
 
@@ -32,19 +32,20 @@ PAGE = "docs/compiled.md"
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told = f"jobs to run, of {', '.join(JOBS)} (all)"
-    made.add_argument("--only", nargs="+", choices=list(JOBS), default=list(JOBS), metavar="JOB", help=told)
-    made.add_argument("--rounds", type=int, default=9, help="rounds of each race (%(default)s)")
-    made.add_argument("--cpp", action="store_true", help="compile and time Pinocchio's forward kinematics in C++")
-    made.add_argument("--quick", action="store_true", help="small sizes, to see that everything runs; the figures mean nothing")
-    told = "make tables and pictures of saved results instead"
-    made.add_argument("--from", type=Path, dest="saved", metavar="FILE", help=told)
-    made.add_argument("--json", type=Path, metavar="FILE", help="also write the results to a new file")
-    made.add_argument("--plots", type=Path, metavar="FOLDER", help="draw the curves into a folder (jobs sizes and batches)")
-    told = "write docs/benchmark.json, docs/images/benchmark_*.png and the table in docs/compiled.md"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    help_text = f"jobs to run, of {', '.join(JOBS)} (all)"
+    result.add_argument("--only", nargs="+", choices=list(JOBS), default=list(JOBS), metavar="JOB", help=help_text)
+    result.add_argument("--rounds", type=int, default=9, help="rounds of each comparison (%(default)s)")
+    result.add_argument(
+        "--quick", action="store_true", help="small sizes, to see that everything runs; the figures mean nothing"
+    )
+    help_text = "make tables and pictures of saved results instead"
+    result.add_argument("--from", type=Path, dest="saved", metavar="FILE", help=help_text)
+    result.add_argument("--json", type=Path, metavar="FILE", help="also write the results to a new file")
+    result.add_argument("--plots", type=Path, metavar="FOLDER", help="draw the curves into a folder (jobs sizes and batches)")
+    help_text = "write docs/benchmark.json, docs/images/benchmark_*.png and the table in docs/compiled.md"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def document(results: Results) -> str:
@@ -84,9 +85,9 @@ def write_docs(results: Results, checkout: Path) -> list[Path]:
 
 def run(arguments: argparse.Namespace) -> None:
     """Do the whole job."""
-    settings = Settings(arguments.rounds, progress=True, cpp=arguments.cpp)
+    settings = Settings(arguments.rounds, progress=True)
     if arguments.quick:
-        settings = quick_settings(arguments.rounds, progress=True, cpp=arguments.cpp)
+        settings = quick_settings(arguments.rounds, progress=True)
     if arguments.rounds < 1:
         raise sr.ParameterError("--rounds", arguments.rounds, "at least 1")
     if arguments.plots is not None or arguments.docs is not None:
@@ -94,8 +95,8 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.json is not None:
         new_file(arguments.json, overwrite=False)
     if arguments.docs is not None and arguments.saved is None:  # tells at once what keeps the page from being written
-        if arguments.quick or not arguments.cpp or set(arguments.only) != set(JOBS):
-            raise sr.ParameterError("--docs", str(arguments.docs), "given with --cpp, for all jobs, without --quick")
+        if arguments.quick or set(arguments.only) != set(JOBS):
+            raise sr.ParameterError("--docs", str(arguments.docs), "given for all jobs, without --quick")
         page_with(arguments.docs, "")
     results = measure(settings, arguments.only) if arguments.saved is None else read_results(arguments.saved)
     print(f"\n{document(results)}")

@@ -30,14 +30,14 @@ MARK = ".softrobots-site"
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     folder = CHECKOUT / "output" / "site"
-    told = "folder of the site: new, empty, or with an older site that is replaced (output/site of the checkout)"
-    made.add_argument("--output", type=Path, default=folder, metavar="FOLDER", help=told)
-    made.add_argument("--no-notebook", action="store_true", help="show the notebook without running it")
-    made.add_argument("--serve", action="store_true", help="then serve the site on 127.0.0.1 until Ctrl-C")
-    made.add_argument("--port", type=int, default=0, help="port of --serve (%(default)s: a free one)")
-    return made
+    help_text = "folder of the site: new, empty, or with an older site that is replaced (output/site of the checkout)"
+    result.add_argument("--output", type=Path, default=folder, metavar="FOLDER", help=help_text)
+    result.add_argument("--no-notebook", action="store_true", help="show the notebook without running it")
+    result.add_argument("--serve", action="store_true", help="then serve the site on 127.0.0.1 until Ctrl-C")
+    result.add_argument("--port", type=int, default=0, help="port of --serve (%(default)s: a free one)")
+    return result
 
 
 class ServedFolder:
@@ -109,17 +109,17 @@ def build(folder: Path, *, execute: bool) -> Path:
     logging.getLogger("traitlets").setLevel(logging.ERROR)  # of the notebook: a cell that fails is an error anyway
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".site-") as scratch:
         os.environ["IPYTHONDIR"] = str(_quiet_kernel(Path(scratch) / "ipython"))
-        made = Path(scratch) / "site"
+        result = Path(scratch) / "site"
         try:
-            config: Any = load_config(str(CHECKOUT / "docs" / "site" / "mkdocs.yml"), strict=True, site_dir=str(made))
+            config: Any = load_config(str(CHECKOUT / "docs" / "site" / "mkdocs.yml"), strict=True, site_dir=str(result))
             config.plugins.on_startup(command="build", dirty=False)
             build_site(config)
             config.plugins.on_shutdown()
         except (BuildError, CellExecutionError, ConfigurationError, SystemExit) as error:
             raise sr.OutputError(f"the documentation is not well: {error}") from error
-        (made / MARK).touch()
+        (result / MARK).touch()
         shutil.rmtree(folder, ignore_errors=True)  # whole or not at all
-        made.rename(folder)
+        result.rename(folder)
     return folder / "index.html"
 
 

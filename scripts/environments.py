@@ -86,15 +86,15 @@ ENVIRONMENTS = {python: Environment(python, python, lowest=False, extra="dev") f
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told = f"environments, of {', '.join(ENVIRONMENTS)} (those whose Python is installed)"
-    made.add_argument("--environment", nargs="+", choices=list(ENVIRONMENTS), metavar="NAME", help=told)
-    made.add_argument("--tests", nargs="+", default=["tests"], metavar="FILE", help="test files (all)")
-    told = "new or empty folder for the reports of the tests (JUnit XML), the output, and results.json"
-    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    told = "write the table of docs/validation.md in a checkout (this one); others keep their last row"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    help_text = f"environments, of {', '.join(ENVIRONMENTS)} (those whose Python is installed)"
+    result.add_argument("--environment", nargs="+", choices=list(ENVIRONMENTS), metavar="NAME", help=help_text)
+    result.add_argument("--tests", nargs="+", default=["tests"], metavar="FILE", help="test files (all)")
+    help_text = "new or empty folder for the reports of the tests (JUnit XML), the output, and results.json"
+    result.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
+    help_text = "write the table of docs/validation.md in a checkout (this one); others keep their last row"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def interpreters() -> dict[str, Path]:
@@ -111,8 +111,8 @@ def interpreters() -> dict[str, Path]:
 
 def _works(file: Path, python: str) -> bool:
     """Whether an interpreter runs, is of that version and can make environments (a shim or a bare one may not)."""
-    told = "import sys, ensurepip; print('%d.%d' % sys.version_info[:2])"
-    done = subprocess.run([file, "-c", told], capture_output=True, text=True, check=False)
+    text = "import sys, ensurepip; print('%d.%d' % sys.version_info[:2])"
+    done = subprocess.run([file, "-c", text], capture_output=True, text=True, check=False)
     return done.returncode == 0 and done.stdout.strip() == python
 
 
@@ -134,18 +134,18 @@ def run_tests(environment: Environment, interpreter: Path, tests: list[str], rep
             [python, "-c", "import platform; print(platform.python_version())"], check=True, capture_output=True, text=True
         ).stdout.strip()
         report = (reports / f"{environment.name}.xml").resolve()
-        asked = [str(python), "-m", "pytest", "-q", "-n", "auto", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
+        command = [str(python), "-m", "pytest", "-q", "-n", "auto", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
         # In CI a missing tool fails its test; without the extras it may be missing.
         variables = {**os.environ, "CI": "true" if environment.extra == "dev" else "", "VIRTUAL_ENV": str(python.parent.parent)}
         variables.pop("PYTHONDONTWRITEBYTECODE", None)  # or each of hundreds of processes compiles the package anew
         began = time.perf_counter()
-        status = subprocess.run(asked, cwd=copy, env=variables, stdout=output, stderr=output, check=False).returncode
+        status = subprocess.run(command, cwd=copy, env=variables, stdout=output, stderr=output, check=False).returncode
         minutes = (time.perf_counter() - began) / 60.0
     if status not in (0, 1) or not report.is_file():  # 0: all passed, 1: some failed; else not all of them ran
         raise sr.OutputError(f"the tests of {environment.name} ended early, with status {status}; see {log}")
     cases = list(ElementTree.parse(report).iter("testcase"))
     bad = [case for case in cases if case.find("failure") is not None or case.find("error") is not None]
-    skipped = [told.get("message", "") for case in cases if (told := case.find("skipped")) is not None]
+    skipped = [text.get("message", "") for case in cases if (text := case.find("skipped")) is not None]
     return Outcome(
         environment=environment.name,
         python=version,
@@ -170,8 +170,8 @@ def table(outcomes: list[Outcome]) -> str:
     lines += [""] if any(found.reasons for found in outcomes) else []
     for found in outcomes:
         if found.reasons and ENVIRONMENTS[found.environment].extra == "dev":
-            told = "; ".join(f"{count}: {reason}" for reason, count in found.reasons.items())
-            lines.append(f"- skipped in {found.environment}: {told}")
+            text = "; ".join(f"{count}: {reason}" for reason, count in found.reasons.items())
+            lines.append(f"- skipped in {found.environment}: {text}")
         elif found.reasons:
             lines.append(f"- skipped in {found.environment}: what needs an optional package, for {len(found.reasons)} reasons")
     return "\n".join(lines)

@@ -40,24 +40,24 @@ NAME = "fuzzing"
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told = f"readers, of {', '.join(READERS)} (all)"
-    made.add_argument("--reader", nargs="+", choices=tuple(READERS), metavar="NAME", help=told)
-    made.add_argument("--cases", type=int, default=20000, metavar="N", help="cases for each reader (%(default)s)")
-    made.add_argument("--first", type=int, default=0, metavar="N", help="number of the first case (%(default)s)")
-    made.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the damages (%(default)s)")
-    made.add_argument("--seconds", type=float, default=10.0, metavar="S", help="CPU time that ends a case [s] (%(default)s)")
-    made.add_argument(
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    help_text = f"readers, of {', '.join(READERS)} (all)"
+    result.add_argument("--reader", nargs="+", choices=tuple(READERS), metavar="NAME", help=help_text)
+    result.add_argument("--cases", type=int, default=20000, metavar="N", help="cases for each reader (%(default)s)")
+    result.add_argument("--first", type=int, default=0, metavar="N", help="number of the first case (%(default)s)")
+    result.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the damages (%(default)s)")
+    result.add_argument("--seconds", type=float, default=10.0, metavar="S", help="CPU time that ends a case [s] (%(default)s)")
+    result.add_argument(
         "--megabytes", type=float, default=1024.0, metavar="MB", help="memory that a case may take [MB] (%(default)s)"
     )
-    made.add_argument(
+    result.add_argument(
         "--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="how many work on it (%(default)s)"
     )
-    made.add_argument("--case", metavar="READER:NUMBER", help="write the file of this case to --output, and read it here")
-    told = "read this file instead, and print what becomes of it, a line of JSON each; may be repeated"
-    made.add_argument("--read", action="append", metavar="READER:FILE", help=told)
-    made.add_argument("--output", type=Path, metavar="FILE", help="new file: that of --case, or a JSON file of the tallies")
-    made.add_argument(
+    result.add_argument("--case", metavar="READER:NUMBER", help="write the file of this case to --output, and read it here")
+    help_text = "read this file instead, and print what becomes of it, a line of JSON each; may be repeated"
+    result.add_argument("--read", action="append", metavar="READER:FILE", help=help_text)
+    result.add_argument("--output", type=Path, metavar="FILE", help="new file: that of --case, or a JSON file of the tallies")
+    result.add_argument(
         "--docs",
         type=Path,
         nargs="?",
@@ -65,8 +65,8 @@ def parser() -> argparse.ArgumentParser:
         metavar="CHECKOUT",
         help="record the table in docs/validation.md of a checkout (this one); without --reader",
     )
-    made.add_argument("--work", choices=tuple(READERS), help=argparse.SUPPRESS)
-    return made
+    result.add_argument("--work", choices=tuple(READERS), help=argparse.SUPPRESS)
+    return result
 
 
 def run(arguments: argparse.Namespace) -> bool:

@@ -31,28 +31,28 @@ LINE = {"start": START, "end": END, "duration": DURATION, "steps": STEPS}
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
     numbers = {"type": float, "nargs": 3}
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--start", **numbers, metavar=("X", "Y", "Z"), help=f"first tip position [m] ({_words(START)})")
-    made.add_argument("--end", **numbers, metavar=("X", "Y", "Z"), help=f"last tip position [m] ({_words(END)})")
-    made.add_argument("--duration", type=float, help=f"time from start to end, quintic time law [s] ({DURATION})")
-    made.add_argument("--steps", type=int, help=f"intervals between start and end ({STEPS})")
-    made.add_argument(
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--start", **numbers, metavar=("X", "Y", "Z"), help=f"first tip position [m] ({_words(START)})")
+    result.add_argument("--end", **numbers, metavar=("X", "Y", "Z"), help=f"last tip position [m] ({_words(END)})")
+    result.add_argument("--duration", type=float, help=f"time from start to end, quintic time law [s] ({DURATION})")
+    result.add_argument("--steps", type=int, help=f"intervals between start and end ({STEPS})")
+    result.add_argument(
         "--csv", type=Path, metavar="FILE", help="waypoints with columns t,x,y,z [s, m], instead of start and end"
     )
-    add_load(made, FORCE)
-    made.add_argument(
+    add_load(result, FORCE)
+    result.add_argument(
         "--stiffness", type=float, default=inflated_beam.MEAN_STIFFNESS, help="of every spring [N m/rad] (%(default)s)"
     )
-    made.add_argument("--pressure", type=float, default=50e3, help="gauge pressure in the links [Pa] (%(default)s)")
-    made.add_argument("--elbow", choices=("up", "down"), default="up", help="side of the elbow at the start (%(default)s)")
-    made.add_argument("--method", choices=METHODS, default="newton", help="how the path is followed (%(default)s)")
-    made.add_argument("--gain", type=float, default=GAIN, help="gain of the paper's method [1/s] (%(default)s)")
-    made.add_argument(
+    result.add_argument("--pressure", type=float, default=50e3, help="gauge pressure in the links [Pa] (%(default)s)")
+    result.add_argument("--elbow", choices=("up", "down"), default="up", help="side of the elbow at the start (%(default)s)")
+    result.add_argument("--method", choices=METHODS, default="newton", help="how the path is followed (%(default)s)")
+    result.add_argument("--gain", type=float, default=GAIN, help="gain of the paper's method [1/s] (%(default)s)")
+    result.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder for the results (output/ik_trajectory_<time>)"
     )
-    made.add_argument("--no-plots", action="store_true", help="do without the plots, which need matplotlib")
-    made.add_argument("--meshcat", action="store_true", help="serve the animation on loopback until Ctrl-C")
-    return made
+    result.add_argument("--no-plots", action="store_true", help="do without the plots, which need matplotlib")
+    result.add_argument("--meshcat", action="store_true", help="serve the animation on loopback until Ctrl-C")
+    return result
 
 
 def _words(point: tuple[float, ...]) -> str:

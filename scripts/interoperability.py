@@ -30,23 +30,23 @@ from studies.shared.checkout import CHECKOUT
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told = f"tools to ask, of {', '.join(TOOLS)} (those that are installed)"
-    made.add_argument("--tools", nargs="+", choices=list(TOOLS), metavar="TOOL", help=told)
-    told = "robots of the equilibria, of %(choices)s (all)"
-    made.add_argument("--robots", nargs="+", choices=list(ROBOTS), default=list(ROBOTS), metavar="ROBOT", help=told)
-    made.add_argument("--poses", type=int, default=POSES, help="poses of each robot, 1 to 5 (%(default)s)")
-    made.add_argument("--no-simulation", action="store_true", help="compare where forces balance only, which is quick")
-    only = made.add_mutually_exclusive_group()
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    help_text = f"tools to ask, of {', '.join(TOOLS)} (those that are installed)"
+    result.add_argument("--tools", nargs="+", choices=list(TOOLS), metavar="TOOL", help=help_text)
+    help_text = "robots of the equilibria, of %(choices)s (all)"
+    result.add_argument("--robots", nargs="+", choices=list(ROBOTS), default=list(ROBOTS), metavar="ROBOT", help=help_text)
+    result.add_argument("--poses", type=int, default=POSES, help="poses of each robot, 1 to 5 (%(default)s)")
+    result.add_argument("--no-simulation", action="store_true", help="compare where forces balance only, which is quick")
+    only = result.add_mutually_exclusive_group()
     only.add_argument("--equilibrium-only", action="store_true", help="leave out the kinematics")
     only.add_argument("--kinematics-only", action="store_true", help="leave out springs and equilibria")
-    made.add_argument(
+    result.add_argument(
         "--from", type=Path, dest="saved", metavar="FILE", help="make tables and pictures of saved results instead"
     )
-    made.add_argument("--output", type=Path, metavar="FILE", help="also write the results to a new JSON file")
-    told = "write docs/interoperability.json, docs/images/interoperability.png and the tables in docs/other_tools.md"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result.add_argument("--output", type=Path, metavar="FILE", help="also write the results to a new JSON file")
+    help_text = "write docs/interoperability.json, docs/images/interoperability.png and the tables in docs/other_tools.md"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def run(arguments: argparse.Namespace) -> bool:

@@ -155,13 +155,13 @@ def _example(name: str) -> dict[str, Any]:
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = (*FIGURES, *SCENES)
-    told = f"figures to make ({', '.join(names)})"
-    made.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME", help=told)
-    told = "folder of the figures (docs/images)"
-    made.add_argument("--output", type=Path, default=DOCS / "images", metavar="FOLDER", help=told)
-    return made
+    help_text = f"figures to make ({', '.join(names)})"
+    result.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME", help=help_text)
+    help_text = "folder of the figures (docs/images)"
+    result.add_argument("--output", type=Path, default=DOCS / "images", metavar="FOLDER", help=help_text)
+    return result
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -51,14 +51,14 @@ class Counts(NamedTuple):
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--limit", type=float, default=95.0, metavar="PERCENT", help="of lines and branches (%(default)g)")
-    made.add_argument("--tests", nargs="+", default=["tests"], metavar="FILE", help="test files (all)")
-    made.add_argument("--files", type=int, default=10, metavar="N", help="files with most that is not run (%(default)s)")
-    made.add_argument("--output", type=Path, metavar="FILE", help="also write coverage.py's JSON report into this new file")
-    told = "write the table of docs/validation.md in a checkout (this one); without --tests"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--limit", type=float, default=95.0, metavar="PERCENT", help="of lines and branches (%(default)g)")
+    result.add_argument("--tests", nargs="+", default=["tests"], metavar="FILE", help="test files (all)")
+    result.add_argument("--files", type=int, default=10, metavar="N", help="files with most that is not run (%(default)s)")
+    result.add_argument("--output", type=Path, metavar="FILE", help="also write coverage.py's JSON report into this new file")
+    help_text = "write the table of docs/validation.md in a checkout (this one); without --tests"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def measure(tests: list[str]) -> tuple[bool, dict[str, Any]]:
@@ -72,8 +72,8 @@ def measure(tests: list[str]) -> tuple[bool, dict[str, Any]]:
         variables = {**os.environ, "COVERAGE_FILE": str(Path(folder) / "data"), "OMP_NUM_THREADS": "1"}
 
         def coverage(*words: str) -> int:
-            asked = [sys.executable, "-m", "coverage", *words]
-            return subprocess.run(asked, cwd=CHECKOUT, env=variables, stdout=sys.stderr, check=False).returncode
+            command = [sys.executable, "-m", "coverage", *words]
+            return subprocess.run(command, cwd=CHECKOUT, env=variables, stdout=sys.stderr, check=False).returncode
 
         if coverage("--version"):
             raise sr.MissingDependency("coverage", "dev")

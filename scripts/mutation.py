@@ -85,16 +85,18 @@ LEFT_OUT = {
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--module", nargs="+", choices=list(PARTS), metavar="NAME", help=f"of {', '.join(PARTS)} (all)")
-    made.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="at a time (%(default)s)")
-    told = "new or empty folder for results.json, the changes that survived, what mutmut said, and its copy of the checkout"
-    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    told = "go on in the folder of an earlier run: what is new or has survived is tested, with the files of today"
-    made.add_argument("--resume", type=Path, metavar="FOLDER", help=told)
-    told = "write the table of docs/validation.md in a checkout (this one); without --module"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--module", nargs="+", choices=list(PARTS), metavar="NAME", help=f"of {', '.join(PARTS)} (all)")
+    result.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="at a time (%(default)s)")
+    help_text = (
+        "new or empty folder for results.json, the changes that survived, what mutmut said, and its copy of the checkout"
+    )
+    result.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
+    help_text = "go on in the folder of an earlier run: what is new or has survived is tested, with the files of today"
+    result.add_argument("--resume", type=Path, metavar="FOLDER", help=help_text)
+    help_text = "write the table of docs/validation.md in a checkout (this one); without --module"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def settings(parts: list[Part]) -> str:
@@ -102,8 +104,8 @@ def settings(parts: list[Part]) -> str:
     tests = dict.fromkeys(f"tests/test_{name}.py" for part in parts for name in part.tests)
     options = ["-p", "tests.support.mutation_profile", "--hypothesis-profile=mutation", "-p", "no:cacheprovider", "--tb=no"]
     options += ["-p", "no:unraisableexception"]  # it collects garbage at every end: half of the time of a change
-    told = configparser.ConfigParser()
-    told["mutmut"] = {
+    summary = configparser.ConfigParser()
+    summary["mutmut"] = {
         "source_paths": "softrobots",
         "only_mutate": "\n".join(["", *(f"softrobots/{file}" for part in parts for file in part.modules)]),
         "also_copy": "\n".join(["", "xacro", "urdf", "scripts", "docs", "README.md", "CHANGELOG.md"]),
@@ -117,7 +119,7 @@ def settings(parts: list[Part]) -> str:
         "timeout_constant": "3.0",
     }
     text = io.StringIO()
-    told.write(text)
+    summary.write(text)
     return text.getvalue()
 
 
@@ -164,11 +166,11 @@ def _mutmut(copy: Path, processes: int, names: list[str], output: IO[str]) -> No
         OutputError: If it fails.
     """
     (copy / "mutants" / "failed.txt").unlink(missing_ok=True)
-    asked = [str(copy / ".venv" / "bin" / "mutmut"), "run", "--max-children", str(processes), *names]
+    command = [str(copy / ".venv" / "bin" / "mutmut"), "run", "--max-children", str(processes), *names]
     variables = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
     with (
         subprocess.Popen(
-            asked, cwd=copy, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            command, cwd=copy, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         ) as running,
         tqdm(desc="changes once more" if names else "changes", unit="change", total=len(names) or None) as bar,
     ):
@@ -183,8 +185,8 @@ def _mutmut(copy: Path, processes: int, names: list[str], output: IO[str]) -> No
                 output.write(line)
     if running.returncode:
         failed = copy / "mutants" / "failed.txt"  # tests/support/mutation_profile.py writes it
-        told = failed.read_text(encoding="utf-8") if failed.is_file() else f"see {output.name}"
-        raise sr.OutputError(f"mutmut ended with status {running.returncode}; tests that fail without a change: {told}")
+        text = failed.read_text(encoding="utf-8") if failed.is_file() else f"see {output.name}"
+        raise sr.OutputError(f"mutmut ended with status {running.returncode}; tests that fail without a change: {text}")
 
 
 def table(verdicts: list[Verdict]) -> str:
@@ -219,11 +221,11 @@ def run(arguments: argparse.Namespace) -> bool:
     mutants = test_changes(make_folder(folder).resolve(), parts, processes, again=arguments.resume is not None)
     verdicts, stale = judge(mutants, explanations)
     survivors = [mutant for verdict in verdicts for mutant in verdict.unexplained]
-    told = "".join(f"{m.name}: {m.status}\n- {m.old}\n+ {m.new}\n\n" for m in survivors)
-    write_text(folder / "survivors.txt", told, overwrite=True)
+    record = "".join(f"{m.name}: {m.status}\n- {m.old}\n+ {m.new}\n\n" for m in survivors)
+    write_text(folder / "survivors.txt", record, overwrite=True)
     result = {"mutmut": MUTMUT, "modules": [{**v._asdict(), "unexplained": len(v.unexplained)} for v in verdicts]}
     write_text(folder / "results.json", json.dumps(result, indent=1) + "\n", overwrite=True)
-    print(told, end="")
+    print(record, end="")
     for entry in stale:
         print(f"{entry.module}: {entry.function}: nothing to explain: {entry.old} -> {entry.new}\n")
     print(f"{table(verdicts)}\n\nfolder: {folder}")

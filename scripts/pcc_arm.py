@@ -29,34 +29,34 @@ LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    what = made.add_mutually_exclusive_group()
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    what = result.add_mutually_exclusive_group()
     what.add_argument(
         "--lengths", type=float, nargs="+", metavar="L", help="muscle lengths, base to tip [m] (0.50 0.53 0.55 0.54 0.51 0.52)"
     )
     what.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help="position of the loaded tip [m]")
     what.add_argument("--csv", type=Path, metavar="FILE", help="waypoints of the loaded tip, columns t,x,y,z [s, m]")
-    made.add_argument(
+    result.add_argument(
         "--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), help="direction in which the tip points at --target"
     )
-    add_load(made)
-    made.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
-    made.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
-    made.add_argument(
+    add_load(result)
+    result.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
+    result.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
+    result.add_argument(
         "--distance",
         type=float,
         default=0.04,
         help="of the muscles from the backbone; the body is drawn 1.25 times as wide [m] (%(default)s)",
     )
-    made.add_argument("--chain", choices=CHAINS, default="sections", help="form of the equivalent rigid chain (%(default)s)")
-    made.add_argument("--elastic-sections", type=int, metavar="N", help="sections a segment, for --chain sections (4)")
-    made.add_argument("--hinges", type=int, metavar="N", help="hinges a segment, for --chain lumped (12)")
-    made.add_argument(
+    result.add_argument("--chain", choices=CHAINS, default="sections", help="form of the equivalent rigid chain (%(default)s)")
+    result.add_argument("--elastic-sections", type=int, metavar="N", help="sections a segment, for --chain sections (4)")
+    result.add_argument("--hinges", type=int, metavar="N", help="hinges a segment, for --chain lumped (12)")
+    result.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder of the results (output/pcc_arm_<time>)"
     )
-    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
-    made.add_argument("--meshcat", action="store_true", help="serve the scene on loopback until Ctrl-C")
-    return made
+    result.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
+    result.add_argument("--meshcat", action="store_true", help="serve the scene on loopback until Ctrl-C")
+    return result
 
 
 def run(arguments: argparse.Namespace) -> Path:

@@ -23,23 +23,23 @@ from studies.shared.command_line import add_resume, blocks_beside, tell_written
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--samples", type=int, default=5000, help="muscle lengths to draw (%(default)s)")
-    made.add_argument("--seed", type=int, default=0, help="seed of the samples (%(default)s)")
-    add_load(made)
-    made.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
-    made.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
-    made.add_argument(
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--samples", type=int, default=5000, help="muscle lengths to draw (%(default)s)")
+    result.add_argument("--seed", type=int, default=0, help="seed of the samples (%(default)s)")
+    add_load(result)
+    result.add_argument("--segments", type=int, default=2, help="number of segments (%(default)s)")
+    result.add_argument("--length", type=float, default=0.524, help="rest length of a segment [m] (%(default)s)")
+    result.add_argument(
         "--distance", type=float, default=0.04, help="distance of the muscles from the backbone [m] (%(default)s)"
     )
-    made.add_argument("--contraction", type=float, default=0.15, help="largest contraction of a muscle [-] (%(default)s)")
-    made.add_argument("--extension", type=float, default=0.15, help="largest extension of a muscle [-] (%(default)s)")
-    made.add_argument(
+    result.add_argument("--contraction", type=float, default=0.15, help="largest contraction of a muscle [-] (%(default)s)")
+    result.add_argument("--extension", type=float, default=0.15, help="largest extension of a muscle [-] (%(default)s)")
+    result.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder for the results (output/pcc_workspace_<time>)"
     )
-    add_resume(made)
-    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
-    return made
+    add_resume(result)
+    result.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
+    return result
 
 
 def run(arguments: argparse.Namespace) -> Path:

@@ -33,16 +33,16 @@ PREFIX = "reproduction_"
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told = f"papers, of {', '.join(PAPERS)} (all)"
-    made.add_argument("--paper", nargs="+", choices=list(PAPERS), default=list(PAPERS), metavar="PAPER", help=told)
-    told = "also write figures (PNG), curves (CSV) and the table (CSV, JSON) into this new or empty folder"
-    made.add_argument("--output", type=Path, metavar="FOLDER", help=told)
-    made.add_argument("--no-plots", action="store_true", help="with --output: do without the figures, which need matplotlib")
-    made.add_argument("--json", action="store_true", help="print the table as one JSON object and nothing else")
-    told = f"write table and figures of {PAGE} and docs/images/{PREFIX}*.png in a checkout (this one)"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    help_text = f"papers, of {', '.join(PAPERS)} (all)"
+    result.add_argument("--paper", nargs="+", choices=list(PAPERS), default=list(PAPERS), metavar="PAPER", help=help_text)
+    help_text = "also write figures (PNG), curves (CSV) and the table (CSV, JSON) into this new or empty folder"
+    result.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
+    result.add_argument("--no-plots", action="store_true", help="with --output: do without the figures, which need matplotlib")
+    result.add_argument("--json", action="store_true", help="print the table as one JSON object and nothing else")
+    help_text = f"write table and figures of {PAGE} and docs/images/{PREFIX}*.png in a checkout (this one)"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def document(found: rendering.Rows) -> dict[str, str]:

@@ -28,19 +28,21 @@ _TOLD = 20  # broken cases that are printed
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     cores = os.cpu_count() or 1
     names = [family.name for family in FAMILIES]
-    made.add_argument("--cases", type=int, default=CASES, metavar="N", help="about how many cases (%(default)s)")
-    made.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random numbers (%(default)s)")
-    made.add_argument("--processes", type=int, default=cores, metavar="N", help="how many work on it (one a core: %(default)s)")
-    told = f"families of cases ({', '.join(names)})"
-    made.add_argument("--families", nargs="+", choices=names, default=names, metavar="NAME", help=told)
-    made.add_argument("--case", metavar="FAMILY:NUMBER", help="run one case again, and tell everything about it")
-    made.add_argument("--json", type=Path, metavar="FILE", help="write the counts to a new file")
-    told = "record the table in docs/validation.md of a checkout (this one); without --families"
-    made.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=told)
-    return made
+    result.add_argument("--cases", type=int, default=CASES, metavar="N", help="about how many cases (%(default)s)")
+    result.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random numbers (%(default)s)")
+    result.add_argument(
+        "--processes", type=int, default=cores, metavar="N", help="how many work on it (one a core: %(default)s)"
+    )
+    help_text = f"families of cases ({', '.join(names)})"
+    result.add_argument("--families", nargs="+", choices=names, default=names, metavar="NAME", help=help_text)
+    result.add_argument("--case", metavar="FAMILY:NUMBER", help="run one case again, and tell everything about it")
+    result.add_argument("--json", type=Path, metavar="FILE", help="write the counts to a new file")
+    help_text = "record the table in docs/validation.md of a checkout (this one); without --families"
+    result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
+    return result
 
 
 def run(arguments: argparse.Namespace) -> bool:
@@ -72,8 +74,8 @@ def _run_again(words: str, seed: int) -> bool:
     name, _, number = words.partition(":")
     if not number.isdecimal():
         raise ParameterError("--case", words, "a family and the number of a case, as arm:17")
-    tally, told = again(name, int(number), seed=seed)
-    print(told)
+    tally, text = again(name, int(number), seed=seed)
+    print(text)
     for _, law in tally.broken:
         print(f"broken: {law}")
     return not tally.broken

@@ -83,8 +83,8 @@ def run(arguments: argparse.Namespace) -> None:
         for method in ("newton", "alternation")
     }
     if arguments.json is not None:
-        told = {"cases": count, "seed": seed, "equilibrium": equilibria, "load_estimation": estimates}
-        write_text(arguments.json, json.dumps(told, indent=2) + "\n", overwrite=False)
+        record = {"cases": count, "seed": seed, "equilibrium": equilibria, "load_estimation": estimates}
+        write_text(arguments.json, json.dumps(record, indent=2) + "\n", overwrite=False)
     print(f"{count} random cases a load, seed {seed}; loads beyond wrinkling test the solvers, not the robot\n")
     print("Equilibria certified stable [%]\n\n" + _table(equilibria))
     print("\nTrue force recovered to 1e-6 from motor torques [%]\n\n" + _table(estimates))

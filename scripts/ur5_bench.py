@@ -39,27 +39,27 @@ TABULATED = tuple(row.pressure / 1e3 for row in inflated_beam.TABLE_3)
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told = f"gauge pressures out of Table 3 [kPa] ({' '.join(f'{p:g}' for p in TABULATED)})"
-    made.add_argument("--pressures", type=float, nargs="+", metavar="P", default=list(TABULATED), help=told)
-    made.add_argument("--steps", type=int, default=40, help="steps of a push (%(default)s)")
-    made.add_argument(
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    help_text = f"gauge pressures out of Table 3 [kPa] ({' '.join(f'{p:g}' for p in TABULATED)})"
+    result.add_argument("--pressures", type=float, nargs="+", metavar="P", default=list(TABULATED), help=help_text)
+    result.add_argument("--steps", type=int, default=40, help="steps of a push (%(default)s)")
+    result.add_argument(
         "--beyond", type=float, default=1.6, help="end of a push over the angle at which the plateau begins (%(default)s)"
     )
-    made.add_argument(
+    result.add_argument(
         "--noise", type=float, nargs=2, metavar=("FORCE", "ANGLE"), default=(0.0, 0.0),
         help="standard deviations of the noise on force [N] and angle [rad], e.g. 0.3 0.0005 (none)",
     )  # fmt: skip
-    made.add_argument("--seed", type=int, default=0, help="seed of the noise (%(default)s)")
-    made.add_argument(
+    result.add_argument("--seed", type=int, default=0, help="seed of the noise (%(default)s)")
+    result.add_argument(
         "--scene-pressure", type=float, metavar="P", help="pressure that the scene shows [kPa] (50, or the last one)"
     )
-    made.add_argument(
+    result.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder for the results (output/ur5_bench_<time>)"
     )
-    made.add_argument("--no-plots", action="store_true", help="do without the plots, which need matplotlib")
-    made.add_argument("--meshcat", action="store_true", help="serve the animation on loopback until Ctrl-C")
-    return made
+    result.add_argument("--no-plots", action="store_true", help="do without the plots, which need matplotlib")
+    result.add_argument("--meshcat", action="store_true", help="serve the animation on loopback until Ctrl-C")
+    return result
 
 
 def run(arguments: argparse.Namespace) -> Path:
@@ -178,13 +178,13 @@ def table(results: list[dict[str, Any]]) -> str:
     ]
     worst = max(r["largest_ik_error_m"] for r in results)
     stable = "yes" if all(r["all_stable_while_held"] for r in results) else "NO"
-    told = (
+    text = (
         "\nTable 3 of the paper holds the true k and M_max of the simulated link; M_w (3) is (pi/4) pi p r^3. 'k small angles':"
         "\nwhat the paper's evaluation, v / (h - l1) and F (h - l1), makes of the same data, relative to the true value."
         "\n"
         f"largest distance of the probe from where it was meant to be: {worst:.2g} m; every step certified stable: {stable}"
     )
-    return "\n" + _aligned([*head, *lines]) + "\n" + told
+    return "\n" + _aligned([*head, *lines]) + "\n" + text
 
 
 def ur5_table(runs: list[BenchRun]) -> str:

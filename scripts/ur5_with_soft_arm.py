@@ -31,41 +31,41 @@ POSE = (0.0, -2.1, 1.9, 0.2, math.pi / 2, 0.0)
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument(
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument(
         "--robot",
         choices=tuple(PAYLOAD),
         default="inflatable_arm",
         help="the soft arm, with its default parameters, a PCC arm without muscles (%(default)s)",
     )
-    told = " ".join(f"{angle:.4g}" for angle in POSE)
-    made.add_argument(
-        "--pose", type=float, nargs=6, metavar="Q", default=POSE, help=f"UR5 joints, base to flange [rad] ({told})"
+    help_text = " ".join(f"{angle:.4g}" for angle in POSE)
+    result.add_argument(
+        "--pose", type=float, nargs=6, metavar="Q", default=POSE, help=f"UR5 joints, base to flange [rad] ({help_text})"
     )
-    made.add_argument(
+    result.add_argument(
         "--arm-angles", type=float, nargs=3, metavar="A",
         help="motors of the inflatable arm, held there [rad] (0 pi/2 0: straight on from the flange)",
     )  # fmt: skip
     given = ", ".join(f"{name}: {mass:g}" for name, mass in PAYLOAD.items())
-    made.add_argument("--payload", type=float, metavar="M", help=f"point mass at the soft tip [kg] ({given})")
-    made.add_argument("--pressure", type=float, metavar="P", help="gauge pressure in the soft arm [Pa] (as the robot has it)")
-    made.add_argument(
+    result.add_argument("--payload", type=float, metavar="M", help=f"point mass at the soft tip [kg] ({given})")
+    result.add_argument("--pressure", type=float, metavar="P", help="gauge pressure in the soft arm [Pa] (as the robot has it)")
+    result.add_argument(
         "--gravity", type=float, nargs=3, metavar="G", default=sr.EARTH_GRAVITY, help="gravity [m/s^2] (0 0 -9.81)"
     )
-    made.add_argument(
+    result.add_argument(
         "--keep-orientation", action="store_true", help="bring the orientation of the tip back, too (takes all six joints)"
     )
-    made.add_argument(
+    result.add_argument(
         "--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="move the loaded tip to this point on a line [m]"
     )
-    made.add_argument("--duration", type=float, default=2.0, help="time of the motion [s] (%(default)s)")
-    made.add_argument("--steps", type=int, default=40, help="intervals of the motion (%(default)s)")
-    made.add_argument(
+    result.add_argument("--duration", type=float, default=2.0, help="time of the motion [s] (%(default)s)")
+    result.add_argument("--steps", type=int, default=40, help="intervals of the motion (%(default)s)")
+    result.add_argument(
         "--output", type=Path, metavar="FOLDER", help="new or empty folder of the results (output/ur5_with_soft_arm_<time>)"
     )
-    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
-    made.add_argument("--meshcat", action="store_true", help="serve the scene on loopback until Ctrl-C")
-    return made
+    result.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
+    result.add_argument("--meshcat", action="store_true", help="serve the scene on loopback until Ctrl-C")
+    return result
 
 
 def run(arguments: argparse.Namespace) -> Path:

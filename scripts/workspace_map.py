@@ -32,39 +32,41 @@ CELLS = {"plane": 160, "box": 19}
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--grid", choices=tuple(CELLS), default="plane", help="where the targets are (%(default)s)")
-    told = ", ".join(f"{cells} for a {grid}" for grid, cells in CELLS.items())
-    made.add_argument(
-        "--cells", type=int, metavar="N", help=f"cells along the reach of the arm, twice as many across it ({told})"
+    result = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--grid", choices=tuple(CELLS), default="plane", help="where the targets are (%(default)s)")
+    help_text = ", ".join(f"{cells} for a {grid}" for grid, cells in CELLS.items())
+    result.add_argument(
+        "--cells", type=int, metavar="N", help=f"cells along the reach of the arm, twice as many across it ({help_text})"
     )
-    made.add_argument("--loads", type=int, default=20, metavar="N", help="number of loads, from 0 to the largest (%(default)s)")
-    made.add_argument("--max-load", type=float, default=40.0, help="largest force on the tip [N] (%(default)s)")
-    made.add_argument(
+    result.add_argument(
+        "--loads", type=int, default=20, metavar="N", help="number of loads, from 0 to the largest (%(default)s)"
+    )
+    result.add_argument("--max-load", type=float, default=40.0, help="largest force on the tip [N] (%(default)s)")
+    result.add_argument(
         "--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), default=(0.0, 0.0, -1.0), help="of the force (0 0 -1)"
     )
-    add_gravity(made)
-    made.add_argument(
+    add_gravity(result)
+    result.add_argument(
         "--link-lengths", type=float, nargs=2, default=(0.6, 0.6), metavar=("L1", "L2"), help="of the links [m] (0.6 0.6)"
     )
-    made.add_argument(
+    result.add_argument(
         "--stiffness", type=float, default=inflated_beam.MEAN_STIFFNESS, help="of every spring [N m/rad] (%(default)s)"
     )
-    made.add_argument("--pressure", type=float, default=50e3, help="gauge pressure in the links [Pa] (%(default)g)")
-    made.add_argument(
+    result.add_argument("--pressure", type=float, default=50e3, help="gauge pressure in the links [Pa] (%(default)g)")
+    result.add_argument(
         "--motor-limit", type=float, default=180.0, help="motors turn this far either way [degrees] (%(default)g)"
     )
-    made.add_argument("--shown-load", type=float, metavar="F", help="load of the picture [N] (half of the largest)")
-    made.add_argument("--backend", choices=("numba", "python"), help="of the compiled solvers (numba if it is installed)")
-    made.add_argument("--threads", type=int, default=1, help="threads of this process (%(default)s)")
-    made.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler to do the work, e.g. tcp://127.0.0.1:8786")
-    made.add_argument("--output", type=Path, metavar="FILE", help="new NPZ file (output/workspace_map_<time>.npz)")
-    add_resume(made)
-    made.add_argument("--overwrite", action="store_true", help="replace files that exist")
-    made.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
-    told = "write only the picture of the guide, here (docs/images/workspace_map.png), replacing it"
-    made.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FILE", help=told)
-    return made
+    result.add_argument("--shown-load", type=float, metavar="F", help="load of the picture [N] (half of the largest)")
+    result.add_argument("--backend", choices=("numba", "python"), help="of the compiled solvers (numba if it is installed)")
+    result.add_argument("--threads", type=int, default=1, help="threads of this process (%(default)s)")
+    result.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler to do the work, e.g. tcp://127.0.0.1:8786")
+    result.add_argument("--output", type=Path, metavar="FILE", help="new NPZ file (output/workspace_map_<time>.npz)")
+    add_resume(result)
+    result.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    result.add_argument("--no-plots", action="store_true", help="do without the picture, which needs matplotlib")
+    help_text = "write only the picture of the guide, here (docs/images/workspace_map.png), replacing it"
+    result.add_argument("--docs", type=Path, nargs="?", const=DOCS, metavar="FILE", help=help_text)
+    return result
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,19 +15,19 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from studies.benchmark import compiled_solvers, cpp_kinematics, mujoco_settling, pinocchio_solvers, processes
+from studies.benchmark import compiled_solvers, mujoco_settling, pinocchio_solvers, processes
 from studies.benchmark.aligned_joints import aligned_joints
 from studies.benchmark.cases import FORCE, ROD_LENGTH, ROD_STIFFNESS, path_targets, rod, rod_forces, standard_cases
+from studies.benchmark.comparison import Comparison, Settings, figure, quick_settings
 from studies.benchmark.jobs import JOBS, measure
-from studies.benchmark.measurement import Contender, interleaved, ratio, require_agreement
+from studies.benchmark.measurement import Workload, interleaved, ratio, require_agreement
 from studies.benchmark.mujoco_settling import SettlingArm
 from studies.benchmark.numpy_arrays import ArrayArm
 from studies.benchmark.pictures import PICTURES
 from studies.benchmark.pink_kinematics import PinkArm
 from studies.benchmark.pinocchio_solvers import NEWTON, PinocchioArm
-from studies.benchmark.race import Race, Settings, figure, quick_settings
 from studies.benchmark.results import AT_LEAST, AT_MOST, Curve, Results, Row, as_json, read_results, require_whole, table
-from studies.benchmark.scipy_solvers import solvers
+from studies.benchmark.scipy_solvers import scipy_root
 from tests.conftest import CHECKOUT, load_script, missing
 from tests.support.tables import each_row
 
@@ -83,11 +82,10 @@ def test_newton_has_the_exact_derivative(arm: sr.SoftModel, form: str, monkeypat
     assert np.abs(found - equilibria(arm, cases)).max() < SAME
 
 
-def test_scipys_solvers_find_the_equilibria(robot: sr.SoftModel) -> None:
+def test_scipys_solver_finds_the_equilibria(robot: sr.SoftModel) -> None:
     cases, bare = cases_of(robot, 4, FORCE), PinocchioArm(robot)
-    for solve in solvers().values():
-        found = np.array([solve(bare, *case)[robot.spring_indices] for case in cases])
-        assert np.abs(found - equilibria(robot, cases)).max() < SAME
+    found = np.array([scipy_root()(bare, *case)[robot.spring_indices] for case in cases])
+    assert np.abs(found - equilibria(robot, cases)).max() < SAME
 
 
 def test_array_operations_find_the_equilibria(robot: sr.SoftModel) -> None:
@@ -123,18 +121,13 @@ def test_sliding_joints_are_known_and_branches_refused() -> None:
         aligned_joints(inner)
 
 
-@pytest.mark.parametrize(("name", "contacts"), [("arm", True), ("arm", False), ("odd_arm", False)])
 @pytest.mark.parametrize("setting", [(0.01, 8.0, 20), (0.2, 40.0, 20)], ids=["simulation", "relaxation"])
-def test_mujoco_settles_in_the_equilibria(
-    tool: Callable, request: pytest.FixtureRequest, name: str, contacts: bool, setting: tuple
-) -> None:
-    """Without contacts for three links, of which the first and the last touch in some poses."""
+def test_mujoco_settles_in_the_equilibria(tool: Callable, arm: sr.SoftModel, setting: tuple) -> None:
     tool("mujoco")
-    robot = request.getfixturevalue(name)
-    cases, simulator = cases_of(robot, 4, FORCE), SettlingArm(robot, contacts=contacts)
+    cases, simulator = cases_of(arm, 4, FORCE), SettlingArm(arm)
     simulator.set(*setting)
     found = np.array([simulator.settle(*case)[0] for case in cases])
-    assert np.abs(found - equilibria(robot, cases)).max() < SAME
+    assert np.abs(found - equilibria(arm, cases)).max() < SAME
 
 
 def test_the_best_settings_of_mujoco_are_chosen(tool: Callable, arm: sr.SoftModel, tmp_path: Path, monkeypatch) -> None:
@@ -189,26 +182,6 @@ def test_the_standard_cases_are_what_they_say() -> None:
     assert rod(2).pinocchio.nv == 12
 
 
-# --- C++
-
-
-def test_what_cpp_lacks_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(cpp_kinematics.shutil, "which", lambda name: None)
-    monkeypatch.setattr(cpp_kinematics, "EIGEN", tmp_path / "eigen3")
-    with pytest.raises(sr.SoftRobotsError, match=r"needs g\+\+, Eigen in .*eigen3 \(Debian: libeigen3-dev\)"):
-        cpp_kinematics.build()
-
-
-def test_what_the_compiler_says_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(cpp_kinematics, "missing_tools", list)
-    refused = subprocess.CompletedProcess([], 1, "", "a.cc:1:1: note\na.cc:2:1: error: no such thing\n")
-    monkeypatch.setattr(cpp_kinematics.subprocess, "run", lambda *_, **__: refused)
-    with pytest.raises(sr.SoftRobotsError, match=r"refuses forward_kinematics.cc: a.cc:2:1: error: no such thing"):
-        cpp_kinematics.build()
-    assert cpp_kinematics.SOURCE.read_text(encoding="utf-8").count("pinocchio::forwardKinematics") == 1
-    assert (cpp_kinematics.pinocchio_headers() / "pinocchio" / "algorithm" / "kinematics.hpp").is_file()
-
-
 # --- The measurement
 
 
@@ -222,8 +195,8 @@ def test_everybody_runs_once_a_round_and_costs_are_a_case() -> None:
 
         return run
 
-    contenders = {"a": Contender(2, spend("a", [9.0, 9.0, 4.0, 8.0])), "b": Contender(5, spend("b", [9.0, 9.0, 10.0, 30.0]))}
-    seconds = interleaved(contenders, 2, clock=lambda: now[0], shortest=0.0)
+    workloads = {"a": Workload(2, spend("a", [9.0, 9.0, 4.0, 8.0])), "b": Workload(5, spend("b", [9.0, 9.0, 10.0, 30.0]))}
+    seconds = interleaved(workloads, 2, clock=lambda: now[0], shortest=0.0)
     assert order == ["a", "a", "b", "b", *"abab"]  # warm-up first
     assert seconds["a"].tolist() == [2.0, 4.0]
     assert seconds["b"].tolist() == [2.0, 6.0]
@@ -231,7 +204,7 @@ def test_everybody_runs_once_a_round_and_costs_are_a_case() -> None:
 
 def test_short_runs_are_repeated_until_they_last() -> None:
     runs = []
-    interleaved({"a": Contender(1, lambda: runs.append(0))}, 1, shortest=1e-3)
+    interleaved({"a": Workload(1, lambda: runs.append(0))}, 1, shortest=1e-3)
     assert len(runs) > 100  # of some 0.1 us each
     with pytest.raises(sr.ParameterError, match="rounds"):
         interleaved({}, 0)
@@ -258,20 +231,20 @@ def test_wrong_answers_are_not_timed(off: float) -> None:
 
 
 def test_a_race_names_who_does_not_take_part() -> None:
-    race = Race(Settings(3, shortest=0.0), "race", clock=iter(range(100)).__next__)
+    comparison = Comparison(Settings(3, shortest=0.0), "comparison", clock=iter(range(100)).__next__)
 
-    def refuse() -> Contender:
+    def refuse() -> Workload:
         raise sr.MissingDependency("mujoco", "interop")
 
-    race.add("here", lambda: Contender(4, lambda: None))
-    race.add("twin", lambda: Contender(1, lambda: None))
-    race.add("gone", refuse)
-    race.run()
-    row = race.cheaper("job", "here", "twin", AT_LEAST, 4.0)
+    comparison.add("here", lambda: Workload(4, lambda: None))
+    comparison.add("twin", lambda: Workload(1, lambda: None))
+    comparison.add("gone", refuse)
+    comparison.run()
+    row = comparison.cheaper("job", "here", "twin", AT_LEAST, 4.0)
     assert (row.value, row.low, row.high, row.our_seconds, row.baseline_seconds) == (4.0, 4.0, 4.0, 0.25, 1.0)
     assert (row.met, row.skipped) == (True, "")
-    assert race.costlier("job", "here", "twin", AT_MOST, 0.2).met is False  # 0.25
-    skipped = race.cheaper("job", "here", "gone", AT_LEAST, 4.0)
+    assert comparison.costlier("job", "here", "twin", AT_MOST, 0.2).met is False  # 0.25
+    skipped = comparison.cheaper("job", "here", "gone", AT_LEAST, 4.0)
     assert (skipped.value, skipped.met, skipped.our_seconds) == (None, None, 0.25)
     assert skipped.skipped.startswith("gone: mujoco is not installed")
     assert "| skipped: gone: mujoco is not installed" in table([skipped])
@@ -320,7 +293,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple]]:
     compiled_solvers.compiled.cache_clear()
 
 
-QUICK = dataclasses.replace(quick_settings(1, progress=False, cpp=False), batch=24, singles=3, waypoints=5, batches=(1, 4))
+QUICK = dataclasses.replace(quick_settings(1, progress=False), batch=24, singles=3, waypoints=5, batches=(1, 4))
 
 
 def test_jobs_compare_ours_with_the_baselines(tool: Callable, stand_in: list) -> None:
@@ -428,7 +401,7 @@ def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
         load_script("benchmark").main(["--help"])
     assert ended.value.code == 0
     told = capsys.readouterr().out
-    assert all(f"--{name}" in told for name in ("only", "rounds", "cpp", "quick", "from", "json", "plots", "docs"))
+    assert all(f"--{name}" in told for name in ("only", "rounds", "quick", "from", "json", "plots", "docs"))
     assert all(job in told for job in JOBS)
 
 
@@ -443,9 +416,8 @@ def test_the_script_runs_end_to_end(tool: Callable, stand_in: list, tmp_path: Pa
     assert results.settings["jobs"] == ["equilibrium", "trajectory"]
     assert results.machine["numpy"] == np.__version__
     by_baseline = {row.baseline: row for row in results.rows}
-    assert by_baseline["one forwardKinematics of Pinocchio in C++"].skipped.endswith("compiled with --cpp only")
     timed = [name for name, row in by_baseline.items() if row.baseline_seconds is not None]
-    assert len(timed) >= 9
+    assert len(timed) >= 8
     assert any("MuJoCo settling, tuned, any step: time step" in note for note in results.notes)
     assert load_script("benchmark").main(["--from", str(target)]) == 0
     assert capsys.readouterr().out == printed.out.partition("\nwritten: ")[0]
@@ -454,7 +426,7 @@ def test_the_script_runs_end_to_end(tool: Callable, stand_in: list, tmp_path: Pa
     assert load_script("benchmark").main(["--from", str(target), "--docs", str(tmp_path)]) == 2
     assert "whole benchmark" in capsys.readouterr().err
     assert load_script("benchmark").main(["--quick", "--docs", str(tmp_path)]) == 2  # before anything is measured
-    assert "--cpp" in capsys.readouterr().err
+    assert "for all jobs, without --quick" in capsys.readouterr().err
     told = json.loads(target.read_text(encoding="utf-8"))
     del told["machine"]["processor"]
     (tmp_path / "foreign.json").write_text(json.dumps(told), encoding="utf-8")
@@ -504,7 +476,7 @@ def test_docs_are_made_of_a_recorded_run(tmp_path: Path, capsys: pytest.CaptureF
 
 def test_the_tables_of_the_pages_are_those_of_the_recorded_run() -> None:
     if not RECORDED.is_file():
-        missing("docs/benchmark.json has not been recorded: scripts/benchmark.py --cpp --docs")
+        missing("docs/benchmark.json has not been recorded: scripts/benchmark.py --docs")
     script, results = load_script("benchmark"), read_results(RECORDED)
     require_whole(results, list(JOBS))
     assert script.page_with(CHECKOUT, script.document(results)) == (CHECKOUT / script.PAGE).read_text(encoding="utf-8")
@@ -522,7 +494,7 @@ def test_a_process_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "FIRST_ANSWER", 'print(\'{"stages": {"solve": 0.0}, "numba": true}\')')
     with pytest.raises(sr.SoftRobotsError, match="imports numba"):
         processes.first_answer()
-    (row,) = measure(quick_settings(1, progress=False, cpp=False), ["fresh"]).rows
+    (row,) = measure(quick_settings(1, progress=False), ["fresh"]).rows
     assert "imports numba" in row.skipped
 
 

@@ -29,11 +29,11 @@ def section(result: dict[str, Any]) -> str:
     if "mujoco" in result:
         cells = by_count(result["mujoco"]["apart"], counts, lambda row: f"{1e3 * row['error_m']:.0e}")
         lines.append(line(["difference of MuJoCo from ours", *cells, "", ""]))
-    told = f"The boundary-value solve at a tolerance of {COARSE:g} lies {1e3 * result['rod']['largest_m']:.0e} mm from that at "
-    told += f"{FINE:g}"
+    text = f"The boundary-value solve at a tolerance of {COARSE:g} lies {1e3 * result['rod']['largest_m']:.0e} mm from that at "
+    text += f"{FINE:g}"
     if "closed_form" in result:
-        told += f", and that lies {1e3 * result['closed_form']['largest_m']:.0e} mm from the elliptic integrals"
-    lines += ["", told + "."]
+        text += f", and that lies {1e3 * result['closed_form']['largest_m']:.0e} mm from the elliptic integrals"
+    lines += ["", text + "."]
     if several:
         lines += ["", "Mean time of a solve in the same run [ms] (not asserted anywhere):", ""]
         lines += [line(["model", *counts]), "|---" * (len(counts) + 1) + "|"]
@@ -47,7 +47,7 @@ def cell(row: Mapping[str, float], *, several: bool) -> str:
     return f"{1e3 * row['error_m']:.3g}" + (f" ({1e3 * row['largest_m']:.3g})" if several else "")
 
 
-def by_count(rows: list[dict[str, Any]], counts: Sequence[int], told: Callable[[dict[str, Any]], str]) -> list[str]:
+def by_count(rows: list[dict[str, Any]], counts: Sequence[int], text: Callable[[dict[str, Any]], str]) -> list[str]:
     """A cell for each number of segments; a chain of too many joints has none."""
-    cells = {row["n"]: told(row) for row in rows}
+    cells = {row["n"]: text(row) for row in rows}
     return [cells.get(n, "-") for n in counts]

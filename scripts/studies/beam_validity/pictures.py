@@ -47,8 +47,8 @@ def link_figure(link: Mapping[str, Any]) -> Any:
     stiffness.plot(pressures, by_beam, color=canvas.COLOURS[1], ls="-", label=f"by (1), E = {link['modulus_Pa'] / 1e6:.1f} MPa")
     stiffness.axhline(MEAN_STIFFNESS, color="0.5", ls="--", lw=1.2, label="mean, as in the paper")
     share = ((LENGTH - HINGE) / LENGTH) ** 2
-    told = "hinge at 30 mm that deflects as (1)"
-    stiffness.plot(pressures, [share * k for k in by_beam], color=canvas.COLOURS[2], ls="-.", label=told)
+    text = "hinge at 30 mm that deflects as (1)"
+    stiffness.plot(pressures, [share * k for k in by_beam], color=canvas.COLOURS[2], ls="-.", label=text)
     stiffness.set(xlabel="gauge pressure [kPa]", ylabel="stiffness k [N m/rad]", title="Stiffness of the hinge")
     stiffness.set_ylim(0.0, 210.0)
     row = row_at(link, SHOWN)

@@ -46,12 +46,12 @@ def link_tables(link: Mapping[str, Any]) -> list[str]:
         )
     forces = np.array([[f or 0.0 for both in row["leaves_at_N"].values() for one in both for f in one] for row in link["rows"]])
     apart = float(np.abs(forces - forces[link["rows"].index(row_at(link, SHOWN))]).max())
-    told = (
+    text = (
         "One link at the force at which it wrinkles (moment at $l_1$): difference of tip deflection / rotation from the exact "
         f"beam [%]. Modulus of the wall: {link['modulus_Pa'] / 1e6:.1f} MPa."
     )
     return [
-        told,
+        text,
         "\n".join(first),
         f"Force [N] at which a model leaves the exact beam, at {SHOWN / 1e3:g} kPa (at other pressures within {apart:.1f} N):",
         "\n".join(second),
@@ -77,7 +77,7 @@ def at(force: float, loads: Sequence[float], values: Sequence[float]) -> float:
 
 def arm_tables(arm: Mapping[str, Any]) -> list[str]:
     """The tables of the arm."""
-    told = f"The arm at {arm['pressure_Pa'] / 1e3:g} kPa in {arm['cases']} random postures under random forces below wrinkling"
+    text = f"The arm at {arm['pressure_Pa'] / 1e3:g} kPa in {arm['cases']} random postures under random forces below wrinkling"
     parts = []
     for kind, rows in arm["beams"].items():
         lines = [
@@ -103,4 +103,4 @@ def arm_tables(arm: Mapping[str, Any]) -> list[str]:
                 )
             lines.append(line(cells))
         parts.append("\n".join(lines))
-    return [f"{told}: error of the tip, median / 95 % / largest:", *parts]
+    return [f"{text}: error of the tip, median / 95 % / largest:", *parts]

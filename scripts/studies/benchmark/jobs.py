@@ -1,4 +1,4 @@
-"""Every job of the benchmark, by the name that scripts/benchmark.py and `softrobots bench` know it by."""
+"""Every job of the benchmark, by the name that scripts/benchmark.py knows it by."""
 
 from __future__ import annotations
 
@@ -11,31 +11,10 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
 from softrobots.core.progress import with_progress
 from studies.benchmark import arm_jobs, motor_jobs, rod_jobs
+from studies.benchmark.comparison import Outcome, Settings, figure
 from studies.benchmark.processes import bytes_per_case, first_answer
-from studies.benchmark.race import Settings, figure
-from studies.benchmark.results import AT_MOST, Curve, Results, Row
+from studies.benchmark.results import AT_MOST, Results
 from studies.shared.machine import machine
-
-Outcome = tuple[list[Row], list[Curve], list[str]]
-"""Rows, curves and notes of a job."""
-
-
-def _rows(job: Callable[[Settings], tuple[list[Row], list[str]]]) -> Callable[[Settings], Outcome]:
-    def run(settings: Settings) -> Outcome:
-        rows, notes = job(settings)
-        return rows, [], notes
-
-    return run
-
-
-def _sizes(settings: Settings) -> Outcome:
-    rows, curves = rod_jobs.sizes(settings)
-    return rows, curves, []
-
-
-def _batches(settings: Settings) -> Outcome:
-    curves, notes = arm_jobs.batches(settings)
-    return [], curves, notes
 
 
 def _fresh(settings: Settings) -> Outcome:
@@ -43,15 +22,12 @@ def _fresh(settings: Settings) -> Outcome:
     name, job = "compiled, python", "first answer in a fresh process without numba"
     try:
         starts = with_progress(range(settings.starts), settings.progress and "fresh processes", label="", unit="start")
-        found = [first_answer() for _ in starts]
+        answers = [first_answer() for _ in starts]
     except SoftRobotsError as error:
-        return [figure(job, name, "s", str(error), AT_MOST, 1.0)], [], []
-    stages = ", ".join(f"{stage} {np.median([start[stage] for start in found]):.3f} s" for stage in found[0])
-    return (
-        [figure(job, name, "s", np.array([start["total"] for start in found]), AT_MOST, 1.0)],
-        [],
-        [f"first answer, medians: {stages}"],
-    )
+        return Outcome([figure(job, name, "s", str(error), AT_MOST, 1.0)])
+    stages = ", ".join(f"{stage} {np.median([start[stage] for start in answers]):.3f} s" for stage in answers[0])
+    row = figure(job, name, "s", np.array([start["total"] for start in answers]), AT_MOST, 1.0)
+    return Outcome([row], notes=[f"first answer, medians: {stages}"])
 
 
 def _memory(settings: Settings) -> Outcome:
@@ -62,44 +38,37 @@ def _memory(settings: Settings) -> Outcome:
         values = np.array([bytes_per_case(settings.memory, "numba")])
     except SoftRobotsError as error:
         values = str(error)
-    return [figure(job, "compiled, numba, batch", "bytes", values, AT_MOST, 200.0)], [], []
+    return Outcome([figure(job, "compiled, numba, batch", "bytes", values, AT_MOST, 200.0)])
 
 
 JOBS: Mapping[str, Callable[[Settings], Outcome]] = {
-    "equilibrium": _rows(arm_jobs.equilibria),
-    "threads": _rows(arm_jobs.two_threads),
-    "gravity": _rows(arm_jobs.under_gravity),
-    "estimation": _rows(motor_jobs.load_estimation),
-    "trajectory": _rows(motor_jobs.trajectory),
-    "rod": _rows(rod_jobs.rods),
+    "equilibrium": arm_jobs.equilibria,
+    "threads": arm_jobs.two_threads,
+    "gravity": arm_jobs.under_gravity,
+    "estimation": motor_jobs.load_estimation,
+    "trajectory": motor_jobs.trajectory,
+    "rod": rod_jobs.rods,
     "fresh": _fresh,
     "memory": _memory,
-    "sizes": _sizes,
-    "batches": _batches,
+    "sizes": rod_jobs.sizes,
+    "batches": arm_jobs.batches,
 }
 """The jobs."""
 
-PLAIN = "plain"
-"""The job of `softrobots bench` if nothing is said: equilibria, short, against baselines that need no extras."""
-
 
 def measure(settings: Settings, jobs: Sequence[str]) -> Results:
-    """Run jobs, in their order.
+    """Run jobs.
 
     Args:
         settings: How much is measured.
-        jobs: Names of the jobs, of `JOBS`, or `PLAIN`.
+        jobs: Names in `JOBS`; they run in the order of that table.
 
     Returns:
-        The results; what cannot be measured here is in them, with the reason.
+        The results; what cannot be measured on this machine is a row with the reason.
     """
-    rows: list[Row] = []
-    curves: list[Curve] = []
-    notes: list[str] = []
-    every = {PLAIN: _rows(arm_jobs.without_extras), **JOBS}
-    chosen = [name for name in every if name in jobs]
-    for name in chosen:
-        more = every[name](settings)
-        rows, curves, notes = rows + more[0], curves + more[1], notes + more[2]
-    told = dataclasses.asdict(settings) | {"jobs": chosen}
-    return Results(machine(), told, tuple(rows), tuple(curves), tuple(notes))
+    chosen = [name for name in JOBS if name in jobs]
+    outcomes = [JOBS[name](settings) for name in chosen]
+    rows = tuple(row for outcome in outcomes for row in outcome.rows)
+    curves = tuple(curve for outcome in outcomes for curve in outcome.curves)
+    notes = tuple(note for outcome in outcomes for note in outcome.notes)
+    return Results(machine(), dataclasses.asdict(settings) | {"jobs": chosen}, rows, curves, notes)

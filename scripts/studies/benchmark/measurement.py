@@ -1,4 +1,4 @@
-"""Timing: all contenders in turn, round after round, in one process; ratios within a round; medians of those.
+"""Timing: all workloads in turn, round after round, in one process; ratios within a round; medians of those.
 
 A neighbour on the machine, or its clock, slows whole rounds, so numbers of one round are comparable and those of different
 rounds are not.
@@ -22,7 +22,7 @@ Clock = Callable[[], float]
 """Seconds since something: `time.process_time` for CPU time, `time.perf_counter` for wall clock."""
 
 
-class Contender(NamedTuple):
+class Workload(NamedTuple):
     """Something to be timed."""
 
     cases: int
@@ -43,20 +43,20 @@ class Spread(NamedTuple):
 
 
 def interleaved(
-    contenders: Mapping[str, Contender],
+    workloads: Mapping[str, Workload],
     rounds: int,
     *,
     clock: Clock = time.process_time,
     shortest: float = 0.02,
     progress: bool | str = False,
 ) -> dict[str, FloatArray]:
-    """Time contenders in turn.
+    """Time workloads in turn.
 
     Each is run before, untimed, to warm up; a short one is repeated within its turn. Linear algebra stays on one thread, and
     the collector of garbage rests, as in `timeit`.
 
     Args:
-        contenders: What to time, by name.
+        workloads: What to time, by name.
         rounds: How often.
         clock: What to time with.
         shortest: Least time of a turn [s].
@@ -71,26 +71,26 @@ def interleaved(
     from threadpoolctl import threadpool_limits
 
     positive_integer("rounds", rounds)
-    seconds = {name: np.zeros(rounds) for name in contenders}
+    seconds = {name: np.zeros(rounds) for name in workloads}
     with threadpool_limits(limits=1, user_api="blas"):
-        repeats = {name: _repeats(contender, shortest) for name, contender in contenders.items()}
+        repeats = {name: _repeats(workload, shortest) for name, workload in workloads.items()}
         for number in with_progress(range(rounds), progress, label="rounds", unit="round"):
             gc.collect()
-            for name, contender in contenders.items():
+            for name, workload in workloads.items():
                 gc.disable()
                 began = clock()
                 for _ in range(repeats[name]):
-                    contender.run()
-                seconds[name][number] = (clock() - began) / (repeats[name] * contender.cases)
+                    workload.run()
+                seconds[name][number] = (clock() - began) / (repeats[name] * workload.cases)
                 gc.enable()
     return seconds
 
 
-def _repeats(contender: Contender, shortest: float) -> int:
+def _repeats(workload: Workload, shortest: float) -> int:
     """How often a run fits into the least time of a turn; runs it twice."""
-    contender.run()
+    workload.run()
     began = time.perf_counter()
-    contender.run()
+    workload.run()
     return max(1, math.ceil(shortest / max(time.perf_counter() - began, 1e-7)))
 
 

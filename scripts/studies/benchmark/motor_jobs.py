@@ -12,14 +12,14 @@ from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.statics.inverse_kinematics import solve_ik
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.load_estimation import estimate_load
-from studies.benchmark.arm_contenders import CHECKED, batch_name, one_by_one, single_name, together
+from studies.benchmark.arm_baselines import CHECKED, batch_name, one_by_one, single_name, together
 from studies.benchmark.cases import LoadCases, arm, path_targets, standard_cases
+from studies.benchmark.comparison import Comparison, Outcome, Settings
 from studies.benchmark.compiled_solvers import BACKENDS, compiled
-from studies.benchmark.measurement import Contender, require_agreement
+from studies.benchmark.measurement import Workload, require_agreement
 from studies.benchmark.pink_kinematics import PinkArm
 from studies.benchmark.pinocchio_solvers import PinocchioArm, estimate_force
-from studies.benchmark.race import Race, Settings
-from studies.benchmark.results import AT_LEAST, Row
+from studies.benchmark.results import AT_LEAST
 from studies.papers.arm_path import FORCE
 
 ESTIMATE = "Python + Pinocchio, Newton 7x7"
@@ -30,70 +30,70 @@ _CLEAR = 50.0
 _ON_TARGET = 1e-9  # [m]
 
 
-def load_estimation(settings: Settings) -> tuple[list[Row], list[str]]:
+def load_estimation(settings: Settings) -> Outcome:
     """Force and springs from motor torques, in poses that show every direction of the force."""
-    race, robot = Race(settings, "load estimation"), PinocchioArm(arm())
+    comparison, robot = Comparison(settings, "load estimation"), PinocchioArm(arm())
     motors, torques, forces = _measured(min(settings.batch, 2000))
     few = LoadCases(motors[: settings.singles], torques[: settings.singles])
     many = LoadCases(*(np.resize(array, (settings.batch, 3)) for array in (motors, torques)))
     checked: dict[str, Any] = {"expected": forces[: min(CHECKED, settings.singles)], "tolerance": _SAME_FORCE, "unit": "N"}
     one_by_one("estimate_load", partial(estimate_load, arm()), few, read=_force, **checked)
 
-    def batch() -> Contender:
+    def batch() -> Workload:
         solve = compiled(arm(), "numba").estimate_loads
         return together(batch_name("numba"), solve, many, read=lambda found: found.forces, **checked)
 
-    def single(backend: str) -> Contender:
+    def single(backend: str) -> Workload:
         return one_by_one(single_name(backend), compiled(arm(), backend).estimate_load, few, read=_force, **checked)
 
-    race.add(
+    comparison.add(
         ESTIMATE, lambda: one_by_one(ESTIMATE, partial(estimate_force, robot), few, read=lambda found: found[0], **checked)
     )
-    race.add(batch_name("numba"), batch)
+    comparison.add(batch_name("numba"), batch)
     for backend in BACKENDS:
-        race.add(single_name(backend), partial(single, backend))
-    race.run()
+        comparison.add(single_name(backend), partial(single, backend))
+    comparison.run()
     job = "load estimation, one call"
     rows = [
-        race.cheaper(job, single_name("numba"), ESTIMATE, AT_LEAST, 130.0),
-        race.cheaper("load estimation, batch", batch_name("numba"), ESTIMATE, AT_LEAST, 800.0),
-        race.cheaper(job, single_name("python"), ESTIMATE),
+        comparison.cheaper(job, single_name("numba"), ESTIMATE, AT_LEAST, 130.0),
+        comparison.cheaper("load estimation, batch", batch_name("numba"), ESTIMATE, AT_LEAST, 800.0),
+        comparison.cheaper(job, single_name("python"), ESTIMATE),
     ]
-    return rows, []
+    return Outcome(rows)
 
 
-def trajectory(settings: Settings) -> tuple[list[Row], list[str]]:
+def trajectory(settings: Settings) -> Outcome:
     """Motor angles along a path: ours with the loaded, elastic arm, Pink with the rigid one."""
-    race = Race(settings, "trajectory")
+    comparison = Comparison(settings, "trajectory")
     targets, force = path_targets(settings.waypoints), np.array(FORCE)
     loaded, rigid = (solve_ik(arm(), targets[0], some, elbow="up").q_motors for some in (force, None))
 
-    def ours(backend: str) -> Contender:
+    def ours(backend: str) -> Workload:
         solver = compiled(arm(), backend)
         found = solver.follow(targets, force, q_motors0=loaded, tolerance=_ON_TARGET).q_motors
         tips = [solve_equilibrium(arm(), q, force, tolerance=1e-13).tip_position for q in found]
         require_agreement(backend, np.array(tips), targets, 2.0 * _ON_TARGET, "m")
-        return Contender(len(targets), lambda: solver.follow(targets, force, q_motors0=loaded, tolerance=_ON_TARGET))
+        return Workload(len(targets), lambda: solver.follow(targets, force, q_motors0=loaded, tolerance=_ON_TARGET))
 
-    def pink(name: str, limits: bool) -> Contender:
+    def pink(name: str, limits: bool) -> Workload:
         solver = PinkArm(arm(), limits=limits)
         found = solver.follow(targets, rigid, tolerance=_ON_TARGET)
         tips = [frame_placement(arm(), arm().configuration(q), arm().tip).translation for q in found]
         require_agreement(name, np.array(tips), targets, 2.0 * _ON_TARGET, "m")
-        return Contender(len(targets), lambda: solver.follow(targets, rigid, tolerance=_ON_TARGET))
+        return Workload(len(targets), lambda: solver.follow(targets, rigid, tolerance=_ON_TARGET))
 
     for backend in BACKENDS:
-        race.add(f"compiled, {backend}", partial(ours, backend))
+        comparison.add(f"compiled, {backend}", partial(ours, backend))
     for name, limits in ((PINK, False), (PINK_LIMITS, True)):
-        race.add(name, partial(pink, name, limits))
-    race.run()
+        comparison.add(name, partial(pink, name, limits))
+    comparison.run()
     job = f"trajectory, a waypoint of {settings.waypoints}"
     rows = [
-        race.cheaper(job, "compiled, numba", PINK_LIMITS, AT_LEAST, 350.0),
-        race.cheaper(job, "compiled, numba", PINK),
-        race.cheaper(job, "compiled, python", PINK),
+        comparison.cheaper(job, "compiled, numba", PINK_LIMITS, AT_LEAST, 350.0),
+        comparison.cheaper(job, "compiled, numba", PINK),
+        comparison.cheaper(job, "compiled, python", PINK),
     ]
-    return rows, []
+    return Outcome(rows)
 
 
 def _measured(count: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -3,7 +3,7 @@
 As good as it gets: motors are welded, and turned by writing the placements of their bodies, so that no case compiles a model
 and only springs move; there are no joint limits; many steps are one call into C; the force stands at the centre of mass of the
 tip, which is moved to the tip's origin, so that it need not follow the pose. Time step, damping and steps between two looks are
-searched on a grid for the least CPU time. Contacts are on, as in the file, or off.
+searched on a grid for the least CPU time. Contacts are on, as in the file.
 
 With time steps far beyond those of a simulation and as much damping, MuJoCo's implicit damping becomes a relaxation method: the
 motion on the way is nothing, the end is the equilibrium, and it is cheaper by half. It is timed, too.
@@ -58,12 +58,11 @@ class Tuning(NamedTuple):
 class SettlingArm:
     """A robot in MuJoCo, whose motors stand where they are put."""
 
-    def __init__(self, model: SoftModel, *, contacts: bool = True) -> None:
+    def __init__(self, model: SoftModel) -> None:
         """Make MuJoCo's models.
 
         Args:
             model: A robot with revolute motors, without sections and muscles.
-            contacts: Whether links may touch, as the file has it.
 
         Raises:
             MissingDependency: If MuJoCo is not installed.
@@ -84,9 +83,6 @@ class SettlingArm:
         self._springs = [int(self.model.joint(name).qposadr[0]) for name in model.spring_joints]
         self._tip, self._reach = int(self.model.body(model.tip).id), model.reach
         self.model.body_ipos[self._tip] = 0.0
-        off = mujoco.mjtDisableBit
-        if not contacts:
-            self.model.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_CONSTRAINT)
         self.stride = STRIDES[0]
 
     def set(self, time_step: float, damping: float, stride: int) -> None:

@@ -85,9 +85,9 @@ class ArrayArm:
 
 def _about_z(angles: FloatArray) -> FloatArray:
     """Rotations about z, shape (n, 3, 3)."""
-    made = np.zeros((len(angles), 3, 3))
-    made[:, 0, 0] = made[:, 1, 1] = np.cos(angles)
-    made[:, 1, 0] = np.sin(angles)
-    made[:, 0, 1] = -made[:, 1, 0]
-    made[:, 2, 2] = 1.0
-    return made
+    result = np.zeros((len(angles), 3, 3))
+    result[:, 0, 0] = result[:, 1, 1] = np.cos(angles)
+    result[:, 1, 0] = np.sin(angles)
+    result[:, 0, 1] = -result[:, 1, 0]
+    result[:, 2, 2] = 1.0
+    return result

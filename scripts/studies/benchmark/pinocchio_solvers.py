@@ -1,8 +1,8 @@
 r"""Equilibria and load estimation as one writes them with Pinocchio in Python: no checks, no result objects, data made once.
 
 Springs are in balance where `r = k (y - rest) - J_k^T f + g_k` vanishes. The fixed point repeats
-`y <- rest + (J_k^T f - g_k) / k` ([Troise 2021] Figure 6). The derivative of `J^T f` that Newton's method needs is to be had
-from Pinocchio in three ways, each a function here. All stop at `|r| <= 1e-10 |f| L`.
+`y <- rest + (J_k^T f - g_k) / k` ([Troise 2021] Figure 6). Newton's method needs the derivative of `J^T f`, which Pinocchio
+gives in two ways, each a function here. All stop at `|r| <= 1e-10 |f| L`.
 
 NumPy on seven numbers costs more than Pinocchio does, so the vectors have one entry a joint, motors too, with no stiffness and
 no softness there: nothing is gathered or scattered. That makes the fixed point a third faster than with index arrays.
@@ -120,18 +120,6 @@ def newton_by_hessian(arm: PinocchioArm, q_motors: FloatArray, force: FloatArray
     return q
 
 
-def newton_by_jacobian(arm: PinocchioArm, q_motors: FloatArray, force: FloatArray) -> FloatArray:
-    """Newton, weightless, with `d(J^T f)_j/dq_i = (f x w_i) . v_j` for `i <= j`, from the Jacobian alone; as `fixed_point`."""
-    q, limit, across = arm.start(q_motors), arm.limit(force), -skew(force)
-    for _ in range(_MOST_NEWTON):
-        jacobian = pin.computeFrameJacobian(arm.pin, arm.data, q, arm.tip, _AXES)
-        residual = (arm.stiffness * (q - arm.rest) - force @ jacobian[:3])[arm.springs]
-        if math.sqrt(residual @ residual) <= limit:
-            break
-        q[arm.springs] -= np.linalg.solve(arm.spring_matrix - slope_by_jacobian(arm, jacobian, across)[arm.block], residual)
-    return q
-
-
 def newton_by_torque_derivatives(arm: PinocchioArm, q_motors: FloatArray, force: FloatArray) -> FloatArray:
     """Newton, with or without gravity, on `computeStaticTorqueDerivatives`; arguments of `fixed_point`.
 
@@ -158,10 +146,9 @@ Solver = Callable[[PinocchioArm, FloatArray, FloatArray], FloatArray]
 
 NEWTON: dict[str, Solver] = {
     "kinematic Hessian": newton_by_hessian,
-    "Jacobian alone": newton_by_jacobian,
     "torque derivatives": newton_by_torque_derivatives,
 }
-"""The three ways to Newton's method, by name."""
+"""Newton's methods by name."""
 
 
 def hessian(arm: PinocchioArm) -> FloatArray:
@@ -177,9 +164,9 @@ def hessian(arm: PinocchioArm) -> FloatArray:
 
 def slope_by_jacobian(arm: PinocchioArm, jacobian: FloatArray, across: FloatArray) -> FloatArray:
     """Derivative of `J^T f`, shape (nv, nv), from the Jacobian, shape (6, nv), and the matrix `-f x`."""
-    made = (jacobian[3:].T @ (across @ jacobian[:3])) * arm.upper
-    made += (made * arm.strictly_upper).T
-    return np.asarray(made)
+    result = (jacobian[3:].T @ (across @ jacobian[:3])) * arm.upper
+    result += (result * arm.strictly_upper).T
+    return np.asarray(result)
 
 
 def estimate_force(arm: PinocchioArm, q_motors: FloatArray, motor_torques: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -48,11 +48,11 @@ def first_answer() -> dict[str, float]:
         SoftRobotsError: If it fails, or imports numba.
     """
     began = time.perf_counter()
-    told = _run(FIRST_ANSWER)
+    text = _run(FIRST_ANSWER)
     total = time.perf_counter() - began
-    if told["numba"]:
+    if text["numba"]:
         raise SoftRobotsError("the first answer without the extra `fast` imports numba")
-    stages: dict[str, float] = told["stages"]
+    stages: dict[str, float] = text["stages"]
     return {"total": total, "start": total - sum(stages.values()), **stages}
 
 

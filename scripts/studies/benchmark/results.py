@@ -89,10 +89,10 @@ class Results:
 
 def as_json(results: Results) -> str:
     """The results as JSON text."""
-    made = dataclasses.asdict(results)
-    for row, written in zip(results.rows, made["rows"], strict=True):
+    result = dataclasses.asdict(results)
+    for row, written in zip(results.rows, result["rows"], strict=True):
         written["met"] = row.met
-    return json.dumps(made, indent=1, allow_nan=False) + "\n"
+    return json.dumps(result, indent=1, allow_nan=False) + "\n"
 
 
 def read_results(path: Path) -> Results:
@@ -124,8 +124,8 @@ def _check(results: Results) -> None:
     figures = [results.settings["rounds"]]
     for row in results.rows:
         texts += [row.job, row.ours, row.baseline, row.unit, row.bound, row.clock, row.skipped]
-        told = (row.value, row.low, row.high, row.target, row.our_seconds, row.baseline_seconds)
-        figures += [number for number in told if number is not None]
+        summary = (row.value, row.low, row.high, row.target, row.our_seconds, row.baseline_seconds)
+        figures += [number for number in summary if number is not None]
     for curve in results.curves:
         texts += [curve.picture, curve.label]
         figures += [*curve.sizes, *curve.seconds]
@@ -164,8 +164,8 @@ def _plain(cell: str) -> str:
 def machine_text(results: Results) -> str:
     """What was measured on: processor, system, versions, in a sentence."""
     named = {name: value for name, value in results.machine.items() if name not in ("processor", "system")}
-    told = ", ".join([results.machine["processor"], results.machine["system"], *map(" ".join, named.items())])
-    return f"Medians of {results.settings['rounds']} rounds on: {told}."
+    text = ", ".join([results.machine["processor"], results.machine["system"], *map(" ".join, named.items())])
+    return f"Medians of {results.settings['rounds']} rounds on: {text}."
 
 
 def require_whole(results: Results, jobs: Sequence[str]) -> None:
@@ -177,8 +177,8 @@ def require_whole(results: Results, jobs: Sequence[str]) -> None:
     lacking = [name for name in jobs if name not in results.settings.get("jobs", ())]
     lacking += [f"{row.job} against {row.baseline}" for row in results.rows if row.skipped]
     if lacking or results.settings.get("quick", True):
-        told = ", ".join(lacking) or "--quick"
-        raise ParameterError("--docs", told, "given for results of the whole benchmark, with --cpp and every extra installed")
+        text = ", ".join(lacking) or "--quick"
+        raise ParameterError("--docs", text, "given for results of the whole benchmark, with every extra installed")
 
 
 def _cost(seconds: float | None) -> str:

@@ -12,10 +12,10 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray
 from softrobots.statics.equilibrium import solve_equilibrium
 from studies.benchmark.cases import rod, rod_forces
+from studies.benchmark.comparison import Comparison, Outcome, Settings, curve
 from studies.benchmark.compiled_solvers import BENDING, compiled
-from studies.benchmark.measurement import Contender, require_agreement
-from studies.benchmark.race import Race, Settings, curve
-from studies.benchmark.results import AT_MOST, Curve, Row
+from studies.benchmark.measurement import Workload, require_agreement
+from studies.benchmark.results import AT_MOST
 
 JACOBIAN = "computeJointJacobians of the chain of six joints a section"
 BENT, FREE, HINGED = "sections, bending only", "sections, all four strains", "pairs of hinges"
@@ -30,43 +30,46 @@ _NEAR = 0.01  # share of the length by which stretch and twist, which are small 
 _FROM, _TO, _GROWTH = 10, 50, 5.0
 
 
-def rods(settings: Settings) -> tuple[list[Row], list[str]]:
+def rods(settings: Settings) -> Outcome:
     """An equilibrium of a rod of many sections against Pinocchio's Jacobian of the same rod."""
-    race, count = Race(settings, "rod"), settings.sections
-    race.add(JACOBIAN, partial(_jacobian, count))
+    comparison, count = Comparison(settings, "rod"), settings.sections
+    comparison.add(JACOBIAN, partial(_jacobian, count))
     for form in FORMS:
-        race.add(f"compiled, numba, {form}", partial(_single, form, count))
-        race.add(f"compiled, numba, {form}, batch", partial(_batch, form, count, settings.batch))
-    race.run()
+        comparison.add(f"compiled, numba, {form}", partial(_single, form, count))
+        comparison.add(f"compiled, numba, {form}, batch", partial(_batch, form, count, settings.batch))
+    comparison.run()
     job = f"rod of {count} sections"
-    return [
-        race.costlier(f"{job}, one call", f"compiled, numba, {BENT}", JACOBIAN, AT_MOST, 4.0),
-        race.costlier(f"{job}, one call", f"compiled, numba, {FREE}", JACOBIAN),
-        race.costlier(f"{job}, one call", f"compiled, numba, {HINGED}", JACOBIAN),
-        *(race.costlier(f"{job}, batch", f"compiled, numba, {form}, batch", JACOBIAN) for form in FORMS),
-    ], []
+    rows = [
+        comparison.costlier(f"{job}, one call", f"compiled, numba, {BENT}", JACOBIAN, AT_MOST, 4.0),
+        comparison.costlier(f"{job}, one call", f"compiled, numba, {FREE}", JACOBIAN),
+        comparison.costlier(f"{job}, one call", f"compiled, numba, {HINGED}", JACOBIAN),
+        *(comparison.costlier(f"{job}, batch", f"compiled, numba, {form}, batch", JACOBIAN) for form in FORMS),
+    ]
+    return Outcome(rows)
 
 
-def sizes(settings: Settings) -> tuple[list[Row], list[Curve]]:
+def sizes(settings: Settings) -> Outcome:
     """Cost of one equilibrium over the number of sections or pairs of hinges, and its growth from 10 to 50."""
-    race = Race(settings, "numbers of sections")
+    comparison = Comparison(settings, "numbers of sections")
     for count in settings.sizes:
-        race.add(f"{JACOBIAN} {count}", partial(_jacobian, count))
+        comparison.add(f"{JACOBIAN} {count}", partial(_jacobian, count))
         for form in FORMS:
-            race.add(f"{form} {count}", partial(_single, form, count))
-        race.add(f"solve_equilibrium, {FREE} {count}", partial(_general, count))
-    race.run()
+            comparison.add(f"{form} {count}", partial(_single, form, count))
+        comparison.add(f"solve_equilibrium, {FREE} {count}", partial(_general, count))
+    comparison.run()
     labels = (*FORMS, f"solve_equilibrium, {FREE}", JACOBIAN)
-    made = [curve("sizes", label, {count: race.cost(f"{label} {count}") for count in settings.sizes}) for label in labels]
+    curves = [
+        curve("sizes", label, {count: comparison.cost(f"{label} {count}") for count in settings.sizes}) for label in labels
+    ]
     rows = []
     if _FROM in settings.sizes and _TO in settings.sizes:
         job = f"equilibrium, {_TO} against {_FROM}"
         targets = {BENT: _GROWTH, FREE: _GROWTH, HINGED: _GROWTH}
-        rows = [race.costlier(job, f"{form} {_TO}", f"{form} {_FROM}", AT_MOST, limit) for form, limit in targets.items()]
-    return rows, [line for line in made if line is not None]
+        rows = [comparison.costlier(job, f"{form} {_TO}", f"{form} {_FROM}", AT_MOST, limit) for form, limit in targets.items()]
+    return Outcome(rows, [line for line in curves if line is not None])
 
 
-def _jacobian(count: int) -> Contender:
+def _jacobian(count: int) -> Workload:
     robot = rod(count)
     model, data = robot.workspace(None)
     poses = [robot.configuration((), _curled(robot.n_springs, seed)) for seed in range(_CASES)]
@@ -75,7 +78,7 @@ def _jacobian(count: int) -> Contender:
         for q in poses:
             pin.computeJointJacobians(model, data, q)
 
-    return Contender(_CASES, run)
+    return Workload(_CASES, run)
 
 
 def _curled(size: int, seed: int) -> FloatArray:
@@ -85,25 +88,25 @@ def _curled(size: int, seed: int) -> FloatArray:
     return np.asarray(strains)
 
 
-def _single(form: str, count: int) -> Contender:
+def _single(form: str, count: int) -> Workload:
     """One call a case."""
     solver, forces = _solver(form, count), rod_forces(_CASES)
     _check(form, count, [solver.equilibrium((), force).tip_position for force in forces[:_CHECKED]], forces)
     none = np.zeros(0)
-    return Contender(_CASES, lambda: [solver.equilibrium(none, force) for force in forces])
+    return Workload(_CASES, lambda: [solver.equilibrium(none, force) for force in forces])
 
 
-def _batch(form: str, count: int, batch: int) -> Contender:
+def _batch(form: str, count: int, batch: int) -> Workload:
     """A batch, smaller than that of the arm by as much as a rod has more springs."""
     solver, size = _solver(form, count), max(_CASES, batch // (4 * count))
     forces, none = rod_forces(size), np.zeros((size, 0))
     _check(form, count, solver.equilibria(none[:_CHECKED], forces[:_CHECKED]).tip_positions, forces)
-    return Contender(size, lambda: solver.equilibria(none, forces))
+    return Workload(size, lambda: solver.equilibria(none, forces))
 
 
-def _general(count: int) -> Contender:
+def _general(count: int) -> Workload:
     robot, forces = rod(count), rod_forces(4)
-    return Contender(len(forces), lambda: [solve_equilibrium(robot, (), force) for force in forces])
+    return Workload(len(forces), lambda: [solve_equilibrium(robot, (), force) for force in forces])
 
 
 def _solver(form: str, count: int) -> Any:

@@ -36,8 +36,8 @@ def boundaries(tube: HelixTube) -> dict[str, float]:
         shares = np.arange(count) + 0.5
         if tube.hinge_rule == "corrected" and count > 1:
             shares[[0, -1]] += np.array([-1.0, 1.0]) / 24.0
-    made = {f"section_1_{number}": float(share) * whole / count for number, share in enumerate(shares, start=1)}
-    return made | {"segment_1": whole, "tip": whole}
+    result = {f"section_1_{number}": float(share) * whole / count for number, share in enumerate(shares, start=1)}
+    return result | {"segment_1": whole, "tip": whole}
 
 
 def analytic(tube: HelixTube, lengths: Any) -> Any:
@@ -70,10 +70,10 @@ def measure(case: Case) -> Row:
 
 def summary(rows: list[Row]) -> list[dict[str, Any]]:
     """Largest errors by set and form."""
-    made = []
+    result = []
     for group, form in dict.fromkeys((row.case.group, row.case.form) for row in rows):
         chosen = [row for row in rows if (row.case.group, row.case.form) == (group, form)]
-        made.append(
+        result.append(
             {
                 "set": group,
                 "chain": form,
@@ -83,4 +83,4 @@ def summary(rows: list[Row]) -> list[dict[str, Any]]:
                 "largest_angle_rad": max(row.angle for row in chosen),
             }
         )
-    return made
+    return result

@@ -19,14 +19,14 @@ from studies.helix_validation.tubes import FILES, FORMS, committed
 
 def table(lines: list[dict[str, Any]]) -> str:
     """Format the largest errors as Markdown."""
-    made = [
+    result = [
         "| set | chain | tubes | boundaries | largest distance [m] | largest angle [rad] |",
         "|---|---|---:|---:|---:|---:|",
     ]
     for line in lines:
         distance, angle = f"{line['largest_distance_m']:.1e}", f"{line['largest_angle_rad']:.1e}"
-        made.append(f"| {line['set']} | {line['chain']} | {line['tubes']} | {line['boundaries']} | {distance} | {angle} |")
-    return "\n".join(made)
+        result.append(f"| {line['set']} | {line['chain']} | {line['tubes']} | {line['boundaries']} | {distance} | {angle} |")
+    return "\n".join(result)
 
 
 def csv_of(rows: list[Row]) -> str:
@@ -43,10 +43,10 @@ def csv_of(rows: list[Row]) -> str:
 
 def figure(rows: list[Row], tolerance: float) -> Any:
     """Draw the committed tube with the frames of its chain on the analytic helix, and the errors of all tubes."""
-    made = canvas.new_figure((12.0, 6.2))
-    grid_ = made.add_gridspec(1, 2, width_ratios=(1.0, 1.2))
-    _draw_chain(made.add_subplot(grid_[0], projection="3d"))
-    axes = made.add_subplot(grid_[1])
+    figure = canvas.new_figure((12.0, 6.2))
+    grid_ = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.2))
+    _draw_chain(figure.add_subplot(grid_[0], projection="3d"))
+    axes = figure.add_subplot(grid_[1])
     groups = list(dict.fromkeys(row.case.group for row in rows))
     gap = 3.0 + 0.05 * len(rows)
     places = [i + gap * groups.index(row.case.group) for i, row in enumerate(rows)]
@@ -73,7 +73,7 @@ def figure(rows: list[Row], tolerance: float) -> Any:
     axes.set_xticks([])
     axes.grid(alpha=0.3, axis="y")
     axes.legend(fontsize=8, ncols=2, loc="upper right")
-    return made
+    return figure
 
 
 def _draw_chain(axes: Any) -> None:
@@ -98,8 +98,8 @@ def _draw_chain(axes: Any) -> None:
             for column, style, _ in axes_of_frames:
                 ends = np.array([frame[:3, 3], frame[:3, 3] + 0.03 * frame[:3, column]])
                 axes.plot(*ends.T, **style)
-    for _, style, told in axes_of_frames:
-        axes.plot([], [], [], label=told, **style)
+    for _, style, text in axes_of_frames:
+        axes.plot([], [], [], label=text, **style)
     low, high = corners.min(axis=0), corners.max(axis=0)
     for axis, a, b in zip("xyz", low, high, strict=True):
         getattr(axes, f"set_{axis}lim")(a, b)

@@ -48,10 +48,10 @@ def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
 
 def _imported(text: str) -> ModuleType:
     """The file as a module; a data class looks its module up while it is made."""
-    made = ModuleType("robot_for_pybullet")
-    sys.modules[made.__name__] = made
+    result = ModuleType("robot_for_pybullet")
+    sys.modules[result.__name__] = result
     try:
-        exec(compile(text, f"{made.__name__}.py", "exec"), made.__dict__)
+        exec(compile(text, f"{result.__name__}.py", "exec"), result.__dict__)
     finally:
-        del sys.modules[made.__name__]
-    return made
+        del sys.modules[result.__name__]
+    return result

@@ -55,7 +55,7 @@ def measure(arguments: argparse.Namespace) -> Results:
 
 def arriving_springs(tools: Sequence[str], robots: Sequence[str]) -> list[dict[str, Any]]:
     """How many joint springs of each file arrive in each tool."""
-    made = []
+    result = []
     for case in equilibrium_cases(robots, 1):
         if case.gravity is not None:
             continue
@@ -67,10 +67,10 @@ def arriving_springs(tools: Sequence[str], robots: Sequence[str]) -> list[dict[s
         for tool in tools:
             for name in FORMATS:
                 read = springs_read(tool, texts[name], name)
-                made.append(
+                result.append(
                     {"tool": tool, "robot": case.robot, "format": name, "read": read, "of": len(case.model.spring_table)}
                 )
-    return made
+    return result
 
 
 def agreed(results: Results) -> bool:

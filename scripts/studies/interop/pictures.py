@@ -15,11 +15,11 @@ SMALLEST = 1e-18
 
 def figure(results: Results) -> Any:
     """Draw every difference against its tolerance."""
-    made = canvas.new_figure((11.0, 5.6))
-    left, right = made.subplots(1, 2, width_ratios=(1.35, 1.0))
+    figure = canvas.new_figure((11.0, 5.6))
+    left, right = figure.subplots(1, 2, width_ratios=(1.35, 1.0))
     _draw_equilibria(left, results["equilibrium"])
     _draw_kinematics(right, results["kinematics"])
-    return made
+    return figure
 
 
 def _draw_equilibria(axes: Any, rows: Sequence[dict[str, Any]]) -> None:

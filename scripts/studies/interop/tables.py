@@ -26,9 +26,9 @@ def equilibrium_table(results: Results) -> str:
     rows = results["equilibrium"]
     titles, keys = [], []
     for tool in _versions(rows):
-        for key, told in (("static", "forces balance"), ("simulated", "simulated")):
+        for key, text in (("static", "forces balance"), ("simulated", "simulated")):
             if any(row["tool"] == tool and row[f"{key}_difference"] is not None for row in rows):
-                titles.append(f"{tool}, {told}")
+                titles.append(f"{tool}, {text}")
                 keys.append((tool, key))
     lines = [line(["", *titles]), "|---|" + "---:|" * len(titles)]
     for robot in (name for name in ROBOTS if any(row["robot"] == name for row in rows)):

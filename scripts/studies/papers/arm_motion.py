@@ -58,10 +58,10 @@ def statics() -> list[Row]:
     torques = _jacobian(found).T @ np.array([*FORCE, 0.0, 0.0, 0.0])
     springs = float(np.abs(found.spring_torques - torques[list(SPRINGS)]).max())
     motors = float(np.abs(found.motor_torques - torques[list(MOTORS)]).max())
-    told = "J of (4) on Table 2; f = (0, 10, -15) N, q_m = (0.3, 0.6, -0.8) rad; springs settle to 1e-9 N m"
+    note = "J of (4) on Table 2; f = (0, 10, -15) N, q_m = (0.3, 0.6, -0.8) rad; springs settle to 1e-9 N m"
     return [
-        equation("(5)", "torques of the springs, tau_k = J_k^T gamma", springs, "N m", told, 5e-9),
-        equation("(6)", "torques of the motors, tau_m = J_m^T gamma", motors, "N m", told, 5e-9),
+        equation("(5)", "torques of the springs, tau_k = J_k^T gamma", springs, "N m", note, 5e-9),
+        equation("(6)", "torques of the motors, tau_m = J_m^T gamma", motors, "N m", note, 5e-9),
     ]
 
 
@@ -70,19 +70,19 @@ def recursions() -> list[Row]:
     model = arm()
     true = solve_equilibrium(model, _POSTURE, FORCE)
     found = estimate_load(model, _POSTURE, true.motor_torques, method="alternation")
-    told = "motor torques made with this force; the paper shows no example"
+    note = "motor torques made with this force; the paper shows no example"
     rows = [
         equation(
-            "Figure 5", "force that the recursion finds, against the true one", largest(found.force - FORCE), "N", told, 1e-8
+            "Figure 5", "force that the recursion finds, against the true one", largest(found.force - FORCE), "N", note, 1e-8
         ),
         equation(
-            "Figure 5", "its estimate of the tip", largest(found.equilibrium.tip_position - true.tip_position), "m", told, 1e-10
+            "Figure 5", "its estimate of the tip", largest(found.equilibrium.tip_position - true.tip_position), "m", note, 1e-10
         ),
     ]
     settled = solve_equilibrium(model, _POSTURE, FORCE, method="fixed_point")
-    told = "100 rounds of q_k <- J_k^T gamma / k on Table 2"
+    note = "100 rounds of q_k <- J_k^T gamma / k on Table 2"
     apart = largest(settled.q_springs - _fixed_point(np.array(_POSTURE)))
-    rows.append(equation("Figure 6", "inner recursion: angles of the springs", apart, "rad", told, 1e-10))
+    rows.append(equation("Figure 6", "inner recursion: angles of the springs", apart, "rad", note, 1e-10))
     followed, smallest, step_error = movement().closed_loop, np.inf, 0.0
     for number in range(len(followed.times) - 1):
         interval = float(followed.times[number + 1] - followed.times[number])
@@ -94,25 +94,25 @@ def recursions() -> list[Row]:
         error = followed.targets[number] - followed.tip_positions[number]
         moved = interval * inverse[list(MOTORS)] @ (velocity + GAIN * error)  # (9)
         step_error = max(step_error, largest(followed.q_motors[number + 1] - followed.q_motors[number] - moved))
-    told = f"position rows of J; Euler steps of 10 ms, gain {GAIN:g} 1/s (ours); our own path"
-    rows.append(equation("(8), (9)", "steps of the motors along a movement", step_error, "rad", told))
-    told = "on our path: with all six rows the closed loop leaves the path, as three motors hold no orientation"
-    rows.append(own("(8)", "smallest singular value of the 6 x 7 Jacobian", smallest, "", told))
+    note = f"position rows of J; Euler steps of 10 ms, gain {GAIN:g} 1/s (ours); our own path"
+    rows.append(equation("(8), (9)", "steps of the motors along a movement", step_error, "rad", note))
+    note = "on our path: with all six rows the closed loop leaves the path, as three motors hold no orientation"
+    rows.append(own("(8)", "smallest singular value of the 6 x 7 Jacobian", smallest, "", note))
     lag = 1e3 * float(followed.tip_error.max())
-    told = f"gain {GAIN:g} 1/s; it lags behind, less with more gain"
-    rows.append(own("Figure 6", "largest distance from our path", lag, "mm", told))
+    note = f"gain {GAIN:g} 1/s; it lags behind, less with more gain"
+    rows.append(own("Figure 6", "largest distance from our path", lag, "mm", note))
     return rows
 
 
 def figures_10_and_11() -> list[Row]:
     """What Figures 10 and 11 show, along our own path."""
     ours = movement()
-    told = "x_start, x_d, duration and gain are not published: Figures 10 and 11 cannot be repeated, only their kind"
-    rows = [absent(UNPUBLISHED, "Figures 10, 11", "path of the tip and angles of the motors", note=told)]
+    note = "x_start, x_d, duration and gain are not published: Figures 10 and 11 cannot be repeated, only their kind"
+    rows = [absent(UNPUBLISHED, "Figures 10, 11", "path of the tip and angles of the motors", note=note)]
     path = f"our path {START} to {END} m, {DURATION:g} s, load (0, 10, -15) N"
-    told = 'solved by Newton at every waypoint; the paper: "effectively follows"'
+    note = 'solved by Newton at every waypoint; the paper: "effectively follows"'
     reached = float(ours.loaded.tip_error.max())
-    rows.append(equation("Figure 10", "distance of the loaded tip from the planned path", reached, "m", told, 2e-9))
+    rows.append(equation("Figure 10", "distance of the loaded tip from the planned path", reached, "m", note, 2e-9))
     sag = 1e3 * float(ours.sagging.tip_error.max())
     rows.append(own("Figure 10", "largest sag without compensation", sag, "mm", path))
     turned = np.abs(ours.loaded.q_motors - ours.rigid.q_motors).max(axis=0)
@@ -121,9 +121,9 @@ def figures_10_and_11() -> list[Row]:
     moments = ours.loaded.link_moments
     if moments is not None:
         for number, moment in enumerate(moments.max(axis=0), start=1):
-            told = path if number == 2 else f"{path}; chosen near the paper's value, it does not confirm it"
+            note = path if number == 2 else f"{path}; chosen near the paper's value, it does not confirm it"
             printed = "17.51" if number == 1 else ""
-            rows.append(own("section 4", f"largest moment on link {number}", float(moment), "N m", told, printed))
+            rows.append(own("section 4", f"largest moment on link {number}", float(moment), "N m", note, printed))
     pressure = ours.loaded.required_pressure
     if pressure is not None:
         rows.append(own("section 4", "pressure that our path demands, exact", 1e-3 * pressure, "kPa", path, ">= 50"))

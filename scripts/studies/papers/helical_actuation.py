@@ -57,12 +57,12 @@ def paths() -> list[Row]:
     example = helix.forward(_SHARE, _ANGLE, PAPER_DIAMETER)
     torsion = printed.curvature_torsion(example.outer_radius, example.pitch)[1]
     signed = helix.curvature_torsion(example, "outer", "left")[1]
-    told = (
+    note = (
         f"the curve (1) is left-handed for b > 0, its torsion negative; the library takes the hand as an argument. {_EXAMPLE}"
     )
     rows = [
         equation("(1), (3)-(5)", "outer, inner and centre path", curve, "m", "the library's left-handed helix"),
-        erratum("(13)", "signed torsion of the outer curve (1)", float(torsion), float(signed), "rad/m", told),
+        erratum("(13)", "signed torsion of the outer curve (1)", float(torsion), float(signed), "rad/m", note),
         equation("(8)", "tangents of the three paths", tangents, "", _RANDOM),
         equation("(9)", "normals of the three paths", normals, "", _RANDOM),
     ]
@@ -77,9 +77,9 @@ def paths() -> list[Row]:
     outer, inner, centre = (helix.tangents(example, 0.0, name) for name in _PATHS)
     for name, other in (("outer", outer), ("inner", inner)):
         found = float(np.degrees(np.arccos(np.clip(other @ centre, -1.0, 1.0))))
-        told = f"printed theta for both; only their sum is 2 theta. {_EXAMPLE}"
+        note = f"printed theta for both; only their sum is 2 theta. {_EXAMPLE}"
         rows.append(
-            erratum("Figure 3", f"angle between {name} and centre tangent", np.degrees(_ANGLE), found, "degrees", told, 0.1)
+            erratum("Figure 3", f"angle between {name} and centre tangent", np.degrees(_ANGLE), found, "degrees", note, 0.1)
         )
     return rows
 
@@ -133,11 +133,11 @@ def measuring() -> list[Row]:
     example = helix.forward(_SHARE, _ANGLE, PAPER_DIAMETER)
     outer, inner = (float(printed.turn_length(example.radius(name), example.pitch)) for name in ("outer", "inner"))
     theirs, ours = printed.from_arcs(outer, inner, PAPER_DIAMETER), helix.measure(outer, inner, PAPER_DIAMETER)
-    told = f"printed m - D/2 and m - 3 D/2, must be m + D/2 and m - D/2; {_EXAMPLE}"
+    note = f"printed m - D/2 and m - 3 D/2, must be m + D/2 and m - D/2; {_EXAMPLE}"
     told_b = "follows from Ro. The mean errors of Figure 7 are below a tenth of this: the paper must have used the right one"
     for name, one, other, why in (
-        ("Ro", theirs.outer, ours.outer_radius, told),
-        ("Ri", theirs.inner, ours.inner_radius, told),
+        ("Ro", theirs.outer, ours.outer_radius, note),
+        ("Ri", theirs.inner, ours.inner_radius, note),
         ("b", theirs.pitch, ours.pitch, told_b),
     ):
         unit = "cm" if name != "b" else "cm/rad"
@@ -151,8 +151,8 @@ def measuring() -> list[Row]:
     )
     stopper, gap = np.random.default_rng(2).uniform(0.001, 0.02, (2, 100))
     apart = largest(helix.contraction_from_stoppers(stopper, gap) - stopper / (stopper + gap))
-    told = "stopper / (stopper + gap)"
-    rows.append(taken(equation("section III-A.2", "contraction from stoppers and gaps", apart, "", told)))
+    note = "stopper / (stopper + gap)"
+    rows.append(taken(equation("section III-A.2", "contraction from stoppers and gaps", apart, "", note)))
     return rows
 
 
@@ -160,8 +160,8 @@ def figures_5_to_7() -> list[Row]:
     """The grid, the scaled helix, and the curves of outer radius and pitch."""
     table = helix.paper_grid().rows
     grid = table[: len(PAPER_ANGLES) * len(PAPER_CONTRACTIONS)]
-    told = "of the grid 2.5, 5, 10 degrees by lambda 0.5 to 0.9 in steps of 0.1 (steps ours), D = 3.31 cm"
-    rows = [own("Figure 5", "helices that would run into themselves", float(sum(not row.realisable for row in grid)), "", told)]
+    note = "of the grid 2.5, 5, 10 degrees by lambda 0.5 to 0.9 in steps of 0.1 (steps ours), D = 3.31 cm"
+    rows = [own("Figure 5", "helices that would run into themselves", float(sum(not row.realisable for row in grid)), "", note)]
     small, large = table[-2:]
     for name in ("outer_radius", "inner_radius", "pitch"):
         ratio = getattr(large, name) / getattr(small, name)
@@ -176,8 +176,8 @@ def figures_5_to_7() -> list[Row]:
             )
         )
     for name, text in ERRORS.items():
-        told = "mean difference of the test helices from (12): the measured arcs are not published"
-        rows.append(absent(MEASURED, "Figure 7", f"mean error of the {name}", text, "mm", told))
+        note = "mean difference of the test helices from (12): the measured arcs are not published"
+        rows.append(absent(MEASURED, "Figure 7", f"mean error of the {name}", text, "mm", note))
     angles = np.array(PAPER_ANGLES)
     start, end = helix.forward(1.0, angles, PAPER_DIAMETER), helix.forward(1e-15, angles, PAPER_DIAMETER)
     apart = largest(np.stack([start.outer_radius - PAPER_DIAMETER / 2, start.pitch - PAPER_DIAMETER / (2 * np.tan(angles))]))
@@ -187,52 +187,54 @@ def figures_5_to_7() -> list[Row]:
     for angle in PAPER_ANGLES:
         name = f"{np.degrees(angle):.4g} degrees"
         simple, exact = float(helix.simple_contraction_limit(angle)), float(helix.contraction_limit(angle))
-        told = "dotted line of the figure, 2 pi b = D; its numbers are not printed"
-        rows.append(own("Figure 7", f"smallest lambda, {name}, simple rule", simple, "", told))
+        note = "dotted line of the figure, 2 pi b = D; its numbers are not printed"
+        rows.append(own("Figure 7", f"smallest lambda, {name}, simple rule", simple, "", note))
         rows.append(
             own("Figure 7", f"smallest lambda, {name}, turns just touch", exact, "", "exact distance of neighbouring turns")
         )
-    told = "the text gives no size of the antenna; softrobots.helix.design_antenna makes one from radius, rise and turns"
-    rows.append(absent(UNPUBLISHED, "Figure 1", "the helical antenna", note=told))
+    note = "the text gives no size of the antenna; softrobots.helix.design_antenna makes one from radius, rise and turns"
+    rows.append(absent(UNPUBLISHED, "Figure 1", "the helical antenna", note=note))
     return rows
 
 
 def grasping() -> list[Row]:
     """Section III-C: the grasped cylinder and Figure 9."""
     test = PAPER_CYLINDER
-    told = "1.5 turns of 8.0 cm rise are as high as the cylinder"
+    note = "1.5 turns of 8.0 cm rise are as high as the cylinder"
     rows = [
         rounded(
-            "section III-C", "height of the grasped cylinder", OBJECT_HEIGHT, 100.0 * test.turns * test.turn_height, "cm", told
+            "section III-C", "height of the grasped cylinder", OBJECT_HEIGHT, 100.0 * test.turns * test.turn_height, "cm", note
         ),
         taken(rounded("section III-C", "diameter of the cylinder", OBJECT_DIAMETER, 200.0 * test.object_radius, "cm")),
     ]
-    told = "printed for radii of helices that grip a cylinder of 4.0 cm diameter: half of it must be meant"
-    rows.append(erratum("section III-C", "largest inner radius", float(LARGEST_RADIUS), 100.0 * test.object_radius, "cm", told))
+    note = "printed for radii of helices that grip a cylinder of 4.0 cm diameter: half of it must be meant"
+    rows.append(erratum("section III-C", "largest inner radius", float(LARGEST_RADIUS), 100.0 * test.object_radius, "cm", note))
     pressures = np.linspace(0.0, 10e3, 6)[:, None]
     found = test.force(pressures)
     apart = float(found.unwrapping[-1, 0]) - 10e3 * _volume_lost()
-    told = "our V(L) by differences, 10 kPa; the paper gives no volume"
-    rows.append(equation("(18)", "F = P dV/dL for bound (a) of our model", abs(apart), "N", told, 1e-6))
+    note = "our V(L) by differences, 10 kPa; the paper gives no volume"
+    rows.append(equation("(18)", "F = P dV/dL for bound (a) of our model", abs(apart), "N", note, 1e-6))
     apart = largest(found.force * pressures[-1] - found.force[-1] * pressures)
     rows.append(taken(equation("Figure 9", "force linear in the pressure, our model", apart / 10e3, "N", "0 to 10 kPa")))
-    told = "bound (b) of our model"
+    note = "bound (b) of our model"
     apart = largest(found.force[:, 0])
-    rows.append(taken(equation("Figure 9", "no force where the radius is not deflected, our model", apart, "N", told)))
-    told = "our model, not the paper's; 10 kPa, D = 3.31 cm assumed. The paper's forces are not printed, and rise up to 4 mm"
+    rows.append(taken(equation("Figure 9", "no force where the radius is not deflected, our model", apart, "N", note)))
+    note = "our model, not the paper's; 10 kPa, D = 3.31 cm assumed. The paper's forces are not printed, and rise up to 4 mm"
     for depth, force in zip(test.deflections, found.force[-1], strict=True):
-        rows.append(own("Figure 9", f"force, deflected by {1e3 * depth:g} mm", float(force), "N", told))
+        rows.append(own("Figure 9", f"force, deflected by {1e3 * depth:g} mm", float(force), "N", note))
     raw = "pressures and forces of the test are not published"
     rows.append(
         absent(MEASURED, "Figure 9", "mean R^2 of force against pressure", R_SQUARED, note=f"{raw}; 1 in any model of (18)")
     )
     rows.append(absent(MEASURED, "Figure 9", "forces", note=raw))
     for depth in test.deflections:
-        made = helix.design_grasp(test.object_radius, test.turn_height, diameter=test.diameter, turns=test.turns, squeeze=depth)
-        told = "from (6) and (11); the paper does not print its actuators. D = 3.31 cm assumed"
+        result = helix.design_grasp(
+            test.object_radius, test.turn_height, diameter=test.diameter, turns=test.turns, squeeze=depth
+        )
+        note = "from (6) and (11); the paper does not print its actuators. D = 3.31 cm assumed"
         name = f"of the helix deflected by {1e3 * depth:g} mm"
-        rows.append(own("section III-C", f"lambda {name}", made.contraction, "", told))
-        rows.append(own("section III-C", f"theta {name}", float(np.degrees(made.angle)), "degrees", told))
+        rows.append(own("section III-C", f"lambda {name}", result.contraction, "", note))
+        rows.append(own("section III-C", f"theta {name}", float(np.degrees(result.angle)), "degrees", note))
     return rows
 
 

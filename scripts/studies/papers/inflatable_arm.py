@@ -47,7 +47,7 @@ _TUBE = {"length": 1e-3 * float(LENGTH), "radius": 1e-3 * float(RADIUS), "wall_t
 def sizes() -> list[Row]:
     """Sizes of the prototype and of the robot."""
     robot, test = InflatableArm(), BendingTest()
-    made = {
+    result = {
         "length L of a link": (LENGTH, robot.link_lengths),
         "radius r": (RADIUS, robot.radius),
         "wall thickness t": (WALL, robot.wall_thickness),
@@ -55,7 +55,7 @@ def sizes() -> list[Row]:
     }
     rows = [
         taken(rounded("section 3" if name[0] != "f" else "section 4", name, printed, 1e3 * float(np.ravel(value)[0]), "mm"))
-        for name, (printed, value) in made.items()
+        for name, (printed, value) in result.items()
     ]
     rows.append(taken(rounded("section 4", "distance h of the probe", PROBE, 1e3 * test.probe_distance, "mm")))
     litres = 1e3 * robot.tank_volume(TANK_PRESSURE)
@@ -77,8 +77,8 @@ def deflection() -> list[Row]:
     load = {"pressure": 50e3, "young_modulus": 138e6}
     ours = float(inflated_beam.deflection(_TUBE["length"], 10.0, **_TUBE, **load))
     printed = deflection_as_printed(_TUBE["length"], 10.0, **load)
-    told = "printed + x^3/6, must be -: a cantilever has v(l) = F l^3/(3 E I) and shear. 10 N, 50 kPa, 138 MPa, nu = 0.3"
-    rows = [erratum("(1)", "deflection of the tip", 1e3 * printed, 1e3 * ours, "mm", told)]
+    note = "printed + x^3/6, must be -: a cantilever has v(l) = F l^3/(3 E I) and shear. 10 N, 50 kPa, 138 MPa, nu = 0.3"
+    rows = [erratum("(1)", "deflection of the tip", 1e3 * printed, 1e3 * ours, "mm", note)]
     stiffness = float(MEAN_STIFFNESS)
 
     def modulus(pressure: float, ratio: float) -> float:
@@ -87,16 +87,16 @@ def deflection() -> list[Row]:
 
     low, high = MODULUS_RANGE
     at = {pressure: f"E from the mean k at {pressure / 1e3:g} kPa" for pressure in MODULUS_RANGE}
-    told = "assumed, the paper does not say: force at the full length, theta = v/L, G = E/(2(1 + nu)), "
-    rows.append(rounded("section 4", at[low], MODULUS_RANGE[low], modulus(low, 0.3), "MPa", told + "nu = 0.3"))
+    note = "assumed, the paper does not say: force at the full length, theta = v/L, G = E/(2(1 + nu)), "
+    rows.append(rounded("section 4", at[low], MODULUS_RANGE[low], modulus(low, 0.3), "MPa", note + "nu = 0.3"))
     why = "nu = 0.3; allowed: 1 MPa. Within the printed range, but 137 by rounding: cut, or another nu (next rows)"
     rows.append(within("section 4", at[high], MODULUS_RANGE[high], modulus(high, 0.3), 1.0, "MPa", why))
     for pressure, text in MODULUS_RANGE.items():
-        told = "the same with nu = 0.25; any nu from 0.20 to 0.25 rounds to both prints"
-        rows.append(rounded("section 4", at[pressure], text, modulus(pressure, POISSON_RATIO), "MPa", told))
+        note = "the same with nu = 0.25; any nu from 0.20 to 0.25 rounds to both prints"
+        rows.append(rounded("section 4", at[pressure], text, modulus(pressure, POISSON_RATIO), "MPa", note))
     twice = 1e-6 * _modulus_as_printed(stiffness, low)
-    told = "with the printed sign; the paper's own 140 MPa needs the minus"
-    rows.append(erratum("(1)", at[low], twice, modulus(low, 0.3), "MPa", told))
+    note = "with the printed sign; the paper's own 140 MPa needs the minus"
+    rows.append(erratum("(1)", at[low], twice, modulus(low, 0.3), "MPa", note))
     return rows
 
 
@@ -114,14 +114,14 @@ def table_3() -> list[Row]:
         for row, text in zip(TABLE_3, WRINKLING_MOMENTS, strict=True)
     ]
     stiffness = [row.stiffness for row in TABLE_3]
-    told = "of the six printed k; those are measured"
-    rows.append(rounded("section 4", "mean stiffness", MEAN_STIFFNESS, float(np.mean(stiffness)), "N m/rad", told))
+    note = "of the six printed k; those are measured"
+    rows.append(rounded("section 4", "mean stiffness", MEAN_STIFFNESS, float(np.mean(stiffness)), "N m/rad", note))
     for name, text, value in zip(("smallest", "largest"), STIFFNESS_RANGE, (min(stiffness), max(stiffness)), strict=True):
-        rows.append(taken(rounded("section 4", f"{name} stiffness", text, value, "N m/rad", told)))
+        rows.append(taken(rounded("section 4", f"{name} stiffness", text, value, "N m/rad", note)))
     moments = {row.pressure: row.max_moment for row in TABLE_3 if row.max_moment is not None}
     share = min(moment / inflated_beam.wrinkling_moment(pressure, radius) for pressure, moment in moments.items())
-    told = "above 1 in all five rows: the largest moment lies beyond the first wrinkle"
-    rows.append(own("Table 3", "smallest M_max / M_w", share, "", told, "follows the trend"))
+    note = "above 1 in all five rows: the largest moment lies beyond the first wrinkle"
+    rows.append(own("Table 3", "smallest M_max / M_w", share, "", note, "follows the trend"))
     raw = "force and displacement of the tests are not published, so the regression cannot be repeated"
     columns: dict[str, tuple[str, list[str]]] = {
         "k": ("N m/rad", [f"{row.stiffness:.2f}" for row in TABLE_3]),
@@ -130,12 +130,12 @@ def table_3() -> list[Row]:
     }
     for name, (unit, texts) in columns.items():
         rows.append(absent(MEASURED, "Table 3", name, f"{texts[0]} ... {texts[-1]}", unit, raw))
-    told = f"exact geometry of the test evaluated for small angles, as the paper does; its sigma_k is {_std():.1f} % or more"
-    rows.append(own("section 4", "largest error of k by small angles", 100.0 * _small_angle_error(), "%", told))
+    note = f"exact geometry of the test evaluated for small angles, as the paper does; its sigma_k is {_std():.1f} % or more"
+    rows.append(own("section 4", "largest error of k by small angles", 100.0 * _small_angle_error(), "%", note))
     rows.append(absent(MEASURED, "Figure 9", "points of the tests", note=raw))
     knee = max(moment / row.stiffness for row, moment in zip(TABLE_3, moments.values(), strict=False))
-    told = "of the curves tau = min(k theta, M_max) from Table 3, see the picture; the paper prints no number"
-    rows.append(own("Figure 9", "largest angle of a knee, M_max / k", knee, "rad", told))
+    note = "of the curves tau = min(k theta, M_max) from Table 3, see the picture; the paper prints no number"
+    rows.append(own("Figure 9", "largest angle of a knee, M_max / k", knee, "rad", note))
     return rows
 
 
@@ -147,14 +147,14 @@ def springs() -> list[Row]:
     moment, radius = float(LARGEST_MOMENT), _TUBE["radius"]
     tabulated = inflated_beam.required_tabulated_pressure(moment, radius)
     if tabulated is not None:
-        told = "the first pressure of Table 3 whose M_w is above 17.51 N m"
-        rows.append(rounded("section 4", "pressure for 17.51 N m", PRESSURE, 1e-3 * tabulated, "kPa", told))
+        note = "the first pressure of Table 3 whose M_w is above 17.51 N m"
+        rows.append(rounded("section 4", "pressure for 17.51 N m", PRESSURE, 1e-3 * tabulated, "kPa", note))
     exact = 1e-3 * inflated_beam.required_pressure(moment, radius)
     rows.append(own("(3)", "pressure for 17.51 N m, exact", exact, "kPa", "M_w = 17.51 N m", ">= 50"))
     size = float(np.linalg.norm(FORCE))
     reach = 2.0 * _TUBE["length"] - 1e-3 * float(HINGE)
-    told = f"of the load of 18.03 N about the hinge of link 1, at least; it can be, the arm beyond is {reach:g} m long"
-    rows.append(own("section 4", "lever arm that 17.51 N m needs", moment / size, "m", told))
+    note = f"of the load of 18.03 N about the hinge of link 1, at least; it can be, the arm beyond is {reach:g} m long"
+    rows.append(own("section 4", "lever arm that 17.51 N m needs", moment / size, "m", note))
     return rows
 
 

@@ -69,9 +69,9 @@ def pose(segment: Segment) -> FloatArray:
 def second_pose(segment: Segment) -> FloatArray:
     """(16): the transform of the second segment, shape (n, 4, 4), with `r_2 (alpha_2 + pi/3)(1 - cos alpha_2)` for its x."""
     r, _, alpha = segment
-    made = pose(Segment(r, segment.bending, alpha + OFFSET))
-    made[..., 0, 3] = r * (alpha + OFFSET) * (1 - np.cos(alpha))
-    return made
+    result = pose(Segment(r, segment.bending, alpha + OFFSET))
+    result[..., 0, 3] = r * (alpha + OFFSET) * (1 - np.cos(alpha))
+    return result
 
 
 def second_tip(first: Segment, second: Segment) -> FloatArray:

@@ -77,13 +77,13 @@ def one_segment() -> list[Row]:
     ]
     example, shape = _example()
     height, right = float(printed.tip_height(example[0])), float(cc.transform(shape[0], "bending_plane")[2, 3])
-    told = "printed r sin alpha, must be r sin theta, as in (9) and (14); our example"
-    rows.append(erratum("(8)", "height of the tip", height, right, "m", told))
+    note = "printed r sin alpha, must be r sin theta, as in (9) and (14); our example"
+    rows.append(erratum("(8)", "height of the tip", height, right, "m", note))
     rows.append(equation("(11)-(13)", "rotation as a product", largest(ours[:, :3, :3] - rotation), "", _RANDOM))
     rows.append(equation("(14), (15)", "transform, all entries", largest(ours - printed.pose(segment)), "m", _RANDOM))
-    told = "the frame of (14) turns with the azimuth, a body without twist does not; our example"
+    note = "the frame of (14) turns with the azimuth, a body without twist does not; our example"
     angle = float(np.degrees(_angle(cc.transform(shape[0]), cc.transform(shape[0], "bending_plane"))))
-    rows.append(own("(14)", "turn between the paper's frame and that of the body", angle, "degrees", told))
+    rows.append(own("(14)", "turn between the paper's frame and that of the body", angle, "degrees", note))
     return rows
 
 
@@ -96,26 +96,26 @@ def two_segments() -> list[Row]:
     example, shape = _example()
     tip = cc.chain_transform(shape, frame="bending_plane")[:3, 3]
     turned = cc.transform(Arc(shape[1].length, shape[1].bending, shape[1].azimuth + printed.OFFSET), "bending_plane")
-    told = f"printed r2 (a2 + pi/3)(1 - cos a2), must be r2 cos(a2 + pi/3)(1 - cos t2); {_SURE}; our example"
+    note = f"printed r2 (a2 + pi/3)(1 - cos a2), must be r2 cos(a2 + pi/3)(1 - cos t2); {_SURE}; our example"
     rows.append(
-        erratum("(16)", "x of the second segment", float(printed.second_pose(example[1])[0, 3]), float(turned[0, 3]), "m", told)
+        erratum("(16)", "x of the second segment", float(printed.second_pose(example[1])[0, 3]), float(turned[0, 3]), "m", note)
     )
     x, _, z = (float(number) for number in printed.second_tip(*example))
-    told = f"no term r1 cos a1 (1 - cos t1), and cos a1 sin t1 sin t2 with a minus; {_SURE}; our example"
-    rows.append(erratum("(17)", "x of the tip", x, float(tip[0]), "m", told))
+    note = f"no term r1 cos a1 (1 - cos t1), and cos a1 sin t1 sin t2 with a minus; {_SURE}; our example"
+    rows.append(erratum("(17)", "x of the tip", x, float(tip[0]), "m", note))
     apart = largest(printed.second_tip(one, two)[:, 1] - ours[:, 1, 3])
     rows.append(equation("(18)", "y of the tip", apart, "m", _RANDOM))
-    told = "printed cos t1 cos t2 in the end, must be cos t1 sin t2; our example"
-    rows.append(erratum("(19)", "z of the tip", z, float(tip[2]), "m", told))
+    note = "printed cos t1 cos t2 in the end, must be cos t1 sin t2; our example"
+    rows.append(erratum("(19)", "z of the tip", z, float(tip[2]), "m", note))
     body = cc.chain_transform(shape)[:3, 3]
     names = ("x", "y", "z")
-    told = "lengths (0.50, 0.53, 0.55 | 0.54, 0.51, 0.52) m, d = 0.04 m, all ours"
+    note = "lengths (0.50, 0.53, 0.55 | 0.54, 0.51, 0.52) m, d = 0.04 m, all ours"
     rows += [
-        own("(15), (16)", f"{name} of the tip, frames of (14)", float(value), "m", told)
+        own("(15), (16)", f"{name} of the tip, frames of (14)", float(value), "m", note)
         for name, value in zip(names, tip, strict=True)
     ]
     rows += [
-        own("section 3", f"{name} of the tip, body without twist", float(value), "m", told)
+        own("section 3", f"{name} of the tip, body without twist", float(value), "m", note)
         for name, value in zip(names, body, strict=True)
     ]
     return rows
@@ -137,19 +137,19 @@ def muscles() -> list[Row]:
     rows.append(equation("(26), (27)", "proportion of the differences", largest(left - right), "m", _RANDOM))
     example, _ = _example()
     sides = printed.tangent_balance(LENGTHS[0], example[0].azimuth)
-    told = f"left side of the equation; printed (l1 - l3) - (l1 - l2), must be the other way round; {_SURE}; (31) is right"
-    rows.append(erratum("(30)", "balance that gives the tangent", float(sides[0]), float(sides[1]), "m", told))
+    note = f"left side of the equation; printed (l1 - l3) - (l1 - l2), must be the other way round; {_SURE}; (31) is right"
+    rows.append(erratum("(30)", "balance that gives the tangent", float(sides[0]), float(sides[1]), "m", note))
     found = cc.arc_from_muscles(lengths, DISTANCE)
     apart = largest(np.sin(found.azimuth) - printed.tangent(lengths) * np.cos(found.azimuth))
-    told = "sin = tan cos, as the tangent itself grows without limit"
-    rows.append(equation("(31)", "tangent of the azimuth", apart, "", told, 1e-10))
+    note = "sin = tan cos, as the tangent itself grows without limit"
+    rows.append(equation("(31)", "tangent of the azimuth", apart, "", note, 1e-10))
     # The root of (41) cancels: 1e-16 of 0.8 m^2 over twice the root of 1e-4 m^2 or more.
     apart = largest(np.stack([np.cos(found.azimuth) - printed.cosine(lengths), np.sin(found.azimuth) - printed.sine(lengths)]))
     rows.append(equation("(32), (33)", "cosine and sine of the azimuth", apart, "", _RANDOM, 1e-10))
     behind = cc.muscles_from_arc(Arc(*np.array((0.5, 1.0, np.radians(150.0)))), DISTANCE)
-    told = "a plain arctangent loses the quadrant; atan2 of (33) and (32) keeps it. Bent towards 150 degrees, ours"
+    note = "a plain arctangent loses the quadrant; atan2 of (33) and (32) keeps it. Bent towards 150 degrees, ours"
     plain, whole = np.degrees(printed.azimuth(behind)), np.degrees(cc.arc_from_muscles(behind, DISTANCE).azimuth)
-    rows.append(erratum("(34)", "azimuth", float(plain), float(whole), "degrees", told))
+    rows.append(erratum("(34)", "azimuth", float(plain), float(whole), "degrees", note))
     apart = largest(arc.length[:, None] / segment.radius[:, None] - lengths / (segment.radius[:, None] - DISTANCE * cosines))
     rows.append(equation("(35), (36)", "bending from any muscle, l/r = l_i/r_i", apart, "rad", _RANDOM))
     apart = largest(segment.radius[:, None] * (arc.length[:, None] - lengths) - arc.length[:, None] * DISTANCE * cosines)
@@ -157,8 +157,8 @@ def muscles() -> list[Row]:
     rows.append(equation("(39)", "length of the backbone", largest(found.length - printed.length(lengths)), "m", _RANDOM))
     clear = np.abs(np.cos(arc.azimuth)) > 0.2
     apart = largest((found.length / found.bending / printed.radius(lengths, DISTANCE) - 1.0)[clear])
-    told = "relative; 0/0 where the first muscle keeps the length of the backbone: |cos alpha| > 0.2"
-    rows.append(equation("(40)", "radius of curvature", apart, "", told, 1e-10))
+    note = "relative; 0/0 where the first muscle keeps the length of the backbone: |cos alpha| > 0.2"
+    rows.append(equation("(40)", "radius of curvature", apart, "", note, 1e-10))
     apart = largest(found.bending - printed.bending(lengths, DISTANCE))
     rows.append(equation("(41)", "bending angle", apart, "rad", f"{_RANDOM}; the root cancels near straight", 1e-10))
     return rows
@@ -167,12 +167,12 @@ def muscles() -> list[Row]:
 def _random(count: int) -> list[tuple[Segment, Arc]]:
     """Random segments, in the paper's terms and in ours."""
     random = np.random.default_rng(524)
-    made = []
+    result = []
     for _ in range(count):
         length, bending = random.uniform(0.45, 0.6, _CASES), random.uniform(0.2, 2.5, _CASES)
         azimuth = random.uniform(-np.pi, np.pi, _CASES)
-        made.append((Segment(length / bending, bending, azimuth), Arc(length, bending, azimuth)))
-    return made
+        result.append((Segment(length / bending, bending, azimuth), Arc(length, bending, azimuth)))
+    return result
 
 
 def _example() -> tuple[tuple[Segment, Segment], tuple[Arc, Arc]]:

@@ -60,12 +60,12 @@ def two_segments() -> Any:
         "torsion_free": ("body without twist", COLOURS[0], "-"),
         "bending_plane": ("frames of (14)", COLOURS[1], "--"),
     }
-    for frame, (told, colour, style) in styles.items():
+    for frame, (note, colour, style) in styles.items():
         base, end = cc.chain_transforms(arcs, frame=frame)
         turn = base[:3, :3] @ pcc_equations.about_z(np.asarray(pcc_equations.OFFSET))
         parts = [cc.backbone(arcs[0], fractions), base[:3, 3] + cc.backbone(arcs[1], fractions) @ turn.T]
         for number, (points, face) in enumerate(zip(parts, (colour, "white"), strict=True)):
-            label = f"segment 2, {told}" if number else None
+            label = f"segment 2, {note}" if number else None
             shade = "0.25" if number == 0 else colour
             left.plot(*points.T, color=shade, lw=3.0 if number == 0 else 2.2, ls="-" if number == 0 else style, label=label)
             left.plot(*points[-1:].T, color=shade, marker="o", mfc=face if number else shade, ls="none")

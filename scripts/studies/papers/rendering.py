@@ -59,7 +59,7 @@ def csv(found: Rows) -> str:
 
 def as_json(found: Rows) -> str:
     """The comparison as JSON: the count by verdict, and the rows of each paper with whether they hold."""
-    made = {
+    result = {
         "failed": len(failed(found)),
         "count": count(found),
         "papers": {
@@ -67,7 +67,7 @@ def as_json(found: Rows) -> str:
             for name, rows in found.items()
         },
     }
-    return json.dumps(made, indent=1, allow_nan=False) + "\n"
+    return json.dumps(result, indent=1, allow_nan=False) + "\n"
 
 
 def failed(found: Rows) -> list[Row]:
@@ -85,15 +85,15 @@ def count(found: Rows) -> dict[str, int]:
 def legend() -> str:
     """What the verdicts mean, one a line."""
     width = max(map(len, KINDS))
-    return "\n".join(f"{kind:<{width}}  {told}" for kind, told in KINDS.items())
+    return "\n".join(f"{kind:<{width}}  {note}" for kind, note in KINDS.items())
 
 
 def summary(found: Rows) -> str:
     """The count by verdict, in a sentence."""
     total = sum(map(len, found.values()))
     wrong = len(failed(found))
-    told = ", ".join(f"{verdict} {number}" for verdict, number in count(found).items())
-    return f"{total} rows: {told}. " + ("Every claim holds." if wrong == 0 else f"{wrong} DO NOT HOLD.")
+    note = ", ".join(f"{verdict} {number}" for verdict, number in count(found).items())
+    return f"{total} rows: {note}. " + ("Every claim holds." if wrong == 0 else f"{wrong} DO NOT HOLD.")
 
 
 def _notes(rows: Sequence[Row], again: str) -> list[str]:

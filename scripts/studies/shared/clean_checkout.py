@@ -37,9 +37,9 @@ def copy_checkout(checkout: Path, folder: Path) -> None:
     Raises:
         OutputError: If the checkout is not one of git, or a file cannot be copied.
     """
-    asked = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     try:
-        listed = subprocess.run(asked, cwd=checkout, check=True, capture_output=True).stdout.decode().split("\0")
+        listed = subprocess.run(command, cwd=checkout, check=True, capture_output=True).stdout.decode().split("\0")
         names = {name for name in listed if (checkout / name).is_file() and folder not in (checkout / name).parents}
         for name in names:
             ours, copied = checkout / name, folder / name
@@ -71,11 +71,11 @@ def make_environment(copy: Path, python: str | Path, packages: Sequence[str], ou
         MissingDependency: If uv is not installed.
         OutputError: If the environment cannot be made; the file says why.
     """
-    made = copy / ".venv" / "bin" / "python"
+    result = copy / ".venv" / "bin" / "python"
     resolution = ["--resolution", "lowest-direct"] if lowest else []
-    install = ["pip", "install", "-q", "--compile-bytecode", "--python", str(made), *resolution, *packages]
-    for words in (["venv", "-q", "--python", str(python), str(made.parent.parent)], install):
-        asked = [find_uv(), *words]
-        if status := subprocess.run(asked, cwd=copy, stdout=output, stderr=output, check=False).returncode:
-            raise OutputError(f"{' '.join(asked)} failed with status {status}; see {output.name}")
-    return made
+    install = ["pip", "install", "-q", "--compile-bytecode", "--python", str(result), *resolution, *packages]
+    for words in (["venv", "-q", "--python", str(python), str(result.parent.parent)], install):
+        command = [find_uv(), *words]
+        if status := subprocess.run(command, cwd=copy, stdout=output, stderr=output, check=False).returncode:
+            raise OutputError(f"{' '.join(command)} failed with status {status}; see {output.name}")
+    return result

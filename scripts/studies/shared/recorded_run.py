@@ -49,8 +49,8 @@ def command_of(script: str, parser: argparse.ArgumentParser, arguments: argparse
         options: Names of those of one value that the result depends on; told where they are not what they are by default.
     """
     given = [(name, getattr(arguments, name)) for name in options]
-    told = [f"--{name} {value}" for name, value in given if value != parser.get_default(name)]
-    return " ".join([f"python scripts/{script}.py", *told])
+    text = [f"--{name} {value}" for name, value in given if value != parser.get_default(name)]
+    return " ".join([f"python scripts/{script}.py", *text])
 
 
 def write_record(

@@ -86,25 +86,25 @@ def draw_cases(family: Family, model: SoftModel, random: Random) -> Case:
 def draw_motors(model: SoftModel, random: Random) -> FloatArray:
     """Actuators: anywhere, at rest, with the elbow straight or folded, or with the tip on the axis of the first motor."""
     joints = len(model.structure.motor_joints)
-    made = np.array(model.relaxed_motors)
+    result = np.array(model.relaxed_motors)
     kind = random.integers(6)
     if kind:
-        made[:joints] = random.uniform(-math.pi, math.pi, joints)
-        muscles = len(made) - joints
+        result[:joints] = random.uniform(-math.pi, math.pi, joints)
+        muscles = len(result) - joints
         if model.muscle_input == "forces":
-            made[joints:] = _size(random, 400.0) * random.uniform(-1.0, 1.0, muscles)
+            result[joints:] = _size(random, 400.0) * random.uniform(-1.0, 1.0, muscles)
         elif muscles:
             drawn = model.actuators.draw(random)
-            made[joints:] = made[joints:] if drawn is None else drawn[joints:] * (1.0 + random.choice([0.0, 1e-9]))
+            result[joints:] = result[joints:] if drawn is None else drawn[joints:] * (1.0 + random.choice([0.0, 1e-9]))
     if kind == 2:
-        made[min(2, joints) : joints] = 0.0
+        result[min(2, joints) : joints] = 0.0
     if kind == 3 and joints:
-        made[joints - 1] = random.choice([-1.0, 1.0]) * (math.pi - random.choice([0.0, 1e-9, 1e-3]))
+        result[joints - 1] = random.choice([-1.0, 1.0]) * (math.pi - random.choice([0.0, 1e-9, 1e-3]))
     if kind == 4 and joints > 1:  # upright: the tip is on the axis of motor 1
-        made[1], made[2:joints] = random.choice([-0.5, 0.5]) * math.pi, 0.0
+        result[1], result[2:joints] = random.choice([-0.5, 0.5]) * math.pi, 0.0
     if kind == 5 and joints == 3:  # bent, and on the axis all the same: links of equal length
-        made[2] = (math.pi - 2.0 * made[1] + math.pi) % (2.0 * math.pi) - math.pi
-    return made
+        result[2] = (math.pi - 2.0 * result[1] + math.pi) % (2.0 * math.pi) - math.pi
+    return result
 
 
 def _size(random: Random, largest: float) -> float:
@@ -118,10 +118,10 @@ def _size(random: Random, largest: float) -> float:
 def _direction(random: Random) -> FloatArray:
     """Anywhere, along an axis, or next to one."""
     kind = random.integers(6)
-    made = random.normal(size=3)
+    result = random.normal(size=3)
     if kind < 2:
-        made = random.choice([-1.0, 1.0]) * np.eye(3)[random.integers(3)] + 10.0 ** random.uniform(-15, -2) * kind * made
-    return np.asarray(made / np.linalg.norm(made))
+        result = random.choice([-1.0, 1.0]) * np.eye(3)[random.integers(3)] + 10.0 ** random.uniform(-15, -2) * kind * result
+    return np.asarray(result / np.linalg.norm(result))
 
 
 @cache

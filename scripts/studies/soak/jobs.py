@@ -152,9 +152,9 @@ def estimate(family: Family, statics: PlainStatics, case: Case, rows: Sequence[i
         found = estimate_load(statics.model, motors, torques, gravity=gravity)
         size = 1e-10 * max(float(np.linalg.norm(torques)), 1e-3)
         hidden = len(found.unobservable_directions) > 0
-        told = _told(found.equilibrium, found.iterations)
-        told["claims"] = {"tip": found.equilibrium.tip_position} | ({} if hidden else {"motor_torques": torques})
-        return told | {"changed": {"forces": found.force}, "within": 1e-9 + 2.0 * size}
+        text = _told(found.equilibrium, found.iterations)
+        text["claims"] = {"tip": found.equilibrium.tip_position} | ({} if hidden else {"motor_torques": torques})
+        return text | {"changed": {"forces": found.force}, "within": 1e-9 + 2.0 * size}
 
     return [_asked(row, ask) for row in rows]
 
@@ -172,12 +172,12 @@ def reach(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]
     def ask(row: int) -> dict[str, Any]:
         target = _target(statics, case, row)
         found = solve_ik(statics.model, target, case.forces[row], gravity=_gravity(case, row), starts=STARTS)
-        told = _told(found.equilibrium, found.iterations)
-        told["claims"]["tip"] = target
+        text = _told(found.equilibrium, found.iterations)
+        text["claims"]["tip"] = target
         low, high = statics.model.motor_limits.T
         if np.any((found.q_motors < low) | (found.q_motors > high)):
-            told["broken"] = "a motor beyond its limits"
-        return told | {"changed": {"motors": found.q_motors}, "within": 2e-9}
+            text["broken"] = "a motor beyond its limits"
+        return text | {"changed": {"motors": found.q_motors}, "within": 2e-9}
 
     return [_asked(row, ask) for row in rows]
 
@@ -191,10 +191,10 @@ Ask = Callable[[CompiledModel, Any, FloatArray | None], Any]
 
 
 def _asked_together(
-    family: Family, statics: PlainStatics, case: Case, rows: Sequence[int], ask: Ask, told: Callable[..., dict[str, Any]]
+    family: Family, statics: PlainStatics, case: Case, rows: Sequence[int], ask: Ask, text: Callable[..., dict[str, Any]]
 ) -> list[Answer]:
     """Ask a batch of the cases with weight, and one of those without."""
-    made: list[Answer] = []
+    result: list[Answer] = []
     chosen = np.array(rows)
     heavy = case.gravity[chosen].any(axis=1)
     for weight in (False, True):
@@ -206,7 +206,7 @@ def _asked_together(
             with limited(_TOGETHER):
                 batch = ask(_compiled(statics.model, family.compiler), part, case.gravity[part[0]] if weight else None)
         except (Exception, Hang) as error:
-            made += [Answer(row, type(error).__name__, broken=f"a batch raises {error!r}") for row in part.tolist()]
+            result += [Answer(row, type(error).__name__, broken=f"a batch raises {error!r}") for row in part.tolist()]
             continue
         seconds = (time.perf_counter() - begun) / len(part)
         errors = ("residual", "unexplained", "tip_error")  # infinite where there is no answer
@@ -214,10 +214,10 @@ def _asked_together(
             certified = bool(batch.certified[place])
             numbers = [np.asarray(getattr(batch, name))[place] for name in vars(batch) if certified or name not in errors]
             fine = all(np.isfinite(one).all() for one in numbers)
-            said = {"springs": batch.q_springs[place], **told(batch, place)} if certified else {}
+            said = {"springs": batch.q_springs[place], **text(batch, place)} if certified else {}
             outcome = STABLE if certified else Status(int(batch.status[place])).name
-            made.append(Answer(row, outcome, seconds=seconds, broken="" if fine else "a number that is not finite", **said))
-    return made
+            result.append(Answer(row, outcome, seconds=seconds, broken="" if fine else "a number that is not finite", **said))
+    return result
 
 
 def batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
@@ -250,12 +250,12 @@ def estimate_batch(family: Family, statics: PlainStatics, case: Case, rows: Sequ
         asked[:] = part.tolist()
         return fast.estimate_loads(case.motors[part], measured[part], gravity=gravity)
 
-    def told(found: Any, place: int) -> dict[str, Any]:
+    def text(found: Any, place: int) -> dict[str, Any]:
         torques = measured[asked[place]]
         size = 1e-10 * max(float(np.linalg.norm(torques)), 1e-3)
         return {"claims": {"motor_torques": torques}, "changed": {"forces": found.forces[place]}, "within": 1e-9 + 2.0 * size}
 
-    return _asked_together(family, statics, case, rows, ask, told)
+    return _asked_together(family, statics, case, rows, ask, text)
 
 
 def reach_batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:

@@ -278,8 +278,8 @@ def _turns(axis: FloatArray, angles: FloatArray) -> FloatArray:
     """Rotations about an axis, shape (n, 3, 3)."""
     x, y, z = axis
     spin = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    made = np.eye(3) + np.sin(angles)[:, None, None] * spin + (1.0 - np.cos(angles))[:, None, None] * (spin @ spin)
-    return np.asarray(made)
+    result = np.eye(3) + np.sin(angles)[:, None, None] * spin + (1.0 - np.cos(angles))[:, None, None] * (spin @ spin)
+    return np.asarray(result)
 
 
 def _null_space(rows: FloatArray) -> FloatArray:

@@ -55,12 +55,12 @@ def parts_of(cases: int, families: Sequence[Family]) -> list[Part]:
         The parts, dear ones first, so that no process ends long after the others.
     """
     whole = sum(family.share for family in families)
-    made: list[Part] = []
+    result: list[Part] = []
     for family in sorted(families, key=lambda family: family.chunk):
         count = max(round(cases * family.share / whole), 1)
         for chunk in range(math.ceil(count / family.chunk)):
-            made.append(Part(family.name, chunk, min(family.chunk, count - family.chunk * chunk)))
-    return made
+            result.append(Part(family.name, chunk, min(family.chunk, count - family.chunk * chunk)))
+    return result
 
 
 def soak(
@@ -185,10 +185,10 @@ def table(tallies: Mapping[str, Tally]) -> str:
     return "\n".join([*lines, _row("**all**", whole)])
 
 
-def _row(told: str, tally: Tally) -> str:
+def _row(text: str, tally: Tally) -> str:
     errors = {name: count for name, count in sorted(tally.outcomes.items()) if name not in (STABLE, UNSTABLE)}
     cells = [
-        told,
+        text,
         f"{tally.cases:,}".replace(",", " "),
         f"{tally.outcomes[STABLE]:,}".replace(",", " "),
         str(tally.outcomes[UNSTABLE]),

@@ -95,7 +95,7 @@ def judge(family: Family, seed: int, chunk: int, rows: Sequence[int]) -> tuple[T
         found = [answer.broken] if answer.broken else []
         if answer.iterations > MOST_ITERATIONS:
             found.append(f"{answer.iterations} iterations")
-        tally.broken += [(family.chunk * chunk + answer.row, told) for told in found]
+        tally.broken += [(family.chunk * chunk + answer.row, text) for text in found]
     answered = [answer for answer in answers if answer.springs is not None]
     if answered:
         _check(tally, family, chunk, statics, case, answered)
@@ -131,7 +131,7 @@ def _check(tally: Tally, family: Family, chunk: int, statics: PlainStatics, case
             softest, error = statics.softest(asked.row(place), springs[place])
             if (softest < -error) if answer.outcome == STABLE else (softest > error):
                 broken.append(f"said to be {answer.outcome}, least eigenvalue {softest:.3g} within {error:.1g}")
-        tally.broken += [(family.chunk * chunk + answer.row, told) for told in broken]
+        tally.broken += [(family.chunk * chunk + answer.row, text) for text in broken]
 
 
 def said(model: SoftModel, case: Case, answers: Sequence[Answer]) -> str:

@@ -57,8 +57,8 @@ def within_limits(option: str, angles: Sequence[float], limits: FloatArray) -> N
     """Refuse angles that are not finite or beyond limits, shape (n, 2) [rad]."""
     checked = finite_array(option, angles, (len(limits),), "rad")
     if np.any((checked < limits[:, 0]) | (checked > limits[:, 1])):
-        told = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in limits)
-        raise sr.ParameterError(option, list(angles), f"within the limits of the joints, {told} rad")
+        text = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in limits)
+        raise sr.ParameterError(option, list(angles), f"within the limits of the joints, {text} rad")
 
 
 def mounted(ur5: Path, arm: SoftArm, held: dict[str, float]) -> str:

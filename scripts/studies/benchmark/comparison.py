@@ -1,17 +1,17 @@
-"""A race: contenders added by name, timed in turn, compared in rows; who cannot take part is named with the reason."""
+"""Workloads that are timed in turn and compared in rows; those that cannot run are listed with the reason."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
-from studies.benchmark.measurement import Clock, Contender, interleaved, ratio, spread
+from studies.benchmark.measurement import Clock, Workload, interleaved, ratio, spread
 from studies.benchmark.results import Curve, Row
 
 
@@ -20,7 +20,7 @@ class Settings:
     """How much is measured."""
 
     rounds: int = 9
-    """Rounds of every race."""
+    """Rounds of every comparison."""
     batch: int = 100_000
     """Cases of a batch."""
     singles: int = 200
@@ -40,75 +40,72 @@ class Settings:
     shortest: float = 0.02
     """Least time of a turn [s]."""
     quick: bool = False
-    """Whether these are small sizes that say nothing of speed."""
+    """Whether these are small sizes for a test run."""
     progress: bool = False
     """Whether to show bars on stderr."""
-    cpp: bool = False
-    """Whether to compile C++."""
 
 
-def short_settings(rounds: int, progress: bool) -> Settings:
-    """Sizes that are done in seconds, and yet say how fast this machine is."""
-    return Settings(
-        rounds, batch=20_000, singles=50, waypoints=50, sections=20, memory=200_000, starts=2, sizes=(2, 5, 10),
-        batches=(1, 100, 10_000), progress=progress,
-    )  # fmt: skip
-
-
-def quick_settings(rounds: int, progress: bool, cpp: bool) -> Settings:
-    """Small sizes that run through everything; the figures mean nothing."""
+def quick_settings(rounds: int, progress: bool) -> Settings:
+    """Small sizes, to test that everything runs; the figures are meaningless."""
     return Settings(
         rounds, batch=200, singles=5, waypoints=20, sections=3, memory=20_000, starts=1, sizes=(2, 3), batches=(1, 50),
-        shortest=0.0, quick=True, progress=progress, cpp=cpp,
+        shortest=0.0, quick=True, progress=progress,
     )  # fmt: skip
+
+
+class Outcome(NamedTuple):
+    """Results of a job."""
+
+    rows: Sequence[Row] = ()
+    """The comparisons."""
+    curves: Sequence[Curve] = ()
+    """The curves."""
+    notes: Sequence[str] = ()
+    """Remarks for the page."""
 
 
 @dataclass
-class Race:
-    """Contenders, then their times."""
+class Comparison:
+    """Workloads that are timed in turn, and their times."""
 
     settings: Settings
     """How much is measured."""
     label: str
-    """What the progress bar says."""
+    """Label of the progress bar."""
     clock: Clock = time.process_time
-    """What to time with."""
-    contenders: dict[str, Contender] = field(default_factory=dict)
-    """Who takes part."""
+    """The clock."""
+    workloads: dict[str, Workload] = field(default_factory=dict)
+    """By name."""
     absent: dict[str, str] = field(default_factory=dict)
-    """Who does not, and why."""
+    """Reason by name of a workload that cannot run."""
     seconds: Mapping[str, FloatArray] = field(default_factory=dict)
     """Seconds a case by name, shape (rounds,), after `run`."""
 
-    def add(self, name: str, make: Callable[[], Contender]) -> None:
-        """Let a contender take part, or note why not: an extra is missing, there is no compiler, its answers are wrong."""
+    def add(self, name: str, make: Callable[[], Workload]) -> None:
+        """Add a workload, or note why it cannot run: an extra is missing, or its answers are wrong."""
         try:
-            self.contenders[name] = make()
+            self.workloads[name] = make()
         except SoftRobotsError as error:
             self.absent[name] = str(error)
 
-    def leave_out(self, name: str, reason: str) -> None:
-        """Note a contender that is not asked to take part."""
-        self.absent[name] = reason
-
-    def run(self) -> Race:
-        """Time everybody who takes part."""
+    def run(self) -> Comparison:
+        """Time the workloads."""
         progress: Any = self.label if self.settings.progress else False
         self.seconds = interleaved(
-            self.contenders, self.settings.rounds, clock=self.clock, shortest=self.settings.shortest, progress=progress
+            self.workloads, self.settings.rounds, clock=self.clock, shortest=self.settings.shortest, progress=progress
         )
         return self
 
     def cost(self, name: str) -> float | None:
-        """Median seconds a case, or None."""
+        """Return the median seconds a case, or None if it was not timed."""
         return spread(self.seconds[name]).median if name in self.seconds else None
 
     def cheaper(self, job: str, ours: str, baseline: str, bound: str = "", target: float | None = None) -> Row:
-        """How many times cheaper ours is."""
+        """Return the row of how many times cheaper `ours` is."""
         return self._row(job, ours, baseline, "times cheaper", bound, target, inverse=False)
 
     def costlier(self, job: str, ours: str, baseline: str, bound: str = "", target: float | None = None) -> Row:
-        """How many times as much ours costs."""
+        """Return the row of how many times as much `ours` costs."""
         return self._row(job, ours, baseline, "times as costly", bound, target, inverse=True)
 
     def _row(self, job: str, ours: str, baseline: str, unit: str, bound: str, target: float | None, *, inverse: bool) -> Row:
@@ -124,7 +121,7 @@ class Race:
 
 
 def figure(job: str, ours: str, unit: str, values: FloatArray | str, bound: str, target: float) -> Row:
-    """A row against nothing: a time or a size.
+    """Return a row without baseline: a time or a size.
 
     Args:
         job: What is done.
@@ -136,16 +133,16 @@ def figure(job: str, ours: str, unit: str, values: FloatArray | str, bound: str,
     """
     if isinstance(values, str):
         return Row(job, ours, "", unit, None, None, None, bound, target, None, None, "wall", values)
-    found = spread(np.asarray(values))
-    return Row(job, ours, "", unit, *found, bound, target, found.median if unit == "s" else None, None, "wall")
+    summary = spread(np.asarray(values))
+    return Row(job, ours, "", unit, *summary, bound, target, summary.median if unit == "s" else None, None, "wall")
 
 
 def curve(picture: str, label: str, costs: Mapping[int, float | None]) -> Curve | None:
-    """A curve of the costs that were measured, or None if there are none.
+    """Return a curve of the measured costs, or None if there are none.
 
     Args:
         picture: Which picture it belongs to.
-        label: What it is the cost of.
+        label: Label of the curve.
         costs: Seconds a case by size.
     """
     known = {size: cost for size, cost in costs.items() if cost is not None}
