@@ -100,11 +100,7 @@ def arc_from_strains(strains: Any) -> Arc:
 
 
 def checked_strains(strains: Any) -> FloatArray:
-    """Return section coordinates without twist as an array of shape (..., 4).
-
-    Raises:
-        ParameterError: As `arc_from_strains`.
-    """
+    """Return section coordinates without twist, shape (..., 4), or raise ParameterError."""
     checked = finite_array("strains", strains, None)
     if checked.ndim == 0 or checked.shape[-1] != 4:
         raise ParameterError("strains", strains, f"of shape (..., 4) (it has shape {checked.shape})")
@@ -116,11 +112,7 @@ def checked_strains(strains: Any) -> FloatArray:
 
 
 def checked_arc(arc: Arc) -> Arc:
-    """Return `arc`.
-
-    Raises:
-        ParameterError: If it is not an `Arc`.
-    """
+    """Return `arc` if it is an `Arc`, or raise ParameterError."""
     if not isinstance(arc, Arc):
         raise ParameterError("arc", arc, "an Arc")
     return arc

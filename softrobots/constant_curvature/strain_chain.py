@@ -18,7 +18,6 @@ undetermined when straight.) `|det J_b| = c^2 |cos u2 cos r2|` vanishes only whe
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -93,17 +92,6 @@ class SectionChain:
         return np.asarray(np.linalg.inv(self._jacobian))
 
 
-class JointMap(NamedTuple):
-    """Joint positions of a section and their derivatives with respect to the section coordinates."""
-
-    positions: FloatArray
-    """Joint positions `m`, shape (..., 6) [rad, rad, m, rad, rad, rad]."""
-    first: FloatArray
-    """First derivative, shape (..., 6, 4)."""
-    second: FloatArray
-    """Second derivative, symmetric in the last two, shape (..., 6, 4, 4)."""
-
-
 def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArray:
     """Return the joint positions of sections.
 
@@ -115,21 +103,6 @@ def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArra
         Shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad].
     """
     return SectionChain(z, rest_length).positions
-
-
-def joint_map(z: FloatArray, rest_length: FloatArray | float) -> JointMap:
-    """Return the joint positions of sections with first and second derivatives.
-
-    Args:
-        z: Section coordinates, shape (..., 4) [rad, rad, rad, m], in range (see `in_range`).
-        rest_length: Rest length of a section, shape (...) [m].
-
-    Returns:
-        Joint positions and derivatives.
-    """
-    chain = SectionChain(z, rest_length)
-    weights = (np.broadcast_to(unit, chain.positions.shape) for unit in np.eye(6))
-    return JointMap(chain.positions, chain.first, np.stack([chain.curvature(unit) for unit in weights], axis=-3))
 
 
 def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:

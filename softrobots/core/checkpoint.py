@@ -134,12 +134,7 @@ def discard(folder: str | os.PathLike[str]) -> None:
 
 
 def _has_case(folder: Path) -> bool:
-    """Whether a folder is a checkpoint, rather than new or empty.
-
-    Raises:
-        OutputExists: If it is a file, or contains files without a `case.json`.
-        OutputError: If it cannot be read.
-    """
+    """Whether a folder is a checkpoint rather than new or empty; raise OutputExists if it is neither."""
     try:
         if not folder.exists():
             return False

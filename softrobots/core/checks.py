@@ -58,11 +58,7 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
 
 
 def positive_array(name: str, value: Any, unit: str) -> FloatArray:
-    """Return `value` as an array of positive numbers, any shape.
-
-    Raises:
-        ParameterError: If a number is not finite or not positive.
-    """
+    """Return `value` as an array of finite positive numbers, any shape, or raise ParameterError."""
     array = finite_array(name, value, None, unit)
     if np.any(array < 1.0 / LARGEST):
         raise ParameterError(name, value, f"positive [{unit}]" + _too_small(bool(np.any(array <= 0.0))))
@@ -70,11 +66,7 @@ def positive_array(name: str, value: Any, unit: str) -> FloatArray:
 
 
 def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
-    """Return `value` as an array of non-negative numbers, any shape.
-
-    Raises:
-        ParameterError: If a number is not finite or is negative.
-    """
+    """Return `value` as an array of finite numbers, zero or positive, any shape, or raise ParameterError."""
     array = finite_array(name, value, None, unit)
     if np.any(array < 0.0):
         raise ParameterError(name, value, f"zero or positive [{unit}]")
@@ -82,11 +74,7 @@ def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
 
 
 def common_shape(name: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape to which arrays of these shapes broadcast.
-
-    Raises:
-        ParameterError: If they do not broadcast.
-    """
+    """Return the shape to which arrays of these shapes broadcast, or raise ParameterError."""
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError as error:
@@ -94,11 +82,7 @@ def common_shape(name: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def finite_number(name: str, value: Any, unit: str = "") -> float:
-    """Return `value` as a finite float.
-
-    Raises:
-        ParameterError: If it is not one.
-    """
+    """Return `value` as a finite float, or raise ParameterError."""
     requirement = "a finite number" + _unit_text(unit)
     if isinstance(value, _NOT_NUMBERS):
         raise ParameterError(name, value, requirement)
@@ -112,11 +96,7 @@ def finite_number(name: str, value: Any, unit: str = "") -> float:
 
 
 def positive_number(name: str, value: Any, unit: str = "") -> float:
-    """Return `value` as a finite positive float.
-
-    Raises:
-        ParameterError: If it is not one.
-    """
+    """Return `value` as a finite positive float, or raise ParameterError."""
     number = finite_number(name, value, unit)
     if number < 1.0 / LARGEST:
         raise ParameterError(name, value, "positive" + _unit_text(unit) + _too_small(number <= 0.0))
@@ -124,11 +104,7 @@ def positive_number(name: str, value: Any, unit: str = "") -> float:
 
 
 def non_negative_number(name: str, value: Any, unit: str = "") -> float:
-    """Return `value` as a finite non-negative float.
-
-    Raises:
-        ParameterError: If it is not one.
-    """
+    """Return `value` as a finite float, zero or positive, or raise ParameterError."""
     number = finite_number(name, value, unit)
     if number < 0.0:
         raise ParameterError(name, value, "zero or positive" + _unit_text(unit))
@@ -136,11 +112,7 @@ def non_negative_number(name: str, value: Any, unit: str = "") -> float:
 
 
 def positive_integer(name: str, value: Any, most: int | None = None) -> int:
-    """Return `value` as a positive integer, at most `most` if that is given.
-
-    Raises:
-        ParameterError: If it is not one.
-    """
+    """Return `value` as a positive integer, at most `most` if that is given, or raise ParameterError."""
     if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | np.integer) or value <= 0:
         raise ParameterError(name, value, "a positive integer")
     if most is not None and value > most:
@@ -149,11 +121,7 @@ def positive_integer(name: str, value: Any, most: int | None = None) -> int:
 
 
 def unit_vector(name: str, value: Any) -> FloatArray:
-    """Return the unit vector in the direction of `value`, shape (3,).
-
-    Raises:
-        ParameterError: If the shape differs, a number is not finite, or all are zero.
-    """
+    """Return the unit vector in the direction of `value`, shape (3,); raise ParameterError for zero or invalid vectors."""
     vector = finite_array(name, value, (3,))
     length = float(np.linalg.norm(vector))
     if length == 0.0:
@@ -162,22 +130,14 @@ def unit_vector(name: str, value: Any) -> FloatArray:
 
 
 def choice(name: str, value: Any, options: Sequence[str]) -> str:
-    """Return `value` if it is one of `options`.
-
-    Raises:
-        ParameterError: If it is not.
-    """
+    """Return `value` if it is one of `options`, or raise ParameterError."""
     if not isinstance(value, str) or value not in options:
         raise ParameterError(name, value, "one of " + ", ".join(map(repr, options)))
     return str(value)
 
 
 def listed(name: str, value: Any, count: int, requirement: str) -> list[Any]:
-    """Return a tuple, list or array of `count` elements as a list.
-
-    Raises:
-        ParameterError: If it is something else.
-    """
+    """Return a tuple, list or array of `count` elements as a list, or raise ParameterError."""
     if not isinstance(value, tuple | list | np.ndarray) or not np.iterable(value) or len(value) != count:
         raise ParameterError(name, value, requirement)
     return list(value)
@@ -190,11 +150,7 @@ def read_only(array: FloatArray) -> FloatArray:
 
 
 def increasing(name: str, values: FloatArray, unit: str) -> FloatArray:
-    """Return `values`, shape (n,), if they increase.
-
-    Raises:
-        ParameterError: If they do not.
-    """
+    """Return `values`, shape (n,), if they increase, or raise ParameterError."""
     if np.any(np.diff(values) <= 0.0):
         raise ParameterError(name, values, f"increasing [{unit}]")
     return values

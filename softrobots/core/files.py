@@ -186,11 +186,7 @@ def csv_text(names: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def _place(target: Path) -> Path:
-    """Resolve symbolic links.
-
-    Raises:
-        OutputError: If links form a loop.
-    """
+    """Resolve symbolic links; raise OutputError for a loop."""
     try:
         place = target.resolve() if target.is_symlink() else target
     except (OSError, RuntimeError) as error:  # RuntimeError: Python before 3.13
@@ -201,22 +197,13 @@ def _place(target: Path) -> Path:
 
 
 def _check_writable(folder: Path) -> None:
-    """Check that files can be created in a folder, before hours of work.
-
-    Raises:
-        OutputError: If permissions or a read-only disk prevent it.
-    """
+    """Raise OutputError if no files can be created in a folder, before hours of work."""
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids):
         raise OutputError(f"cannot write in {folder}: no permission, or a read-only disk")
 
 
 def _move_to_free_name(part: Path, place: Path) -> None:
-    """Rename a finished draft without replacing another file.
-
-    Raises:
-        OutputExists: If the name exists.
-        OSError: If the draft cannot be renamed.
-    """
+    """Rename a finished draft; raise OutputExists rather than replace another file."""
     taken = OutputExists(f"{place} exists; choose another name or allow overwriting")
     try:
         os.link(part, place)  # unlike a rename, this never replaces a file

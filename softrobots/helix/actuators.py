@@ -269,11 +269,7 @@ def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> Fl
 
 
 def _check_row(where: str, rows: Sequence[Sequence[float]], place: int) -> None:
-    """Check that a row is in range and continues the rows before it.
-
-    Raises:
-        FileFormatError: If it does not.
-    """
+    """Raise FileFormatError if a row is out of range or does not continue the rows before it."""
     pressure, share = rows[place]
     if not 0.0 < share <= 1.0:
         raise FileFormatError(f"{where}: contraction = {share!r}; a number in (0, 1] is required")

@@ -262,11 +262,7 @@ def within(value: FloatArray, limits: Limits | None, rounding: float) -> BoolArr
 
 
 def checked_limits(name: str, limits: Any, unit: str) -> Limits | None:
-    """Return `contraction_limits` or `angle_limits` as a pair of numbers, or None if that is given.
-
-    Raises:
-        ParameterError: If they are not a pair, not in order or out of range.
-    """
+    """Return limits as a pair in order and in range, or None if they are None, or raise ParameterError."""
     if limits is None:
         return None
     contraction = name == "contraction_limits"

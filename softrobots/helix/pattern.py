@@ -157,11 +157,7 @@ class Pattern:
 
 
 def checked_pattern(pattern: Any) -> Pattern:
-    """Return `pattern` if it is a `Pattern`.
-
-    Raises:
-        ParameterError: If it is not.
-    """
+    """Return `pattern` if it is a `Pattern`, or raise ParameterError."""
     if not isinstance(pattern, Pattern):
         raise ParameterError("pattern", pattern, "a Pattern (returned by helix.pinch_pattern)")
     return pattern

@@ -222,23 +222,14 @@ def measure(outer_arc: Any, inner_arc: Any, diameter: Any, turns: Any = 1.0) -> 
 
 
 def checked_actuator(contraction: Any, angle: Any, diameter: Any) -> Actuator:
-    """Return contraction, angle and diameter as arrays that broadcast.
-
-    Raises:
-        ParameterError: If the contraction is not in (0, 1], the angle not in [0, pi/2), the diameter not positive, or the
-            shapes do not broadcast.
-    """
+    """Return contraction, angle and diameter as arrays that broadcast, or raise ParameterError."""
     shares, angles, sizes = checked_contraction(contraction), checked_angle(angle), positive_array("diameter", diameter, "m")
     common_shape("diameter", shares.shape, angles.shape, sizes.shape)
     return Actuator(shares, angles, sizes)
 
 
 def checked_contraction(contraction: Any) -> FloatArray:
-    """Return contractions as an array.
-
-    Raises:
-        ParameterError: If one is not in (0, 1].
-    """
+    """Return contractions in (0, 1] as an array, or raise ParameterError."""
     shares = positive_array("contraction", contraction, "-")
     if np.any(shares > 1.0):
         raise ParameterError("contraction", contraction, CONTRACTION_RANGE)
@@ -246,11 +237,7 @@ def checked_contraction(contraction: Any) -> FloatArray:
 
 
 def checked_angle(angle: Any) -> FloatArray:
-    """Return angles of an actuator to the axis of the tube as an array.
-
-    Raises:
-        ParameterError: If one is not in [0, pi/2).
-    """
+    """Return angles of actuators to the axis of the tube, in [0, pi/2) rad, as an array, or raise ParameterError."""
     angles = finite_array("angle", angle, None, "rad")
     if np.any(angles < 0.0):
         raise ParameterError("angle", angle, "in [0, pi/2) rad; handedness is an argument of its own")
@@ -260,11 +247,7 @@ def checked_angle(angle: Any) -> FloatArray:
 
 
 def turning_sign(handedness: str) -> float:
-    """Return +1 for a right-handed helix, -1 for a left-handed one.
-
-    Raises:
-        ParameterError: If it is neither "right" nor "left".
-    """
+    """Return +1 for "right", -1 for "left", or raise ParameterError."""
     return 1.0 if choice("handedness", handedness, HANDEDNESS) == "right" else -1.0
 
 
@@ -274,11 +257,7 @@ def length_ratio(contraction: FloatArray, angle: FloatArray) -> FloatArray:
 
 
 def checked_shape(shape: Any) -> HelixShape:
-    """Return `shape` if it is a `HelixShape`.
-
-    Raises:
-        ParameterError: If it is something else.
-    """
+    """Return `shape` if it is a `HelixShape`, or raise ParameterError."""
     if not isinstance(shape, HelixShape):
         raise ParameterError("shape", shape, "a HelixShape (returned by helix.forward, or from its two radii and pitch)")
     return shape
