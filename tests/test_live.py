@@ -387,7 +387,7 @@ def test_a_robot_without_actuators_has_its_force_moved() -> None:
     tube = sr.load_model(sr.PccArm(segment_lengths=(0.3,), muscle_azimuths=()))
     state = sr.solve_equilibrium(tube, ())
     live, keys = LiveView(FakePage(), state), KeyMoves(state)
-    assert "force" in keys.told
+    assert "force" in keys.hint
     assert keys.press("x", live.wanted, live.start, state).force[0] > 0.0
     for key in ("t", "1", "+"):
         with pytest.raises(sr.ParameterError):

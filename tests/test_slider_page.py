@@ -92,7 +92,7 @@ def test_a_slider_of_one_of_four_muscles_takes_the_others_along() -> None:
         assert lengths[1] == pytest.approx(0.54, abs=1e-12)
         # Four muscles a quarter turn apart around one backbone: opposite ones have the same mean.
         assert lengths[0] + lengths[2] == pytest.approx(lengths[1] + lengths[3], abs=1e-9)
-        assert page._panel.wish.q_motors == pytest.approx(tuple(lengths), abs=1e-12)
+        assert page._panel.setting.q_motors == pytest.approx(tuple(lengths), abs=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ class SegmentBody:
         return np.asarray(self.poses[:, :3, 3])
 
     def surface(self, sides: int = 24) -> tuple[FloatArray, FloatArray]:
-        """Triangles of the tube around the backbone, closed at both ends.
+        """Return the triangles of the tube around the backbone, closed at both ends.
 
         Args:
             sides: Corners of its cross-section.
@@ -48,7 +48,7 @@ class SegmentBody:
         return tube(self.poses[:, :3, :3], self.backbone, self.radius, sides)
 
     def thinned(self, spacing: float) -> SegmentBody:
-        """The same body without frames that follow another within less than a spacing [m]; the last one stays."""
+        """Return the body without frames that follow another within less than a spacing [m]; the last one is kept."""
         steps = np.linalg.norm(np.diff(self.backbone, axis=0), axis=1)
         kept, run = [0], 0.0
         for number, step in enumerate(steps.tolist(), start=1):
@@ -56,13 +56,13 @@ class SegmentBody:
             if run >= spacing:
                 kept.append(number)
                 run = 0.0
-        if kept[-1] != len(steps):  # the last frame takes the place of the one before it, unless that is the first
+        if kept[-1] != len(steps):  # the last frame replaces the one before it, unless that is the first
             kept[max(len(kept) - 1, 1) :] = [len(steps)]
         chosen = {name: points[kept] for name, points in self.muscles.items()}
         return SegmentBody(self.number, self.poses[kept], self.radius, chosen, {n: p[kept] for n, p in self.lines.items()})
 
     def dome(self, sides: int = 24, rings: int = 6) -> tuple[FloatArray, FloatArray]:
-        """Triangles of half a ball on the end of the tube, the tip of a tube that everts there.
+        """Return the triangles of a hemisphere on the end of the tube, for the tip of an everting tube.
 
         Args:
             sides: Corners of its cross-section.
@@ -77,7 +77,7 @@ class SegmentBody:
         return tube(poses[:, :3, :3], poses[:, :3, 3], self.radius * np.cos(angle), sides)
 
     def muscle_surface(self, name: str, radius: float, sides: int = 8) -> tuple[FloatArray, FloatArray]:
-        """Triangles of a tube around a muscle or a line, as in `surface`.
+        """Return the triangles of a tube around a muscle or a line, as in `surface`.
 
         Args:
             name: The muscle, or the line.
@@ -88,16 +88,16 @@ class SegmentBody:
             Corners and triangles.
 
         Raises:
-            NameNotFound: If no muscle or line of the segment is called that.
+            NameNotFound: If the segment has no muscle or line of that name.
         """
-        there = self.muscles | self.lines
-        if name not in there:
-            raise NameNotFound("muscle", name, there)
-        return tube(self.poses[:, :3, :3], there[name], radius, sides)
+        lines = self.muscles | self.lines
+        if name not in lines:
+            raise NameNotFound("muscle", name, lines)
+        return tube(self.poses[:, :3, :3], lines[name], radius, sides)
 
 
 def tube(rotations: FloatArray, centres: FloatArray, radius: FloatArray | float, sides: int) -> tuple[FloatArray, FloatArray]:
-    """Triangles of a closed tube.
+    """Return the triangles of a closed tube.
 
     Args:
         rotations: Axes of each cross-section, which lies in x and y, shape (n, 3, 3).
@@ -125,17 +125,17 @@ def tube(rotations: FloatArray, centres: FloatArray, radius: FloatArray | float,
 
 
 def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:
-    """Shape of the body of a loaded robot; see `body_at`.
+    """Return the shape of the body of a loaded robot; see `body_at`.
 
     Args:
         equilibrium: The loaded robot.
-        points: Points a section, the start of the segment apart.
+        points: Points for each section, besides the start of the segment.
 
     Returns:
         The segments, base to tip; empty for a robot without sections.
 
     Raises:
-        ParameterError: If it is no equilibrium, or `points` is not positive.
+        ParameterError: If `equilibrium` is no Equilibrium, or `points` is not positive.
     """
     if not isinstance(equilibrium, Equilibrium):
         raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
@@ -143,16 +143,16 @@ def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:
 
 
 def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, points: int = 12) -> tuple[SegmentBody, ...]:
-    """Shape of the body at given coordinates: screw motions from the start of each segment along its sections.
+    """Return the shape of the body at given coordinates: screw motions along the sections of each segment.
 
-    For sections of constant strain this is exact. A lumped chain is drawn as the smooth body that it stands for, which its
-    rigid links follow to the order of the discretisation.
+    Exact for sections of constant strain. For a lumped chain it is the smooth body that the chain approximates, to the order
+    of the discretisation.
 
     Args:
         model: The robot.
         q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
         q_springs: Elastic coordinates, shape (n_springs,) [rad or m].
-        points: Points a section, the start of the segment apart.
+        points: Points for each section, besides the start of the segment.
 
     Returns:
         The segments, base to tip; empty for a robot without sections.
@@ -169,7 +169,7 @@ def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, point
     pin.forwardKinematics(pin_model, data, model.embed(model.coordinates.at(q_motors, q_springs).joints))
     coordinates = structure.section_coordinates(q_motors, q_springs)
     shares = np.arange(1, points + 1) / points
-    made = []
+    bodies = []
     for number in dict.fromkeys(section.segment for section in sections):
         rows = [row for row, section in enumerate(sections) if section.segment == number]
         pose = _start(model, data, rows[0])
@@ -183,8 +183,8 @@ def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, point
         frames = np.concatenate(poses)
         muscles = {tag.name: _along(frames, tag) for tag in structure.muscles if tag.segment == number}
         lines = {tag.name: _along(frames, tag) for tag in structure.lines if tag.segment == number}
-        made.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles, lines))
-    return tuple(made)
+        bodies.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles, lines))
+    return tuple(bodies)
 
 
 def _along(frames: FloatArray, tag: MuscleTag | LineTag) -> FloatArray:

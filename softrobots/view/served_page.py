@@ -1,4 +1,4 @@
-"""What every page that is served has: an address on loopback, a tunnel to it, and an end."""
+"""Base class of served pages: address on loopback, SSH tunnel, and closing."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from types import TracebackType
 from typing import TypeVar
 
 LOOPBACK = "127.0.0.1"
-"""The only address that is served."""
+"""The only address that pages are served on."""
 
-_LOOK = 0.2  # [s], between two looks at whether a page is still served
+_CHECK_INTERVAL = 0.2  # [s], between checks whether a page is still served
 
 _Page = TypeVar("_Page", bound="ServedPage")
 
@@ -45,21 +45,21 @@ class ServedPage(abc.ABC):
 
     @property
     def port(self) -> int:
-        """The port that is really used."""
+        """The port in use."""
         return urllib.parse.urlsplit(self.url).port or 0
 
     @property
     def tunnel(self) -> str:
-        """Command to type on another machine to see the page there, at the same address."""
+        """Command that makes the page reachable from another machine, at the same address."""
         return tunnel_to(self.port)
 
     def wait(self) -> None:
         """Serve until Ctrl-C or until the server ends."""
         with contextlib.suppress(KeyboardInterrupt):
             while self.serving:
-                time.sleep(_LOOK)
+                time.sleep(_CHECK_INTERVAL)
 
 
 def tunnel_to(port: int) -> str:
-    """Command to type on another machine that makes a port of this one's loopback reachable there, under the same number."""
+    """Return the SSH command that forwards a port of this machine's loopback to another machine, under the same number."""
     return f"ssh -L {port}:{LOOPBACK}:{port} {socket.gethostname()}"

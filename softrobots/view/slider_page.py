@@ -1,4 +1,4 @@
-"""A robot in the browser with sliders: motors or muscles, a force on the tip, gravity; every change is solved and drawn."""
+"""A robot in the browser with sliders for motors or muscles, tip force and gravity; every change is solved and drawn."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from softrobots.view.meshcat_page.stage import Stage
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import LOOPBACK, ServedPage
 from softrobots.view.viser_page.server import end_server, start_server
-from softrobots.view.viser_page.slider_panel import SliderPanel, Wish, round_down
+from softrobots.view.viser_page.slider_panel import Setting, SliderPanel, round_down
 from softrobots.view.viser_page.tree import ViserTree
 from softrobots.view.warm_start import next_equilibrium
 
-_BENDING = 0.25  # how far the largest force moves the tip of a relaxed robot, as far as it is linear, of the robot's size
+_BENDING = 0.25  # linear deflection of the relaxed tip under the largest force, of the robot's size
 _ANY_FORCE = 10.0  # [N], the largest force on a robot that does not bend
 _TRAIL = 2000  # most points of the path of the tip
 
@@ -31,9 +31,9 @@ _TRAIL = 2000  # most points of the path of the tip
 class SliderPage(ServedPage):
     """A page with sliders for one robot, served by viser on loopback only; a context manager that ends its server.
 
-    The equilibrium is solved anew at every change, from the one that is shown: a robot that has snapped through stays on its
-    branch until it is reset. While a solution is under way changes are not queued: the newest is taken up next. Where there is
-    no equilibrium, the page says so and keeps showing the last one.
+    The equilibrium is solved at every change, from the one that is shown: a robot that has snapped through stays on its branch
+    until it is reset. Changes during a solution are not queued: the newest is solved next. Where there is no equilibrium, the
+    page says so and keeps showing the last one.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class SliderPage(ServedPage):
             gravity: Gravity, shape (3,) [m/s^2], world axes, which can be switched off; by default it is off, and the Earth's
                 when it is switched on.
             port: Port of the page; the first free one from 8080 by default.
-            full_force: How far each slider of the force goes to both sides [N]; by default a round number that bends the robot
+            full_force: Largest force of each slider, to both sides [N]; by default a round number that bends the robot
                 visibly, or the largest component of `force` if that is more.
 
         Raises:
@@ -71,16 +71,16 @@ class SliderPage(ServedPage):
         self._full = _visible_force(model) if full_force is None else positive_number("full_force", full_force, "N")
         if full_force is None:
             self._full = max(self._full, float(np.abs(push).max()))
-        self._start = Wish(self._checked_motors(motors), self._checked_force(push), gravity is not None)
-        wished = None if port is None else positive_integer("port", port, 65535)
-        self._equilibrium = self._cold(self._start)
-        self._last: Wish | None = self._start
+        self._start = Setting(self._checked_motors(motors), self._checked_force(push), gravity is not None)
+        wanted_port = None if port is None else positive_integer("port", port, 65535)
+        self._equilibrium = self._solve_from_rest(self._start)
+        self._last: Setting | None = self._start
         self._problem: Exception | None = None
         self._trail: list[FloatArray] = []
         self._scenes = SceneBuilder(model)
         self._lock, self._wake, self._closed = threading.Lock(), threading.Event(), threading.Event()
         self._worker = threading.Thread(target=self._follow, name="softrobots sliders", daemon=True)
-        self._server = start_server(model.pinocchio.name, wished)
+        self._server = start_server(model.pinocchio.name, wanted_port)
         try:
             self._port = int(self._server.get_port())
             self._tree = ViserTree(self._server)
@@ -91,7 +91,7 @@ class SliderPage(ServedPage):
             self._panel = SliderPanel(self._server.gui, model, self._start, self._full, changed=self._wake.set)
             self._draw()
             self._show_extras()
-            self._panel.tell(self._equilibrium, self._robot.legend())
+            self._panel.report(self._equilibrium, self._robot.legend())
         except BaseException:
             end_server(self._server)
             raise
@@ -132,18 +132,18 @@ class SliderPage(ServedPage):
         motors = None if q_motors is None else self._checked_motors(q_motors)
         push = None if force is None else self._checked_force(finite_array("force", force, (3,), "N"))
         if gravity is not None and not isinstance(gravity, bool):
-            raise ParameterError("gravity", gravity, "True or False; the page was given the vector when it was made")
+            raise ParameterError("gravity", gravity, "True or False; the vector is an argument of SliderPage")
         with self._lock:
             if self._closed.is_set():
                 raise ViewerError("the page is closed; open a new one")
-            now = self._panel.wish
-            wish = Wish(
+            now = self._panel.setting
+            setting = Setting(
                 now.q_motors if motors is None else motors,
                 now.force if push is None else push,
                 now.gravity if gravity is None else gravity,
             )
-            self._panel.put(wish)
-            self._solve(wish)
+            self._panel.move_to(setting)
+            self._solve(setting)
             if self._problem is not None:
                 raise self._problem
             return self._equilibrium
@@ -160,36 +160,36 @@ class SliderPage(ServedPage):
         end_server(self._server)
 
     def _follow(self) -> None:
-        """Take up what the sliders ask for until the page is closed; of changes that come meanwhile the newest."""
+        """Follow the sliders until the page is closed; of several changes the newest counts."""
         while self._wake.wait() and not self._closed.is_set():
             self._wake.clear()
             with self._lock:
-                if self._panel.taken_reset():
-                    self._panel.put(self._start)
-                    self._equilibrium, self._trail, self._last = self._cold(self._start), [], None
-                wish = self._panel.wish
+                if self._panel.take_reset():
+                    self._panel.move_to(self._start)
+                    self._equilibrium, self._trail, self._last = self._solve_from_rest(self._start), [], None
+                setting = self._panel.setting
                 if self._last is not None and not self._model.actuators.independent:
-                    wish = wish._replace(q_motors=_fitting(self._model, self._last.q_motors, wish.q_motors))
-                    self._panel.put(wish)
-                self._solve(wish)
+                    setting = setting._replace(q_motors=_fitting(self._model, self._last.q_motors, setting.q_motors))
+                    self._panel.move_to(setting)
+                self._solve(setting)
 
-    def _solve(self, wish: Wish) -> None:
-        """Solve and draw what is asked for, unless it is what was asked for last; where that fails, the page says why."""
+    def _solve(self, setting: Setting) -> None:
+        """Solve and draw a setting unless it is the last one; on failure the page says why."""
         try:
-            if wish != self._last:
-                self._last, self._problem = wish, None
-                gravity = self._gravity if wish.gravity else None
-                self._equilibrium = next_equilibrium(self._equilibrium, wish.q_motors, wish.force, gravity=gravity)
+            if setting != self._last:
+                self._last, self._problem = setting, None
+                gravity = self._gravity if setting.gravity else None
+                self._equilibrium = next_equilibrium(self._equilibrium, setting.q_motors, setting.force, gravity=gravity)
                 self._draw()
             self._show_extras()
-        except Exception as error:  # whatever it is: the next change has another chance
+        except Exception as error:  # any error: the thread must go on with the next change
             self._problem = error
-        self._panel.tell(self._equilibrium, self._robot.legend(), "" if self._problem is None else str(self._problem))
+        self._panel.report(self._equilibrium, self._robot.legend(), "" if self._problem is None else str(self._problem))
 
-    def _cold(self, wish: Wish) -> Equilibrium:
+    def _solve_from_rest(self, setting: Setting) -> Equilibrium:
         """Solve from relaxed springs."""
-        gravity = self._gravity if wish.gravity else None
-        return solve_equilibrium(self._model, wish.q_motors, wish.force, gravity=gravity)
+        gravity = self._gravity if setting.gravity else None
+        return solve_equilibrium(self._model, setting.q_motors, setting.force, gravity=gravity)
 
     def _draw(self) -> None:
         """Draw the equilibrium."""
@@ -197,7 +197,7 @@ class SliderPage(ServedPage):
         self._robot.show(self._scenes.loaded(self._equilibrium))
 
     def _show_extras(self) -> None:
-        """Draw what can be switched on and off."""
+        """Draw what check boxes switch on and off."""
         self._root["rigid"].set_property("visible", self._panel.rigid)
         if self._panel.path:
             self._robot.trace(np.array(self._trail))
@@ -217,22 +217,23 @@ class SliderPage(ServedPage):
         return tuple(force.tolist())
 
 
-def _fitting(model: SoftModel, last: tuple[float, ...], wished: tuple[float, ...]) -> tuple[float, ...]:
-    """Muscle lengths that some shape of the robot has: those that changed stay as wished, the others follow, within limits."""
+def _fitting(model: SoftModel, last: tuple[float, ...], values: tuple[float, ...]) -> tuple[float, ...]:
+    """Muscle lengths that a shape of the robot has: those that changed are kept, the others follow, within limits."""
     here, basis = np.array(last), model.actuators.basis
-    change = np.array(wished) - here
+    change = np.array(values) - here
     moved = change != 0.0
     step = basis @ np.linalg.lstsq(basis[moved], change[moved], rcond=None)[0]
     return tuple(model.actuators.go(here, step).tolist())
 
 
 def _visible_force(model: SoftModel) -> float:
-    """A round force that moves the tip of the relaxed robot by a part of its size, where it gives way most easily [N]."""
+    """A round force that moves the tip of the relaxed robot by a part of its size in its most compliant direction [N]."""
     try:
-        softest = float(np.linalg.eigvalsh(compliance(model, solve_equilibrium(model, model.relaxed_motors))[:3, :3])[-1])
+        relaxed = solve_equilibrium(model, model.relaxed_motors)
+        largest = float(np.linalg.eigvalsh(compliance(model, relaxed)[:3, :3])[-1])
     except (NeutralEquilibrium, NotConverged):
         return _ANY_FORCE
-    force = _BENDING * model.reach / max(softest, 1e-300)
+    force = _BENDING * model.reach / max(largest, 1e-300)
     if not 1e-6 < force < 1e6:
         return _ANY_FORCE
     return round_down(force)

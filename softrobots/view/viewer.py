@@ -19,7 +19,7 @@ from softrobots.statics.trajectory import Trajectory
 from softrobots.view.meshcat_page.inline_page import InlinePage
 from softrobots.view.meshcat_page.page_text import legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
-from softrobots.view.meshcat_page.server import connect, end_server, start_server, tell_server
+from softrobots.view.meshcat_page.server import connect, end_server, send_html, start_server
 from softrobots.view.meshcat_page.stage import Stage
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import ServedPage
@@ -53,7 +53,7 @@ class Viewer(ServedPage):
             root = self._page["softrobots"]
             self._robot = RobotDrawing(root, self._scenes.robot, self._scenes.relaxed(), self._scenes.extent.size)
             self._stage = Stage(self._page, root, self._scenes.extent)
-            tell_server(self._page, "page", live_page(model.pinocchio.name))
+            send_html(self._page, "page", live_page(model.pinocchio.name))
             self._legend = ""
             self._show_legend()
         except BaseException:
@@ -85,7 +85,7 @@ class Viewer(ServedPage):
         self._show_legend()
 
     def show_configuration(self, q: FloatArray) -> None:
-        """Show the robot at a configuration of Pinocchio, shape (nq,), without load: no arrows, no wrinkling, the chain alone.
+        """Show the chain alone at a configuration of Pinocchio, shape (nq,), without load.
 
         Raises:
             ParameterError: If the shape differs or a number is not finite.
@@ -110,10 +110,10 @@ class Viewer(ServedPage):
         self._show_legend()
 
     def mark(self, target: Any) -> None:
-        """Draw a cross at a target, in place of the last one.
+        """Draw a cross at a target, and remove the last one.
 
         Args:
-            target: Where, shape (3,) [m]; None: no cross.
+            target: Position, shape (3,) [m]; None: no cross.
 
         Raises:
             ParameterError: If the shape differs or a number is not finite.
@@ -129,8 +129,8 @@ class Viewer(ServedPage):
         Args:
             trajectory: A trajectory of the viewer's robot.
             duration: Time of the animation [s]; the time of the trajectory by default.
-            repetitions: How often it plays. (At the end of the last one meshcat goes back to the start, and then mixes the two
-                when the slider is moved; hence not once by default.)
+            repetitions: Number of repetitions; many by default, because meshcat mixes start and end when the slider is moved
+                after the last one.
 
         Raises:
             ParameterError: If it belongs to another robot, or the duration is not positive.
@@ -175,21 +175,21 @@ class Viewer(ServedPage):
         self._show_legend()
 
     def look_at(self, tip: FloatArray) -> None:
-        """Put the middle between base and tip where the camera looks, and the camera square to the arm, a little above.
+        """Look at the middle between base and tip, square to the arm and a little from above.
 
         The base is the world's origin, unless the chain starts farther from it than it is long.
 
         Args:
-            tip: Where the tip is, or is on average, shape (3,) [m].
+            tip: Position of the tip, or its average, shape (3,) [m].
         """
         self._stage.look_at(tip)
 
     def look_from(self, eye: Any, centre: Any) -> None:
-        """Put the camera somewhere.
+        """Place the camera.
 
         Args:
-            eye: Where the camera is, shape (3,) [m], world axes.
-            centre: What it looks at, shape (3,) [m], world axes; not where it is.
+            eye: Position of the camera, shape (3,) [m], world axes.
+            centre: Point that it looks at, shape (3,) [m], world axes.
 
         Raises:
             ParameterError: If a shape differs, a number is not finite, or both are the same point.
@@ -222,11 +222,11 @@ class Viewer(ServedPage):
         Raises:
             OutputExists: If the file exists and `overwrite` is false.
         """
-        new_file(path, overwrite=overwrite)  # tells at once
+        new_file(path, overwrite=overwrite)  # refused before the work
         return write_text(path, self.html(title), overwrite=overwrite)
 
     def inline(self, height: int = 480, *, title: str = "softrobots") -> InlinePage:
-        """The page as it is now, for a cell of a notebook; stays there when the viewer is closed.
+        """Return the page as it is now for a cell of a notebook, where it remains when the viewer is closed.
 
         Args:
             height: Height in the notebook [px].
@@ -239,7 +239,7 @@ class Viewer(ServedPage):
         return InlinePage(self.html(title), positive_integer("height", height, 10_000))
 
     def _repr_html_(self) -> str:
-        """What Jupyter shows of a viewer: `inline`."""
+        """Return the page for Jupyter; see `inline`."""
         return self.inline()._repr_html_()
 
     def close(self) -> None:
@@ -250,10 +250,10 @@ class Viewer(ServedPage):
         end_server(self._server)
 
     def _show_legend(self) -> None:
-        """Bring the legend of the served page up to what is drawn."""
+        """Update the legend of the served page."""
         rows = legend_rows(self._robot.legend())
         if rows != self._legend:
-            tell_server(self._page, "legend", rows)
+            send_html(self._page, "legend", rows)
             self._legend = rows
 
     def _check(self, equilibrium: Any) -> None:

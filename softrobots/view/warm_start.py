@@ -1,4 +1,4 @@
-"""The next equilibrium and the next solution, from where a robot is: as it moves while somebody turns a knob."""
+"""Warm-started equilibrium and inverse kinematics for interactive use."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 
-_STARTS = 6  # of a search when that from the last coordinates fails: somebody waits
+_STARTS = 6  # searches when that from the last coordinates fails: few, for a quick answer
 
 
 def next_equilibrium(last: Equilibrium, q_motors: Any, force: Any = None, *, gravity: Any = None) -> Equilibrium:
-    """Find the equilibrium that a robot comes to from another one; a robot that has snapped through stays on its branch.
+    """Solve an equilibrium starting from another one; a robot that has snapped through stays on its branch.
 
     Args:
-        last: Where it is.
+        last: The equilibrium to start from.
         q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
         force: Force on the tip, shape (3,) [N], world axes.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
 
     Returns:
-        The equilibrium found by `solve_equilibrium` from the springs of `last`, or, if there is none, from relaxed springs.
+        The equilibrium that `solve_equilibrium` finds from the springs of `last`, or else from relaxed springs.
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range.
@@ -42,22 +42,22 @@ def next_equilibrium(last: Equilibrium, q_motors: Any, force: Any = None, *, gra
 
 
 def next_solution(last: Equilibrium, target: Any, force: Any = None, *, gravity: Any = None) -> IkSolution:
-    """Find actuator coordinates that put the loaded tip at a target, near to those of another equilibrium.
+    """Solve the inverse kinematics of the loaded tip starting from another equilibrium.
 
     Args:
-        last: Where the robot is.
+        last: The equilibrium to start from.
         target: Target of the tip, shape (3,) [m], world axes.
         force: Force on the tip, shape (3,) [N], world axes.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
 
     Returns:
-        The solution that a search from the actuator coordinates of `last` ends in, or, if it does not arrive, the nearest of
-        those that `solve_ik` finds from a few starts.
+        The solution of a search from the actuator coordinates of `last`, or, if it fails, the nearest solution that
+        `solve_ik` finds from a few starts.
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has no actuators.
-        TargetUnreachable: If no search arrives.
-        EquilibriumNotFound: If the springs settle at none of the starts.
+        TargetUnreachable: If no search reaches the target.
+        EquilibriumNotFound: If there is no equilibrium at any of the starts.
     """
     start = _within_limits(last.model, last.q_motors)
     try:
@@ -67,6 +67,6 @@ def next_solution(last: Equilibrium, target: Any, force: Any = None, *, gravity:
 
 
 def _within_limits(model: SoftModel, motors: FloatArray) -> FloatArray | None:
-    """Where a search may start; None, for its own start, if these coordinates are beyond the limits."""
+    """The coordinates as a start of a search, or None if they are beyond the limits."""
     low, high = model.motor_limits.T
     return motors if np.all((motors >= low) & (motors <= high)) else None

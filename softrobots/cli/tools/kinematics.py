@@ -113,8 +113,9 @@ def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow
         "version": str(tool.version),
         "file": label,
         "joints_in_file": len(truth.joints),
+        "precision": tool.precision,
+        "limits": tool.limits,
     }
-    facts |= {"joints_in_file": len(truth.joints), "precision": tool.precision, "limits": tool.limits}
     start = time.perf_counter()
     try:
         with open_in(tool.name, file) as robot:

@@ -16,10 +16,10 @@ from softrobots.view.figures.canvas import line_style, new_figure
 
 
 def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, *, critical: float | None = None) -> Any:
-    """Way of the tip and least stiffness over the tip force along a direction, one line a branch of equilibria.
+    """Displacement of the tip and least stiffness over the tip force along a direction, one line for each branch.
 
     Args:
-        branches: Equilibria in the order of growing force, by what is told of them; the way is counted from the first.
+        branches: Equilibria in the order of growing force, by label; displacements are relative to the first.
         direction: Direction of the force, shape (3,), any length but zero, world axes.
         critical: Force at which the robot buckles [N], to be marked; see `softrobots.critical_load`.
 
@@ -53,11 +53,11 @@ def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, 
 
 
 def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
-    """Way of the tip across a push, and the softest eigenvalue, over the force; one line a branch, dashed where not stable.
+    """Displacement of the tip across a push and least eigenvalue over the force; a line for each branch, dashed if unstable.
 
     Args:
-        found: Branches as `softrobots.post_buckling_branches` gives them; the way is counted from the first point of the first.
-        across: Direction of the way that is drawn, shape (3,), any length but zero, world axes.
+        found: Branches of `softrobots.post_buckling_branches`; displacements are relative to the first point of the first.
+        across: Direction of the displacement that is drawn, shape (3,), any length but zero, world axes.
 
     Returns:
         The figure.
@@ -76,7 +76,7 @@ def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
         ways = [1e3 * float(unit @ (one.tip_position - origin)) for one in branch.equilibria]
         style = line_style(number) | {"ls": "-", "ms": 4, "markevery": max(len(ways) // 5, 1)}
         dashed = ~branch.stable
-        dashed[:-1] |= dashed[1:]  # up to where the other line ends
+        dashed[:-1] |= dashed[1:]  # up to the end of the solid line
         for axes, values in ((left, ways), (right, branch.softest)):
             axes.plot(branch.forces, np.where(branch.stable, values, np.nan), label=branch.label, **style)
             axes.plot(branch.forces, np.where(dashed, values, np.nan), **(style | {"ls": "--", "marker": ""}))
@@ -90,12 +90,12 @@ def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
 
 
 def reaction(runs: Mapping[str, Sequence[ImposedDisplacement]]) -> Any:
-    """Force on a probe over the way that it pushes a robot, one line a run.
+    """Force on a probe over its displacement of a robot, one line for each run.
 
-    Markers are filled where the robot would be stable under the same force as a dead load, empty where only the probe holds it.
+    Markers are filled where the robot is stable under the same force as a dead load, empty where only the probe stabilises it.
 
     Args:
-        runs: Solutions in the order of growing displacement, by what is told of them.
+        runs: Solutions in the order of growing displacement, by label.
 
     Returns:
         The figure.
@@ -108,16 +108,16 @@ def reaction(runs: Mapping[str, Sequence[ImposedDisplacement]]) -> Any:
     figure = new_figure((8.0, 4.6))
     axes = figure.add_subplot()
     for number, (label, run) in enumerate(runs.items()):
-        ways = 1e3 * np.array([held.displacement for held in run])
-        forces = np.array([held.reaction for held in run])
+        ways = 1e3 * np.array([state.displacement for state in run])
+        forces = np.array([state.reaction for state in run])
         style = line_style(number)
         colour, marker = style["color"], style["marker"]
         axes.plot(ways, forces, color=colour, ls=style["ls"], label=label)
-        dead = np.array([held.equilibrium.stable for held in run])
+        dead = np.array([state.equilibrium.stable for state in run])
         axes.plot(ways[dead], forces[dead], ls="", marker=marker, ms=5, color=colour)
         axes.plot(ways[~dead], forces[~dead], ls="", marker=marker, ms=5, color=colour, mfc="white")
-    for face, told in (("black", "stable under the force alone, too"), ("white", "held by the probe only")):
-        axes.plot([], [], ls="", marker="o", ms=5, color="black", mfc=face, label=told)
+    for face, label in (("black", "stable under the force alone, too"), ("white", "held by the probe only")):
+        axes.plot([], [], ls="", marker="o", ms=5, color="black", mfc=face, label=label)
     axes.set(xlabel="displacement of the probe [mm]", ylabel="force on the robot [N]", title="Imposed displacement")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=9)

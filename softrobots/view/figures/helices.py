@@ -1,7 +1,7 @@
 """Figures of helical actuation, after Figures 5, 7 and 9 of [Blumenschein 2018]. Needs matplotlib (extra `plot`).
 
 Every function returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Lines differ in style or marker too,
-so that they can be told apart in grey.
+to be distinguished in grey.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def grid(contractions: Any, angles: Any, diameter: float, length: float, handedn
         raise ParameterError("contractions", len(shares) * len(tilts), f"at most {MOST_HELICES} helices with the angles")
     if span > MOST_DIAMETERS * size:
         raise ParameterError("length", length, f"at most {MOST_DIAMETERS:g} diameters, {MOST_DIAMETERS * size:g} m")
-    helix.forward(shares, tilts[:, None], size)  # refuses what has no shape before anything is drawn
+    helix.forward(shares, tilts[:, None], size)  # raises before anything is drawn
     drawn = [[draw(share, tilt, size, span, handedness) for share in shares] for tilt in tilts]
     return sheet(drawn, shares, tilts, f"Tubes {100 * size:.3g} cm thick, {span:.3g} m long before they contract, to one scale")
 
@@ -117,24 +117,24 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     depths = _row("deflections", test.deflections, "m")
     if len(depths) > len(COLOURS):
         raise ParameterError("deflections", test.deflections, f"at most {len(COLOURS)} numbers")
-    test.force(most, depths)  # refuses what is out of range
+    test.force(most, depths)  # raises if out of range
     deepest = min(0.5 * test.diameter, test.object_radius, max(1.5 * float(depths.max()), 0.1 * test.diameter))
     pressures, range_of = np.linspace(0.0, most, 9), np.linspace(0.0, deepest, 300)
     figure = new_figure((11.5, 5.4))
     left, right = figure.subplots(1, 2, sharey=True)
     for number, depth in enumerate(depths):
-        found, colour = test.force(pressures, depth), COLOURS[number]
+        bounds, colour = test.force(pressures, depth), COLOURS[number]
         style = {"color": colour, "marker": MARKERS[number], "ms": 7, "clip_on": False}
-        left.plot(pressures / 1e3, found.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
-        told = f"force, deflected by {1e3 * depth:.3g} mm"
-        left.plot(pressures / 1e3, found.force, lw=2.2, ls=_STYLES[number % 3], markevery=(number, 3), label=told, **style)
-        right.plot([1e3 * depth], [found.force[-1]], ls="none", zorder=4, **style)
+        left.plot(pressures / 1e3, bounds.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
+        label = f"force, deflected by {1e3 * depth:.3g} mm"
+        left.plot(pressures / 1e3, bounds.force, lw=2.2, ls=_STYLES[number % 3], markevery=(number, 3), label=label, **style)
+        right.plot([1e3 * depth], [bounds.force[-1]], ls="none", zorder=4, **style)
     bounds = test.force(most, range_of)
     right.plot(1e3 * range_of, bounds.force, color="0.75", lw=6.0, label="force, the smaller bound", zorder=1)
     right.plot(1e3 * range_of, bounds.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
     right.plot(1e3 * range_of, bounds.contact, color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b): the wall flattens")
-    found = test.force(pressures, 0.0)
-    left.plot(pressures / 1e3, found.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
+    undeflected = test.force(pressures, 0.0)
+    left.plot(pressures / 1e3, undeflected.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
     left.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), open marks: the wall flattens")
     left.set(xlabel="gauge pressure [kPa]", ylabel="grasp force [N]", xlim=(0.0, most / 1e3))
     right.set(xlabel=f"deflection of the inner radius at {most / 1e3:.3g} kPa [mm]", xlim=(0.0, 1e3 * deepest))
@@ -142,8 +142,8 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
         axes.legend(fontsize=9, loc="upper left" if axes is left else "lower right")
-    told = f"object {200 * test.object_radius:.3g} cm thick, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
-    figure.suptitle(f"Grasp force: our model, not data of the paper ({told}, {100 * test.turn_height:.3g} cm rise per turn)")
+    case = f"object {200 * test.object_radius:.3g} cm thick, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
+    figure.suptitle(f"Grasp force: our model, not data of the paper ({case}, {100 * test.turn_height:.3g} cm rise per turn)")
     return figure
 
 
@@ -169,11 +169,11 @@ def _against_contraction(all_axes: tuple[Any, Any, Any], tilt: float, diameter: 
 
 
 def _name_lines(figure: Any, axes: Any) -> None:
-    """Legend of angles, and of what lines and marks of every angle mean."""
+    """Legend of the angles, and of the lines and marks that all angles share."""
     from matplotlib.lines import Line2D
 
     angles, names = axes.get_legend_handles_labels()
-    told: dict[str, dict[str, Any]] = {
+    styles: dict[str, dict[str, Any]] = {
         r"start, $\lambda$ = 1, and end, $\lambda$ = 0": {"marker": "o", "ms": 7, "ls": "none"},
         "the tube would run into itself": {"ls": _THIN_STYLE, "lw": 1.2},
         r"a turn rises by a diameter, $2\pi b = D$": {"lw": 1.0, "color": "0.35"},
@@ -181,8 +181,8 @@ def _name_lines(figure: Any, axes: Any) -> None:
         r"limit by the simple rule, $2\pi b \geq D$": {"marker": "x", "ms": 6, "mew": 1.5, "ls": "none"},
     }
     black: dict[str, Any] = {"color": "black"}
-    lines = [Line2D([], [], **(black | style)) for style in told.values()]
-    figure.legend(angles + lines, names + list(told), loc="outside lower center", ncols=3, fontsize=9)
+    lines = [Line2D([], [], **(black | style)) for style in styles.values()]
+    figure.legend(angles + lines, names + list(styles), loc="outside lower center", ncols=3, fontsize=9)
 
 
 def _row(name: str, values: Any, unit: str) -> FloatArray:

@@ -1,7 +1,7 @@
 """Helices as shaded tubes on a sheet: rows and columns of one scale, seen from the front and a little above.
 
-Needs matplotlib (extra `plot`). The tubes are projected and shaded here, because matplotlib's own axes in space would give each
-helix a scale of its own.
+Needs matplotlib (extra `plot`). The tubes are projected and shaded here, because matplotlib's 3D axes would scale each helix
+differently.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ class DrawnTube:
     """One tube, projected and shaded."""
 
     faces: FloatArray
-    """Corners on the screen of the triangles that are seen, far ones first, shape (n, 3, 2) [m]."""
+    """Corners on the screen of the visible triangles, far ones first, shape (n, 3, 2) [m]."""
     colours: FloatArray
     """Their colours, shape (n, 3)."""
     caption: str
-    """What stands below."""
+    """The caption below."""
     touches: bool
     """Whether the tube runs into itself."""
 
@@ -68,7 +68,7 @@ def draw(share: float, tilt: float, diameter: float, length: float, handedness: 
         handedness: "right" or "left".
 
     Returns:
-        The triangles that are seen, and what stands below.
+        The visible triangles, and the caption.
 
     Raises:
         ParameterError: If an argument is out of range, or the tube has more windings than can be drawn.
@@ -175,8 +175,8 @@ def _key(axes: Any, scale: float, contact: bool) -> None:
     bar *= next(number for number in (5, 2, 1) if number * bar * scale <= 1.8)
     axes.plot([0.4, 0.4 + scale * bar], [0.38, 0.38], color="black", lw=3.0, solid_capstyle="butt")
     axes.text(0.4 + 0.5 * scale * bar, 0.32, f"{100 * bar:.3g} cm", ha="center", va="top", fontsize=9)
-    told = {"actuator, contracts": ACTUATOR, "line opposite, keeps its length": OPPOSITE}
+    colours = {"actuator, contracts": ACTUATOR, "line opposite, keeps its length": OPPOSITE}
     if contact:
-        told["in contact: the tube runs into itself"] = WALL_IN_CONTACT
-    patches = [Patch(color=colour, label=text) for text, colour in told.items()]
+        colours["in contact: the tube runs into itself"] = WALL_IN_CONTACT
+    patches = [Patch(color=colour, label=text) for text, colour in colours.items()]
     axes.legend(handles=patches, loc="lower right", ncols=2, fontsize=9, frameon=False)

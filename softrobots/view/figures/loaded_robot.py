@@ -72,11 +72,11 @@ def shape(equilibrium: Equilibrium) -> Any:
         return None if text in labelled else labelled.add(text) or text  # type: ignore[func-returns-value]
 
     model = equilibrium.model
-    held = model.muscle_input == "lengths" or not model.muscles
-    unloaded = body_at(model, equilibrium.q_motors, model.rest) if held else ()
-    told = "without load, same muscle lengths" if model.muscles else "without load"
+    lengths_given = model.muscle_input == "lengths" or not model.muscles
+    unloaded = body_at(model, equilibrium.q_motors, model.rest) if lengths_given else ()
+    meaning = "without load, same muscle lengths" if model.muscles else "without load"
     for segment in unloaded:
-        axes.plot(*segment.backbone.T, color="0.5", lw=1.5, ls=":", label=label(told))
+        axes.plot(*segment.backbone.T, color="0.5", lw=1.5, ls=":", label=label(meaning))
     for segment in segments:
         axes.plot(*segment.backbone.T, color="0.15", lw=3.0, label=label("backbone"))
         for name, points in segment.muscles.items():

@@ -13,10 +13,10 @@ from softrobots.statics.workspace_map import WorkspaceMap
 from softrobots.view.figures.canvas import new_figure, plain_words
 
 NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
-"""What becomes of a target under a load: never reached, lost under the load, reached with a wrinkled link, carried."""
+"""Outcome of a target under a load: never reached, lost under the load, reached with a wrinkled link, carried."""
 
 SHADES = ("#ffffff", "#7f7f7f", "#f3cc6b", "#17375e")
-"""Colour of each; apart in grey, too."""
+"""Colour of each outcome; they differ in lightness too."""
 _LABELS = ("not reached", "reached with smaller loads only", "reached, a link wrinkles", "reached, no link wrinkles")
 
 
@@ -38,7 +38,7 @@ def workspace(samples: Workspace) -> Any:
     figure = new_figure((13.0, 4.4))
     tips, order = samples.tip_positions, np.argsort(samples.manipulability)
     scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 7, "rasterized": True}
-    scale |= {"linewidths": 0.2, "edgecolors": "0.35"}  # or the lightest are lost on white
+    scale |= {"linewidths": 0.2, "edgecolors": "0.35"}  # so that the lightest are visible on white
     all_axes = figure.subplots(1, 3)
     centre, half = 0.5 * (tips.max(0) + tips.min(0)), 0.55 * max(float(np.ptp(tips, axis=0).max()), 1e-3)
     for axes, (one, two) in zip(all_axes, ((0, 2), (1, 2), (0, 1)), strict=True):
@@ -77,7 +77,7 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
         raise ParameterError("result", result.grid.shape, "a map with at least two coordinates x and z (this is its shape)")
     wanted = result.loads[-1] / 2.0 if load is None else finite_number("load", load, "N")
     level = int(np.abs(result.loads - wanted).argmin())
-    new_figure((1.0, 1.0))  # tells what is missing before matplotlib is imported here
+    new_figure((1.0, 1.0))  # raises MissingDependency before matplotlib is imported here
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
 
@@ -112,14 +112,14 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
         axes.plot(0.0, 0.0, marker="+", color="k", ms=10, ls="none")
         axes.set(aspect="equal", xlabel="distance from the axis of motor 1 [m]" if flat and across[0] > 0.0 else "x [m]")
     reach_axes.set_ylabel("height z [m]")
-    weight = "weightless arm" if result.gravity is None else f"arm under gravity {_told(result.gravity)} m/s²"
+    weight = "weightless arm" if result.gravity is None else f"arm under gravity {_components(result.gravity)} m/s²"
     where = "" if flat else f", slice at y = {result.grid.y[middle]:.4g} m"
-    figure.suptitle(f"{plain_words(result.model.pinocchio.name)}: force along {_told(result.direction)}, {weight}{where}")
+    figure.suptitle(f"{plain_words(result.model.pinocchio.name)}: force along {_components(result.direction)}, {weight}{where}")
     return figure
 
 
 def outcome(result: WorkspaceMap, level: int) -> Any:
-    """What becomes of each target at a load of the map: `NOT_REACHED`, `LOST`, `WRINKLED` or `CARRIED`, `grid.shape`."""
+    """Return the outcome of each target at a load of the map: `NOT_REACHED`, `LOST`, `WRINKLED` or `CARRIED`, `grid.shape`."""
     here, wrinkled = result.reached[..., level], result.wrinkled[..., level]
     before = result.reached[..., :level].any(axis=-1)
     return np.where(here, np.where(wrinkled, WRINKLED, CARRIED), np.where(before, LOST, NOT_REACHED))
@@ -144,19 +144,19 @@ def _contours(axes: Any, result: WorkspaceMap, values: FloatArray, levels: set[f
     own = sorted(level for level in levels if finite.min() < level < finite.max())
     plain = MaxNLocator(6).tick_values(finite.min(), finite.max())
     plain = [value for value in plain if finite.min() < value < finite.max() and value not in own]
-    for chosen, style, edge, told in (
+    for chosen, style, edge, label in (
         (plain, {"colors": "white", "linewidths": 0.9}, "black", "{:g}"),
         (own, {"colors": "black", "linewidths": 1.8, "linestyles": "--"}, "white", "own: {:g}"),
     ):
         if chosen:
             lines = axes.contour(result.grid.x, result.grid.z, values.T, levels=chosen, **style)
-            # One number a level, on its longest line: where the value falls off a cliff, many short ones lie together.
+            # One number for each level, on its longest line: steep places have many short ones.
             longest = [max(segments, key=len) for segments in lines.allsegs if segments]
             places = [segment[len(segment) // 2] for segment in longest if len(segment) > 1]
-            for text in axes.clabel(lines, fmt=told.format, fontsize=9, manual=places):
+            for text in axes.clabel(lines, fmt=label.format, fontsize=9, manual=places):
                 text.set_path_effects([withStroke(linewidth=2.0, foreground=edge)])
             lines.set_path_effects([withStroke(linewidth=1.6, foreground=edge)])
 
 
-def _told(vector: Any) -> str:
+def _components(vector: Any) -> str:
     return f"({', '.join(f'{number:.4g}' for number in vector)})"

@@ -1,4 +1,4 @@
-"""What can be asked of a live view: the grammar of its lines and of its JSON objects."""
+"""Commands of a live view: lines and JSON objects."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ or a JSON object, e.g. {"motors": [0.3, 0.6, -0.8], "force": [0, 10, -15], "grav
 
 
 class Wanted(NamedTuple):
-    """What a live view shows, or is asked to show; arrays are read-only."""
+    """The state that a live view shows or shall show; arrays are read-only."""
 
     motors: FloatArray
     """Actuator coordinates, shape (n_motors,) [rad, m or N]; with a target, those found for it."""
     target: FloatArray | None
-    """Where the tip must be, shape (3,) [m]; None: wherever it is with these actuator coordinates."""
+    """Target of the tip, shape (3,) [m]; None: the actuator coordinates are given instead."""
     force: FloatArray
     """Force on the tip, shape (3,) [N]."""
     gravity: FloatArray | None
@@ -37,15 +37,15 @@ class Wanted(NamedTuple):
 
 
 def changed(line: str, now: Wanted, start: Wanted) -> Wanted:
-    """What is wanted after a line.
+    """Return the state after a command.
 
     Args:
-        line: A line of `GRAMMAR`. One that is empty or starts with `#` says nothing.
-        now: What is wanted before it.
-        start: What `reset` goes back to.
+        line: A line of `GRAMMAR`. One that is empty or starts with `#` has no effect.
+        now: The state before it.
+        start: The state that `reset` restores.
 
     Returns:
-        What is wanted; `now` itself if the line says nothing, `start` itself after `reset`.
+        The state; `now` itself if the line has no effect, `start` itself after `reset`.
 
     Raises:
         NameNotFound: If there is no such command.
@@ -67,14 +67,14 @@ def changed(line: str, now: Wanted, start: Wanted) -> Wanted:
 
 
 def read_commands(text: str, start: Wanted) -> Wanted:
-    """What the text of a file asks for: the start, changed by each of its lines, or by one JSON object.
+    """Return the state after all commands of a text: lines, or one JSON object, applied to the start.
 
     Args:
         text: The whole text.
-        start: What holds for everything that the text does not name.
+        start: The state that the commands change.
 
     Returns:
-        What is wanted.
+        The state.
 
     Raises:
         NameNotFound: If there is no such command.
@@ -96,11 +96,11 @@ def _json_object(text: str) -> Mapping[str, Any]:
         raise FileFormatError(f"this is no JSON object: {error}") from error
 
 
-def _changed_by(told: Mapping[str, Any], now: Wanted) -> Wanted:
-    if "motors" in told and "target" in told:
-        raise ParameterError("motors", told["motors"], "left out where a target is given: they follow from it")
+def _changed_by(values: Mapping[str, Any], now: Wanted) -> Wanted:
+    if "motors" in values and "target" in values:
+        raise ParameterError("motors", values["motors"], "left out where a target is given: they follow from it")
     wanted = now
-    for name, value in told.items():
+    for name, value in values.items():
         wanted = _setter(name, tuple(_SETTERS))(wanted, value)
     return wanted
 

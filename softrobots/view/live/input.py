@@ -1,4 +1,4 @@
-"""Where the commands of a live view come from: keys of a terminal, lines of a pipe, a file that is watched."""
+"""Sources of commands of a live view: keys of a terminal, lines of a pipe, a watched file."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from softrobots.view.live.commands import GRAMMAR, Wanted, changed, read_command
 from softrobots.view.live.keys import KEYS, KeyMoves
 from softrobots.view.live.loop import Commands, LiveView
 
-_WAIT = 0.2  # [s], for input, before a look at whether the page is still there
-_PERIOD = 0.1  # [s], between two looks at a file
+_WAIT = 0.2  # [s], for input, between checks whether the page is still served
+_PERIOD = 0.1  # [s], between checks of a file
 _RECENT = 2.0  # [s]: a file written less than this ago may be written again within one tick of its clock
 _LARGEST = 1_000_000  # bytes of a file of commands, or of a line
-_ESCAPE_WAIT = 0.1  # [s], for the rest of what a key sends
+_ESCAPE_WAIT = 0.1  # [s], for the rest of an escape sequence
 
 _KEY = re.compile(r"\x1b[\[O](\d*)[\d;]*([A-Za-z~])|.", re.DOTALL)
 _PART_OF_KEY = re.compile(r"\x1b([\[O][\d;]*)?$")
@@ -33,14 +33,14 @@ _NUMBERED = {"5": "page up", "6": "page down"}
 _ENDING = ("SIGTERM", "SIGHUP", "SIGQUIT")
 
 Tell = Callable[[str], object]
-"""Takes a line for the person who commands."""
+"""Prints a line for the user."""
 
 
 class Lines:
-    """Commands as lines on a file descriptor, e.g. a pipe; its end is `quit`. The text after the last end of line is a line."""
+    """Commands as lines on a file descriptor, e.g. a pipe; its end means `quit`. Text after the last newline is a line."""
 
     def __init__(self, descriptor: int, tell: Tell) -> None:
-        """Read from a descriptor; `tell` takes help."""
+        """Read from a descriptor; `tell` prints help."""
         self._descriptor, self._tell = descriptor, tell
         self._text, self._open = b"", True
 
@@ -62,13 +62,13 @@ class Lines:
 
 
 class WatchedFile:
-    """A file that says what is wanted; what it does not name is as at the start. Looked at ten times a second."""
+    """A file of commands, checked ten times a second; what it does not name is as at the start."""
 
     def __init__(self, path: Path, tell: Tell) -> None:
-        """Watch a file, which need not exist yet; `tell` takes a line that it does not.
+        """Watch a file, which need not exist yet; `tell` prints that it does not.
 
         Raises:
-            ParameterError: If something else than a file is there.
+            ParameterError: If the path is no file, e.g. a folder.
         """
         if path.exists() and not path.is_file():
             raise ParameterError("live", str(path), "a file, or the word keyboard")
@@ -79,7 +79,7 @@ class WatchedFile:
         self._missed = False
 
     def read(self, live: LiveView) -> Wanted | None:
-        """See `softrobots.view.live.loop.Commands.read`: the whole file, when it says something new."""
+        """See `softrobots.view.live.loop.Commands.read`: the whole file, when its content is new."""
         time.sleep(max(0.0, self._last + _PERIOD - time.monotonic()))
         self._last = time.monotonic()
         text = self._new_text()
@@ -91,13 +91,13 @@ class WatchedFile:
             raise FileFormatError(f"{self._path} is no text: {error}") from error
 
     def _new_text(self) -> bytes | None:
-        """The content, if it is another one than the last time."""
+        """The content if it has changed, else None."""
         try:
-            about = self._path.stat()
-            mark = (about.st_mtime_ns, about.st_size, about.st_ino)
-            if mark == self._mark and time.time() - about.st_mtime > _RECENT:
+            status = self._path.stat()
+            mark = (status.st_mtime_ns, status.st_size, status.st_ino)
+            if mark == self._mark and time.time() - status.st_mtime > _RECENT:
                 return None
-            text = self._content() if stat.S_ISREG(about.st_mode) else None
+            text = self._content() if stat.S_ISREG(status.st_mode) else None
             if mark != self._mark and (text is None or len(text) > _LARGEST):
                 self._mark = mark
                 raise FileFormatError(f"{self._path} must be a file of at most {_LARGEST} bytes")
@@ -113,19 +113,19 @@ class WatchedFile:
         return text
 
     def _content(self) -> bytes:
-        """What the file holds, or so much of it that it is too much; what `stat` tells of its size need not be true."""
+        """The content up to one byte beyond the limit; the size in `stat` may be wrong."""
         with self._path.open("rb") as file:
             return file.read(_LARGEST + 1)
 
 
 class Keys:
-    """Commands as single keys of a terminal, taken as they are pressed; all that were pressed at a time count as one."""
+    """Commands as single keys of a terminal; keys that arrive together are one command."""
 
     def __init__(self, descriptor: int, tell: Tell, terminal: Terminal, moves: KeyMoves) -> None:
-        """Read from the descriptor of a terminal; `tell` takes help."""
+        """Read from the descriptor of a terminal; `tell` prints help."""
         self._descriptor, self._tell, self._terminal, self._moves = descriptor, tell, terminal, moves
         self._text = ""
-        tell(moves.told)
+        tell(moves.hint)
 
     def read(self, live: LiveView) -> Wanted | None:
         """See `softrobots.view.live.loop.Commands.read`."""
@@ -148,11 +148,11 @@ class Keys:
             elif key not in ("\n", "\r"):
                 before, wanted = wanted, self._moves.press(key, wanted, live.start, live.equilibrium)
                 if wanted is before and key != "r":
-                    self._tell(self._moves.told)
+                    self._tell(self._moves.hint)
         return None if wanted is live.wanted else wanted
 
     def _more(self, seconds: float) -> bool:
-        """Wait for keys; whether there are more."""
+        """Wait for keys; return whether there are any."""
         if not select.select([self._descriptor], [], [], seconds)[0]:
             return False
         part = os.read(self._descriptor, 4096).decode("utf-8", "replace")
@@ -160,7 +160,7 @@ class Keys:
         return True
 
     def _line(self, text: str) -> tuple[str, str]:
-        """The line that somebody types after `:`, and what comes after it."""
+        """The line typed after `:`, and the text after it."""
         with self._terminal.lines():
             sys.stdout.write(":")
             sys.stdout.flush()
@@ -174,10 +174,10 @@ class Keys:
 
 
 class Terminal:
-    """A terminal that gives keys as they are pressed, without showing them; a context manager that puts everything back.
+    """A terminal in single-key mode without echo; a context manager that restores it.
 
-    Also when the program is asked to end (SIGTERM, SIGHUP, SIGQUIT), which then raises SystemExit, and when it is stopped by
-    Ctrl-Z and goes on.
+    It is restored at SIGTERM, SIGHUP and SIGQUIT too, which raise SystemExit, and set again when the program continues after
+    Ctrl-Z.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -186,7 +186,7 @@ class Terminal:
         self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Terminal:
-        """Begin to give single keys."""
+        """Switch to single keys."""
         import termios
 
         saved = termios.tcgetattr(self._descriptor)
@@ -205,12 +205,12 @@ class Terminal:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Put everything back."""
+        """Restore the terminal."""
         self._stack.close()
 
     @contextlib.contextmanager
     def lines(self) -> Iterator[None]:
-        """Give whole lines for a while, shown as they are typed and edited."""
+        """Switch to whole lines, shown and edited as usual, for the time of the context."""
         self._restore()
         try:
             yield
@@ -257,7 +257,7 @@ def commands_from(where: str | Path, live: LiveView, tell: Tell) -> Iterator[Com
 
 
 def _typed(line: str, now: Wanted, live: LiveView, tell: Tell) -> Wanted | None:
-    """What a typed line asks for; None if nothing."""
+    """The state after a typed line; None if it has no effect."""
     if line.strip() in ("help", "?"):
         tell(GRAMMAR)
         return None
@@ -266,7 +266,7 @@ def _typed(line: str, now: Wanted, live: LiveView, tell: Tell) -> Wanted | None:
 
 
 def _named(pressed: re.Match[str] | None) -> str:
-    """Name of what a key sent."""
+    """Name of the key of an escape sequence."""
     if pressed is None or not pressed[2]:
         return pressed[0] if pressed else ""
     named = _NUMBERED.get(pressed[1]) if pressed[2] == "~" else _NAMED.get(pressed[2])

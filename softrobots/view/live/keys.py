@@ -1,4 +1,4 @@
-"""What single keys do in a live view; knows nothing of terminals."""
+"""Effect of single keys in a live view, independent of terminals."""
 
 from __future__ import annotations
 
@@ -30,15 +30,19 @@ _MOVES = {
     "right": (0, 1.0), "left": (0, -1.0), "page up": (1, 1.0), "page down": (1, -1.0), "up": (2, 1.0), "down": (2, -1.0),
     "x": (0, 1.0), "X": (0, -1.0), "y": (1, 1.0), "Y": (1, -1.0), "z": (2, 1.0), "Z": (2, -1.0),
 }  # fmt: skip
-_TARGET_SHARE, _FORCE_SHARE, _MOTOR_SHARE = 0.02, 0.01, 0.05  # steps: of the reach, by what bends it so far, of motor_scale
-_FURTHEST = 2.0**20  # times a step is doubled or halved: whoever leans on the key gets no infinite step
+_TARGET_SHARE, _FORCE_SHARE, _MOTOR_SHARE = (
+    0.02,
+    0.01,
+    0.05,
+)  # of reach, of force for reach, of motor_scale
+_FURTHEST = 2.0**20  # largest factor of a step: a key that is held down gives no infinite step
 
 
 class KeyMoves:
-    """Turns keys into what is wanted; remembers what they move, and by how much."""
+    """Turns keys into states; keeps what they move and the sizes of steps."""
 
     def __init__(self, equilibrium: Equilibrium) -> None:
-        """Choose steps that can be seen.
+        """Choose visible steps.
 
         Args:
             equilibrium: The loaded robot at the start.
@@ -55,23 +59,23 @@ class KeyMoves:
             self._force_step = _round_step(_FORCE_SHARE * model.reach / softness)
 
     @property
-    def told(self) -> str:
-        """What the keys move, in a line."""
+    def hint(self) -> str:
+        """One line about what the keys move."""
         motors = f"; + and - actuator {self._motor + 1} by {self._motor_steps[self._motor]:g}" if self._motor_steps else ""
         what = f"force by {self._force_step:g} N" if self._force else f"target by {self._target_step:g} m"
         return f"arrows move the {what}{motors}; ? lists the keys"
 
     def press(self, key: str, now: Wanted, start: Wanted, equilibrium: Equilibrium) -> Wanted:
-        """What is wanted after a key.
+        """Return the state after a key.
 
         Args:
             key: A character, or the name of a key: "up", "down", "left", "right", "page up", "page down".
-            now: What is wanted before it.
-            start: What `r` goes back to.
+            now: The state before it.
+            start: The state that `r` restores.
             equilibrium: The loaded robot, from whose tip a target starts to move.
 
         Returns:
-            What is wanted; `now` itself if the key only changes what keys do, `start` itself after `r`.
+            The state; `now` itself if the key only changes what keys move, `start` itself after `r`.
 
         Raises:
             NameNotFound: If the key does nothing.
@@ -99,14 +103,14 @@ class KeyMoves:
         return now
 
     def _moved(self, axis: int, sign: float, now: Wanted, equilibrium: Equilibrium) -> Wanted:
-        """The force or the target a step along an axis."""
+        """The force or the target moved by a step along an axis."""
         step = sign * (self._force_step if self._force else self._target_step) * np.eye(3)[axis]
         if self._force:
             return now._replace(force=read_only(now.force + step))
         return now._replace(target=read_only((equilibrium.tip_position if now.target is None else now.target) + step))
 
     def _turned(self, sign: float, now: Wanted) -> Wanted:
-        """The chosen actuator a step on."""
+        """The chosen actuator moved by a step."""
         self._choose(self._motor)
         motors: FloatArray = np.array(now.motors)
         motors[self._motor] += sign * self._motor_steps[self._motor]

@@ -1,4 +1,4 @@
-"""A live view: a robot in the browser that follows commands while it is looked at."""
+"""A live view: a robot in the browser that follows commands."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from softrobots.view.warm_start import next_equilibrium, next_solution
 
 
 class Page(Protocol):
-    """What shows the robot: a `softrobots.view.viewer.Viewer`, or something like it."""
+    """What shows the robot, such as a `softrobots.Viewer`."""
 
     @property
     def serving(self) -> bool:
-        """Whether anybody can look at it."""
+        """Whether it is served."""
 
     def show(self, equilibrium: Equilibrium) -> None:
         """Show a loaded robot."""
@@ -30,7 +30,7 @@ class Page(Protocol):
 
 
 class Commands(Protocol):
-    """Where commands come from; see `softrobots.view.live.input`."""
+    """A source of commands; see `softrobots.view.live.input`."""
 
     def read(self, live: LiveView) -> Wanted | None:
         """Wait a fraction of a second for commands.
@@ -39,7 +39,7 @@ class Commands(Protocol):
             live: The view as it is.
 
         Returns:
-            What is wanted now; None if nothing new came.
+            The commanded state; None if no command came.
 
         Raises:
             SoftRobotsError: If a command is wrong. More can be read after it.
@@ -47,14 +47,14 @@ class Commands(Protocol):
 
 
 class LiveView:
-    """A robot on a page, and what it was last asked for."""
+    """A robot on a page, and its last commanded state."""
 
     def __init__(self, page: Page, shown: Equilibrium | IkSolution) -> None:
-        """Begin with a robot that is shown already.
+        """Start with a robot that is shown already.
 
         Args:
             page: What shows it.
-            shown: The loaded robot, or the solution whose target is to be held; loaded by a force on the tip and gravity only.
+            shown: The loaded robot, or the solution whose target it keeps; loaded by a tip force and gravity only.
 
         Raises:
             ParameterError: If it is loaded otherwise.
@@ -69,17 +69,17 @@ class LiveView:
             tip_force(equilibrium),
             None if gravity is None else read_only(finite_array("gravity", gravity, (3,), "m/s^2")),
         )
-        """What it began with."""
+        """The first state."""
         self.wanted = self.start
-        """What is shown."""
+        """The state that is shown."""
         self.equilibrium = self._first = equilibrium
         """The loaded robot that is shown."""
 
     def apply(self, wanted: Wanted) -> Equilibrium:
-        """Show the robot as it is wanted; if there is no such equilibrium, everything stays as it is.
+        """Show the robot in a commanded state; without such an equilibrium nothing changes.
 
         Args:
-            wanted: What is wanted.
+            wanted: The state.
 
         Returns:
             The loaded robot.
@@ -91,25 +91,25 @@ class LiveView:
             ViewerError: If the page is closed.
         """
         if wanted is self.start:
-            found = self._first  # not what the robot would come to from where it is now
+            equilibrium = self._first  # a warm start could end on another branch
         elif wanted.target is None:
-            found = next_equilibrium(self.equilibrium, wanted.motors, wanted.force, gravity=wanted.gravity)
+            equilibrium = next_equilibrium(self.equilibrium, wanted.motors, wanted.force, gravity=wanted.gravity)
         else:
-            found = next_solution(self.equilibrium, wanted.target, wanted.force, gravity=wanted.gravity).equilibrium
-        self.page.show(found)
+            equilibrium = next_solution(self.equilibrium, wanted.target, wanted.force, gravity=wanted.gravity).equilibrium
+        self.page.show(equilibrium)
         self.page.mark(wanted.target)
-        self.wanted, self.equilibrium = wanted._replace(motors=found.q_motors), found
-        return found
+        self.wanted, self.equilibrium = wanted._replace(motors=equilibrium.q_motors), equilibrium
+        return equilibrium
 
 
 def follow(live: LiveView, commands: Commands, tell: Callable[[str], object], complain: Callable[[str], object]) -> None:
-    """Follow commands until they end, or the page does. A command that cannot be followed is told, and the next one is read.
+    """Follow commands until they end or the page is closed. A command that fails is reported, and the next one is read.
 
     Args:
         live: The view.
         commands: Where commands come from.
-        tell: Takes a line on each robot that is shown.
-        complain: Takes a line on each command that cannot be followed.
+        tell: Prints a line for each robot that is shown.
+        complain: Prints a line for each command that fails.
 
     Raises:
         ViewerError: If the page is closed on the way.
@@ -129,7 +129,7 @@ def follow(live: LiveView, commands: Commands, tell: Callable[[str], object], co
 
 
 def state_line(equilibrium: Equilibrium) -> str:
-    """A loaded robot in a line: where its tip is, its actuators, whether it is stable and wrinkled, the residual."""
+    """Return one line about a loaded robot: tip, actuators, stability, wrinkling, residual."""
     words = [f"tip {_spelled(equilibrium.tip_position)} m"]
     if len(equilibrium.q_motors):
         words.append(f"motors {_spelled(equilibrium.q_motors)}" + ("" if equilibrium.within_limits else " (beyond limits)"))
@@ -140,15 +140,15 @@ def state_line(equilibrium: Equilibrium) -> str:
 
 
 def tip_force(equilibrium: Equilibrium) -> FloatArray:
-    """Force on the tip, shape (3,) [N], of a robot that nothing else but gravity loads.
+    """Return the tip force, shape (3,) [N], of a robot without other loads than gravity.
 
     Raises:
         ParameterError: If there is another force, or a moment.
     """
     model, wrenches = equilibrium.model, equilibrium.load.wrenches
     if any(wrench.any() for name, wrench in wrenches.items() if name != model.tip) or not equilibrium.conservative:
-        told = {name: wrench.tolist() for name, wrench in wrenches.items()}
-        raise ParameterError("load", told, "a force on the tip and gravity only, to be changed by commands")
+        given = {name: wrench.tolist() for name, wrench in wrenches.items()}
+        raise ParameterError("load", given, "a force on the tip and gravity only, to be changed by commands")
     return read_only(np.array(wrenches[model.tip][:3]) if model.tip in wrenches else np.zeros(3))
 
 

@@ -1,1 +1,1 @@
-"""The meshcat page of `softrobots.view.viewer`: its server, what is drawn on it, and pages as self-contained files."""
+"""The meshcat page of `softrobots.view.viewer`: server, drawing, and self-contained files."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class InlinePage:
-    """A self-contained page that Jupyter shows where this is the last expression of a cell.
+    """A self-contained page that Jupyter shows if it is the last expression of a cell.
 
-    It is an iframe that holds the whole page: no server, no extension of Jupyter and no network is needed, and it stays in the
-    notebook when that is saved.
+    It is an iframe that holds the whole page: it needs no server, Jupyter extension or network, and is saved with the
+    notebook.
     """
 
     page: str
@@ -20,12 +20,12 @@ class InlinePage:
     """Height in the notebook [px]; it is as wide as the cell."""
 
     def _repr_html_(self) -> str:
-        """What Jupyter asks for."""
+        """Return the iframe for Jupyter."""
         return (
             f'<iframe title="softrobots" srcdoc="{html.escape(self.page)}" '
             f'style="width:100%;height:{self.height}px;border:0"></iframe>'
         )
 
     def __repr__(self) -> str:
-        """A line for where no HTML is shown; the page itself is a megabyte."""
+        """Return a short text for consoles; the page itself is a megabyte."""
         return f"InlinePage({len(self.page)} characters, height={self.height})"

@@ -1,8 +1,8 @@
-"""What a meshcat page draws, as one packed text: the same bytes every time, and a third of the size.
+"""The drawing commands of a meshcat page as one packed text: reproducible, and a third of the size.
 
-Meshcat's own pages hold one base64 text a command, with random names of objects that tell when and on which machine they were
-made. Here the commands are renamed, rounded, split where they repeat each other, deflated together with the script of the page,
-and unpacked by the browser.
+Meshcat's own pages hold one base64 text for each command, with random object names that reveal time and machine. Here objects
+are renumbered, numbers rounded, repeated arrays shared, and everything deflated together with the script of the page; the
+browser unpacks it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _REPEATED = 256  # bytes of an array from which it is looked for among the other
 
 
 def read_page(static: str) -> tuple[str, list[bytes]]:
-    """Take a page of meshcat's `static_html` apart.
+    """Return script and commands of a page of meshcat's `static_html`.
 
     Args:
         static: The page.
@@ -48,10 +48,10 @@ def read_page(static: str) -> tuple[str, list[bytes]]:
 
 
 def tidied(commands: Sequence[bytes]) -> list[bytes]:
-    """The same commands whenever and wherever they were made.
+    """Return the commands independent of time and machine.
 
-    Objects are numbered instead of named at random, numbers are multiples of `RESOLUTION` (which also hides what the last bits
-    of two machines differ by), and the animation comes after what it moves.
+    Objects are numbered instead of named at random, numbers are multiples of `RESOLUTION` (which removes differences in the
+    last bits between machines), and the animation comes after the objects that it moves.
     """
     import umsgpack
 
@@ -63,26 +63,26 @@ def tidied(commands: Sequence[bytes]) -> list[bytes]:
     drawn: list[bytes] = []
     played: list[bytes] = []
     for command in commands:
-        told = _rounded(umsgpack.unpackb(command))
-        text = _UUID.sub(number, umsgpack.packb(told, force_float_precision="single"))
-        (played if told["type"] == "set_animation" else drawn).append(text)
+        decoded = _rounded(umsgpack.unpackb(command))
+        text = _UUID.sub(number, umsgpack.packb(decoded, force_float_precision="single"))
+        (played if decoded["type"] == "set_animation" else drawn).append(text)
     return drawn + played
 
 
 def packed(script: str, commands: Sequence[bytes]) -> str:
     """Pack a script and commands into one line of base64.
 
-    It holds, deflated: a line of JSON, the lengths of pieces and of which pieces each command is made; then the pieces, of
-    which the first is the script. Arrays that several commands share, such as corners of triangles, are one piece.
+    It holds, deflated, a line of JSON (lengths of all pieces, and the pieces of each command), then the pieces, of which the
+    first is the script. Arrays that several commands share, such as corners of triangles, are one piece.
     """
     pieces: dict[bytes, int] = {script.encode(): 0}
-    made = [[pieces.setdefault(part, len(pieces)) for part in _parts(command)] for command in commands]
-    head = json.dumps({"lengths": [len(piece) for piece in pieces], "commands": made}, separators=(",", ":"))
+    numbered = [[pieces.setdefault(part, len(pieces)) for part in _parts(command)] for command in commands]
+    head = json.dumps({"lengths": [len(piece) for piece in pieces], "commands": numbered}, separators=(",", ":"))
     return base64.b64encode(zlib.compress(head.encode() + b"\n" + b"".join(pieces), 9)).decode()
 
 
 def unpacked(text: str) -> tuple[str, list[bytes]]:
-    """The script and the commands in what `packed` returned.
+    """Return script and commands from the text of `packed`.
 
     Raises:
         ViewerError: If it is no such text.
@@ -93,11 +93,11 @@ def unpacked(text: str) -> tuple[str, list[bytes]]:
         if not unpacker.eof:
             raise ValueError(f"it is cut off, or has more than {_LARGEST} bytes")
         head, _, rest = inflated.partition(b"\n")
-        told, pieces = parse_json(head.decode()), []
-        for length in told["lengths"]:
+        index, pieces = parse_json(head.decode()), []
+        for length in index["lengths"]:
             pieces.append(rest[:length])
             rest = rest[length:]
-        return pieces[0].decode(), [b"".join(pieces[number] for number in numbers) for numbers in told["commands"]]
+        return pieces[0].decode(), [b"".join(pieces[number] for number in numbers) for numbers in index["commands"]]
     except (ValueError, KeyError, IndexError, TypeError, zlib.error) as error:
         raise ViewerError(f"this is no packed page: {error}") from error
 

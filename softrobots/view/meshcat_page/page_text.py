@@ -1,4 +1,4 @@
-"""A self-contained page: a robot with a title and a legend, in one file of HTML that works offline and on a phone."""
+"""The HTML of a page with title and legend: self-contained and offline, or served."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE,
 SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
 """.strip()
 
-# A window that is narrow for its height shows as much from side to side as one of seven to five, by a smaller scale.
+# A window narrower than seven to five is scaled down, so that it shows the same width.
 _FIT = """
     const fit = () => { viewer.camera.zoom = Math.min(1, innerWidth / innerHeight / 1.4); viewer.set_dirty(); };
     addEventListener("resize", fit);
@@ -77,7 +77,7 @@ FIT
   });
 """.strip("\n").replace("FIT", _FIT)
 
-# Meshcat's script takes the commands of the server; the legend, which it does not know, is put where the page has it.
+# Meshcat's script handles the commands of the server, except that of the legend, which it does not know.
 _FOLLOWER = """
   {
     const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
@@ -96,10 +96,9 @@ FIT
 
 
 def page_text(static: str, title: str, legend: Sequence[tuple[Colour, str]]) -> str:
-    """Make a page of our own out of meshcat's.
+    """Return a self-contained page of what a page of meshcat shows.
 
-    The same scene gives the same text: nothing in it is random or tells the time. The browser unpacks it with its own
-    `DecompressionStream`, and asks for no other file.
+    The same scene gives the same text. The browser unpacks it with its own `DecompressionStream` and requests no other file.
 
     Args:
         static: Meshcat's page, from `static_html`.
@@ -126,7 +125,7 @@ def page_text(static: str, title: str, legend: Sequence[tuple[Colour, str]]) -> 
 
 
 def live_page(title: str) -> str:
-    """Make the page that the meshcat server serves: it draws what the server says, and shows the legend that it is told.
+    """Return the page that the meshcat server serves: it follows the commands of the server and shows its legend.
 
     Args:
         title: Title of the page.
@@ -139,25 +138,25 @@ def live_page(title: str) -> str:
 
 
 def legend_rows(legend: Sequence[tuple[Colour, str]]) -> str:
-    """HTML of a legend: one line for each colour and meaning, the colour as background of an empty `span`."""
+    """Return the HTML of a legend: one line for each colour and meaning, the colour as background of an empty `span`."""
     rows = (f'\n<div><span style="background:{_css(colour)}"></span>{html.escape(text)}</div>' for colour, text in legend)
     return "".join(rows)
 
 
 def scene_of(page: str) -> tuple[str, list[bytes]]:
-    """The script and the drawing commands of a page that `page_text` made, for comparisons.
+    """Return script and drawing commands of a page of `page_text`, for comparisons.
 
     Raises:
         ViewerError: If it is no such page.
     """
-    found = _SCENE.search(page)
-    if found is None:
+    match = _SCENE.search(page)
+    if match is None:
         raise ViewerError("this page was not made by softrobots: it holds no packed scene")
-    return unpacked(found[1])
+    return unpacked(match[1])
 
 
 def _page(title: str, rows: str, hint: str, scene: str, head: str = "") -> str:
-    """What written and served pages share."""
+    """The frame that written and served pages share."""
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -179,7 +178,7 @@ def _page(title: str, rows: str, hint: str, scene: str, head: str = "") -> str:
 
 
 def _css(colour: Colour) -> str:
-    """A colour as the legend shows it: faint things show better with twice their opacity."""
+    """A colour of the legend in CSS, with twice the opacity of transparent ones."""
     if isinstance(colour, int):
         return f"#{colour:06x}"
     red, green, blue = (round(255 * value) for value in colour[:3])

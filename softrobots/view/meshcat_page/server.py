@@ -1,4 +1,4 @@
-"""Starts and ends the meshcat server of a viewer, on loopback only, and connects to it."""
+"""Start and end the meshcat server of a viewer, on loopback only, and connect to it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 from softrobots.core.errors import ViewerError
 from softrobots.view.served_page import LOOPBACK
 
-_REPLY_TIME = 30_000  # [ms], longest wait for an answer of the server
+_REPLY_TIME = 30_000  # [ms], longest wait for a reply of the server
 # As a file: as a module of the package it would import Pinocchio first, which takes as long as the server itself.
 _RUN = f"import runpy; runpy.run_path({str(Path(__file__).with_name('server_process.py'))!r}, run_name='__main__')"
 
@@ -29,28 +29,28 @@ def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str,
     Raises:
         ViewerError: If it ends before it serves, e.g. because the port is taken.
     """
-    wish = [] if port is None else [str(port)]
+    port_argument = [] if port is None else [str(port)]
     server = subprocess.Popen(
-        [sys.executable, "-u", "-c", _RUN, LOOPBACK, *wish],
+        [sys.executable, "-u", "-c", _RUN, LOOPBACK, *port_argument],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
-    watchdog = threading.Timer(_REPLY_TIME / 1000.0, server.kill)  # a server that says nothing ends, and so does the wait
+    watchdog = threading.Timer(_REPLY_TIME / 1000.0, server.kill)  # a silent server is killed, which ends the wait
     watchdog.start()
-    found: dict[str, str] = {}
-    while server.stdout is not None and len(found) < 2:
+    addresses: dict[str, str] = {}
+    while server.stdout is not None and len(addresses) < 2:
         line = server.stdout.readline().decode("utf-8", "replace")
         if not line:
             watchdog.cancel()
-            told = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
+            message = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
             end_server(server)
-            raise ViewerError(f"the meshcat server ended before it served: {told}")
+            raise ViewerError(f"the meshcat server ended before it served: {message}")
         name, _, value = line.strip().partition("=")
         if name in ("zmq_url", "web_url"):
-            found[name] = value
+            addresses[name] = value
     watchdog.cancel()
-    return server, found["zmq_url"], found["web_url"]
+    return server, addresses["zmq_url"], addresses["web_url"]
 
 
 def end_server(server: subprocess.Popen[bytes]) -> None:
@@ -67,13 +67,13 @@ def end_server(server: subprocess.Popen[bytes]) -> None:
 
 
 def connect(zmq_url: str, web_url: str) -> Any:
-    """Connect to a server; returns a `meshcat.Visualizer` whose calls fail rather than wait for ever."""
+    """Connect to a server; return a `meshcat.Visualizer` whose calls raise instead of waiting forever."""
     import meshcat
     import zmq
     from meshcat.visualizer import ViewerWindow
 
     class Window(ViewerWindow):  # type: ignore[misc]
-        """Meshcat's window without its second socket, which nobody closes, and without its message on stdout."""
+        """Meshcat's window without its second socket, which is never closed, and without its message on stdout."""
 
         def __init__(self) -> None:
             self.server_proc = None
@@ -85,14 +85,14 @@ def connect(zmq_url: str, web_url: str) -> Any:
             """Send a command, and wait for the answer."""
             try:
                 super().send(command)
-            except zmq.ZMQError as error:  # ended or stopped while it was asked
+            except zmq.ZMQError as error:  # ended or stopped during the call
                 raise ViewerError(f"the meshcat server does not answer: {error}") from error
 
     return meshcat.Visualizer(window=Window())
 
 
-def tell_server(page: Any, what: str, text: str) -> None:
-    """Tell a server what meshcat itself has no words for.
+def send_html(page: Any, what: str, text: str) -> None:
+    """Send a server what meshcat has no command for.
 
     Args:
         page: The `meshcat.Visualizer`.

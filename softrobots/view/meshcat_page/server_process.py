@@ -1,9 +1,8 @@
-"""The meshcat server as a process of its own, which `server.start_server` runs; it imports nothing of this package.
+"""The meshcat server as a separate process, which `server.start_server` runs; it imports nothing of this package.
 
-Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds the address that it is
-told, answers no page from elsewhere, and ends when its standard input closes, which happens however the parent ends. Its page
-is the one that the parent sends, with a legend; and it forgets properties that have been set anew, which meshcat's own keeps
-and sends to every new browser.
+Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds the given address,
+refuses foreign pages, and ends when its standard input closes, which happens however the parent ends. It serves the page that
+the parent sends, with a legend, and drops properties that have been set again, which meshcat's own keeps for every new browser.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import Any
 
 
 def main() -> None:
-    """Serve until standard input closes; print `zmq_url=` and `web_url=` first. Words: the address, and perhaps the port."""
+    """Print `zmq_url=` and `web_url=`, and serve until standard input closes; arguments: the address, and perhaps the port."""
     import umsgpack
     from meshcat.servers.zmqserver import VIEWER_ROOT, ZMQWebSocketBridge, find_node
     from tornado.web import Application, RequestHandler
@@ -31,47 +30,47 @@ def main() -> None:
         return listen(self, port, address=sys.argv[1], **options)
 
     class Refused(RequestHandler):  # type: ignore[misc]
-        """What pages from elsewhere get, also where they ask for the websocket."""
+        """The answer to foreign pages, also to their websocket requests."""
 
         def prepare(self) -> None:
-            """Answer before anything else is looked at."""
+            """Refuse before any other handling."""
             self.set_status(403)
             self.finish(rules["REFUSAL"])
 
     def find_for_this_machine(self: Any, request: Any, **options: Any) -> Any:
-        told = request.headers
-        if rules["is_local"](told.get("Host"), told.get("Origin") or told.get("Sec-Websocket-Origin")):
+        headers = request.headers
+        if rules["is_local"](headers.get("Host"), headers.get("Origin") or headers.get("Sec-Websocket-Origin")):
             return find_handler(self, request, **options)
         return self.get_handler_delegate(request, Refused)
 
     class NoIcon(RequestHandler):  # type: ignore[misc]
-        """What browsers ask for of themselves; without an answer they tell an error."""
+        """The icon that browsers request by themselves; without an answer they log an error."""
 
         def get(self) -> None:
-            """Answer with nothing."""
+            """Return an empty answer."""
             self.set_status(204)
 
     class Page(RequestHandler):  # type: ignore[misc]
         """The page that the parent sent; meshcat's own until it sends one."""
 
         def get(self) -> None:
-            """Answer with it."""
+            """Return the page."""
             self.set_header("Cache-Control", "no-store")
-            self.finish(bridge.told.get("page") or Path(VIEWER_ROOT, "index.html").read_text(encoding="utf-8"))
+            self.finish(bridge.page or Path(VIEWER_ROOT, "index.html").read_text(encoding="utf-8"))
 
     class Bridge(ZMQWebSocketBridge):  # type: ignore[misc]
         """Meshcat's server with a page of our own and its legend."""
 
         def __init__(self, port: int | None) -> None:
-            self.told: dict[str, str] = {}
+            self.page = ""
             self.legend = b""
             super().__init__(port=port)
 
         def handle_zmq(self, frames: list[bytes]) -> None:
-            """Take a command of the parent."""
+            """Handle a command of the parent."""
             kind, where, data = frames if len(frames) == 3 else (frames[0], b"", b"")
             if kind == b"page":
-                self.told["page"] = umsgpack.unpackb(data)["text"]
+                self.page = umsgpack.unpackb(data)["text"]
                 self.zmq_socket.send(b"ok")
             elif kind == b"legend":
                 self.legend = data
@@ -85,13 +84,13 @@ def main() -> None:
                 node.properties = [*(old for old in node.properties[:-1] if umsgpack.unpackb(old)["property"] != name), data]
 
         def forward_to_websockets(self, frames: list[bytes]) -> None:
-            """Pass a command on to every browser; one that is about to go must not keep the others from it."""
+            """Send a command to every browser; one that is closing must not stop the others."""
             for websocket in tuple(self.websocket_pool):
                 with contextlib.suppress(WebSocketClosedError):
                     websocket.write_message(frames[2], binary=True)
 
         def send_scene(self, websocket: Any) -> None:
-            """Tell a new browser everything."""
+            """Send everything to a new browser."""
             super().send_scene(websocket)
             if self.legend:
                 websocket.write_message(self.legend, binary=True)
@@ -105,7 +104,7 @@ def main() -> None:
     bridge.app.add_handlers(".*", [(r"/favicon\.ico", NoIcon), (r"/static/(?:index\.html)?", Page)])
     print(f"zmq_url={bridge.zmq_url}\nweb_url={bridge.web_url}", flush=True)  # noqa: T201
     quiet = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(quiet, sys.stdout.fileno())  # nobody reads on, and a full pipe would block the server
+    os.dup2(quiet, sys.stdout.fileno())  # the parent reads no further, and a full pipe would block the server
     os.dup2(quiet, sys.stderr.fileno())
     threading.Thread(target=_end_with_parent, daemon=True).start()
     bridge.run()

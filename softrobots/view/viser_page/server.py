@@ -1,7 +1,4 @@
-"""The server of a page with sliders: viser, on loopback only, without a word on stdout and without sharing.
-
-It answers pages of this machine only (`softrobots.view.local_requests`), which viser itself does not look at.
-"""
+"""Viser's server for a page with sliders: on loopback only, silent, without public sharing, for pages of this machine only."""
 
 from __future__ import annotations
 
@@ -41,17 +38,17 @@ def start_server(label: str, port: int | None = None) -> Any:
         raise MissingDependency("viser", "viser") from error
 
     class Server(viser.ViserServer):  # type: ignore[misc]
-        """Viser's server without the public tunnel that any page which finds the port could ask for."""
+        """Viser's server without the public tunnel that any page which finds the port could request."""
 
         def request_share_url(self, verbose: bool = True) -> None:
             """Share nothing."""
 
-    # Viser greets and says goodbye on stdout whatever it is told. Rich collects what the calling thread prints, no other.
+    # Viser prints to stdout at start and end even with verbose=False. Rich captures only what the calling thread prints.
     console = rich.get_console()
     with console.capture(), _for_this_machine():
         server = Server(host=LOOPBACK, port=FIRST_PORT if port is None else port, label=label, verbose=False)
     server.get_event_loop().call_soon_threadsafe(console.begin_capture)
-    if port is not None and server.get_port() != port:  # viser takes the next free one
+    if port is not None and server.get_port() != port:  # viser took the next free one
         end_server(server)
         raise ViewerError(f"port {port} of {LOOPBACK} cannot be had: it is taken, or reserved for the system")
     server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -61,7 +58,7 @@ def start_server(label: str, port: int | None = None) -> Any:
 
 @contextmanager
 def _for_this_machine() -> Iterator[None]:
-    """Servers of websockets that are started meanwhile refuse pages from elsewhere; viser has no place to say so."""
+    """Make websocket servers that are started meanwhile refuse foreign pages (`local_requests`); viser has no option for it."""
     import websockets.asyncio.server
 
     websockets_server: Any = websockets.asyncio.server

@@ -1,4 +1,4 @@
-"""Objects of meshcat in viser's terms: triangles, points and lines, of one colour each."""
+"""Meshcat objects as viser draws them: triangles, points and lines, of one colour each."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class Drawn:
     colour: tuple[int, int, int]
     """Red, green, blue, each up to 255."""
     opacity: float | None = None
-    """Opacity of triangles that can be seen through."""
+    """Opacity of transparent triangles, else None."""
     flat: bool = False
     """Whether triangles are flat; others look round."""
     size: float = 0.0
     """Size of points [m]."""
 
     def becomes(self, other: Drawn) -> bool:
-        """Whether a change of corners and colour makes the other object of this one."""
+        """Whether the other object differs in corners and colour only, so that a handle can be changed to it."""
         same = (self.kind, self.opacity, self.flat, self.size) == (other.kind, other.opacity, other.flat, other.size)
         return same and (self.faces is other.faces or np.array_equal(self.faces, other.faces))
 
@@ -71,18 +71,18 @@ class Drawn:
         )
 
     def change(self, handle: Any) -> None:
-        """Make what a handle shows this object; see `becomes`."""
+        """Change a handle to this object; see `becomes`."""
         if self.kind == "triangles":
             handle.vertices, handle.color = self.corners, self.colour
         else:
             handle.points, handle.colors = self.corners, np.array(self.colour, dtype=np.uint8)
 
 
-def drawn_of(thing: Any, material: Any = None) -> Drawn:
+def drawn_of(meshcat_object: Any, material: Any = None) -> Drawn:
     """Translate an object of meshcat.
 
     Args:
-        thing: A box, sphere, cylinder or triangles of `meshcat.geometry`, or its points or line segments with their material.
+        meshcat_object: A box, sphere, cylinder or triangles of `meshcat.geometry`, or its points or lines with a material.
         material: Material of a geometry.
 
     Returns:
@@ -93,19 +93,19 @@ def drawn_of(thing: Any, material: Any = None) -> Drawn:
     """
     import meshcat.geometry as known
 
-    if isinstance(thing, known.Object) and isinstance(thing.geometry, known.PointsGeometry):
-        points, colours = np.asarray(thing.geometry.position).T, thing.geometry.color
-        if isinstance(thing, known.LineSegments):
-            return Drawn("lines", points.reshape(-1, 2, 3), None, _rgb(thing.material.color))
-        if isinstance(thing, known.Points) and colours is not None and len(points):
+    if isinstance(meshcat_object, known.Object) and isinstance(meshcat_object.geometry, known.PointsGeometry):
+        points, colours = np.asarray(meshcat_object.geometry.position).T, meshcat_object.geometry.color
+        if isinstance(meshcat_object, known.LineSegments):
+            return Drawn("lines", points.reshape(-1, 2, 3), None, _rgb(meshcat_object.material.color))
+        if isinstance(meshcat_object, known.Points) and colours is not None and len(points):
             red, green, blue = (round(255 * share) for share in np.asarray(colours)[:, 0].tolist())
-            return Drawn("points", points, None, (red, green, blue), size=thing.material.size)
-    elif isinstance(thing, known.Geometry) and material is not None:
-        corners, faces, flat = _triangles(thing)
+            return Drawn("points", points, None, (red, green, blue), size=meshcat_object.material.size)
+    elif isinstance(meshcat_object, known.Geometry) and material is not None:
+        corners, faces, flat = _triangles(meshcat_object)
         return Drawn(
             "triangles", corners, faces, _rgb(material.color), material.opacity if material.transparent else None, flat
         )
-    raise ViewerError(f"a {type(thing).__name__} without a material cannot be drawn on a page with sliders")
+    raise ViewerError(f"a {type(meshcat_object).__name__} without a material cannot be drawn on a page with sliders")
 
 
 def _rgb(colour: int) -> tuple[int, int, int]:

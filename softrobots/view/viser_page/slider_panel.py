@@ -1,4 +1,4 @@
-"""The panel beside a robot in the browser: sliders of its motors and of the force on its tip, and what the statics says."""
+"""The panel beside a robot in the browser: sliders of its motors and tip force, and a report of the equilibrium."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.meshcat_page.page_text import Colour, legend_rows
 
 _STEPS = 400  # least number of steps of a slider
-_LISTED = 6  # inflated links of which each is told
-_SLIDE = 1.0  # [m], how far from the middle a slide without limits goes
+_LISTED = 6  # most inflated links that are listed one by one
+_SLIDE = 1.0  # [m], half the range of a prismatic joint without limits
 
 _STYLE = (
     "<style>#softrobots-panel{font:13px/1.5 sans-serif;padding:0 1em .5em} #softrobots-note{font-weight:bold;color:#8b0000}"
@@ -24,8 +24,8 @@ _STYLE = (
 )
 
 
-class Wish(NamedTuple):
-    """What the sliders ask for."""
+class Setting(NamedTuple):
+    """Values of all sliders."""
 
     q_motors: tuple[float, ...]
     """Actuator coordinates [rad, m or N]."""
@@ -38,15 +38,15 @@ class Wish(NamedTuple):
 class SliderPanel:
     """The panel on a page of viser."""
 
-    def __init__(self, gui: Any, model: SoftModel, start: Wish, full_force: float, *, changed: Callable[[], None]) -> None:
+    def __init__(self, gui: Any, model: SoftModel, start: Setting, full_force: float, *, changed: Callable[[], None]) -> None:
         """Add the panel.
 
         Args:
             gui: The `viser.GuiApi`.
             model: The robot.
-            start: Where the sliders stand.
-            full_force: How far each slider of the force goes to both sides [N].
-            changed: Called whenever somebody changes something, in the thread of the server: must not wait.
+            start: Initial values.
+            full_force: Largest force of each slider, to both sides [N].
+            changed: Called at every change, in the thread of the server; must not block.
         """
         self._gui, self._changed = gui, changed
         self._reset = False
@@ -66,40 +66,40 @@ class SliderPanel:
         self._text = gui.add_html(_STYLE)
 
     @property
-    def wish(self) -> Wish:
-        """What the sliders ask for now."""
+    def setting(self) -> Setting:
+        """The values now."""
         motors, force = (tuple(slider.value for slider in sliders) for sliders in (self._motors, self._force))
-        return Wish(motors, force, self._gravity.value)
+        return Setting(motors, force, self._gravity.value)
 
     @property
     def rigid(self) -> bool:
-        """Whether the rigid robot is to be seen."""
+        """Whether the rigid robot is visible."""
         return bool(self._rigid.value)
 
     @property
     def path(self) -> bool:
-        """Whether the path of the tip is to be seen."""
+        """Whether the path of the tip is visible."""
         return bool(self._path.value)
 
-    def taken_reset(self) -> bool:
-        """Whether the button was pressed since the last call."""
+    def take_reset(self) -> bool:
+        """Return whether the reset button was pressed since the last call."""
         pressed, self._reset = self._reset, False
         return pressed
 
-    def put(self, wish: Wish) -> None:
+    def move_to(self, setting: Setting) -> None:
         """Move the sliders."""
-        values = (*wish.q_motors, *wish.force)
+        values = (*setting.q_motors, *setting.force)
         for slider, value in zip((*self._motors, *self._force), values, strict=True):
             slider.value = value
-        self._gravity.value = wish.gravity
+        self._gravity.value = setting.gravity
 
-    def tell(self, equilibrium: Equilibrium, legend: Sequence[tuple[Colour, str]], problem: str = "") -> None:
-        """Write what an equilibrium is and what the colours mean.
+    def report(self, equilibrium: Equilibrium, legend: Sequence[tuple[Colour, str]], problem: str = "") -> None:
+        """Show facts of an equilibrium, and the legend.
 
         Args:
             equilibrium: The equilibrium that is shown.
             legend: Colour and meaning of each thing.
-            problem: Why it is not the one that the sliders ask for.
+            problem: Why there is no equilibrium for the values of the sliders; empty if there is.
         """
         rows = "".join(f"<tr><td>{name}</td><td>{html.escape(text)}</td></tr>" for name, text in _facts(equilibrium))
         note = f'<div id="softrobots-note">NO EQUILIBRIUM; the picture shows the last one. {html.escape(problem)}</div>'
@@ -110,15 +110,17 @@ class SliderPanel:
 
     def _slider(self, name: str, unit: str, low: float, high: float, value: float) -> Any:
         first, last, step = slider_grid(low, high)
-        made = self._gui.add_slider(f"{name} [{unit}]", first, last, step, first)  # a round number: viser shows as many digits
-        made.value = value
-        made.on_update(self._moved)
-        return made
+        handle = self._gui.add_slider(
+            f"{name} [{unit}]", first, last, step, first
+        )  # viser shows as many digits as the initial value has
+        handle.value = value
+        handle.on_update(self._moved)
+        return handle
 
     def _checkbox(self, label: str, ticked: bool) -> Any:
-        made = self._gui.add_checkbox(label, ticked)
-        made.on_update(self._moved)
-        return made
+        handle = self._gui.add_checkbox(label, ticked)
+        handle.on_update(self._moved)
+        return handle
 
     # Coroutines run in the thread of the server; functions would each take another thread of a pool.
     async def _moved(self, _: Any) -> None:
@@ -155,7 +157,7 @@ def slider_grid(low: float, high: float) -> tuple[float, float, float]:
 
 
 def _ends(limits: Sequence[float], unit: str) -> tuple[float, float]:
-    """Limits of a slider: those of the motor, or, where it has none, a distance from the other or from zero."""
+    """Limits of a slider: those of the motor; a missing one lies a default range from the other, or from zero."""
     (low, high), around = limits, math.pi if unit == "rad" else _SLIDE
     if math.isinf(low) and math.isinf(high):
         return -around, around
@@ -163,7 +165,7 @@ def _ends(limits: Sequence[float], unit: str) -> tuple[float, float]:
 
 
 def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:
-    """Name and text of what the statics says."""
+    """Name and value of each fact of an equilibrium."""
     x, y, z = equilibrium.tip_position.tolist()
     facts = [("tip [m]", f"{x:.4f}  {y:.4f}  {z:.4f}")]
     truths = (
@@ -174,11 +176,11 @@ def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:
     facts += [(name, "yes" if true else "no") for name, true in truths]
     groups = equilibrium.model.spring_groups
     left = [1.0 - moment / group.wrinkling_moment for moment, group in zip(equilibrium.link_moments, groups, strict=True)]
-    told = [
+    links = [
         f"{'link' if group.segment is None else 'section'} {number}: "
         + ("wrinkled" if share <= 0.0 or flat else f"{100.0 * share:.0f} %")
         for number, (group, share, flat) in enumerate(zip(groups, left, equilibrium.saturated, strict=True), start=1)
     ]
-    if len(told) > _LISTED:
-        told = [f"least of {len(told)}, {told[int(np.argmin(left))]}"]
-    return facts + ([("left to wrinkling", "; ".join(told))] if told else [])
+    if len(links) > _LISTED:
+        links = [f"least of {len(links)}, {links[int(np.argmin(left))]}"]
+    return facts + ([("left to wrinkling", "; ".join(links))] if links else [])

@@ -1,7 +1,7 @@
-"""The drawings of the meshcat view, shown by viser.
+"""A viser scene that takes the calls of a meshcat page.
 
-`ViserTree` takes what the drawings say to a meshcat page: objects, transforms and visibility, by path, and the camera. `commit`
-compares that with what viser shows and tells viser the difference: a tube that bends is a change of corners, not a new tube.
+`ViserTree` records objects, transforms and visibility by path, and the camera. `commit` compares them with what viser shows and
+sends the difference: a tube that bends is a change of corners, not a new tube.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray
 from softrobots.view.viser_page.shapes import Drawn, drawn_of
 
-_CAMERA = "/Cameras/default/rotated/<object>"  # what a page calls its camera
+_CAMERA = "/Cameras/default/rotated/<object>"  # path of the camera on a meshcat page
 
 _AMBIENT, _SUN = 2.2, 2.0  # strength of the light from everywhere and from above
 
 
 @dataclass
 class _Wanted:
-    """What the drawings said of a path."""
+    """The recorded state of a path."""
 
     drawn: Drawn | None = None
     transform: FloatArray = field(default_factory=lambda: np.eye(4))
@@ -31,7 +31,7 @@ class _Wanted:
 
 @dataclass
 class _Shown:
-    """What viser shows of a path."""
+    """The state of a path that viser shows."""
 
     handle: Any
     drawn: Drawn
@@ -45,9 +45,9 @@ class ViserTree:
         """Show on a `viser.ViserServer`."""
         self._server = server
         self.wanted: dict[str, _Wanted] = {}
-        """What the drawings said, by path."""
+        """The recorded state by path."""
         self._shown: dict[str, _Shown] = {}
-        # Viser's own light is a photograph of a street; under an even one colours look like those of the legend.
+        # Viser's default light is a photograph; under even light colours look like those of the legend.
         scene = server.scene
         scene.configure_environment_map(None)
         scene.configure_default_lights(False)
@@ -59,12 +59,12 @@ class ViserTree:
         return ViserNode(self, path)
 
     def look_from(self, eye: FloatArray) -> None:
-        """Put the camera of browsers that connect from now on at a point, shape (3,) [m]; it looks at the origin."""
+        """Place the camera of browsers that connect later at a point, shape (3,) [m], looking at the origin."""
         self._server.initial_camera.position = eye
         self._server.initial_camera.look_at = np.zeros(3)
 
     def commit(self) -> None:
-        """Bring the page up to what the drawings said since the last time; browsers draw it at once."""
+        """Send all changes since the last call in one message."""
         places: dict[str, tuple[FloatArray, bool]] = {"": (np.eye(4), True)}
         with self._server.atomic():
             for path in [path for path in self._shown if path not in self.wanted]:
@@ -74,7 +74,7 @@ class ViserTree:
                     self._show(path, wanted.drawn, *self._place(path, places))
 
     def _place(self, path: str, places: dict[str, tuple[FloatArray, bool]]) -> tuple[FloatArray, bool]:
-        """Pose in the world and visibility of a path, with all that is above it."""
+        """World pose and visibility of a path, with those of all nodes above it."""
         if path not in places:
             pose, visible = self._place(path.rpartition("/")[0], places)
             wanted = self.wanted.get(path)
@@ -87,7 +87,7 @@ class ViserTree:
             self._shown.pop(path).handle.remove()
             shown = None
         if shown is None:
-            if visible:  # what is never seen never gets to a browser
+            if visible:  # an object that is never visible is never sent
                 handle = drawn.add(self._server.scene, f"/{path}", wxyz=_quaternion(pose), position=pose[:3, 3])
                 self._shown[path] = _Shown(handle, drawn, pose)
             return
@@ -102,7 +102,7 @@ class ViserTree:
 
 
 class ViserNode:
-    """A path of a tree, with the part of a `meshcat.Visualizer` that the drawings use."""
+    """A node of a tree, with the methods of a `meshcat.Visualizer` that drawings use."""
 
     def __init__(self, tree: ViserTree, path: str) -> None:
         """Stand for a path, e.g. "softrobots/deformed/link_1"."""
@@ -112,24 +112,24 @@ class ViserNode:
         """Node at a path below."""
         return ViserNode(self._tree, f"{self._path}/{path}")
 
-    def set_object(self, thing: Any, material: Any = None) -> None:
+    def set_object(self, meshcat_object: Any, material: Any = None) -> None:
         """Put an object there.
 
         Args:
-            thing: A geometry, or points or lines with their material, of `meshcat.geometry`.
+            meshcat_object: A geometry, or points or lines with their material, of `meshcat.geometry`.
             material: Material of the geometry.
 
         Raises:
             ViewerError: If it is something else.
         """
-        self._own().drawn = drawn_of(thing, material)
+        self._own().drawn = drawn_of(meshcat_object, material)
 
     def set_transform(self, matrix: FloatArray) -> None:
         """Put everything there at a pose, shape (4, 4) [m], in the axes of the node above."""
         self._own().transform = np.array(matrix)
 
     def set_property(self, name: str, value: Any) -> None:
-        """Show or hide everything there, or place the camera; what else a meshcat page has of its own, viser has not.
+        """Show or hide everything there, or place the camera; other properties of meshcat are ignored.
 
         Args:
             name: "visible", or "position" of the camera.
