@@ -336,7 +336,7 @@ BAD = {
     "view inflatable_arm --result x.npz": "--result must be given without ROBOT",
     "view --result x.npz --gravity --target 1 2 3": "without --target, a load",
     "view --result nowhere.npz": "cannot read a result",
-    "view inflatable_arm --growth": "helix_tube, with chain=sections, where it is to grow",
+    "view inflatable_arm --growth": "helix_tube, with chain=sections, for --growth",
     "view helix_tube_lumped --growth --html a.html": "helix_tube, with chain=sections",
     "view helix_tube --growth --force 0 0 1": "--growth must be given without a load",
     "view helix_tube --growth --live keyboard": "--growth must be given without --live",
