@@ -28,8 +28,8 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 JOBS = {
-    "study": "of scripts/: the project's own studies, tables and pages",
-    "system": "in a real browser, notebook or documentation site, or with a C compiler",
+    "study": "of scripts/: the project's own studies, tables and pages; and proofs by thousands of random cases",
+    "system": "in a real browser, notebook or documentation site, of code in guides, or with a C compiler",
 }
 """Marks of tests that run in jobs of their own, and what these tests are."""
 SYSTEM_FIXTURES = {"browser", "site"}

@@ -8,10 +8,13 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from softrobots.compiled import Status
 from tests.conftest import CHECKOUT, missing
 from tests.support.documentation import PageRunner, blocks
+
+pytestmark = pytest.mark.system
 
 GUIDE = (CHECKOUT / "docs" / "compiled.md").read_text(encoding="utf-8")
 

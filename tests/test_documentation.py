@@ -45,6 +45,7 @@ def run_page(name: str, folder: Path) -> dict[str, object]:
         raise
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("name", PAGES)
 def test_the_code_of_the_page_prints_what_it_says(name: str, tmp_path: Path) -> None:
     names = run_page(name, tmp_path)

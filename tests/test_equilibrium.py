@@ -138,6 +138,7 @@ def test_a_moment_about_the_axis_of_one_spring(arm: sr.SoftModel) -> None:
     assert np.allclose(found.q_springs, [0, -7.0 / 172.71, 0, -7.0 / 172.71], atol=1e-13)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("size", "cases"), [(18, 10_000), (50, 10_000), (100, 10_000), (150, 10_000), (200, 10_000)])
 def test_every_random_case_ends_certified_stable(arm: sr.SoftModel, size: float, cases: int) -> None:
     """Every case is solved to 1e-10 and certified; an independent eigenvalue solver agrees with the certificate.
@@ -157,6 +158,7 @@ def test_every_random_case_ends_certified_stable(arm: sr.SoftModel, size: float,
     assert softest > 0.0
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("size", "share"), [(50, 1.0), (150, 0.69), (200, 0.34)])
 def test_the_papers_fixed_point_converges_as_often_as_measured(arm: sr.SoftModel, size: float, share: float) -> None:
     """docs/theory.md 1.4: 100, 70, 34 %; of 250 cases the standard deviation is 3 %, three of them are allowed."""

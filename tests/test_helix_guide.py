@@ -12,6 +12,8 @@ import softrobots as sr
 from softrobots import helix
 from tests.conftest import CHECKOUT
 
+pytestmark = pytest.mark.system
+
 GUIDE = (CHECKOUT / "docs" / "helix.md").read_text(encoding="utf-8")
 DIAMETER = 0.0331
 

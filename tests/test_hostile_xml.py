@@ -382,6 +382,7 @@ TOLD = {
 }
 
 
+@pytest.mark.study
 def test_the_script_tells_crashes_hangs_and_other_exceptions_apart(tmp_path: Path) -> None:
     planted = PLANTED.format(script=str(CHECKOUT / "scripts" / "fuzz_readers.py"))
     names: dict[str, Any] = {"__file__": str(tmp_path / "planted.py")}

@@ -17,6 +17,7 @@ def true_case(
     return motors, force, sr.solve_equilibrium(arm, motors, force, tolerance=1e-13, **options)
 
 
+@pytest.mark.study
 def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel) -> None:
     """1e-6 relative in at least 99 % of 10 000 cases at 18 N; each miss is a pose near a singular one."""
     rng, found = np.random.default_rng(0), 0
@@ -32,6 +33,7 @@ def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel) -> N
     assert found >= 9_900
 
 
+@pytest.mark.study
 def test_the_papers_alternation_recovers_fewer(arm: sr.SoftModel) -> None:
     rng, found = np.random.default_rng(0), 0
     for _ in range(400):
@@ -98,6 +100,7 @@ def test_noisy_torques_near_singular_poses_give_an_answer(arm: sr.SoftModel, mot
         assert np.isfinite(estimate.covariance).all()
 
 
+@pytest.mark.study
 def test_covariance_is_the_scatter_of_repeated_estimates(arm: sr.SoftModel) -> None:
     """2000 noisy torques; a sample covariance errs by sqrt(2 / 2000) = 3 %, five of them are allowed."""
     motors, force, std = np.array([0.3, 0.9, -1.4]), np.array([2.0, 10.0, -15.0]), np.array([0.02, 0.03, 0.01])

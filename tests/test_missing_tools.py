@@ -38,6 +38,7 @@ def test_right():
 }
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(
     ("ci", "told"), [("", "2 failed, 1 passed, 5 skipped, 1 error"), ("true", "6 failed, 1 passed, 2 errors")]
 )

@@ -23,6 +23,8 @@ from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 from tests.conftest import CHECKOUT
 
+pytestmark = pytest.mark.system
+
 EXAMPLES = CHECKOUT / "docs" / "examples"
 PAGE = (CHECKOUT / "docs" / "own_robot.md").read_text(encoding="utf-8")
 

@@ -5,7 +5,11 @@ from __future__ import annotations
 import json
 import re
 
+import pytest
+
 from tests.conftest import CHECKOUT
+
+pytestmark = pytest.mark.system
 
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
 

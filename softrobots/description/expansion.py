@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import itertools
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -89,14 +90,16 @@ def _expanded(path: Path, texts: Mapping[str, str]) -> str:
 
 @contextmanager
 def _checked_files() -> Iterator[None]:
-    """Let xacro read every file, also included ones, by `read_xml`, and stop at `MOST_STEPS`.
+    """Let xacro read every file, also included ones, by `read_xml`, stop at `MOST_STEPS`, and take linear time.
 
     xacro itself reads in the encoding of the system, expands entities and waits for pipes; a macro that doubles itself takes
     minutes.
     """
     import xacro
 
-    parse, evaluate, resolve, steps = xacro.parse, xacro.eval_all, xacro.resolve_macro, 0
+    own = xacro.parse, xacro.eval_all, xacro.resolve_macro, xacro.replace_node
+    parse, evaluate, resolve, _ = own
+    steps = 0
 
     def count(more: int) -> None:
         nonlocal steps
@@ -120,8 +123,33 @@ def _checked_files() -> Iterator[None]:
         count(len(macro[2].body.getElementsByTagName("*")))  # all of it is copied, also branches that are not taken
         return macro
 
-    xacro.parse, xacro.eval_all, xacro.resolve_macro = checked, evaluated, resolved
+    xacro.parse, xacro.eval_all, xacro.resolve_macro, xacro.replace_node = checked, evaluated, resolved, _replace_node
     try:
         yield
     finally:
-        xacro.parse, xacro.eval_all, xacro.resolve_macro = parse, evaluate, resolve
+        xacro.parse, xacro.eval_all, xacro.resolve_macro, xacro.replace_node = own
+
+
+def _replace_node(node: Any, by: Any, content_only: bool = False) -> None:
+    """Replace a node by others, or by what they contain; xacro's own function searches the siblings for every one of them."""
+    nodes = []
+    for source in by if isinstance(by, list) else [by] if by is not None else []:
+        if content_only:
+            nodes += source.childNodes
+            del source.childNodes[:]
+        else:
+            if source.parentNode is not None:
+                source.parentNode.removeChild(source)
+            nodes.append(source)
+    siblings = node.parentNode.childNodes
+    place = siblings.index(node)
+    row = [node.previousSibling, *nodes, node.nextSibling]
+    for left, right in itertools.pairwise(row):
+        if left is not None:
+            left.nextSibling = right
+        if right is not None:
+            right.previousSibling = left
+    for new in nodes:
+        new.parentNode = node.parentNode
+    siblings[place : place + 1] = nodes
+    node.parentNode = node.previousSibling = node.nextSibling = None
