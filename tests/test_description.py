@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import re
 import subprocess
@@ -24,6 +25,7 @@ from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube, PccArm
 from softrobots.robots.fields import facts_of
 from softrobots.robots.xacro_robot import default_text
+from tests.conftest import CHECKOUT
 from tests.support.laws import law
 from tests.support.oracles import tube_points
 from tests.support.tables import each_row
@@ -128,6 +130,25 @@ def test_the_xacro_files_check_the_bounds_of_the_dataclass(kind: type) -> None:
             low, high = (eval(texts.get(key, "None"), {"pi": math.pi}) for key in ("low", "high"))
             assert (None, low)[:: 1 if "strict" in texts else -1] == (facts.at_least, facts.above), name
             assert high in (None, facts.at_most), name
+
+
+def test_the_table_of_the_guide_has_the_defaults_of_the_arm() -> None:
+    """A cell has a value for each name, or one for all: `0.055 m, 0.5 mm`, `(0.6, 0.6) m`, `none: ...`."""
+    page = (CHECKOUT / "docs" / "inflatable_arm.md").read_text(encoding="utf-8")
+    facts, scales = facts_of(sr.InflatableArm), {"mm": (1e-3, "m"), "kPa": (1e3, "Pa")}
+    defaults = {field.name: field.default for field in dataclasses.fields(sr.InflatableArm)}
+    checked = []
+    for names, cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]*) \|", page, flags=re.MULTILINE)[:9]:
+        values = re.findall(r"(\([\d., ]+\)|[\d.]+|pi|none) ?([^,:]*)", cell)
+        for name, (number, unit) in zip(re.findall(r"\w+", names), itertools.cycle(values), strict=False):
+            scale, unit = scales.get(unit, (1.0, unit))
+            if number == "none":
+                assert defaults[name] is None
+            else:
+                assert np.allclose(scale * np.array(eval(number, {"pi": math.pi})), defaults[name], rtol=1e-15), name
+                assert unit == facts[name].unit, name
+            checked.append(name)
+    assert len(checked) == 13
 
 
 def test_mass_centre_and_inertia_are_those_of_two_capped_tubes() -> None:
@@ -283,7 +304,7 @@ def robot_with(joint: str = "", inside: str = "") -> str:
     ("text", "message"),
     [
         ("<mujoco/>", "root tag <mujoco>; <robot> is required"),
-        (robot_with('<softrobots:spring stiffness="0" rest="0"/>'), "positive one is required"),
+        (robot_with('<softrobots:spring stiffness="0" rest="0"/>'), "positive number is required"),
         (robot_with('<softrobots:spring stiffness="inf" rest="0"/>'), "finite number is required"),
         (robot_with('<softrobots:spring stiffness="10"/>'), "rest = None; a finite number"),
         (robot_with('<softrobots:role value="spring"/>'), "role 'spring' and no spring"),

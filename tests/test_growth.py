@@ -234,7 +234,7 @@ def test_a_distributed_force_needs_sections(arm: sr.SoftModel, model: sr.SoftMod
     ("old", "new", "message"),
     [
         ('name="actuator" segment="1"', 'name="actuator" segment="2"', "line 'actuator'.*runs along segment 2; available: 1"),
-        ('distance="0.01655" name="actuator"', 'distance="-1" name="actuator"', "distance -1.0; a positive one"),
+        ('distance="0.01655" name="actuator"', 'distance="-1" name="actuator"', "distance -1.0; a positive number"),
         ('azimuth="0.0" distance="0.01655"', 'azimuth="x" distance="0.01655"', "azimuth = 'x'"),
         ('springs="section_1_2_bend_x ', 'springs="section_1_99_bend_x ', "section_1_99_bend_x"),
     ],

@@ -768,10 +768,10 @@ def test_files_whose_joints_are_not_at_the_rest_shape_are_refused(change: Callab
         (one_section, changed("section", SECTION, rest="0 12 5"), "a positive stretch are required"),
         (two_hinges, changed("lumped_section", SECTION, rest=None), "a positive stretch are required"),
         (two_hinges, changed("lumped_section", SECTION, rest="0 inf 5 1"), "a positive stretch are required"),
-        (two_hinges, changed("lumped_section", SECTION, hinge="0"), "has hinge 0.0; a positive one"),
+        (two_hinges, changed("lumped_section", SECTION, hinge="0"), "has hinge 0.0; a positive number"),
         (two_hinges, changed("lumped_section", SECTION, hinge=None), "has hinge = None; a finite number"),
         (two_hinges, changed("line", "actuator", segment="2"), "line 'actuator' .* runs along segment 2"),
-        (two_hinges, changed("line", "actuator", distance="0"), "has distance 0.0; a positive one"),
+        (two_hinges, changed("line", "actuator", distance="0"), "has distance 0.0; a positive number"),
     ],
 )
 def test_malformed_tags_are_refused(text: Callable[[], str], change: Callable, message: str) -> None:

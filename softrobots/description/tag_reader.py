@@ -90,8 +90,7 @@ def _read_joint(joint: ElementTree.Element, source: str, springs: dict[str, Spri
 
 def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[str]) -> InflatedLinkTag:
     names = tuple(element.get("springs", "").split())
-    missing = [name for name in names if name not in springs]
-    if not names or missing:
+    if not names or any(name not in springs for name in names):
         raise DescriptionError(
             f"an inflated_link of {source} names the springs {' '.join(names) or '(none)'}; "
             f"springs that exist are required: {', '.join(springs) or 'none'}"
@@ -105,24 +104,14 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
 
 
 def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]) -> SectionTag:
-    name = element.get("name", "")
-    where = f"the section {name!r} of {source}"
+    name, where = _named(element, "section", source)
     joints = tuple(element.get("joints", "").split())
     if len(joints) != 6 or any(roles.get(joint) != "section" for joint in joints):
         raise DescriptionError(
             f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
         )
-    return SectionTag(
-        name,
-        _segment(element, where),
-        joints,
-        _positive(element, "length", where),
-        _positive(element, "EI", where),
-        _positive(element, "GJ", where),
-        _positive(element, "EA", where),
-        _rest(element, where),
-        _positive(element, "radius", where),
-    )
+    length, ei, gj, ea, radius = (_positive(element, key, where) for key in ("length", "EI", "GJ", "EA", "radius"))
+    return SectionTag(name, _segment(element, where), joints, length, ei, gj, ea, _rest(element, where), radius)
 
 
 def _rest(element: ElementTree.Element, where: str) -> tuple[float, ...]:
@@ -134,12 +123,10 @@ def _rest(element: ElementTree.Element, where: str) -> tuple[float, ...]:
 
 
 def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> LumpedSectionTag:
-    name = element.get("name", "")
-    where = f"the lumped section {name!r} of {source}"
+    name, where = _named(element, "lumped section", source)
     joints = {key: element.get(key, "") for key in COORDINATES if element.get(key)}
-    missing = [key for key in ("bend_x", "bend_y") if key not in joints]
-    unknown = [joint for joint in joints.values() if joint not in springs]
-    if missing or unknown or len(set(joints.values())) != len(joints):
+    complete = {"bend_x", "bend_y"} <= joints.keys() and springs.keys() >= set(joints.values())
+    if not complete or len(set(joints.values())) != len(joints):
         raise DescriptionError(
             f"{where} names the joints {joints}; different spring joints bend_x and bend_y are required; "
             "twist and stretch are optional"
@@ -149,8 +136,7 @@ def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[
 
 
 def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
-    name = element.get("name", "")
-    where = f"the muscle {name!r} of {source}"
+    name, where = _named(element, "muscle", source)
     positive = {key: _positive(element, key, where) for key in ("distance", "rest_length", "shortest", "longest", "strongest")}
     if not positive["shortest"] < positive["longest"]:
         raise DescriptionError(f"{where} is shortest at {positive['shortest']} and longest at {positive['longest']} m")
@@ -158,9 +144,13 @@ def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
 
 
 def _line(element: ElementTree.Element, source: str) -> LineTag:
-    name = element.get("name", "")
-    where = f"the line {name!r} of {source}"
+    name, where = _named(element, "line", source)
     return LineTag(name, _segment(element, where), _number(element, "azimuth", where), _positive(element, "distance", where))
+
+
+def _named(element: ElementTree.Element, kind: str, source: str) -> tuple[str, str]:
+    """Name of a part, and the part for errors."""
+    return element.get("name", ""), f"the {kind} {element.get('name', '')!r} of {source}"
 
 
 def _tip(root: ElementTree.Element, source: str) -> str | None:

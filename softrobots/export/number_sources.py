@@ -18,6 +18,7 @@ from softrobots.robots import HelixTube, InflatableArm, PccArm, XacroRobot
 Rules = dict[tuple[str, str], str]
 """Expression by the name of a part (joint, section, muscle, link) and of one of its numbers."""
 
+_Row = tuple[str, float | list[float], str, str, str]  # name, value or one a segment, unit, meaning, expression (of the first)
 _BEND = ("-pi / 2", "pi / 2")
 
 
@@ -43,7 +44,7 @@ def number_rules(robot: XacroRobot) -> Rules:
 
 def derived_numbers(robot: XacroRobot) -> dict[str, dict[str, Any]]:
     """Return value, unit, meaning and source of the numbers that expressions name besides the parameters."""
-    rows: list[tuple[str, float | list[float], str, str, str]] = []
+    rows: list[_Row] = []
     if isinstance(robot, PccArm):
         name = "elastic_sections" if robot.chain == "sections" else "hinges"
         lengths = [length / getattr(robot, name) for length in robot.segment_lengths]
@@ -54,46 +55,34 @@ def derived_numbers(robot: XacroRobot) -> dict[str, dict[str, Any]]:
     return {name: dict(zip(keys, facts, strict=True)) for name, *facts in rows}
 
 
-def _tube_stiffness(robot: HelixTube) -> list[tuple[str, float | list[float], str, str, str]]:
-    radius, wall, modulus = robot.radius, robot.wall_thickness, robot.young_modulus
-    rows: list[tuple[str, float | list[float], str, str, str]] = [("radius", radius, "m", "Radius of the tube", "diameter / 2")]
-    for name, kind, unit, value, rule in (
-        (
-            "EI",
-            "bending",
-            "N m2",
-            (modulus + robot.pressure * radius / (2.0 * wall)) * math.pi * radius**3 * wall,
-            "(young_modulus + pressure * radius / (2 * wall_thickness)) * pi * radius**3 * wall_thickness",
-        ),
-        (
-            "GJ",
-            "torsional",
-            "N m2",
-            modulus / (2.0 * (1.0 + robot.poisson_ratio)) * 2.0 * math.pi * radius**3 * wall,
-            "young_modulus / (2 * (1 + poisson_ratio)) * 2 * pi * radius**3 * wall_thickness",
-        ),
-        (
-            "EA",
-            "axial",
-            "N",
-            modulus * 2.0 * math.pi * radius * wall,
-            "young_modulus * 2 * pi * radius * wall_thickness",
-        ),
-    ):
-        measured = getattr(robot, f"{kind}_stiffness")
-        source = (value, unit, f"{kind.capitalize()} stiffness", rule)
-        rows.append((name, *source) if measured is None else (name, measured, *source[1:3], f"{kind}_stiffness"))
+def _tube_stiffness(robot: HelixTube) -> list[_Row]:
+    r, t, modulus = robot.radius, robot.wall_thickness, robot.young_modulus
+    walls = {
+        "bending": (modulus + robot.pressure * r / (2.0 * t)) * math.pi * r**3 * t,
+        "torsional": modulus / (2.0 * (1.0 + robot.poisson_ratio)) * 2.0 * math.pi * r**3 * t,
+        "axial": modulus * 2.0 * math.pi * r * t,
+    }
+    rules = {
+        "bending": "(young_modulus + pressure * radius / (2 * wall_thickness)) * pi * radius**3 * wall_thickness",
+        "torsional": "young_modulus / (2 * (1 + poisson_ratio)) * 2 * pi * radius**3 * wall_thickness",
+        "axial": "young_modulus * 2 * pi * radius * wall_thickness",
+    }
+    rows: list[_Row] = [("radius", r, "m", "Radius of the tube", "diameter / 2")]
+    for name, kind, unit in (("EI", "bending", "N m2"), ("GJ", "torsional", "N m2"), ("EA", "axial", "N")):
+        measured, meaning = getattr(robot, f"{kind}_stiffness"), f"{kind.capitalize()} stiffness"
+        value, rule = (walls[kind], rules[kind]) if measured is None else (measured, f"{kind}_stiffness")
+        rows.append((name, value, unit, meaning, rule))
     return rows
 
 
-def _tube_shape(robot: HelixTube) -> list[tuple[str, float | list[float], str, str, str]]:
+def _tube_shape(robot: HelixTube) -> list[_Row]:
     _, curvature, torsion, _ = robot.strains.tolist()
     length, rate = robot.centre_length / robot.n_sections, math.hypot(curvature, torsion)
     count = "elastic_sections" if robot.chain == "sections" else "hinges"
     square = "((1 - contraction)**2 + 4 * contraction * cos(angle)**2)"
     sign = "" if robot.handedness == "right" else "-"
     bend, twist = "2 * (1 - contraction**2)", f"{sign}4 * contraction * sin(2 * angle)"
-    rows: list[tuple[str, float | list[float], str, str, str]] = [
+    rows: list[_Row] = [
         ("section_length", length, "m", "Rest length of a section", f"length * sqrt({square}) / (2 * cos(angle)) / {count}"),
         ("curvature", curvature, "rad/m", "Curvature of the centre line", f"{bend} / (diameter * {square})"),
         ("torsion_rate", torsion, "rad/m", "Torsion of the centre line", f"{twist} / (diameter * {square})"),

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, TypeVar
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -27,28 +28,29 @@ Form = Literal["single", "per_part", "colour", "special"]
 Value = TypeVar("Value")
 
 
-class Facts(NamedTuple):
+@dataclass(frozen=True)
+class Facts:
     """What is known of a parameter besides its name and default."""
 
-    what: str
-    """Meaning."""
     unit: str
     """Unit, "-" for ratios, empty for words, truth values and counts."""
-    source: str
+    what: str
+    """Meaning."""
+    source: str = "chosen"
     """Where the default comes from."""
-    above: float | None
+    above: float | None = None
     """Lower bound, excluded."""
-    at_least: float | None
+    at_least: float | None = None
     """Lower bound, included."""
-    below: float | None
+    below: float | None = None
     """Upper bound, excluded."""
-    at_most: float | None
+    at_most: float | None = None
     """Upper bound, included."""
-    options: tuple[str, ...]
+    options: tuple[str, ...] = ()
     """Words to choose from."""
-    form: Form
+    form: Form = "single"
     """How many values there are."""
-    in_xacro: bool
+    in_xacro: bool = True
     """Whether the xacro file has an argument of this name."""
 
     @property
@@ -74,29 +76,15 @@ class Facts(NamedTuple):
         )
 
 
-def parameter(
-    default: Value,
-    unit: str,
-    what: str,
-    source: str = "chosen",
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    below: float | None = None,
-    at_most: float | None = None,
-    options: tuple[str, ...] = (),
-    form: Form = "single",
-    in_xacro: bool = True,
-) -> Value:
-    """Return a dataclass field with a default and facts; see `Facts`."""
-    facts = Facts(what, unit, source, above, at_least, below, at_most, options, form, in_xacro)
-    field: Value = dataclasses.field(default=default, metadata={"facts": facts})
+def parameter(default: Value, *facts: Any, **more_facts: Any) -> Value:
+    """Return a dataclass field with a default and `Facts`, e.g. `parameter(0.1, "m", "Radius of the rod", above=0.0)`."""
+    field: Value = dataclasses.field(default=default, metadata={"facts": Facts(*facts, **more_facts)})
     return field
 
 
-def per_part(default: Value, unit: str, what: str, source: str = "chosen", **bounds: float) -> Value:
+def per_part(default: Value, *facts: Any, **more_facts: Any) -> Value:
     """Return such a field with one number for all parts or one for each."""
-    return parameter(default, unit, what, source, form="per_part", **bounds)  # type: ignore[arg-type]
+    return parameter(default, *facts, form="per_part", **more_facts)
 
 
 def facts_of(robot: Any) -> dict[str, Facts]:

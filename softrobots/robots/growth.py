@@ -1,9 +1,8 @@
-"""Growth of a helical tube at its tip: grown length as a coordinate of one chain.
+"""Growth of a helical tube by eversion at its tip, as section coordinates of the chain of the whole tube.
 
-The tube everts: new wall comes out at the tip, and what has come out does not move along the tube again. So of `n` sections the
-first ones are whole, one is coming out, and the others wait at the tip, as short as the chain allows. All of them are section
-coordinates of the chain of the whole tube: `m(z)` needs no other robot for another length. (A robot of its own, with its own
-weight and stiffness, is `HelixTube.grown(length)`.)
+Everted wall does not move along the tube. So the first sections have their full length, one is partly everted, and the others
+are at the tip, as short as the chain allows. (`HelixTube.grown(length)` is a separate robot with the weight and stiffness of
+that length.)
 """
 
 from __future__ import annotations
@@ -16,29 +15,28 @@ from softrobots.core.errors import ParameterError
 from softrobots.robots import HelixTube
 
 SHORTEST = 0.002
-"""Share of its length that a section which has not come out keeps; a section of no length has no chord."""
+"""Length of a section that is not everted, relative to its full length; a chord needs some length."""
 
 
 def grown_coordinates(tube: HelixTube, length: float, front: float = 0.0) -> FloatArray:
-    """Section coordinates of a tube that has grown to a length.
+    """Return the section coordinates of a tube that has grown to a length.
 
     Args:
         tube: The whole tube, with chain="sections".
-        length: Length of the uninflated tube that has come out [m], from `SHORTEST` of the whole to the whole.
+        length: Everted length of the uninflated tube [m], from `SHORTEST` times the whole length to the whole length.
         front: Length of uninflated tube behind the tip over which the helix forms [m]: there the contraction rises from that of
-            the tube to 1 at the tip, where the tube is straight; 0: formed as it comes out.
+            the tube to 1 at the tip, where the tube is straight; 0 if the helix forms at the tip.
 
     Returns:
-        Section coordinates, shape (n_sections, 4) [rad, rad, rad, m]. Without a front all sections end on the
-        helix, the last at the length that has come out.
+        Section coordinates, shape (n_sections, 4) [rad, rad, rad, m]. Without a front all sections end on the helix.
 
     Raises:
-        ParameterError: If the tube is no `HelixTube` or lumped, or a length is out of range.
+        ParameterError: If the tube is no `HelixTube` or is lumped, or a length is out of range.
     """
     if not isinstance(tube, HelixTube):
         raise ParameterError("tube", tube, "a HelixTube")
     if tube.chain != "sections":
-        raise ParameterError("tube", tube.chain, 'a HelixTube with chain="sections"; between hinges nothing can grow')
+        raise ParameterError("tube", tube.chain, 'a HelixTube with chain="sections"; lumped chains cannot grow')
     grown = positive_number("length", length, "m")
     if not SHORTEST * tube.length <= grown <= tube.length:
         raise ParameterError("length", length, f"from {SHORTEST * tube.length} m to the length of the tube, {tube.length} m")

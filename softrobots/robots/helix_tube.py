@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -132,8 +132,7 @@ class HelixTube(XacroRobot):
         False, "", "Whether a tube that runs into itself is accepted; the property contact says where", in_xacro=False
     )
 
-    XACRO: ClassVar[str] = "helix_tube.urdf.xacro"
-    """File in xacro/ that describes this robot."""
+    XACRO = "helix_tube.urdf.xacro"
 
     def __post_init__(self) -> None:
         """Check every field."""

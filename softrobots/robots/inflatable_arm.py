@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 from softrobots import inflated_beam
 from softrobots.core.errors import ParameterError
@@ -101,8 +100,7 @@ class InflatableArm(XacroRobot):
         2.0, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
     )
 
-    XACRO: ClassVar[str] = "inflatable_arm.urdf.xacro"
-    """File in xacro/ that describes this robot."""
+    XACRO = "inflatable_arm.urdf.xacro"
 
     def __post_init__(self) -> None:
         """Check every field and repeat single numbers for all links."""

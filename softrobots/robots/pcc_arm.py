@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -118,8 +118,7 @@ class PccArm(XacroRobot):
         2.0, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
     )
 
-    XACRO: ClassVar[str] = "pcc_arm.urdf.xacro"
-    """File in xacro/ that describes this robot."""
+    XACRO = "pcc_arm.urdf.xacro"
 
     def __post_init__(self) -> None:
         """Check every field and repeat single numbers for all segments."""
