@@ -1,6 +1,6 @@
 """Build the documentation site: guides, notebook, API reference, changelog, with search, without requests to the network.
 
-Every warning is an error: a link that leads nowhere, an equation that is none, a page that nobody finds, a cell that fails.
+Every warning is an error: a broken link, an equation that cannot be converted, a page outside the navigation, a failing cell.
 Needs the extra `docs`.
 """
 
@@ -25,7 +25,7 @@ from studies.shared.command_line import serve
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MARK = ".softrobots-site"
-"""A file that every site has that was built here: its folder may be replaced."""
+"""A file in every site that was built here: its folder may be replaced."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -59,7 +59,7 @@ class ServedFolder:
 
     @property
     def tunnel(self) -> str:
-        """The command that makes it reachable from another machine."""
+        """The command that forwards the port to another machine."""
         return tunnel_to(self._server.server_port)
 
     def wait(self) -> None:
@@ -84,8 +84,8 @@ def build(folder: Path, *, execute: bool) -> Path:
 
     Raises:
         MissingDependency: If the extra `docs` is not installed.
-        OutputExists: If the folder holds something that is no site of this script.
-        OutputError: If something is wrong with the documentation; what it is has been logged.
+        OutputExists: If the folder holds anything but a site of this script.
+        OutputError: If the build has a warning or an error, which is logged.
     """
     folder = folder.resolve()
     if not (folder / MARK).is_file():
@@ -109,29 +109,29 @@ def build(folder: Path, *, execute: bool) -> Path:
     logging.getLogger("traitlets").setLevel(logging.ERROR)  # of the notebook: a cell that fails is an error anyway
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".site-") as scratch:
         os.environ["IPYTHONDIR"] = str(_quiet_kernel(Path(scratch) / "ipython"))
-        result = Path(scratch) / "site"
+        site = Path(scratch) / "site"
         try:
-            config: Any = load_config(str(CHECKOUT / "docs" / "site" / "mkdocs.yml"), strict=True, site_dir=str(result))
+            config: Any = load_config(str(CHECKOUT / "docs" / "site" / "mkdocs.yml"), strict=True, site_dir=str(site))
             config.plugins.on_startup(command="build", dirty=False)
             build_site(config)
             config.plugins.on_shutdown()
         except (BuildError, CellExecutionError, ConfigurationError, SystemExit) as error:
-            raise sr.OutputError(f"the documentation is not well: {error}") from error
-        (result / MARK).touch()
+            raise sr.OutputError(f"the documentation cannot be built: {error}") from error
+        (site / MARK).touch()
         shutil.rmtree(folder, ignore_errors=True)  # whole or not at all
-        result.rename(folder)
+        site.rename(folder)
     return folder / "index.html"
 
 
 def _quiet_kernel(folder: Path) -> Path:
-    """Settings of a notebook kernel that tells errors only, not that it listens on loopback."""
+    """Settings of a notebook kernel that logs errors only, not that it listens on loopback."""
     profile = make_folder(folder / "profile_default")
     (profile / "ipython_kernel_config.py").write_text("get_config().IPKernelApp.log_level = 40\n", encoding="utf-8")
     return folder
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Build, tell where, and serve if asked."""
+    """Build, print where, and serve with --serve."""
     page = build(arguments.output, execute=not arguments.no_notebook)
     print(f"written to {page.parent}: open {page.name}")
     if arguments.serve:

@@ -358,7 +358,7 @@ PLAIN_WRITES = {
     "scripts/mutation.py": "the log of a program while it runs",
     "scripts/studies/fuzzing/worker.py": "a temporary folder, a switch of the kernel, and a pipe",
     "scripts/build_docs.py": "a temporary folder, which then becomes the site",
-    "docs/site/made_pages.py": "the folder in which the site is built",
+    "docs/site/generated_pages.py": "the folder in which the site is built",
 }
 WRITING = {
     "write_text", "write_bytes", "savefig", "savez", "savez_compressed", "savetxt", "tofile", "rename",

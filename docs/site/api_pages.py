@@ -1,7 +1,7 @@
-"""What stands on which page of the API reference: for each page a title, a sentence, and the names in their order.
+"""The pages of the API reference: for each a title, a sentence, and the names that it documents, in order.
 
-A name of a package stands for everything that it exports, a name of a module for everything public in it; a test sees to it
-that no public name is left out.
+The name of a package stands for everything that it exports, that of a module for everything public in it. A test checks that
+no public name is left out.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ class ApiPage(NamedTuple):
 
     title: str
     """Its heading."""
-    told: str
-    """What is there."""
+    summary: str
+    """What the page documents, in a sentence."""
     names: tuple[str, ...]
     """Full names: of things, or of modules of which everything public is shown."""
 
 
 PACKAGES = tuple(f"softrobots.{name}" for name in ("inflated_beam", "constant_curvature", "helix", "export", "compiled.sweeps"))
-"""Names that are packages: what they export, by module."""
+"""Names of packages, which are documented by what they export, module by module."""
 
 
 FIGURES = Path(softrobots.__file__).parent / "view" / "figures"
 
 BEHIND_GUIDES = "---\nsearch:\n  boost: 0.5\n---\n\n"
-"""Makes a search find guides first."""
+"""Front matter that ranks a page behind the guides in a search."""
 
 
 def _top(*names: str) -> tuple[str, ...]:
@@ -124,13 +124,13 @@ def parts(package: str) -> dict[str, list[str]]:
     tree = ast.parse((Path(init) / "__init__.py").read_text(encoding="utf-8"))
     public = set(importlib.import_module(package).__all__)
     imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
-    found = {str(node.module): [alias.name for alias in node.names if alias.name in public] for node in imports}
-    return {module: names for module, names in found.items() if names}
+    names_by_module = {str(node.module): [alias.name for alias in node.names if alias.name in public] for node in imports}
+    return {module: names for module, names in names_by_module.items() if names}
 
 
 def page_text(page: ApiPage) -> str:
     """A page as Markdown for mkdocstrings."""
-    blocks = [f"{BEHIND_GUIDES}# {page.title}\n\n{page.told}\n"]
+    blocks = [f"{BEHIND_GUIDES}# {page.title}\n\n{page.summary}\n"]
     for name in page.names:
         if name in PACKAGES:
             blocks.append(f"Everything here is imported as `{name}.NAME`.\n")
@@ -148,5 +148,5 @@ def _block(name: str, members: list[str] | None = None) -> str:
 
 def overview() -> str:
     """The page that lists the others."""
-    rows = "\n".join(f"| [{page.title}]({name}.md) | {page.told} |" for name, page in PAGES.items())
+    rows = "\n".join(f"| [{page.title}]({name}.md) | {page.summary} |" for name, page in PAGES.items())
     return f"# API reference\n\nFrom the docstrings. SI units and radians everywhere.\n\n| page | |\n|---|---|\n{rows}\n"

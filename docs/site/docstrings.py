@@ -1,7 +1,9 @@
-"""Docstrings for the site: their mathematics as Markdown instead of reStructuredText, and units that are no links."""
+"""Docstrings for the site: mathematics as Markdown, and fields of robots described by their facts."""
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
 import re
 import textwrap
 from typing import Any
@@ -27,10 +29,20 @@ def as_markdown(text: str) -> str:
     return INLINE.sub(r"$\1$", BLOCK.sub(block, plain + "\n")).rstrip()
 
 
-class MathInDocstrings(griffe.Extension):
-    """Rewrites every docstring as it is loaded."""
+class SiteDocstrings(griffe.Extension):
+    """Rewrites docstrings as Markdown, and writes those of fields with facts."""
 
     def on_object(self, *, obj: Any, **_: Any) -> None:
-        """Rewrite one."""
+        """Rewrite one docstring as Markdown."""
         if obj.docstring is not None:
             obj.docstring.value = as_markdown(obj.docstring.value)
+
+    def on_class(self, *, cls: Any, **_: Any) -> None:
+        """Describe the fields of a robot: meaning, unit, bounds and source; show their defaults as values."""
+        if "parameter(" not in cls.source and "per_part(" not in cls.source:
+            return
+        kind = getattr(importlib.import_module(cls.module.path), cls.name)
+        for field in dataclasses.fields(kind) if dataclasses.is_dataclass(kind) else ():
+            if "facts" in field.metadata and field.name in cls.members:
+                cls.members[field.name].docstring = griffe.Docstring(field.metadata["facts"].description, parent=cls)
+                cls.members[field.name].value = repr(field.default)

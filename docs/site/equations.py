@@ -102,19 +102,19 @@ def _check_braces(latex: str) -> None:
 
 
 def _plain(latex: str) -> str:
-    """What latex2mathml knows for some things that it does not."""
+    """Replace what latex2mathml does not know by an equivalent that it knows."""
 
-    def environment(found: re.Match[str]) -> str:
-        if found[2] not in (*ENVIRONMENTS, *MATRICES):
-            raise EquationError(f"unknown environment {found[2]} in {latex!r}; known: {', '.join((*ENVIRONMENTS, *MATRICES))}")
-        return f"\\{found[1]}{{{ENVIRONMENTS.get(found[2], found[2])}}}"
+    def environment(match: re.Match[str]) -> str:
+        if match[2] not in (*ENVIRONMENTS, *MATRICES):
+            raise EquationError(f"unknown environment {match[2]} in {latex!r}; known: {', '.join((*ENVIRONMENTS, *MATRICES))}")
+        return f"\\{match[1]}{{{ENVIRONMENTS.get(match[2], match[2])}}}"
 
     latex = re.sub(r"\\(begin|end)\{(.*?)\}", environment, latex)
-    return _OPERATOR.sub(lambda found: rf"\mathrm{{{found[1]}}}", latex)
+    return _OPERATOR.sub(lambda match: rf"\mathrm{{{match[1]}}}", latex)
 
 
 def _check(element: ElementTree.Element, latex: str) -> None:
-    """Refuse what latex2mathml passes through, and what browsers do not draw."""
+    """Refuse what latex2mathml passes through unconverted, and what browsers do not draw."""
     kind, text = element.tag.removeprefix(f"{{{MATHML}}}"), element.text or ""
     if "\\" in text or (kind == "mi" and text in {"{", "}", "&"}):
         raise EquationError(f"{text!r} is not known in {latex!r}")
@@ -204,10 +204,10 @@ def fence(source: str, language: str, css_class: str, options: Any, md: Any, **_
 def convert_marked(text: str, name: str) -> str:
     """Convert what arithmatex has marked in a page's HTML."""
 
-    def one(found: re.Match[str]) -> str:
-        latex = html.unescape(found[3]).strip()
+    def one(match: re.Match[str]) -> str:
+        latex = html.unescape(match[3]).strip()
         try:
-            return display_block(latex) if found[2] == "[" else mathml(latex, display=False)
+            return display_block(latex) if match[2] == "[" else mathml(latex, display=False)
         except EquationError as error:
             _log.warning("%s: %s", name, error)
             return html.escape(latex)
@@ -233,7 +233,7 @@ def on_page_content(text: str, page: Any, **_: Any) -> str:
     name = page.file.src_uri
     if name.endswith(".ipynb"):
         text = _NETWORK.sub("", text)
-        text = _CELL.sub(lambda found: found[1] + _mark(found[2]) + found[3], text)
+        text = _CELL.sub(lambda match: match[1] + _mark(match[2]) + match[3], text)
     return convert_marked(text, name)
 
 

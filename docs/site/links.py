@@ -13,7 +13,7 @@ from functools import cache
 from typing import Any
 
 from api_pages import PAGES
-from made_pages import CHECKOUT, TOP, source_files, source_page
+from generated_pages import CHECKOUT, TOP, source_files, source_page
 from mkdocs.exceptions import PluginError
 from mkdocs.utils import get_relative_url
 
@@ -36,18 +36,18 @@ OWN_MODULES = {
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Turn links to files beside docs/ into links to their pages."""
 
-    def one(found: re.Match[str]) -> str:
-        target = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page.file.src_uri), found[2]))
+    def one(match: re.Match[str]) -> str:
+        target = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page.file.src_uri), match[2]))
         path = CHECKOUT / target
         if target in TOP:
-            made = TOP[target]
+            page_path = TOP[target]
         elif path.is_dir():
-            made = f"source/{target}/index.md"
+            page_path = f"source/{target}/index.md"
         else:
-            made = source_page(path)
+            page_path = source_page(path)
         if not path.exists():
-            raise PluginError(f"{page.file.src_uri}: {found[2]} does not exist")
-        return found[1] + posixpath.relpath(made, posixpath.dirname(page.file.src_uri) or ".")
+            raise PluginError(f"{page.file.src_uri}: {match[2]} does not exist")
+        return match[1] + posixpath.relpath(page_path, posixpath.dirname(page.file.src_uri) or ".")
 
     return OUTWARD.sub(one, markdown) if page.file.generated_by is None else markdown
 
@@ -55,25 +55,25 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 @cache
 def _identifiers() -> dict[str, str]:
     """Names as guides write them, and what they are called in the reference."""
-    found = {}
+    identifiers = {}
     for name in softrobots.__all__:
         module = getattr(softrobots, name)
         if hasattr(module, "__all__"):
-            found |= {f"{name}.{inner}": f"softrobots.{name}.{inner}" for inner in module.__all__}
-            found[name] = f"softrobots.{name}"
+            identifiers |= {f"{name}.{inner}": f"softrobots.{name}.{inner}" for inner in module.__all__}
+            identifiers[name] = f"softrobots.{name}"
         elif not name.startswith("_"):
-            found[name] = f"softrobots.{name}"
+            identifiers[name] = f"softrobots.{name}"
     for page in PAGES.values():
         for full in page.names:
-            found.setdefault(full.rpartition(".")[2], full)
-            found[full.removeprefix("softrobots.")] = full
-    found |= {"compile": "softrobots.compiled.run.compiled_model.compile_model"}
+            identifiers.setdefault(full.rpartition(".")[2], full)
+            identifiers[full.removeprefix("softrobots.")] = full
+    identifiers |= {"compile": "softrobots.compiled.run.compiled_model.compile_model"}
     classes = {name: getattr(softrobots, name) for name in softrobots.__all__ if isinstance(getattr(softrobots, name), type)}
     classes["CompiledModel"] = importlib.import_module("softrobots.compiled.run.compiled_model").CompiledModel
     for name, kind in classes.items():
         known = [inner for inner in (*vars(kind), *getattr(kind, "__annotations__", ())) if not inner.startswith("_")]
-        found |= {f"{name}.{inner}": f"{found[name]}.{inner}" for inner in known}
-    return found
+        identifiers |= {f"{name}.{inner}": f"{identifiers[name]}.{inner}" for inner in known}
+    return identifiers
 
 
 def _identifier(code: str, own: str | None) -> str | None:
@@ -94,14 +94,14 @@ def on_page_content(text: str, page: Any, files: Any, **_: Any) -> str:
     sources = {path.relative_to(CHECKOUT).as_posix(): path for path in source_files()}
     own = OWN_MODULES.get(name)
 
-    def one(found: re.Match[str]) -> str:
-        code = html.unescape(found[1])
+    def one(match: re.Match[str]) -> str:
+        code = html.unescape(match[1])
         if code in sources:
             file = files.get_file_from_path(source_page(sources[code]))
-            return f'<a href="{get_relative_url(file.url, page.url)}">{found[0]}</a>'
+            return f'<a href="{get_relative_url(file.url, page.url)}">{match[0]}</a>'
         command = name in ("commands.md", "changelog.md") and code.isalpha() and code.islower()
         identifier = None if command else _identifier(code, own)
-        return found[0] if identifier is None else f'<autoref identifier="{identifier}" optional>{found[0]}</autoref>'
+        return match[0] if identifier is None else f'<autoref identifier="{identifier}" optional>{match[0]}</autoref>'
 
     parts = UNTOUCHED.split(text)
     return "".join(part if index % 2 else CODE.sub(one, part) for index, part in enumerate(parts))
