@@ -2,7 +2,7 @@
 
 Read from the imports of the source. A room stands above all rooms that it imports. An arrow that follows from others is left
 out: `view` imports `core`, and `model`, which imports `core`. With --check nothing is written; status 1 if it shows other
-rooms or imports than there are, or a room that has grown or shrunk by more than a tenth.
+rooms or imports than there are, or a room that has grown or shrunk by more than a fifth.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ KEY = "Rooms"
 """Entry of the PNG file that says as JSON what is drawn."""
 WIDTH, HEIGHT, GAP, RISE, LANE = 3.3, 1.8, 0.4, 2.5, 0.35
 """Width and height of a box, gap between boxes, distance of layers, width of an arrow that passes a layer [inch]."""
-TOLERANCE = 0.1
+TOLERANCE = 0.2
 """Share by which the lines of a room may differ from the picture."""
 
 
