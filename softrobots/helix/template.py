@@ -18,7 +18,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.core.files import as_path, csv_text, new_file, write_text
 from softrobots.helix.design import in_mm
 from softrobots.helix.pattern import Pattern, checked_pattern
-from softrobots.helix.template_drawing import TEXT, Window, draw_sheet, group, marks, mm, rectangle, segment, text
+from softrobots.helix.template_drawing import TEXT, Window, draw_sheet, element, marks, mm, segment, text
 
 _ROUNDING = 1e-9  # of a page
 _THINNEST, _THICKEST, _LONGEST = 1e-3, 10.0, 200.0  # tubes that can be drawn [m]
@@ -149,10 +149,12 @@ def _svg_text(plan: Pattern, window: Window) -> str:
     root = ET.Element("svg", {"xmlns": "http://www.w3.org/2000/svg", "version": "1.1"})
     root.attrib |= {"width": f"{mm(width)}mm", "height": f"{mm(height)}mm", "viewBox": f"0 0 {mm(width)} {mm(height)}"}
     root.attrib |= {"font-family": "Arial, Helvetica, sans-serif", "font-size": mm(TEXT)}
-    rectangle(root, (0.0, 0.0), width, height, fill="white")
+    element(root, "rect", fill="white", x=0.0, y=0.0, width=width, height=height)
     _draw_title(root, plan, _LEFT, f" - page {window.page} of {window.pages}" if window.pages > 1 else "")
-    rectangle(ET.SubElement(root, "clipPath", {"id": "sheet-clip"}), (window.start, 0.0), shown, around)
-    sheet = group(root, id="sheet", transform=f"translate({mm(_LEFT - window.start)} {mm(_TOP)})", fill="none", stroke="black")
+    clip = element(root, "clipPath", id="sheet-clip")
+    element(clip, "rect", x=window.start, y=0.0, width=shown, height=around)
+    origin = f"translate({mm(_LEFT - window.start)} {mm(_TOP)})"
+    sheet = element(root, "g", id="sheet", transform=origin, fill="none", stroke="black")
     draw_sheet(sheet, plan, window)
     _draw_ruler_and_instructions(root, plan, _LEFT, _TOP + around + 13.0, paged=window.pages > 1)
     ET.indent(root)
@@ -161,9 +163,9 @@ def _svg_text(plan: Pattern, window: Window) -> str:
 
 def _draw_title(root: ET.Element, plan: Pattern, left: float, page: str) -> None:
     """Draw the title and the numbers of the plan, down to 31 mm from the top."""
-    block = group(root, id="title-block")
+    block = element(root, "g", id="title-block")
     noun = {"pinch": "pinch", "tape": "tape", "stoppers": "stopper"}[plan.method]
-    text(block, f"Helical actuation of an inflated tube: {noun} pattern{page}", (left, 9.0), size=5.0, bold=True)
+    text(block, f"Helical actuation of an inflated tube: {noun} pattern{page}", (left, 9.0), size=5.0, font_weight="bold")
     shape, (removed, noun_plural) = plan.shape, ("gap", "gaps") if plan.method == "stoppers" else ("pinched", "pinches")
     columns = (
         (
@@ -192,13 +194,13 @@ def _draw_title(root: ET.Element, plan: Pattern, left: float, page: str) -> None
 
 def _draw_ruler_and_instructions(root: ET.Element, plan: Pattern, left: float, top: float, *, paged: bool) -> None:
     """Draw a ruler of 100 mm and the instructions, 32 mm in all."""
-    ruler = group(root, id="check-ruler", stroke="black", **{"stroke-width": "0.3"})
-    segment(ruler, (left, top + 3.0), (left + 100.0, top + 3.0), **{"class": "ruler"})
+    ruler = element(root, "g", id="check-ruler", stroke="black", stroke_width=0.3)
+    segment(ruler, (left, top + 3.0), (left + 100.0, top + 3.0), class_="ruler")
     for tick in range(11):
         x = left + 10.0 * tick
-        segment(ruler, (x, top + (0.0 if tick % 5 == 0 else 1.5)), (x, top + 3.0), **{"class": "tick"})
+        segment(ruler, (x, top + (0.0 if tick % 5 == 0 else 1.5)), (x, top + 3.0), class_="tick")
     text(ruler, "This ruler is 100 mm long: print at 100 %, not fitted to the page, and measure it.", (left + 104.0, top + 3.0))
-    legend = group(root, id="legend")
+    legend = element(root, "g", id="legend")
     y = top + 11.0
     for number, lines in enumerate(_instructions(plan, paged), 1):
         text(legend, f"{number}.", (left, y))

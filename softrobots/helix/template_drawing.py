@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,11 +23,11 @@ TEXT = 3.2
 
 _SMALL = 2.6  # size of labels [mm]
 _FILLS = {
-    "tape": {"fill": "#ffd84d", "fill-opacity": "0.45"},
+    "tape": {"fill": "#ffd84d", "fill_opacity": "0.45"},
     "stopper": {"fill": "#9cc4e4"},
-    "gap": {"stroke-dasharray": "1 0.7"},
+    "gap": {"stroke_dasharray": "1 0.7"},
 }
-_ON_SHEET = {"clip-path": "url(#sheet-clip)"}
+_ON_SHEET = {"clip_path": "url(#sheet-clip)"}
 
 Point = tuple[float, float]
 """Position on the drawing, y downwards [mm]."""
@@ -53,15 +53,15 @@ def draw_sheet(sheet: ET.Element, plan: Pattern, window: Window) -> None:
     around, length = 1e3 * plan.sheet_width, 1e3 * plan.tube_length
     line = _Line(math.cos(plan.angle), turning_sign(plan.handedness) * math.sin(plan.angle))
     half_mark = min(0.1 * around, 12.0, 0.2 * around * line.along)  # less where wraps are near to each other
-    folds = group(sheet, id="folds", **{"stroke": "#808080", "stroke-width": "0.35", "stroke-dasharray": "5 2"})
+    folds = element(sheet, "g", id="folds", stroke="#808080", stroke_width=0.35, stroke_dasharray="5 2")
     for y in (0.0, 0.5 * around, around):
-        segment(folds, (window.start, y), (window.end, y), **{"class": "fold"})
+        segment(folds, (window.start, y), (window.end, y), class_="fold")
     _draw_marks(sheet, plan, window, line, half_mark)
-    red = group(sheet, id="actuator-line", **{"stroke": "#d00000", "stroke-width": "0.4"}, **_ON_SHEET)
+    red = element(sheet, "g", id="actuator-line", stroke="#d00000", stroke_width=0.4, **_ON_SHEET)
     for start, end, wrap in _wrapped(plan, around):
-        segment(red, start, end, **{"class": "actuator-line", "data-wrap": str(wrap)})
-    box = group(sheet, **{"stroke-width": "0.3"}, **(_ON_SHEET if window.pages > 1 else {}))
-    rectangle(box, (0.0, 0.0), length, around, id="sheet-outline")
+        segment(red, start, end, class_="actuator-line", data_wrap=str(wrap))
+    box = element(sheet, "g", stroke_width=0.3, **(_ON_SHEET if window.pages > 1 else {}))
+    element(box, "rect", id="sheet-outline", x=0.0, y=0.0, width=length, height=around)
     _draw_numbers(sheet, plan, window, line, half_mark)
     _draw_edges(sheet, plan, window)
 
@@ -90,9 +90,10 @@ class _Line(NamedTuple):
         """Position at `arc` along the line from (0, `base`), and `aside` from it, downwards [mm]."""
         return arc * self.along - aside * self.across, base + arc * self.across + aside * self.along
 
-    def box(self, start: float, end: float, aside: float, base: float) -> list[Point]:
+    def box(self, start: float, end: float, aside: float, base: float) -> str:
         """Corners of a rectangle along the line that reaches `aside` to either side of it."""
-        return [self.place(*place, base) for place in ((start, -aside), (end, -aside), (end, aside), (start, aside))]
+        corners = ((start, -aside), (end, -aside), (end, aside), (start, aside))
+        return _coordinates([self.place(*corner, base) for corner in corners])
 
 
 def _wrapped(plan: Pattern, around: float) -> list[tuple[Point, Point, int]]:
@@ -113,42 +114,42 @@ def _wrapped(plan: Pattern, around: float) -> list[tuple[Point, Point, int]]:
 
 def _draw_marks(sheet: ET.Element, plan: Pattern, window: Window, line: _Line, half_mark: float) -> None:
     """Draw the pinches, pieces of tape, stoppers and gaps."""
-    box = group(sheet, id="marks", **{"stroke-width": "0.25", "stroke-linejoin": "round"}, **_ON_SHEET)
+    box = element(sheet, "g", id="marks", stroke_width=0.25, stroke_linejoin="round", **_ON_SHEET)
     around, bar = 1e3 * plan.sheet_width, 0.25 * half_mark
     aside = {"pinch": half_mark, "tape": 0.5e3 * (plan.tape_width or 0.0), "stopper": bar, "gap": bar}
     for number, kind, start, end, base in _shown(plan, window, line):
         middle, reach = base + 0.5 * (start + end) * line.across, aside[kind] + 0.5 * (end - start) + 1.0
-        attributes = {"data-number": str(number), "data-start": mm(start), "data-end": mm(end)}
+        attributes = {"data_number": str(number), "data_start": mm(start), "data_end": mm(end)}
         for shift in (0.0, around, -around):
             if shift and not -reach < middle + shift < around + reach:
                 continue
             name = {"class": f"{kind} copy"} if shift else {"class": kind, "id": f"{kind}-{number}"}
-            mark = group(box, **name, **attributes)
+            mark = element(box, "g", **name, **attributes)
             if kind == "pinch":
                 _draw_pinch(mark, line, start, end, half_mark, base + shift)
             else:
-                polygon(mark, line.box(start, end, aside[kind], base + shift), **_FILLS[kind])
+                element(mark, "polygon", **_FILLS[kind], points=line.box(start, end, aside[kind], base + shift))
 
 
 def _draw_pinch(mark: ET.Element, line: _Line, start: float, end: float, half_mark: float, base: float) -> None:
     """Draw two marks square to the line, the wall between them that is folded away, and arrows that bring them together."""
     length = end - start
     mark.set("stroke-width", mm(min(0.25, 0.2 * length)))
-    polygon(mark, line.box(start, end, half_mark, base), stroke="none", fill="black", **{"fill-opacity": "0.07"})
+    element(mark, "polygon", stroke="none", fill="black", fill_opacity=0.07, points=line.box(start, end, half_mark, base))
     for name, arc in (("start", start), ("end", end)):
-        segment(mark, line.place(arc, -half_mark, base), line.place(arc, half_mark, base), **{"class": f"mark {name}"})
+        segment(mark, line.place(arc, -half_mark, base), line.place(arc, half_mark, base), class_=f"mark {name}")
     head, aside = min(0.25 * length, 1.4), 0.75 * half_mark
     for arc, tip in ((start, start + 0.45 * length), (end, end - 0.45 * length)):
         back = tip - math.copysign(head, tip - arc)
         places = ((arc, aside), (tip, aside), (back, aside - 0.5 * head), (tip, aside), (back, aside + 0.5 * head))
-        polyline(mark, [line.place(*place, base) for place in places], **{"class": "arrow"})
+        element(mark, "polyline", class_="arrow", points=_coordinates([line.place(*place, base) for place in places]))
 
 
 def _draw_numbers(sheet: ET.Element, plan: Pattern, window: Window, line: _Line, half_mark: float) -> None:
     """Draw the numbers of pinches and gaps above the line, or below if there is no room; only each n-th of a dense pattern."""
     around, apart = 1e3 * plan.sheet_width, 1e3 * plan.spacing * line.along
     every = next((n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500) if n * apart >= 7.0), 1000)
-    halo = {"class": "number", "stroke": "white", "stroke-width": "0.8", "paint-order": "stroke"}
+    halo = {"class": "number", "stroke": "white", "stroke_width": "0.8", "paint_order": "stroke"}
     for number, kind, start, end, base in _shown(plan, window, line):
         if kind not in ("pinch", "gap") or not (number == 1 or number % every == 0):
             continue
@@ -156,7 +157,7 @@ def _draw_numbers(sheet: ET.Element, plan: Pattern, window: Window, line: _Line,
         for side in (-aside, aside):
             x, y = line.place(0.5 * (start + end), side, base)
             if window.start + 2.5 <= x <= window.end - 2.5 and 2.0 <= y <= around - 2.0:
-                text(sheet, str(number), (x, y + 0.9), size=_SMALL, anchor="middle", attributes=halo)
+                text(sheet, str(number), (x, y + 0.9), size=_SMALL, anchor="middle", **halo)
                 break
 
 
@@ -177,16 +178,16 @@ def _draw_edges(sheet: ET.Element, plan: Pattern, window: Window) -> None:
     for name, y in (("fold A", 0.0), ("fold B", 0.5 * around), ("fold A", around)):
         text(sheet, name, (window.start - 1.5, y + 1.0), size=_SMALL, anchor="end")
     if window.page == 1:
-        text(sheet, "BASE", (0.0, -1.8), bold=True)
+        text(sheet, "BASE", (0.0, -1.8), font_weight="bold")
     if window.page == window.pages:
-        text(sheet, "TIP", (length, -1.8), anchor="end", bold=True)
+        text(sheet, "TIP", (length, -1.8), anchor="end", font_weight="bold")
     for x in window.joins:
-        green = group(sheet, **{"class": "join", "stroke": "#008040", "stroke-width": "0.3", "data-x": mm(x)})
+        green = element(sheet, "g", class_="join", stroke="#008040", stroke_width=0.3, data_x=x)
         segment(green, (x, -4.0), (x, around + 1.5))
         for share in (0.25, 0.75):
             segment(green, (x - 4.0, share * around), (x + 4.0, share * around))
         text(green, "join", (x, -5.0), size=_SMALL, anchor="middle")
-    scale = group(sheet, id="scale", **{"stroke-width": "0.2"})
+    scale = element(sheet, "g", id="scale", stroke_width=0.2)
     for tick in range(math.ceil(window.start / 10.0 - 1e-9), math.floor(window.end / 10.0 + 1e-9) + 1):
         x, long = 10.0 * tick, tick % 5 == 0
         segment(scale, (x, around + 2.0), (x, around + (4.5 if long else 3.2)))
@@ -196,54 +197,23 @@ def _draw_edges(sheet: ET.Element, plan: Pattern, window: Window) -> None:
             text(scale, f"{x:.0f}", (x, around + 7.6), size=_SMALL, anchor="middle")
 
 
-def group(parent: ET.Element, **attributes: str) -> ET.Element:
-    """Add an empty group."""
-    return ET.SubElement(parent, "g", attributes)
+def element(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Element:
+    """Add an SVG element; numbers are lengths [mm], `stroke_width` stands for `stroke-width` and `class_` for `class`."""
+    values = {name: value if isinstance(value, str) else mm(value) for name, value in attributes.items()}
+    return ET.SubElement(parent, tag, {name.rstrip("_").replace("_", "-"): value for name, value in values.items()})
 
 
 def segment(parent: ET.Element, start: Point, end: Point, **attributes: str) -> None:
     """Add a straight line."""
-    ends = {"x1": mm(start[0]), "y1": mm(start[1]), "x2": mm(end[0]), "y2": mm(end[1])}
-    ET.SubElement(parent, "line", {**attributes, **ends})
-
-
-def polyline(parent: ET.Element, points: Sequence[Point], **attributes: str) -> None:
-    """Add a line through points."""
-    ET.SubElement(parent, "polyline", {**attributes, "points": _coordinates(points)})
-
-
-def polygon(parent: ET.Element, corners: Sequence[Point], **attributes: str) -> None:
-    """Add a closed polygon."""
-    ET.SubElement(parent, "polygon", {**attributes, "points": _coordinates(corners)})
-
-
-def rectangle(parent: ET.Element, corner: Point, width: float, height: float, **attributes: str) -> None:
-    """Add a rectangle from its upper left corner."""
-    place = {"x": mm(corner[0]), "y": mm(corner[1]), "width": mm(width), "height": mm(height)}
-    ET.SubElement(parent, "rect", {**attributes, **place})
+    element(parent, "line", **attributes, x1=start[0], y1=start[1], x2=end[0], y2=end[1])
 
 
 def text(
-    parent: ET.Element,
-    words: str,
-    place: Point,
-    *,
-    size: float = TEXT,
-    anchor: str = "start",
-    bold: bool = False,
-    attributes: Mapping[str, str] | None = None,
+    parent: ET.Element, words: str, place: Point, size: float = TEXT, anchor: str = "start", **attributes: str | float
 ) -> None:
     """Add a line of text, its baseline at `place`."""
-    settings = {
-        "x": mm(place[0]),
-        "y": mm(place[1]),
-        "font-size": mm(size),
-        "text-anchor": anchor,
-        "fill": "black",
-        "stroke": "none",
-    }
-    settings |= {**({"font-weight": "bold"} if bold else {}), **(attributes or {})}
-    ET.SubElement(parent, "text", settings).text = words
+    style: dict[str, str | float] = {"font_size": size, "text_anchor": anchor, "fill": "black", "stroke": "none"}
+    element(parent, "text", x=place[0], y=place[1], **{**style, **attributes}).text = words
 
 
 def mm(value: float) -> str:

@@ -11,7 +11,6 @@ References:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -57,24 +56,14 @@ def required_pressure(moment: float, radius: float) -> float:
     return non_negative_number("moment", moment, "N m") / wrinkling_moment(1.0, radius)
 
 
-@dataclass(frozen=True)
-class _Section:
-    """Section properties of a pressurised thin tube."""
-
-    cap_force: float
-    wall_section: float
-    second_moment: float
-
-    @classmethod
-    def of(cls, pressure: float, radius: float, wall_thickness: float) -> _Section:
-        pressure = non_negative_number("pressure", pressure, "Pa")
-        radius = positive_number("radius", radius, "m")
-        wall_thickness = positive_number("wall_thickness", wall_thickness, "m")
-        if wall_thickness > 0.1 * radius:
-            raise ParameterError("wall_thickness", wall_thickness, f"a thin wall, at most a tenth of the radius {radius} m")
-        return cls(
-            pressure * math.pi * radius**2, 2.0 * math.pi * radius * wall_thickness, math.pi * radius**3 * wall_thickness
-        )
+def _section(pressure: float, radius: float, wall_thickness: float) -> tuple[float, float, float]:
+    """Return cap force [N], wall section [m^2] and second moment of area [m^4] of a pressurised thin tube."""
+    pressure = non_negative_number("pressure", pressure, "Pa")
+    radius = positive_number("radius", radius, "m")
+    wall_thickness = positive_number("wall_thickness", wall_thickness, "m")
+    if wall_thickness > 0.1 * radius:
+        raise ParameterError("wall_thickness", wall_thickness, f"a thin wall, at most a tenth of the radius {radius} m")
+    return pressure * math.pi * radius**2, 2.0 * math.pi * radius * wall_thickness, math.pi * radius**3 * wall_thickness
 
 
 def _shear_ratio(poisson_ratio: float) -> float:
@@ -124,10 +113,10 @@ def deflection(
     if np.any((x < 0.0) | (x > length)):
         raise ParameterError("position", position, f"within [0, {length}] m, the length of the beam")
     force = finite_number("force", force, "N")
-    section = _Section.of(pressure, radius, wall_thickness)
+    cap_force, wall_section, second_moment = _section(pressure, radius, wall_thickness)
     modulus = positive_number("young_modulus", young_modulus, "Pa")
-    bending = (modulus + section.cap_force / section.wall_section) * section.second_moment
-    shear = section.cap_force + _shear_ratio(poisson_ratio) * modulus * section.wall_section
+    bending = (modulus + cap_force / wall_section) * second_moment
+    shear = cap_force + _shear_ratio(poisson_ratio) * modulus * wall_section
     return np.asarray(force / bending * (length * x**2 / 2.0 - x**3 / 6.0) + force * x / shear)
 
 
@@ -204,10 +193,10 @@ def young_modulus_from_stiffness(
     """
     stiffness = positive_number("stiffness", stiffness, "N m/rad")
     length = positive_number("length", length, "m")
-    section = _Section.of(pressure, radius, wall_thickness)
-    c = _shear_ratio(poisson_ratio) * section.wall_section
-    bending, shear = stiffness * length / (3.0 * section.second_moment), stiffness / (c * length)
-    stress, shear_stress = section.cap_force / section.wall_section, section.cap_force / c
+    cap_force, wall_section, second_moment = _section(pressure, radius, wall_thickness)
+    c = _shear_ratio(poisson_ratio) * wall_section
+    bending, shear = stiffness * length / (3.0 * second_moment), stiffness / (c * length)
+    stress, shear_stress = cap_force / wall_section, cap_force / c
     middle = 0.5 * ((bending - stress) + (shear - shear_stress))
     half_difference = math.hypot(0.5 * ((bending - stress) - (shear - shear_stress)), math.sqrt(bending) * math.sqrt(shear))
     if middle >= 0.0:
