@@ -133,7 +133,7 @@ def test_gravities_take_turns_in_one_workspace(arm: sr.SoftModel, rng: np.random
         (BRANCHED, {"springs": {"wrist": -1.0}}, sr.ParameterError, "springs.*positive"),
         (BRANCHED, {"springs": {"wrist": (1.0, float("nan"))}}, sr.ParameterError, "finite"),
         (BRANCHED, {"springs": ["wrist"]}, sr.ParameterError, "mapping"),
-        (BRANCHED, {"springs": SPRINGS}, sr.DescriptionError, r"2 ends \(.*finger.*\); say which frame is the tip"),
+        (BRANCHED, {"springs": SPRINGS}, sr.DescriptionError, r"2 ends \(.*finger.*\); give the name of the tip frame"),
         (BRANCHED, {"springs": SPRINGS, "tip": "fingr"}, sr.NameNotFound, "'fingr'.*did you mean 'finger'"),
         (BRANCHED, {"springs": SPRINGS, "motors": ["elbw"]}, sr.NameNotFound, "'elbw'.*did you mean 'elbow'"),
         (BRANCHED, {"springs": SPRINGS, "motors": ["wrist"]}, sr.ParameterError, "without a spring"),

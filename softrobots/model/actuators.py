@@ -1,4 +1,4 @@
-"""The actuators of a robot, motor joints and then muscles: their limits, and which of their positions go together."""
+"""The actuators of a robot, motor joints and then muscles: limits, scales and consistent positions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Actuators:
         softness: FloatArray,
         lengths: MuscleLengths | None,
     ) -> None:
-        """Collect them.
+        """Collect names, limits and scales.
 
         Args:
             joints: Names of the motor joints.
@@ -46,29 +46,29 @@ class Actuators:
         """Lower and upper limits, shape (n_motors, 2) [rad, m or N]."""
         muscle_scale = 1.0 / (softness * distance) if lengths is None else distance
         self.scale = read_only(np.concatenate([np.ones(len(joints)), muscle_scale]))
-        """Change of each that moves the robot about as much as a radian, shape (n_motors,) [rad, m or N]."""
+        """Change of each equivalent to about a radian of motion, shape (n_motors,) [rad, m or N]."""
         self.turning = np.array([*turning, *(False for _ in muscles)], dtype=bool)
         """Which of them turn rather than slide or pull, shape (n_motors,), truth values."""
         self.units = (*("rad" if turns else "m" for turns in turning), *("N" if lengths is None else "m" for _ in muscles))
         """Unit of each."""
         self.basis = read_only(np.diag(self.scale) if lengths is None else lengths.basis(self.scale))
-        """Independent changes, shape (n_motors, n), each about a radian's worth of motion."""
+        """Independent changes, shape (n_motors, n), each equivalent to about a radian of motion."""
         self.independent = self.basis.shape[0] == self.basis.shape[1]
-        """Whether each can be set by itself; more than three muscles along a segment must fit together."""
+        """Whether each can be set by itself; the lengths of more than three muscles along a segment depend on each other."""
         relaxed = np.concatenate([np.zeros(len(joints)), [0.0 if lengths is None else m.rest_length for m in muscles]])
         self.relaxed = read_only(np.clip(relaxed, *self.limits.T))
         """Joints at zero, muscles at rest or without tension, as near as the limits allow, shape (n_motors,) [rad, m or N]."""
         self._unit = "rad" if not muscles else "N" if lengths is None else "m"
 
     def checked(self, value: Any, field: str) -> FloatArray:
-        """Return positions that the robot can take, as a new array.
+        """Return positions that the robot can have, as a new array.
 
         Args:
             value: Positions, shape (n_motors,) [rad, m or N].
             field: Name of the parameter, for the error.
 
         Raises:
-            ParameterError: If the shape differs, a number is not finite, or no shape of the robot has such muscle lengths.
+            ParameterError: If the shape differs, a number is not finite, or the robot cannot have such muscle lengths.
         """
         motors = finite_array(field, value, (len(self.names),), self._unit)
         if self._lengths is not None:
@@ -76,25 +76,25 @@ class Actuators:
         return motors
 
     def admit(self, motors: FloatArray) -> bool:
-        """Whether some shape of the robot has these positions, shape (n_motors,)."""
+        """Return whether the robot can have these positions, shape (n_motors,)."""
         return self._lengths is None or self._lengths.refusal(motors) is None
 
     def draw(self, random: np.random.Generator) -> FloatArray | None:
         """Draw positions uniformly within the limits (continuous joints: one turn), shape (n_motors,).
 
-        Muscle lengths are made to fit together. None if no shape of the robot has what was drawn.
+        Muscle lengths are projected to consistent ones. None if the robot cannot have the result.
         """
         low, high = self.limits.T
-        drawn = random.uniform(np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi))
+        sample = random.uniform(np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi))
         if self._lengths is not None:
-            drawn = self._lengths.consistent(drawn)
-        return drawn if self.admit(drawn) and np.all((drawn >= low) & (drawn <= high)) else None
+            sample = self._lengths.consistent(sample)
+        return sample if self.admit(sample) and np.all((sample >= low) & (sample <= high)) else None
 
     def go(self, motors: FloatArray, step: FloatArray) -> FloatArray:
-        """Go a step, as far as the limits allow.
+        """Return the positions after a step that is shortened to the limits.
 
-        Independent actuators stop one by one. Muscle lengths that must fit together stop together. Segments that would bend
-        beyond the range of their sections bend up to it.
+        Independent actuators are clipped one by one; muscle lengths that depend on each other share one factor. The bending of
+        segments is limited to the range of their sections.
 
         Args:
             motors: Positions within the limits, shape (n_motors,).
@@ -113,14 +113,14 @@ class Actuators:
         return np.asarray(moved if self._lengths is None else self._lengths.within_range(moved))
 
     def active_limits(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Limits that are reached: of actuators, and the range of sections with given muscle lengths.
+        """Return the limits that are reached: of actuators, and of the range of sections with given muscle lengths.
 
         Args:
             motors: Positions, shape (n_motors,).
 
         Returns:
-            Outward normals, and rows whose outer product with themselves is the second derivative of the limited quantity (zero
-            for the flat limits of actuators), each shape (n, n_motors).
+            Outward normals, and rows whose outer products are the second derivatives of the limited quantities (zero for
+            actuators), each shape (n, n_motors).
         """
         low, high = self.limits.T
         slack, units = 1e-12 * self.scale, np.diag(1.0 / self.scale)

@@ -40,7 +40,7 @@ def assemble(
         springs: Springs by joint name.
         motors: Names of the motor joints.
         tip: Name of the tip frame.
-        muscle_input: What is given of the muscles, "lengths" or "forces".
+        muscle_input: What `q_motors` holds of the muscles, "lengths" or "forces".
 
     Returns:
         The model.

@@ -1,7 +1,7 @@
-"""From a Pinocchio model to a `softrobots.model.serial_chain.SerialChain`: each joint turned so that its axis is z.
+"""Read a Pinocchio model as a `softrobots.model.serial_chain.SerialChain`, in which every joint axis is z.
 
-A frame of the chain stands where Pinocchio's frame of the same joint does, with axes `A` in it such that `A e_z` is the axis
-of the joint. What Pinocchio places at `(R, p)` in its frame is at `(A^T R, A^T p)` in the frame of the chain. For an axis along
+A frame of the chain has the origin of Pinocchio's frame of the same joint, and axes `A` in it such that `A e_z` is the axis of
+the joint. A placement `(R, p)` in Pinocchio's frame is `(A^T R, A^T p)` in the frame of the chain. For an axis along
 x, y or z, `A` is a signed permutation, so that zeros stay exact.
 """
 
@@ -165,7 +165,7 @@ def _placed(placement: Any, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _snapped(array: FloatArray) -> FloatArray:
-    """Read-only copy; entries that miss 0, 1 or -1 by rounding are put there."""
+    """Read-only copy; entries that differ from 0, 1 or -1 by rounding are set to that."""
     whole = np.round(array)
     near = (np.abs(array - whole) <= _ROUNDING) & (np.abs(whole) <= 1.0)
     return read_only(np.where(near, whole, array) + 0.0)  # + 0.0: no zero is negative

@@ -35,7 +35,7 @@ class ReducedLoad(NamedTuple):
     coupling: FloatArray
     """Derivative of `elastic` with respect to the actuators, shape (n_elastic, n_motors)."""
     potential: float
-    """Potential energy of actuators that exert given forces [J]; 0 for those that hold a position."""
+    """Potential energy of actuators with given forces [J]; 0 for those with given positions."""
     scale: float
     """Size of those forces [N]."""
 
@@ -126,7 +126,7 @@ class SectionCoordinates:
         rest_joints: FloatArray,
         count: int,
     ) -> None:
-        """Order the elastic coordinates: springs, then four a section.
+        """Take the joints; elastic coordinates are springs, then four a section.
 
         Args:
             motor_indices: Places of the motor joints in Pinocchio's velocity vector.
@@ -142,7 +142,7 @@ class SectionCoordinates:
         """Joints that are coordinates by themselves."""
         order = np.concatenate([self.singles, np.repeat(section_indices[:, 0], 4)])
         self.before = read_only((order[:, None] < order).astype(np.float64))
-        """Which coordinate moves joints nearer to the base than which other, shape (n, n): 1 or 0."""
+        """1 where the coordinate of the row is nearer to the base than that of the column, else 0, shape (n, n)."""
         self.places = len(self.singles) + np.arange(4 * len(lengths)).reshape(-1, 4)
         """Places of the coordinates of each section, motors before all, shape (n_sections, 4)."""
 
@@ -204,6 +204,6 @@ class SectionPoint:
         return np.concatenate([matrix[:, c.singles], flat], axis=1)
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Combine the columns of the joints of each section."""
+        """Columns per actuator, and per spring and section coordinate."""
         combined, n = self._combine(jacobian), len(self._c.motor_indices)
         return combined[:, :n], combined[:, n:]

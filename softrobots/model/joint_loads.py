@@ -35,10 +35,10 @@ class Entries(NamedTuple):
 
 
 class JointLoad(NamedTuple):
-    """What a load does to the joints."""
+    """A load as joint torques, with the factors of its derivative."""
 
     torque: FloatArray
-    """Torque that the joints must carry, `sum J^T w - g(q)`, shape (nv,) [N m or N]."""
+    """Torque on the joints, `sum J^T w - g(q)`, shape (nv,) [N m or N]."""
     angular: FloatArray
     """Angular Jacobians of all wrenches, stacked, shape (3 k, nv)."""
     by_force: FloatArray
@@ -46,23 +46,23 @@ class JointLoad(NamedTuple):
     by_moment: FloatArray | None
     """`mu x` of their angular Jacobians, shape (3 k, nv) [N m]; None without moments."""
     gravity_derivative: FloatArray | None
-    """Derivative of the part of gravity, shape (nv, nv); None if weightless."""
+    """Derivative of the gravity torque, shape (nv, nv); None if weightless."""
     potential: float
-    """Potential energy of forces and gravity, `-sum f . p + U_g` [J]; moments have none and do not count."""
+    """Potential energy of forces and gravity, `-sum f . p + U_g` [J]; moments have none."""
     scale: float
     """Size of the load, `sum |f| reach + |moment|` plus the norm of the gravity torque [N m]."""
 
-    def derivative(self, wanted: Entries) -> FloatArray:
-        """Derivative of `torque` with respect to the joint coordinates: the entries wanted, shape of `wanted`."""
-        made: FloatArray = self.angular.T.dot(self.by_force).take(wanted.ordered)
+    def derivative(self, entries: Entries) -> FloatArray:
+        """Return entries of the derivative of `torque` with respect to the joint coordinates, shape of `entries`."""
+        matrix: FloatArray = self.angular.T.dot(self.by_force).take(entries.ordered)
         if self.by_moment is not None:
-            made += self.angular.T.dot(self.by_moment).take(wanted.places) * wanted.below
+            matrix += self.angular.T.dot(self.by_moment).take(entries.places) * entries.below
         if self.gravity_derivative is not None:
-            made += self.gravity_derivative.take(wanted.places)
-        return made
+            matrix += self.gravity_derivative.take(entries.places)
+        return matrix
 
     def within(self, columns: FloatArray) -> FloatArray:
-        """Blocks of the derivative of forces and moments within groups of joints.
+        """Return the diagonal blocks of the derivative of forces and moments for groups of joints.
 
         Args:
             columns: The joints of each group, base to tip, shape (n, m), integers.
@@ -73,11 +73,11 @@ class JointLoad(NamedTuple):
         upper, strictly_upper = _triangles(columns.shape[1])
         angular, by_force = (matrix[:, columns].transpose(1, 0, 2) for matrix in (self.angular, self.by_force))
         back = np.swapaxes(angular, -1, -2)
-        made = (back @ by_force) * upper
-        made += np.swapaxes(made * strictly_upper, -1, -2)
+        blocks = (back @ by_force) * upper
+        blocks += np.swapaxes(blocks * strictly_upper, -1, -2)
         if self.by_moment is not None:
-            made += (back @ self.by_moment[:, columns].transpose(1, 0, 2)) * strictly_upper.T
-        return np.asarray(made)
+            blocks += (back @ self.by_moment[:, columns].transpose(1, 0, 2)) * strictly_upper.T
+        return np.asarray(blocks)
 
 
 @lru_cache(maxsize=16)

@@ -1,4 +1,4 @@
-"""Loading a robot into a `SoftModel`: ours, or anybody's URDF, MJCF or SDF, with springs of the file or said by the caller."""
+"""Loading of a robot as a `SoftModel`: URDF, MJCF or SDF, with springs from the file or from the caller."""
 
 from __future__ import annotations
 
@@ -32,35 +32,35 @@ def load_model(
     tip: str | None = None,
     muscles: str = "lengths",
 ) -> SoftModel:
-    """Load a robot: ours, or anybody's URDF, MJCF or SDF.
+    """Load a robot of this package, or a URDF, MJCF or SDF file.
 
-    The root tag tells the kind. MJCF (`stiffness`, `springref`; needs MuJoCo) and SDF (`spring_stiffness`,
+    The root tag decides which. MJCF (`stiffness`, `springref`; needs MuJoCo) and SDF (`spring_stiffness`,
     `spring_reference`; needs Drake) are translated: `urdf` of the model is the translation, coordinates are those of the file
     (`qpos`, joint angle). See `softrobots.description.readers.mjcf.read_mjcf` and `softrobots.description.readers.sdf.read_sdf`
-    for names, and for what is refused because it bears on the statics and we do not have it. The gravity of a file is not ours:
-    without `gravity=` the robot is weightless.
+    for names, and for elements that are refused because they affect the statics and are not supported. The gravity of a file is
+    ignored: without `gravity=` the robot is weightless.
 
     Args:
         source: A robot of this package, a path (`Path` or text), or the text of a description (starting with `<`).
         springs: For files without springs of their own: `{joint: stiffness}` or `{joint: (stiffness, rest)}`
-            [N m/rad or N/m; rad or m]. Given, it replaces the springs in the file. `{}` says that the robot is rigid.
+            [N m/rad or N/m; rad or m]. If given, it replaces the springs of the file. `{}` for a rigid robot.
         motors: Names of the motor joints; movable joints that are neither motor, spring nor part of a section are then locked
             at zero. By default every movable joint without a spring is a motor.
-        tip: Name of the tip frame; by default the one that the file names, `tip`, or the only link at the end of the tree.
-        muscles: What is given of the muscles, if the robot has any: their "lengths" [m] or the "forces" they pull with [N].
+        tip: Name of the tip frame; by default the one in the file, else `tip`, else the only leaf of the tree.
+        muscles: What `q_motors` holds of the muscles: their "lengths" [m] or tensions, "forces" [N].
 
     Returns:
         The model.
 
     Raises:
-        DescriptionError: If the file cannot be read, is of another kind or has what we do not have, has no springs and none
+        DescriptionError: If the file cannot be read, is of another kind or has unsupported elements, has no springs and none
             are given, has joints other than revolute, continuous and prismatic, has a spring on a fixed joint, would have a
             motor that mimics another joint, has a section whose joints are not the chain that its tag describes, has muscles
-            that do not fix the shape of their segment, or has no single end.
+            that do not fix the shape of their segment, or has several leaves and no tip.
         MissingDependency: If it is MJCF or SDF, and MuJoCo or Drake is not installed (extra `interop`).
         NameNotFound: If a named joint or frame does not exist.
         ParameterError: If a stiffness is not positive, a rest coordinate is not finite, a joint is named twice or belongs to a
-            section, or `muscles` is none of the choices.
+            section, or `muscles` is not one of the choices.
     """
     choice("muscles", muscles, MUSCLE_INPUTS)
     urdf, label = read_source(source)
@@ -72,7 +72,7 @@ def load_model(
     movable = [name for name in model.names if name != "universe"]
     in_sections = {name for section in tags.sections for name in section.joints}
     free = [name for name in movable if name not in in_sections]
-    spring_tags = _springs_said(springs, free) if springs is not None else dict(tags.springs)
+    spring_tags = _given_springs(springs, free) if springs is not None else dict(tags.springs)
     if springs is None and not spring_tags and not tags.sections:
         raise DescriptionError(
             f"{label} has no joint springs; give springs={{joint: stiffness}} for its movable joints "
@@ -83,7 +83,7 @@ def load_model(
         raise DescriptionError(
             f"{label} has a spring or a section on {', '.join(stray)}, which cannot move; movable: {', '.join(movable)}"
         )
-    motor_names = _motors_said(motors, free, spring_tags, tags)
+    motor_names = _motor_names(motors, free, spring_tags, tags)
     coupled = [name for name in tags.mimics if name in motor_names or name in spring_tags or name in in_sections]
     if coupled:
         raise DescriptionError(
@@ -110,20 +110,20 @@ def load_model(
     )
 
 
-def _springs_said(springs: Any, movable: Sequence[str]) -> dict[str, SpringTag]:
+def _given_springs(springs: Any, movable: Sequence[str]) -> dict[str, SpringTag]:
     if not isinstance(springs, Mapping):
         raise ParameterError("springs", springs, "a mapping {joint: stiffness} or {joint: (stiffness, rest)}")
-    said = {}
+    tags = {}
     for name, value in springs.items():
         if name not in movable:
             raise NameNotFound("movable joint", str(name), movable)
         stiffness, rest = value if isinstance(value, tuple | list) and len(value) == 2 else (value, 0.0)
         field = f"springs[{name!r}]"
-        said[name] = SpringTag(positive_number(field, stiffness, "N m/rad or N/m"), finite_number(field, rest, "rad or m"))
-    return said
+        tags[name] = SpringTag(positive_number(field, stiffness, "N m/rad or N/m"), finite_number(field, rest, "rad or m"))
+    return tags
 
 
-def _motors_said(motors: Any, movable: Sequence[str], springs: Mapping[str, SpringTag], tags: RobotTags) -> list[str]:
+def _motor_names(motors: Any, movable: Sequence[str], springs: Mapping[str, SpringTag], tags: RobotTags) -> list[str]:
     if motors is None:
         return [name for name in movable if name not in springs and tags.roles.get(name, "motor") != "locked"]
     if isinstance(motors, str) or not isinstance(motors, Sequence):
@@ -160,14 +160,14 @@ def _check_section(model: Any, section: SectionTag, label: str) -> None:
     for place, (number, kind, origin) in enumerate(zip(numbers, kinds, origins, strict=True)):
         name = section.joints[place]
         if model.joints[number].shortname() != f"JointModel{kind}":
-            told = f"a {model.joints[number].shortname()}, required: JointModel{kind}"
+            problem = f"a {model.joints[number].shortname()}, required: JointModel{kind}"
         elif place > 0 and model.parents[number] != numbers[place - 1]:
-            told = f"not a child of joint {section.joints[place - 1]}"
+            problem = f"not a child of joint {section.joints[place - 1]}"
         elif origin is not None and not model.jointPlacements[number].isApprox(origin, 1e-9):
-            told = "not where the rest shape of the section puts it"
+            problem = "not where the rest shape of the section puts it"
         else:
             continue
-        raise DescriptionError(f"joint {name} of section {section.name} of {label} is {told}")
+        raise DescriptionError(f"joint {name} of section {section.name} of {label} is {problem}")
 
 
 def _tip(model: Any, tip: str | None, label: str) -> str:
@@ -181,8 +181,8 @@ def _tip(model: Any, tip: str | None, label: str) -> str:
     parents = {frame.parentFrame for frame in model.frames}
     leaves = [frame.name for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY and i not in parents]
     if len(leaves) != 1:
-        told = ", ".join(leaves[:20]) + (", ..." if len(leaves) > 20 else "")
-        raise DescriptionError(f"{label} has {len(leaves)} ends ({told}); say which frame is the tip: tip=...")
+        names = ", ".join(leaves[:20]) + (", ..." if len(leaves) > 20 else "")
+        raise DescriptionError(f"{label} has {len(leaves)} ends ({names}); give the name of the tip frame, tip=...")
     return str(leaves[0])
 
 

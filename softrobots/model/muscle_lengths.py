@@ -1,4 +1,4 @@
-"""Muscles of given length: what they hold of a robot's shape, and what they leave free; see `softrobots.model.muscles`."""
+"""Muscles of given lengths: the constrained and the free coordinates of a robot; see `softrobots.model.muscles`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from softrobots.model.muscles import MUSCLE_STRAINS, Segments, muscle_arms
 from softrobots.model.springs import Springs
 
 CONSISTENT = 1e-6
-"""Muscle lengths of a segment that miss those of the nearest arc by more than this are refused [m]."""
+"""Largest accepted difference of the muscle lengths of a segment from those of the nearest arc [m]."""
 
 _LEAST_LENGTH = 0.01  # of a section, relative to its rest length
 
 
 class MuscleLengths:
-    """Coordinates of a robot whose muscles hold given lengths: motors, then lengths, are given; what lengths leave is free."""
+    """Coordinates of a robot with given muscle lengths: motors, then lengths, are given; the rest of the strains is free."""
 
     def __init__(
         self,
@@ -34,15 +34,15 @@ class MuscleLengths:
         section_lengths: Mapping[int, float],
         largest_bending: float | None = None,
     ) -> None:
-        """Find the free coordinates.
+        """Compute the free coordinates.
 
         Args:
             inner: The robot without muscles.
             tags: The muscles.
-            segments: Which of its elastic coordinates belong to which segment.
+            segments: Places of the coordinates of each segment among its elastic coordinates.
             springs: Springs of its elastic coordinates.
             section_lengths: Rest length of the sections of each segment [m].
-            largest_bending: Bending of one section that lengths may ask for [rad]; `LARGEST_BENDING` by default.
+            largest_bending: Limit of the bending of one section [rad]; `LARGEST_BENDING` by default.
 
         Raises:
             DescriptionError: If the muscles of a segment do not fix its bending and elongation.
@@ -83,10 +83,10 @@ class MuscleLengths:
                     modes.append(column)
                     names.append(f"segment_{segment}_{key}_mode_{number}")
                     turning.append(key != "stretch")
-        held = {place for group in groups for place in group}
-        free = [place for place in range(count) if place not in held]
+        constrained = {place for group in groups for place in group}
+        free = [place for place in range(count) if place not in constrained]
         self.groups = tuple(groups)
-        """Elastic coordinates of the robot without muscles whose sum the lengths hold, group by group."""
+        """Elastic coordinates of the robot without muscles whose sum the lengths constrain, group by group."""
         self.slopes = read_only(np.array(slopes).reshape(-1, len(tags)))
         """Derivative of those sums with respect to the lengths, shape (n_groups, n_muscles) [rad/m or -]."""
         self.spread = read_only(spread)
@@ -102,38 +102,40 @@ class MuscleLengths:
         """Springs of the free coordinates."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleLengthPoint:
-        """Go to given coordinates."""
+        """Return the robot at given coordinates."""
         count = len(motors) - len(self._tags)
         strains = self.strains(motors, elastic)
         return MuscleLengthPoint(self._inner.at(motors[:count], strains), self.spread, self.free, self._springs, strains)
 
     def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
-        change = motors[len(motors) - len(self._tags) :] - self._rest_lengths
-        return np.asarray(self.spread @ change + self.free @ elastic)
+        return np.asarray(self.spread @ self._change(motors) + self.free @ elastic)
+
+    def _change(self, motors: FloatArray) -> FloatArray:
+        """Change of the muscle lengths from rest, shape (n_muscles,) [m]."""
+        return np.asarray(motors[len(motors) - len(self._tags) :] - self._rest_lengths)
 
     def consistent(self, motors: FloatArray) -> FloatArray:
-        """Nearest motors and lengths that arcs explain, shape (n_motors,)."""
-        made = np.array(motors)
-        lengths = made[len(motors) - len(self._tags) :]
-        lengths -= self._misfit @ (lengths - self._rest_lengths)
-        return made
+        """Return motors and the nearest lengths of arcs, shape (n_motors,)."""
+        nearest = np.array(motors)
+        nearest[len(motors) - len(self._tags) :] -= self._misfit @ self._change(motors)
+        return nearest
 
     def basis(self, scale: FloatArray) -> FloatArray:
-        """Independent changes of motors and lengths, of size `scale`, shape (n_motors, n)."""
+        """Return independent changes of motors and lengths, of size `scale`, shape (n_motors, n)."""
         count = len(scale) - len(self._tags)
         consistent = np.eye(len(self._tags)) - self._misfit
         if not np.any(np.abs(self._misfit) > 1e-12):
             return np.diag(scale)
         values, vectors = np.linalg.eigh(consistent)
         directions = np.asarray(vectors[:, values > 0.5])
-        made = np.zeros((len(scale), count + directions.shape[1]))
-        made[:count, :count] = np.diag(scale[:count])
-        made[count:, count:] = scale[count:, None] * directions
-        return made
+        basis = np.zeros((len(scale), count + directions.shape[1]))
+        basis[:count, :count] = np.diag(scale[:count])
+        basis[count:, count:] = scale[count:, None] * directions
+        return basis
 
     def check(self, field: str, motors: FloatArray) -> None:
-        """Refuse lengths that no shape of the robot has.
+        """Refuse lengths that the robot cannot have.
 
         Raises:
             ParameterError: If a length is not positive, if no arc explains the lengths of a segment, or if they would bend a
@@ -144,11 +146,10 @@ class MuscleLengths:
             raise ParameterError(field, motors, requirement)
 
     def refusal(self, motors: FloatArray) -> str | None:
-        """What lengths would have to be, if no shape of the robot has the given ones; None if one has."""
-        lengths = motors[len(motors) - len(self._tags) :]
-        if np.any(lengths <= 0.0):
+        """Return the requirement that muscle lengths fail; None if the robot can have them."""
+        if np.any(motors[len(motors) - len(self._tags) :] <= 0.0):
             return "positive muscle lengths [m]"
-        change = lengths - self._rest_lengths
+        change = self._change(motors)
         misfit = np.abs(self._misfit @ change)
         if misfit.max() > CONSISTENT:
             segment = self._tags[int(np.argmax(misfit))].segment
@@ -173,25 +174,25 @@ class MuscleLengths:
         return None
 
     def within_range(self, motors: FloatArray) -> FloatArray:
-        """Actuators with each segment bent no further than its sections may, its mean length kept, shape (n_motors,)."""
-        made = np.array(motors)
+        """Return actuators with the bending of each segment limited, its mean length unchanged, shape (n_motors,)."""
+        limited = np.array(motors)
         first = len(motors) - len(self._tags)
         for segment, bending, _ in self._bendings(motors):
             if bending > self._largest_bending:
                 rows = [first + row for row, tag in enumerate(self._tags) if tag.segment == segment]
                 arms = muscle_arms([tag for tag in self._tags if tag.segment == segment])
                 rest = self._rest_lengths[[row - first for row in rows]]
-                sums = np.linalg.lstsq(arms, made[rows] - rest, rcond=None)[0]
-                made[rows] -= arms[:, :2] @ sums[:2] * (1.0 - self._largest_bending / bending)
-        return made
+                sums = np.linalg.lstsq(arms, limited[rows] - rest, rcond=None)[0]
+                limited[rows] -= arms[:, :2] @ sums[:2] * (1.0 - self._largest_bending / bending)
+        return limited
 
     def reached_range(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Slopes of the bending of segments that have reached the range of their sections; see `Actuators.active_limits`."""
+        """Derivatives of the bending of segments at the limit of their sections; see `Actuators.active_limits`."""
         slopes, bends = [], []
         count = len(motors)
         for _, bending, (x, y) in self._bendings(motors):
             if bending >= self._largest_bending * (1.0 - 1e-9):
-                spread = self.spread[[x, y]] @ (motors[count - len(self._tags) :] - self._rest_lengths)
+                spread = self.spread[[x, y]] @ self._change(motors)
                 along, across = np.zeros(count), np.zeros(count)
                 along[count - len(self._tags) :] = (spread[0] * self.spread[x] + spread[1] * self.spread[y]) / bending
                 across[count - len(self._tags) :] = (spread[0] * self.spread[y] - spread[1] * self.spread[x]) / bending
@@ -201,17 +202,17 @@ class MuscleLengths:
 
     def _bendings(self, motors: FloatArray) -> list[tuple[int, float, tuple[int, int]]]:
         """Each segment with muscles: number, largest bending of a section [rad], places of the two bendings of that section."""
-        spread = self.spread @ (motors[len(motors) - len(self._tags) :] - self._rest_lengths)
-        found = []
+        spread = self.spread @ self._change(motors)
+        bendings = []
         for segment, about_x, about_y in self._bent:
-            bendings = np.hypot(spread[about_x], spread[about_y])
-            most = int(bendings.argmax())
-            found.append((segment, float(bendings[most]), (int(about_x[most]), int(about_y[most]))))
-        return found
+            sizes = np.hypot(spread[about_x], spread[about_y])
+            most = int(sizes.argmax())
+            bendings.append((segment, float(sizes[most]), (int(about_x[most]), int(about_y[most]))))
+        return bendings
 
 
 class MuscleLengthPoint(NamedTuple):
-    """A robot with held muscle lengths."""
+    """A robot at given muscle lengths."""
 
     inner: Point
     """The robot without muscles."""
@@ -231,11 +232,11 @@ class MuscleLengthPoint(NamedTuple):
 
     @property
     def valid(self) -> bool:
-        """Whether the chain can be there."""
+        """Whether every section is within its range."""
         return self.inner.valid
 
     def reduce(self, joints: JointLoad) -> ReducedLoad:
-        """Carry over to lengths and free coordinates; the load on a muscle is its tension, spring-back included."""
+        """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included."""
         load = self.inner.reduce(joints)
         unbalanced = load.elastic - self.springs.stiffness * (self.strains - self.springs.rest)
         half = self.free.T @ load.derivative
@@ -249,13 +250,13 @@ class MuscleLengthPoint(NamedTuple):
         )
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Combine the columns of the strains."""
+        """Columns per motor and length, and per free coordinate."""
         motors, elastic = self.inner.columns(jacobian)
         return np.concatenate([motors, elastic @ self.spread], axis=1), elastic @ self.free
 
 
 def _differences(stiffness: FloatArray) -> FloatArray:
-    """Orthonormal columns without sum, shape (n, n - 1), that make the stiffness diagonal; cosines where it is uniform."""
+    """Orthonormal columns of sum zero, shape (n, n - 1), that diagonalise the stiffness; cosines where it is uniform."""
     n = len(stiffness)
     places = (np.arange(n) + 0.5)[:, None]
     cosines = np.sqrt(2.0 / n) * np.cos(np.pi * places * np.arange(1, n) / n)

@@ -9,8 +9,8 @@ coordinates. (Twist lengthens a muscle too, in second order: by `(d t)^2 / (2 l)
 neglected: 1 mm in 0.524 m for 0.8 rad at 0.04 m.)
 
 - *Lengths given* (`softrobots.model.muscle_lengths`): they fix the sums of bending and elongation over a segment. Free are the
-  differences between its sections, and twist: `z = z_u + N y` with `A N = 0`. The part `z_u` spreads the sums as the stiffness
-  wants it, so that `N^T K z_u = 0` and the stiffness of `y` is diagonal.
+  differences between its sections, and twist: `z = z_u + N y` with `A N = 0`. The part `z_u` distributes the sums in inverse
+  proportion to stiffness, so that `N^T K z_u = 0` and the stiffness of `y` is diagonal.
 - *Forces given*: all section coordinates are free, and a tension `t` adds the energy `t A z`.
 """
 

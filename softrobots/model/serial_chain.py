@@ -1,7 +1,7 @@
-"""A robot as a serial chain, base to tip: all that the compiled solvers know of it.
+"""A robot as a serial chain, base to tip: the input of the compiled solvers.
 
-Plain data without Pinocchio. Every joint turns about, or slides along, the z axis of its own frame; whatever else a description
-says (axes, fixed links, bodies that are welded together) is in the constant placements between them.
+Plain data without Pinocchio. Every joint turns about, or slides along, the z axis of its own frame; axes, fixed links and
+welded bodies of the description are part of the constant placements between them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from softrobots.core.checks import FloatArray
 
 
 class ChainBody(NamedTuple):
-    """Mass that moves with a frame of the chain."""
+    """Mass fixed to a frame of the chain."""
 
     mass: float
     """Mass [kg]."""
@@ -38,7 +38,7 @@ class ChainJoint:
     strain: int | None
     """Its place among the strains (see `SerialChain.stiffness`); None for a motor."""
     body: ChainBody
-    """What moves with its frame."""
+    """The mass fixed to its frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,8 @@ class ChainSection:
     strain: int
     """Place of the first of its four section coordinates among the strains."""
     bodies: tuple[ChainBody, ...]
-    """What moves with the frames behind its six joints `strain_chain.JOINTS`, in the axes that those joints make from the axes
-    of the start; the last is the end of the section."""
+    """The masses fixed to the frames behind its six joints `strain_chain.JOINTS`, in the axes that result from those joints and
+    the axes of the start; the last is the end of the section."""
 
 
 Element: TypeAlias = ChainJoint | ChainSection
@@ -68,9 +68,9 @@ Element: TypeAlias = ChainJoint | ChainSection
 class SerialChain:
     """The elements from base to tip, with springs and muscles.
 
-    Strains are the coordinates of spring joints and sections before muscles are laid over them: spring joints, base to tip,
-    then four a section. Where muscle lengths are given, sums of strains are held, and the elastic coordinates are combinations
-    of the strains; otherwise they are the strains.
+    Strains are the coordinates of spring joints, base to tip, and then of sections, four each, without muscles. Given muscle
+    lengths constrain sums of strains, and the elastic coordinates are combinations of the strains; otherwise they are the
+    strains.
     """
 
     name: str
@@ -92,13 +92,13 @@ class SerialChain:
     limits: FloatArray
     """Lower and upper limit of the actuators, motor joints and then muscles, shape (n_actuators, 2) [rad, m or N]."""
     muscle_input: str
-    """What is given of the muscles, "lengths" or "forces"."""
+    """What `q_motors` holds of the muscles, "lengths" or "forces"."""
     muscle_rest: FloatArray
     """Muscle lengths where the strains are zero, shape (n_muscles,) [m]."""
     muscle_matrix: FloatArray
     """Derivative of the muscle lengths with respect to the strains, shape (n_muscles, n_strains)."""
     held: tuple[tuple[int, ...], ...]
-    """Groups of strains whose sum the given muscle lengths hold, base to tip; empty without given lengths."""
+    """Groups of strains whose sum the given muscle lengths constrain, base to tip; empty without given lengths."""
     held_slope: FloatArray
     """Derivative of those sums with respect to the muscle lengths, shape (n_groups, n_muscles)."""
     elastic: FloatArray

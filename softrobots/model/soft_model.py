@@ -29,7 +29,7 @@ class SoftModel:
     """A robot with actuators (prescribed) and elastic coordinates (free), ready for statics.
 
     Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then muscle lengths (or tensions).
-    Elastic coordinates, `q_springs`, are joint springs and what the actuators leave free of the sections of constant strain.
+    Elastic coordinates, `q_springs`, are joint springs and the free coordinates of the sections of constant strain.
 
     Returned by `softrobots.load_model`. Arrays are ordered base to tip. A model is immutable; do not change `pinocchio` either.
 
@@ -92,7 +92,7 @@ class SoftModel:
 
     @property
     def spring_joints(self) -> tuple[str, ...]:
-        """Names of the elastic coordinates: spring joints by their names, then what is free of sections.
+        """Names of the elastic coordinates: spring joints, then the free coordinates of sections.
 
         `section_<segment>_<i>_bend_x` is a section coordinate; `segment_<i>_bend_x_mode_<j>` a difference between the sections
         of a segment whose muscle lengths are given.
@@ -158,7 +158,7 @@ class SoftModel:
 
     @property
     def motor_scale(self) -> FloatArray:
-        """Change of each actuator that moves the robot about as much as a radian, shape (n_motors,), read-only."""
+        """Change of each actuator equivalent to about a radian of motion, shape (n_motors,), read-only."""
         return self.actuators.scale
 
     @property
@@ -185,14 +185,14 @@ class SoftModel:
         return self.structure.spring_indices
 
     def checked_motors(self, q_motors: Any, field: str = "q_motors") -> FloatArray:
-        """Return actuator coordinates that the robot can take, as a new array.
+        """Return actuator coordinates that the robot can have, as a new array.
 
         Args:
             q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
             field: Name of the parameter, for the error.
 
         Raises:
-            ParameterError: If the shape differs, a number is not finite, or no shape of the robot has such muscle lengths.
+            ParameterError: If the shape differs, a number is not finite, or the robot cannot have such muscle lengths.
         """
         return self.actuators.checked(q_motors, field)
 
@@ -242,7 +242,7 @@ class SoftModel:
             name: Name of the frame.
 
         Returns:
-            Its number. Pinocchio itself answers an unknown name with a number out of range.
+            Its number. (Pinocchio itself returns a number out of range for an unknown name.)
 
         Raises:
             NameNotFound: If there is no such frame; the error lists the links.

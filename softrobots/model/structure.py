@@ -68,13 +68,13 @@ class Structure:
     muscles: tuple[MuscleTag, ...]
     """Muscles."""
     muscle_input: str
-    """What is given of the muscles, "lengths" or "forces"."""
+    """What `q_motors` holds of the muscles, "lengths" or "forces"."""
     muscle_matrix: FloatArray
     """Derivative of the muscle lengths with respect to the strains, shape (n_muscles, n_strains)."""
     muscle_lengths: MuscleLengths | None
     """The constraint of given muscle lengths; None if forces are given or there are no muscles."""
     lines: tuple[LineTag, ...]
-    """Lines along the segments that are drawn only."""
+    """Lines along the segments, for pictures only."""
     elastic_limits: FloatArray
     """Limits of the joints that springs and sections move, in the order of Pinocchio's velocities, shape (nv, 2)."""
 

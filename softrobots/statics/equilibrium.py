@@ -1,6 +1,6 @@
 """Static equilibrium of a robot with joint springs, as a certified result.
 
-The solvers themselves are in `softrobots.statics.elastostatics`.
+The solvers are in `softrobots.statics.elastostatics`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Equilibrium:
     load: Load
     """The load."""
     method: str
-    """The solver that found it."""
+    """The solver."""
     q_motors: FloatArray
     """Motor coordinates, shape (n_motors,) [rad or m]."""
     q_springs: FloatArray
@@ -54,9 +54,9 @@ class Equilibrium:
     residual: float
     """Norm of the out-of-balance torque [N m]."""
     tolerance: float
-    """What the residual had to stay below [N m]."""
+    """Largest residual that was accepted [N m]."""
     iterations: int
-    """Steps that led here: evaluations of the residual, or steps of the search or estimation that it is the end of."""
+    """Evaluations of the residual, or steps of the search or estimation that ended here."""
     stable: bool
     """Certified: every eigenvalue of the tangent stiffness has a positive real part."""
 
@@ -84,7 +84,7 @@ class Equilibrium:
     def link_moments(self) -> FloatArray:
         """Moment at each inflated link, both springs combined (Euclidean norm), shape (n_links,) [N m].
 
-        Empty if the model names no inflated links. A section carries the moment of its middle; what is told of it is the
+        Empty if the model names no inflated links. The springs of a section carry the moment at its middle; its entry is the
         largest along it, with the moment linear between the middles of the sections of a segment, and beyond them.
         """
         groups = self.model.spring_groups
@@ -121,7 +121,7 @@ class Equilibrium:
 
     @property
     def wrinkled(self) -> bool:
-        """Whether a link carries its wrinkling moment or more, or is on its plateau: linear springs no longer hold."""
+        """Whether a link carries its wrinkling moment or more, or is on its plateau: linear springs are no longer valid."""
         moments = zip(self.link_moments, self.model.spring_groups, strict=True)
         return any(moment >= group.wrinkling_moment for moment, group in moments) or any(self.saturated)
 
@@ -129,7 +129,7 @@ class Equilibrium:
     def within_limits(self) -> bool:
         """Whether every actuator and every elastic joint is within its limits; statics does not clip.
 
-        Of muscles both the length and the tension count, whichever is given.
+        Muscles must be within both their lengths and their tensions, whichever is given.
         """
         structure = self.model.structure
         joints = self.model.coordinates.at(self.q_motors, self.q_springs).joints
@@ -165,9 +165,8 @@ def solve_equilibrium(
 
     It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
     has no energy, the one reached by Newton from there, or while the load grows from zero, or while the moments grow from the
-    equilibrium without them. A descent ends in a stable
-    equilibrium, or in one that is free to move without a force (a symmetric robot that has buckled can turn its bow about its
-    axis): that is not certified stable.
+    equilibrium without them. A descent ends in a stable equilibrium, or in a neutral one (a symmetric robot that has buckled
+    can turn its bow about its axis), which is not certified stable.
 
     Args:
         model: The robot.
@@ -176,10 +175,10 @@ def solve_equilibrium(
         wrench: Wrench at `frame`, shape (6,) [N, N m], world axes, force first; or `{frame: (6,)}` for several.
         frame: Name of the frame of `force` and `wrench`; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes, e.g. `softrobots.EARTH_GRAVITY`; None: weightless.
-        method: "newton", or "fixed_point" (the paper's, converges for small loads only).
-        q_springs0: Where to start, shape (n_springs,) [rad or m]; the relaxed springs by default.
+        method: "newton", or "fixed_point" ([Troise 2021], converges for small loads only).
+        q_springs0: Start of the solver, shape (n_springs,) [rad or m]; the relaxed springs by default.
         tolerance: Largest residual, relative to `max(|f| reach + |moment| + |g|, 1e-3 N m)`.
-        max_iterations: Most evaluations; 200 for "newton", 1000 for "fixed_point" by default.
+        max_iterations: Limit of evaluations; 200 for "newton", 1000 for "fixed_point" by default.
 
     Returns:
         The equilibrium with its certificate.
@@ -218,7 +217,7 @@ def solve_equilibrium(
 
 
 def _hint(best: Equilibrium) -> str:
-    """What may help, for the error."""
+    """Advice for the error message."""
     ends = best.model.structure.at_range_end(best.q_motors, best.q_springs)
     if ends:
         return (
@@ -231,7 +230,7 @@ def _hint(best: Equilibrium) -> str:
             springs = ", ".join(best.model.spring_joints[place] for place in group.springs)
             return (
                 f"; the link of {springs} is on the plateau of its moment, {group.max_moment:g} N m, and cannot carry a dead "
-                f"moment beyond it; solve_imposed_displacement goes on where the displacement is given"
+                f"moment beyond it; solve_imposed_displacement finds equilibria there for a given displacement"
             )
     if not best.conservative:
         return "; under a world-fixed moment the load grows from zero, then the moments alone, until the path turns back"
@@ -249,7 +248,7 @@ def equilibrium_from_state(
     tolerance: float = TOLERANCE,
     stable: bool | None = None,
 ) -> Equilibrium:
-    """Make the result object of a state; `stable` if that is known already."""
+    """Result of a state; `stable` if it is already known."""
     return Equilibrium(
         model=model,
         load=load,
@@ -269,7 +268,7 @@ def equilibrium_from_state(
 
 
 def check_same_model(model: SoftModel, equilibrium: Any) -> None:
-    """Refuse anything but an equilibrium of a model equal to the one given.
+    """Check that an argument is an equilibrium of a model.
 
     Raises:
         ParameterError: If it is something else.

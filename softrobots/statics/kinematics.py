@@ -1,4 +1,4 @@
-"""Where the frames of a robot are, and how they move with its joints."""
+"""Forward kinematics and geometric Jacobians of the frames of a robot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def frame_placement(model: SoftModel, q: FloatArray, frame: str) -> Any:
         frame: Name of the frame.
 
     Returns:
-        A `pinocchio.SE3` of the caller's own [m].
+        A new `pinocchio.SE3` [m].
 
     Raises:
         NameNotFound: If there is no such frame.

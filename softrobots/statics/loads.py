@@ -1,4 +1,4 @@
-"""What pulls on a robot: dead wrenches at its frames, and gravity; and what they do in joint coordinates."""
+"""Load cases: dead wrenches at frames of a robot and gravity, and their torques in joint coordinates."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class LoadTerm(NamedTuple):
     force: FloatArray
     """Its force, shape (3,) [N]."""
     rows: FloatArray
-    """What multiplies the Jacobian of the frame, shape (7, 6): the wrench; `-f x` on linear rows; `mu x` on angular ones."""
+    """Factor of the Jacobian of the frame, shape (7, 6): the wrench; `-f x` on linear rows; `mu x` on angular ones."""
     norms: tuple[float, float]
     """Norms of force [N] and moment [N m]."""
 
     @classmethod
     def of(cls, frame: str, wrench: FloatArray) -> LoadTerm:
-        """Prepare a wrench, shape (6,), at a frame."""
+        """Compute the rows of a wrench, shape (6,), at a frame."""
         fx, fy, fz, mx, my, mz = wrench.tolist()
         return cls(frame, wrench[:3], _UNIT_ROWS.dot(wrench).reshape(7, 6), (math.hypot(fx, fy, fz), math.hypot(mx, my, mz)))
 
@@ -69,20 +69,17 @@ class Load:
     gravity: tuple[float, float, float] | None
     """Gravity, world axes [m/s^2]; None: weightless."""
     terms: tuple[LoadTerm, ...] = field(init=False, repr=False)
-    """The wrenches with the matrices that the statics needs of them."""
+    """The wrenches with the matrices of their derivatives."""
     conservative: bool = field(init=False, repr=False)
-    """Whether the load has a potential: no moment in it."""
+    """Whether the load has a potential: it has no moment."""
 
     def __post_init__(self) -> None:
-        """Keep a read-only copy of the wrenches, and prepare them."""
-        kept, terms, conservative = {}, [], True
-        for frame, wrench in self.wrenches.items():
-            kept[frame] = read_only(np.array(wrench))
-            terms.append(LoadTerm.of(frame, kept[frame]))
-            conservative = conservative and terms[-1].norms[1] == 0.0
-        object.__setattr__(self, "wrenches", MappingProxyType(kept))
-        object.__setattr__(self, "terms", tuple(terms))
-        object.__setattr__(self, "conservative", conservative)
+        """Copy the wrenches, read-only, and compute their terms."""
+        copies = {frame: read_only(np.array(wrench)) for frame, wrench in self.wrenches.items()}
+        terms = tuple(LoadTerm.of(frame, wrench) for frame, wrench in copies.items())
+        object.__setattr__(self, "wrenches", MappingProxyType(copies))
+        object.__setattr__(self, "terms", terms)
+        object.__setattr__(self, "conservative", all(term.norms[1] == 0.0 for term in terms))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle with a plain dictionary."""
@@ -152,15 +149,15 @@ class Load:
 def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, FloatArray]:
     """A uniform dead force along the sections of a robot, as wrenches at its sections.
 
-    Each half of a section passes its share to the nearer end (lumped: each section to its hinge), an approximation of second
-    order in the length of a section, like the chain. The half at the base loads nothing that moves.
+    The force on each half of a section acts at the nearer end (lumped: that of a section at its hinge), an approximation of
+    second order in the length of a section, like the chain. The half at the base has no effect.
 
     Args:
         model: A robot with sections.
         force_per_length: Force per rest length, shape (3,) [N/m], world axes.
 
     Returns:
-        Wrench, shape (6,) [N, N m], by frame: for `wrench=` of `solve_equilibrium`.
+        Wrench, shape (6,) [N, N m], by frame, for `solve_equilibrium(wrench=...)`.
 
     Raises:
         ParameterError: If the robot has no sections, the shape differs or a number is not finite.
@@ -176,14 +173,14 @@ def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, Floa
 
 
 class AppliedLoad:
-    """A load on a robot, ready to be carried to its joints; belongs to the thread that made it.
+    """A load on a robot as joint torques; belongs to the thread that created it.
 
-    (The derivatives are the closed form of the kinematic Hessian; Pinocchio's own static derivatives take the load as a
-    follower.)
+    The derivatives are the closed form of the kinematic Hessian, because Pinocchio's own static derivatives are those of a
+    follower load.
     """
 
     def __init__(self, model: SoftModel, load: Load) -> None:
-        """Look up what stays the same while the robot moves."""
+        """Look up the frames and the scale of the load."""
         self._model, self._data = model.workspace(load.gravity)
         self._load, self._nv, self._terms, self._scale = load, self._model.nv, [], 0.0
         for term in load.terms:
@@ -200,20 +197,20 @@ class AppliedLoad:
             Torque, derivative, potential and size.
         """
         model, data, nv = self._model, self._data, self._nv
-        if nv == 0:  # nothing moves; Pinocchio's frame Jacobian crashes without columns
+        if nv == 0:  # Pinocchio's frame Jacobian crashes without columns
             return JointLoad(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), None, None, 0.0, 0.0)
         torques, angular, by_force, by_moment = [], [], [], []
         potential, scale = 0.0, self._scale
         for frame, term in self._terms:
             jacobian = pin.computeFrameJacobian(model, data, q, frame, _AXES)
-            if nv == 1:  # Pinocchio answers one column with a vector
+            if nv == 1:  # Pinocchio returns one column as a vector
                 jacobian = jacobian.reshape(6, 1)
-            made = term.rows.dot(jacobian)
-            torques.append(made[0])
+            products = term.rows.dot(jacobian)
+            torques.append(products[0])
             angular.append(jacobian[3:])
-            by_force.append(made[1:4])
+            by_force.append(products[1:4])
             if not self._load.conservative:
-                by_moment.append(made[4:])
+                by_moment.append(products[4:])
             potential -= float(term.force.dot(pin.updateFramePlacement(model, data, frame).translation))
         gravity_derivative: FloatArray | None = None
         if self._load.gravity is not None:
@@ -221,7 +218,7 @@ class AppliedLoad:
             torques.append(-data.g)
             scale += math.hypot(*data.g.tolist())
             potential += pin.computePotentialEnergy(model, data)
-        if len(angular) != 1:  # no wrench, or several one above the other
+        if len(angular) != 1:  # no wrench, or several: stacked
             angular, by_force, by_moment = (
                 [np.concatenate([np.zeros((0, nv)), *rows])] for rows in (angular, by_force, by_moment)
             )

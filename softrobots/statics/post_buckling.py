@@ -1,4 +1,4 @@
-r"""Buckling and what comes after: every branch of equilibria that leaves the path at the critical load, followed and labelled.
+r"""Post-buckling: every branch of equilibria that leaves the path at the critical load, followed and labelled.
 
 At the critical force `F_c` of a push along `d` the tangent stiffness `K_t` of the path from zero force (the *fundamental*
 path) is singular: `K_t v = 0`. Other equilibria leave it along the buckling modes `v`. They are found at a small distance
@@ -6,13 +6,12 @@ path) is singular: `K_t v = 0`. Other equilibria leave it along the buckling mod
 
 .. math:: r(y) - F J^T d = 0, \quad v^T (y - y_c) = a
 
-for `y` and `F`, on both sides of every mode, and followed by the length of the path (pseudo-arclength continuation), so that a
-branch whose force falls is followed as well as one whose force grows. One mode makes a pitchfork: the fundamental path and two
-branches. Where two modes have the same critical force (side and up springs of equal stiffness) branches may leave in any
-direction of their plane; those that do are where the torque *across* that direction vanishes at distance `a`. It vanishes in
-some directions only if the robot tells directions apart (two springs of a universal joint do, in fourth order: eight branches);
-it vanishes in all of them if the robot is round (a section of constant strain). Then the buckled equilibria form a *ring*: each
-can be moved to the next without a force. Such an equilibrium is neutral, not stable, and the branch says so.
+for `y` and `F`, on both sides of every mode, and followed by pseudo-arclength continuation, whether the force grows or falls.
+One mode makes a pitchfork: the fundamental path and two branches. Where two modes have the same critical force (side and up
+springs of equal stiffness) branches may leave in any direction of their plane: where the torque *across* that direction
+vanishes at distance `a`. It vanishes in some directions only if the robot is not round (two springs of a universal joint, in
+fourth order: eight branches), and in all of them if it is (a section of constant strain). Then the buckled equilibria form a
+*ring*: each can be moved to the next without a force; it is neutral, not stable (`EquilibriumBranch.neutral`).
 """
 
 from __future__ import annotations
@@ -39,15 +38,15 @@ FUNDAMENTAL = "fundamental"
 """Label of the path from zero force."""
 
 RING = "ring"
-"""Label of one of a ring of equilibria; the others are the same robot, bent in another direction."""
+"""Label of a branch out of a ring; the others are the same robot, bent in another direction."""
 
 BEYOND = 1.25
-"""How far branches are followed by default, relative to the critical force."""
+"""Default limit of the force on branches, relative to the critical force."""
 
 _AWAY = 0.03  # largest change of a spring at which a branch is sought [rad or m]
 _DIRECTIONS = 48  # of a plane of modes in which branches are sought
-_ROUND = 1e-6  # torque across a direction that counts as none, relative to the springs' at that distance
-_TIE = 0.99  # share of the largest change at which a spring is named, too
+_ROUND = 1e-6  # torque across a direction that counts as zero, relative to the springs' at that distance
+_TIE = 0.99  # share of the largest change from which a spring is part of the label
 
 
 Found = TypeVar("Found")
@@ -55,16 +54,16 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True, eq=False)
 class EquilibriumBranch:
-    """Equilibria under a force that grows or falls, one after the other."""
+    """A sequence of equilibria under a force that grows or falls."""
 
     label: str
-    """`FUNDAMENTAL`; by the springs that move most when it begins, with their sign, e.g. "+spring_1_up"; or `RING`."""
+    """`FUNDAMENTAL`; `RING`; or the springs that move most at its start, with their sign, e.g. "+spring_1_up"."""
     equilibria: tuple[Equilibrium, ...]
-    """From zero force, or from the critical point, on; each tells of itself whether it is stable."""
+    """Equilibria from zero force, or from the critical point, on."""
     forces: FloatArray
     """Force along the direction at each of them, shape (n,) [N]."""
     amplitude: FloatArray
-    """Distance of the springs from the critical point along the buckling modes, shape (n,) [rad or m]; 0 if none is there."""
+    """Distance of the springs from the critical point along the buckling modes, shape (n,) [rad or m]; 0 without a mode."""
     energy: FloatArray
     """Elastic energy and potential of the load, shape (n,) [J]."""
     softest: FloatArray
@@ -79,7 +78,7 @@ class EquilibriumBranch:
 
     @cached_property
     def neutral(self) -> Any:
-        """Which can be moved without a force, shape (n,), truth values: all of a ring, and the critical point itself."""
+        """Which are neutral, shape (n,), truth values: all of a ring, and the critical point itself."""
         return np.abs(self.softest) <= NEUTRAL
 
 
@@ -93,10 +92,10 @@ def post_buckling_branches(
     max_force: float | None = None,
     largest_step: float = 0.05,
 ) -> tuple[EquilibriumBranch, ...]:
-    """Follow the equilibrium path under a growing force, and every branch that leaves it where it stops being stable.
+    """Follow the equilibrium path under a growing force, and every branch that leaves it at the critical load.
 
-    At a limit point nothing branches off: the path itself turns back, and is followed as far as it goes. Where a link comes
-    onto the plateau of its moment a branch goes on.
+    At a limit point nothing branches off: the path itself turns back, and is followed to its end. Branches continue beyond the
+    knee of a link with a largest moment.
 
     Args:
         model: The robot.
@@ -104,7 +103,7 @@ def post_buckling_branches(
         direction: Direction of the force, shape (3,), any length but zero, world axes.
         frame: Frame that is pushed; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
-        max_force: Where branches end [N]; by default `BEYOND` times the critical force.
+        max_force: Force at which branches end [N]; by default `BEYOND` times the critical force.
         largest_step: Largest distance between two points of a branch [rad]; a change of the force by the critical one counts
             as much as a radian.
 
@@ -133,11 +132,11 @@ def post_buckling_branches(
     with one_blas_thread(model.n_springs):
         origin, here = path.point(critical.origin, 0.0), path.point(critical.q_springs, critical.force)
         modes = _modes(path, here) if critical.crosses else np.zeros((0, model.n_springs))
-        found = [_told(path, FUNDAMENTAL, modes, *path.follow([origin], path.tangent(origin), most, largest_step))]
+        branches = [_branch(path, FUNDAMENTAL, modes, *path.follow([origin], path.tangent(origin), most, largest_step))]
         for label, there in sorted(_leaving(path, modes), key=lambda one: one[0]):
             points, ended = path.follow([here, there], path.place(there), most, largest_step)
-            found.append(_told(path, label, modes, points, ended))
-    return tuple(found)
+            branches.append(_branch(path, label, modes, points, ended))
+    return tuple(branches)
 
 
 def _modes(path: ForcePath, critical: PathPoint) -> FloatArray:
@@ -173,7 +172,7 @@ def _leaving(path: ForcePath, modes: FloatArray) -> list[tuple[str, PathPoint]]:
         if one.across * other.across < 0.0 and (high - low) % (2.0 * np.pi) < 1.5 * between
     )
     if all(abs(point.across) <= _ROUND * _torque_at(path, along) for _, along, point in known):
-        # Nearly round: one that nothing holds across.
+        # Nearly round: a point without torque across.
         balanced = (point for _, _, point in known if point.across == 0.0)
         found = next(balanced, None) or next((point for _, point in crossings if point is not None), None)
         return [(RING, known[0][2] if found is None else found)]
@@ -181,7 +180,7 @@ def _leaving(path: ForcePath, modes: FloatArray) -> list[tuple[str, PathPoint]]:
 
 
 def _all_found(path: ForcePath, least: int, found: list[Found]) -> list[Found]:
-    """Refuse to leave out a branch: a crossing has branches on both sides, and a plane of modes at least four.
+    """Check the number of branches: two at a crossing, at least four in a plane of modes.
 
     Raises:
         NeutralEquilibrium: If there are fewer.
@@ -192,7 +191,7 @@ def _all_found(path: ForcePath, least: int, found: list[Found]) -> list[Found]:
 
 
 def _distance(model: SoftModel, along: FloatArray) -> float:
-    """Distance along a unit vector at which branches are sought: before a link comes onto the plateau of its moment."""
+    """Distance along a unit vector at which branches are sought: before the knee of any link."""
     stiffness = model.stiffness
     knees = [
         group.max_moment / float(stiffness[group.springs[0]]) for group in model.spring_groups if group.max_moment is not None
@@ -201,33 +200,33 @@ def _distance(model: SoftModel, along: FloatArray) -> float:
 
 
 def _torque_at(path: ForcePath, along: FloatArray) -> float:
-    """Torque of the springs there."""
+    """Torque of the springs at that distance."""
     return float(np.linalg.norm(path.model.stiffness * along)) * _distance(path.model, along)
 
 
 def _at_distance(path: ForcePath, along: FloatArray, across: FloatArray | None = None) -> PathPoint | None:
-    """The equilibrium at a distance from the critical point, held across by a torque if a direction across is given."""
-    held = np.zeros((0, len(along))) if across is None else across[None]
-    rows = np.concatenate([along[None], held])
+    """The equilibrium at a distance from the critical point, with a torque along `across` if given."""
+    guides = np.zeros((0, len(along))) if across is None else across[None]
+    rows = np.concatenate([along[None], guides])
     aims = np.zeros(len(rows))
     aims[0] = _distance(path.model, along)
-    return path.newton(np.append(aims[0] * along, 0.0), np.column_stack([rows, np.zeros(len(rows))]), aims, held)
+    return path.newton(np.append(aims[0] * along, 0.0), np.column_stack([rows, np.zeros(len(rows))]), aims, guides)
 
 
-def _told(path: ForcePath, label: str, modes: FloatArray, points: list[PathPoint], ended: str) -> EquilibriumBranch:
+def _branch(path: ForcePath, label: str, modes: FloatArray, points: list[PathPoint], ended: str) -> EquilibriumBranch:
     equilibria = tuple(
         equilibrium_from_state(path.model, path.motors, path.load(point.force), point.state, method="newton", iterations=number)
         for number, point in enumerate(points)
     )
     away = [float(np.linalg.norm(modes @ (point.springs - path.springs))) for point in points]
-    softest = [float(np.linalg.eigvalsh(scaled(point.state.tangent, path.model.stiffness))[0]) for point in points]
+    min_eigenvalues = [float(np.linalg.eigvalsh(scaled(point.state.tangent, path.model.stiffness))[0]) for point in points]
     return EquilibriumBranch(
         label=label,
         equilibria=equilibria,
         forces=read_only(np.array([point.force for point in points])),
         amplitude=read_only(np.array(away)),
         energy=read_only(np.array([point.state.energy for point in points])),
-        softest=read_only(np.array(softest)),
+        softest=read_only(np.array(min_eigenvalues)),
         ended=ended,
     )
 

@@ -1,4 +1,4 @@
-"""First derivatives of a loaded equilibrium: how the tip follows the motors, and how it gives way to a load."""
+"""First derivatives of a loaded equilibrium: elastostatic Jacobian, compliance, and slope of the motor torques."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatAr
 
 
 def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
-    """Motion of the tip per wrench added at the tip, motors held: `J_k K_t^-1 J_k^T`.
+    """Motion of the tip per wrench added at the tip, at fixed motors: `J_k K_t^-1 J_k^T`.
 
     Motion is translation, then rotation vector; the wrench is force, then moment; world axes. Symmetric if the load has a
     potential (Maxwell-Betti).
@@ -56,7 +56,7 @@ def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
 
 
 def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Geometric Jacobian of the tip per actuator and per elastic coordinate, the other held, linear rows first.
+    """Geometric Jacobian of the tip per actuator and per elastic coordinate, the other fixed, linear rows first.
 
     Args:
         model: The robot.
@@ -73,7 +73,7 @@ def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -
 def tip_motion(
     motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """How tip and springs follow the motors at constant load, from matrices at an equilibrium.
+    """Derivatives of tip and springs by the motors at constant load, from matrices at an equilibrium.
 
     Args:
         motors: Rows of the tip Jacobian, columns per actuator, shape (m, n_motors).
@@ -92,7 +92,7 @@ def tip_motion(
 
 
 def motor_torque_slope(motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray) -> FloatArray:
-    r"""Derivative of the actuator loads with respect to a tip force, springs following.
+    r"""Derivative of the actuator loads with respect to a tip force, springs in equilibrium.
 
     .. math:: d\tau_m/df = J_m^T + d(J_m^T w - g_m)/dy \, K_t^{-1} J_k^T
 

@@ -1,4 +1,4 @@
-"""Buckling: the load at which an equilibrium path loses its stability."""
+"""Buckling: the critical load, at which an equilibrium path loses its stability."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from softrobots.statics.elastostatics import balanced_state, newton
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
 
-_MOST_POINTS = 20_000  # of the path
+_MOST_POINTS = 20_000  # of a path
 _NEWTON_STEPS = 12
 _TOLERANCE = 1e-12
 _SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
 _LARGEST_MOVE = 0.1  # [rad] of a spring between two points of the path
 _NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the one at zero force, may vanish in the next step
-_KNEE = 1e-6  # relative distance of the springs from the beginning of a plateau that counts as none
+_KNEE = 1e-6  # relative distance of the springs from the beginning of a plateau that is neglected
 _KNEE_STEP = 1e-4  # of the force, relative to the force reached: shorter steps may cross the beginning of a plateau
 _STIFF = 1e-9  # eigenvalues above this, relative to the springs' own stiffness, count for the prediction
 
 NEUTRAL = 1e-7
-"""Smallest eigenvalue, relative to the springs' own stiffness, that counts as none."""
+"""Eigenvalue, relative to the springs' own stiffness, up to which it counts as zero."""
 
 
 class CriticalPoint(NamedTuple):
-    """Where an equilibrium path stops being stable."""
+    """Point at which an equilibrium path loses its stability."""
 
     force: float
     """The force [N]."""
     q_springs: FloatArray
     """The springs at the last stable point of the path, shape (n_springs,) [rad or m]."""
     crosses: bool
-    """Whether an eigenvalue of the tangent stiffness goes through zero there and the path goes on, unstable.
+    """Whether an eigenvalue of the tangent stiffness crosses zero and the path continues, unstable.
 
-    Else it turns back, or jumps below zero where a link comes onto its plateau.
+    Otherwise the path turns back, or the eigenvalue jumps below zero at the plateau of a link.
     """
     origin: FloatArray
     """The springs at the beginning of the path, without the force, shape (n_springs,) [rad or m]."""
@@ -55,12 +55,12 @@ def critical_load(
     gravity: Any = None,
     max_force: float | None = None,
 ) -> float:
-    """Smallest force along a direction at which the equilibrium stops being stable.
+    """Smallest force along a direction at which the equilibrium loses its stability.
 
     Follows the equilibrium from zero force, without leaving its path, until the smallest eigenvalue of the tangent
-    stiffness crosses zero (a pitchfork, as of an axially pushed straight arm) or the path turns back (a limit point). A push
-    that is oblique, however little, may bend the robot smoothly where the exact one buckles it, and then has no limit, unless a
-    link with a largest moment collapses: where it reaches its plateau, or later.
+    stiffness crosses zero (a pitchfork, as of an axially pushed straight arm) or the path turns back (a limit point). A
+    slightly oblique push may bend the robot smoothly where the exact one buckles it, and then has no critical load, unless a
+    link with a largest moment collapses, at its plateau or beyond.
 
     Args:
         model: The robot.
@@ -68,7 +68,7 @@ def critical_load(
         direction: Direction of the force, shape (3,), any length but zero, world axes.
         frame: Frame that is pushed; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
-        max_force: Largest force to try [N]; by default 100 times the largest stiffness over the reach.
+        max_force: Limit of the force [N]; by default 100 times the largest stiffness over the reach.
 
     Returns:
         The force [N].
@@ -91,7 +91,7 @@ def critical_point(
     gravity: Any = None,
     max_force: float | None = None,
 ) -> CriticalPoint:
-    """Find where the equilibrium path under a growing force stops being stable: `critical_load` with all that is known of it.
+    """Find the critical point of the equilibrium path under a growing force; see `critical_load`.
 
     Args:
         model: The robot.
@@ -99,7 +99,7 @@ def critical_point(
         direction: Direction of the force, shape (3,), any length but zero, world axes.
         frame: Frame that is pushed; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
-        max_force: Largest force to try [N]; by default 100 times the largest stiffness over the reach.
+        max_force: Limit of the force [N]; by default 100 times the largest stiffness over the reach.
 
     Returns:
         The point.
@@ -123,7 +123,7 @@ def critical_point(
     at = model.tip if frame is None else frame
 
     def follow(magnitude: float, last: _Point) -> _Point | None:
-        """The point of the path at a force, from a point nearby; None if Newton leaves the path."""
+        """Point of the path at a force, from a nearby point; None if Newton leaves the path."""
         guess = last.state.q_springs + (magnitude - last.force) * last.slope
         state = _correct(model, motors, constant.plus(at, magnitude * push), guess, last.state.q_springs)
         return None if state is None else _point(model, state, magnitude, push, at)
@@ -131,32 +131,34 @@ def critical_point(
     with one_blas_thread(model.n_springs):
         first_state = balanced_state(model, motors, constant, model.rest)
         here = None if first_state is None else _point(model, first_state, 0.0, push, at)
-        if first_state is None or here is None or here.softest <= 0.0:
+        if first_state is None or here is None or here.min_eigenvalue <= 0.0:
             raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
         first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
-        nearly_zero = _NEARLY_ZERO * here.softest
+        nearly_zero = _NEARLY_ZERO * here.min_eigenvalue
         for _ in range(_MOST_POINTS):
             if here.force >= largest:
                 break
             there = follow(min(here.force + step, largest), here)
             knee = step < _KNEE_STEP * max(here.force, first_step) and there is not None and _knee_between(model, here, there)
-            if there is None or (not knee and here.softest > nearly_zero and there.softest < 0.5 * here.softest):
-                step *= 0.5  # too far to tell this path from a neighbour
+            if there is None or (
+                not knee and here.min_eigenvalue > nearly_zero and there.min_eigenvalue < 0.5 * here.min_eigenvalue
+            ):
+                step *= 0.5  # too far to distinguish this path from a neighbour
                 if step < _SHORTEST_STEP * max(here.force, first_step):
-                    if here.softest <= 10.0 * nearly_zero or _at_knee(model, here):
+                    if here.min_eigenvalue <= 10.0 * nearly_zero or _at_knee(model, here):
                         # It turns back: a limit point.
                         return CriticalPoint(here.force, here.state.q_springs, False, first_state.q_springs)
                     break
-            elif there.softest <= 0.0:
+            elif there.min_eigenvalue <= 0.0:
                 force, last = _bisect(follow, here, there.force)
-                return CriticalPoint(force, last.state.q_springs, last.softest <= NEUTRAL, first_state.q_springs)
+                return CriticalPoint(force, last.state.q_springs, last.min_eigenvalue <= NEUTRAL, first_state.q_springs)
             else:
                 here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
     reached = f"{here.force:.6g} N along {unit.tolist()}"
-    told = f"the equilibrium stays stable up to {reached}"
+    message = f"the equilibrium stays stable up to {reached}"
     if here.force < largest:
-        told += f"; its path could not be followed further (up to {largest:.6g} N was wanted)"
-    raise NoCriticalLoad(told, max_force=here.force)
+        message += f"; its path could not be followed further (limit: {largest:.6g} N)"
+    raise NoCriticalLoad(message, max_force=here.force)
 
 
 class _Point(NamedTuple):
@@ -164,7 +166,7 @@ class _Point(NamedTuple):
 
     force: float
     state: ElasticState
-    softest: float
+    min_eigenvalue: float
     """Smallest eigenvalue of the tangent stiffness, relative to the springs' own stiffness."""
     slope: FloatArray
     """Derivative of the springs with respect to the force."""
@@ -180,7 +182,7 @@ def _point(model: SoftModel, state: ElasticState, force: float, push: FloatArray
 
 
 def _knee_between(model: SoftModel, here: _Point, there: _Point) -> bool:
-    """Whether a link goes onto its plateau between two points: there the tangent jumps."""
+    """Whether a link reaches or leaves its plateau between two points: there the tangent jumps."""
     return model.springs.saturated(here.state.q_springs) != model.springs.saturated(there.state.q_springs)
 
 
@@ -192,20 +194,20 @@ def _at_knee(model: SoftModel, here: _Point) -> bool:
 
 
 def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high: float) -> tuple[float, _Point]:
-    """Narrow the bracket of the zero of the smallest eigenvalue down to rounding; the force, and the point below it."""
+    """Bisect the zero of the smallest eigenvalue down to rounding; the force, and the point below it."""
     while True:
         middle = 0.5 * (here.force + high)
         if not here.force < middle < high:
             return middle, here
         there = follow(middle, here)
-        if there is not None and there.softest > 0.0:
+        if there is not None and there.min_eigenvalue > 0.0:
             here = there
         else:
             high = middle
 
 
 def _correct(model: SoftModel, motors: FloatArray, load: Load, guess: FloatArray, last: FloatArray) -> ElasticState | None:
-    """Newton from a prediction; None if it does not converge, or not near the prediction and the last point."""
+    """Newton from a prediction; None if it does not converge near the prediction and the last point."""
     state, _ = newton(model, motors, load, guess, tolerance=_TOLERANCE, max_iterations=_NEWTON_STEPS, largest_step=0.5)
     if state is None:
         return None
