@@ -113,8 +113,6 @@ SEPARATE = {
 EQUATIONS = ("studies.papers.dh_tables", "studies.papers.helix_equations", "studies.papers.pcc_equations")
 """Equations as the papers print them, with which the package is compared."""
 LONG = {
-    "softrobots.compiled.program.looped_program",
-    "softrobots.compiled.run.compiled_model",
     "softrobots.helix.shapes",
     "softrobots.model.soft_model",
     "softrobots.statics.elastostatics",

@@ -1,4 +1,4 @@
-"""Tolerances of the compiled solvers: those of the solvers on Pinocchio, where they have them, and their own."""
+"""Tolerances and limits of the compiled solvers; those of the solvers on Pinocchio where these have the same."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from softrobots.model import springs
 from softrobots.statics import elastic_state, elastostatics, force_search
 
 TOLERANCE = elastic_state.TOLERANCE
-"""Largest residual of an answer, relative to the size of the load."""
+"""Largest residual of a result, relative to the size of the load."""
 
 NEWTON_TOLERANCE = 1e-12
-"""Residual at which Newton stops; reached from one below `TOLERANCE` in one step."""
+"""Relative residual at which Newton's method stops; one step leads there from `TOLERANCE`."""
 
 LEAST_SIZE = elastic_state.MOMENT_FLOOR
 """Least size of a load [N m]."""
@@ -19,7 +19,7 @@ LARGEST_NUMBER = checks.LARGEST
 """Largest component of a force [N] or of gravity [m/s^2]."""
 
 LARGEST_POSITION = 1e9
-"""Largest position of a motor joint [rad or m]: sines of larger angles lose digits, and beyond 1e15 mean nothing."""
+"""Largest position of a motor joint [rad or m]; sines of larger angles lose digits."""
 
 LARGEST_SIZE = 1e31
 """Largest size of motor torques [N m]; above it squares would soon overflow."""
@@ -28,7 +28,7 @@ POSITIVE_PIVOT = springs.POSITIVE
 """Smallest pivot that counts as positive, relative to the springs' own stiffness."""
 
 SMALL_PIVOT_SHIFT = 1e-3
-"""Least pivot of a guarded step, relative to the spring's own stiffness; every second guarded step has the larger one."""
+"""Least pivot of a step with shifted pivots, relative to the spring's own stiffness; used by turns with the larger one."""
 
 LARGE_PIVOT_SHIFT = 3.0
 """The larger one."""
@@ -37,46 +37,46 @@ LARGEST_STEP = elastostatics.LARGEST_STEP
 """Largest Newton step, as a norm [rad]."""
 
 SHORT_STEP = 0.1 * LARGEST_STEP
-"""A guarded step shorter than this may be doubled [rad]."""
+"""Length below which a step with shifted pivots may be doubled [rad]."""
 
 ARMIJO = elastostatics.ARMIJO
-"""Share of the predicted fall of the energy that a step must reach."""
+"""Share of the predicted decrease of the energy that a step must reach."""
 
 ENERGY_ROUNDING = elastic_state.ENERGY_ROUNDING
-"""Energies this close, relative to their terms, cannot be told apart."""
+"""Rounding of energies, relative to their terms."""
 
 MAX_LANES = 16
-"""Most cases that are worked on side by side."""
+"""Largest number of cases side by side."""
 
 MIN_LANES = 8
-"""Fewest: two vectors of four numbers, so that one is computed while the other waits."""
+"""Smallest number: two vectors of four numbers, so that one is computed while the other waits."""
 
 LANE_MEMORY = 65_536
 """Workspace of all lanes together [bytes]."""
 
 OBSERVABLE = force_search.OBSERVABLE
-"""Smallest singular value of the elastostatic Jacobian at which the motors feel every force, relative to the reach."""
+"""Smallest singular value of the elastostatic Jacobian at which every force is observable, relative to the reach."""
 
 RANK_TOLERANCE = 1e-6
-"""Singular value of the elastostatic Jacobian that counts as none, relative to the reach."""
+"""Singular value of the elastostatic Jacobian that counts as zero, relative to the reach."""
 
 HIDDEN = force_search.HIDDEN
-"""Share of the motor torques that may stay unexplained where the motors do not feel every force."""
+"""Share of the motor torques that may stay unexplained where a direction of the force is not observable."""
 
 PASSES = 10
-"""Newton passes before a case is left to the descent or the search."""
+"""Newton passes before the descent or the search takes over a case."""
 
 FORCE_PASSES = 5
-"""The same in load estimation. Cases that take more are near a pose in which the motors do not feel every force, and plain
-Newton may find one far from zero; the damped search finds the one that `softrobots.estimate_load` does."""
+"""The same in load estimation. Cases that take more are near a pose in which a direction of the force is not observable, and
+plain Newton may find a force far from zero; the damped search finds that of `softrobots.estimate_load`."""
 
 DESCENT_STEPS = 200
-"""Most steps of a descent."""
+"""Largest number of steps of a descent."""
 
 SEARCH_STEPS = 100
-"""Most steps of a search for a force or for motors."""
+"""Largest number of steps of a search for a force or for motors."""
 
 MAX_UNROLLED_JOINTS = 16
-"""Most joints of a robot that is traced in one straight line; longer ones and those with muscles get loops.
+"""Largest number of joints of an unrolled chain; longer ones, and those with sections or muscles, are looped.
 
-A straight line is a quarter faster than loops, and with twenty joints takes twice as long to compile."""
+Unrolled code is a quarter faster than loops, and with twenty joints takes twice as long to compile."""

@@ -1,4 +1,4 @@
-"""What became of a case."""
+"""Outcome of a case of a compiled solver."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """Outcome of one case of a compiled solver; everything but `CERTIFIED` is a failure, and says which."""
+    """Outcome of one case of a compiled solver; every value but `CERTIFIED` is a failure."""
 
     CERTIFIED = 0
     """In balance to 1e-10 of the load, and certified stable."""
     UNSTABLE = 1
     """In balance, but not stable: neutral, or a saddle that the descent did not inward."""
     UNSETTLED = 2
-    """Not in balance within the steps; also where a load presses a section to the end of its range."""
+    """Not in balance after the largest number of steps; also where a load presses a section to the end of its range."""
     OUT_OF_RANGE = 3
     """A section is bent or twisted beyond its range."""
     NOT_A_NUMBER = 4
-    """The input is not finite or too large to compute with, or muscle lengths that no shape has."""
+    """The input is not finite or too large to compute with, or no shape has the given muscle lengths."""
     UNOBSERVABLE = 5
-    """The force explains the motor torques, but so do others: the motors do not feel one of its directions here."""
+    """Other forces explain the motor torques as well: one direction of the force is not observable in this pose."""
     NOT_REACHED = 6
-    """No force was found that explains the motor torques; the tip does not reach its target, or only by a jump."""
+    """No force was found that explains the motor torques; or the tip does not reach its target, or only by a jump."""
     BEYOND_LIMITS = 7
     """The tip reaches its target only with a motor beyond its limits."""
 

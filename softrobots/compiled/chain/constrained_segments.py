@@ -1,11 +1,11 @@
-"""The ends of a segment whose muscle lengths are given: its multipliers come in at its tip and are eliminated at its base."""
+"""Ends of a segment with given muscle lengths: its multipliers are added at its tip and eliminated at its base."""
 
 from __future__ import annotations
 
 from softrobots.compiled.chain.elements import vector
 from softrobots.compiled.chain.elimination import eliminate_multipliers
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout, load_outboard, sides, store_outboard
-from softrobots.compiled.chain.unknowns import Unknowns, softness_of
+from softrobots.compiled.chain.unknowns import Unknowns, compliances_of
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar
 
@@ -13,25 +13,23 @@ from softrobots.compiled.trace.expressions import Scalar
 def segment_blocks(
     unknowns: Unknowns, recursion: RecursionLayout, segment: int, tip: TipLayout | None = None
 ) -> tuple[list[Block], int]:
-    """Trace what happens at the ends of a segment whose sums are held.
+    """Trace the functions at the ends of a constrained segment.
 
     Args:
         unknowns: The chain.
-        recursion: Places of what elements pass on.
+        recursion: Places of the sums that elements hand on.
         segment: Its number.
-        tip: For a look at the tip: the places of what that passes on and finds.
+        tip: Places of the response of the tip, to trace that.
 
     Returns:
         Functions that add the multipliers at its tip, eliminate them at its base, and solve for them there on the step pass;
         and the size of the record.
     """
-    softness, look = softness_of(unknowns, segment), "" if tip is None else "tip_"
+    softness, look = compliances_of(unknowns, segment), "" if tip is None else "tip_"
     count = len(softness)
     column_places = sides(recursion.column, None if tip is None else tip.column)
     turn_places = sides(recursion.turn, None if tip is None else tip.turn)
-    add = Block(
-        f"add_multipliers_{look}{segment}", "Begin with the multipliers of a segment: nothing is coupled with them yet."
-    )
+    add = Block(f"add_multipliers_{look}{segment}", "Add the multipliers of a segment, without coupling.")
     add.store_all(recursion.matrix + 6, [0.0] * (count * (count + 7) // 2))
     if tip is None:
         add.store_all(recursion.gaps, [0.0] * count)
@@ -39,13 +37,13 @@ def segment_blocks(
     for place in column_places:
         add.store_all(place + 3, [0.0] * count)
     eliminate = Block(f"eliminate_multipliers_{look}{segment}", "Eliminate the multipliers of a segment.", ("at",))
-    given, state = load_outboard(eliminate, recursion, 3 + count, tip)
+    outboard, state = load_outboard(eliminate, recursion, 3 + count, tip)
     gaps: list[Scalar] = [0.0] * count
     if tip is None:
         arrived = eliminate.loads(recursion.gaps, count)
         state = [*state, *arrived]
         gaps = [*arrived]
-    made, beyond = eliminate_multipliers(given, gaps, softness)
+    eliminated, beyond = eliminate_multipliers(outboard, gaps, softness)
     store_outboard(eliminate, recursion, beyond, tip)
     eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
     solve = Block(f"solve_multipliers_{look}{segment}", "Find the multipliers of a segment.", ("at",), eliminate.trace)
@@ -57,17 +55,17 @@ def segment_blocks(
         error: Scalar = sums[1]
         for place, (group, total, gap, soft) in enumerate(zip(groups, totals, gaps, softness, strict=True)):
             solve.store(recursion.constraint_torques + place, total * (1.0 / len(unknowns.chain.held[group])))
-            torque = gap * (1.0 / soft)  # what closing the gap takes
+            torque = gap * (1.0 / soft)  # of closing the gap
             error = error + torque * torque
         solve.store(recursion.steps + 1, error)
         state = [*state, *totals]
     for side, (place, turn) in enumerate(zip(turn_places, turns, strict=True)):
-        multipliers = made.steps(side, vector(turn)).tolist()
+        multipliers = eliminated.steps(side, vector(turn)).tolist()
         solve.store_all(place + 3, multipliers)
         if tip is not None:
-            found = tip.constraint_loads if side == 0 else tip.constraint_columns + (side - 1) * tip.n_constraints
+            first = tip.constraint_loads if side == 0 else tip.constraint_columns + (side - 1) * tip.n_constraints
             for group, value in zip(groups, multipliers, strict=True):
-                solve.store(found + group, value)
+                solve.store(first + group, value)
     arriving = [*(one for turn in turns for one in turn), *sums]
     size = hoist([solve], eliminate, arriving, 0, "at", overwritten=state)
     return [add, eliminate, solve], size

@@ -1,11 +1,11 @@
-r"""Joints and sections: how they move what is beyond them, traced.
+r"""Motion of outboard elements by joints and sections, traced.
 
-All vectors are in one set of reference axes. Going from the tip to the base, what is beyond an element is known by levers: a
-load is a force `F` (the force on the tip; the acceleration of gravity) with the lever `r` of the points that it acts on, from
-the element's origin (the tip's; the sum of mass times position). A coordinate `j` of the element that turns what is beyond by
-:math:`\omega_j` and moves the lever by :math:`J_j` contributes
+All vectors are in one set of reference axes. From the tip to the base, the elements beyond an element are represented by loads:
+a force `F` (the force on the tip; the acceleration of gravity) with a lever `r` from the element's origin (position of the tip;
+sum of mass times position). A coordinate `j` of the element that turns all beyond it by :math:`\omega_j` and moves the lever by
+:math:`J_j` contributes
 
-- torque `sum J_j . F` to its own balance,
+- the torque `sum J_j . F` to its own balance,
 - `c_j = sum J_j x F` to the second derivative: for every coordinate `i` nearer to the base,
   :math:`\partial^2 (F \cdot r)/\partial q_i \partial q_j = \omega_i \cdot c_j`.
 
@@ -29,53 +29,53 @@ Vector = Any
 
 
 class Load(NamedTuple):
-    """A dead force and what it acts on beyond an element."""
+    """A dead force on the elements beyond an element."""
 
     force: Vector
     """The force [N]; for weight: gravity [m/s^2]."""
     lever: Vector
     """Position of the tip from the element's origin [m]; for weight: sum of mass times position [kg m]."""
     share: Scalar
-    """How much of the lever moves with the element's origin: 1, or the mass beyond [kg]."""
+    """Derivative of the lever with respect to the element's origin: 1, or the mass beyond [kg]."""
 
 
 @dataclass
 class Motion:
-    """An element at its coordinates, with all that elimination needs; `k` coordinates."""
+    """Derivatives of an element with `k` coordinates, for the elimination."""
 
     twists: Vector
-    """What is beyond turns by this per coordinate, shape (3, k)."""
+    """Rotation of all beyond it per coordinate, shape (3, k)."""
     bends: Vector
     """`c_j` of each coordinate, shape (3, k)."""
     moves: Vector
-    """The tip moves by this per coordinate, shape (3, k)."""
+    """Displacement of the tip per coordinate, shape (3, k)."""
     torque: list[Scalar]
     """Torque of all loads on each coordinate, (k) [N m or N]."""
     weight: list[Scalar]
-    """The part of it that is weight."""
+    """Part of it due to weight."""
     curvature: Vector
     """Second derivatives of the work of the loads within the element, shape (k, k)."""
 
 
 def vector(values: Sequence[Scalar]) -> Vector:
-    """An array of expressions."""
-    made = np.zeros(len(values), dtype=object)
-    made[:] = list(values)
-    return made
+    """Return an array of expressions."""
+    array = np.zeros(len(values), dtype=object)
+    array[:] = list(values)
+    return array
 
 
 def matrix(rows: Sequence[Sequence[Scalar]]) -> Vector:
-    """A matrix of expressions."""
+    """Return a matrix of expressions."""
     return np.array([vector(row) for row in rows], dtype=object)
 
 
 def constants(values: Any) -> Vector:
-    """An array of constants as plain floats."""
+    """Return an array of constants as plain floats."""
     return np.asarray(values, dtype=np.float64).astype(object)
 
 
 def cross(one: Vector, other: Vector) -> Vector:
-    """Vector product."""
+    """Return the vector product."""
     return vector(
         [
             one[1] * other[2] - one[2] * other[1],
@@ -86,19 +86,19 @@ def cross(one: Vector, other: Vector) -> Vector:
 
 
 def outer(one: Vector, other: Vector) -> Vector:
-    """Product of each with each."""
+    """Return the outer product."""
     return np.multiply.outer(one, other)
 
 
 def turned(axes: Vector, angle: Scalar) -> Vector:
-    """Axes turned about their own z."""
+    """Return axes turned about their own z."""
     c, s = cosine(angle), sine(angle)
     x, y, z = axes.T
     return np.array([x * c + y * s, y * c - x * s, z], dtype=object).T
 
 
 def turning_joint(axis: Vector, loads: Sequence[Load]) -> Motion:
-    """A joint that turns about `axis`, the loads' levers from its origin."""
+    """Return the motion of a joint that turns about `axis`; levers of the loads from its origin."""
     moves = [cross(axis, load.lever) for load in loads]
     bend = sum((cross(move, load.force) for move, load in zip(moves, loads, strict=True)), constants(np.zeros(3)))
     torques = [load.force @ move for move, load in zip(moves, loads, strict=True)]
@@ -106,7 +106,7 @@ def turning_joint(axis: Vector, loads: Sequence[Load]) -> Motion:
 
 
 def sliding_joint(axis: Vector, loads: Sequence[Load]) -> Motion:
-    """A joint that slides along `axis`."""
+    """Return the motion of a joint that slides along `axis`."""
     force = sum((load.force * load.share for load in loads), constants(np.zeros(3)))
     torques = [(load.force @ axis) * load.share for load in loads]
     return _single(constants(np.zeros(3)), cross(axis, force), axis, torques, 0.0)
@@ -118,7 +118,7 @@ def _single(twist: Vector, bend: Vector, move: Vector, torques: Sequence[Scalar]
 
 
 class Screw:
-    """A section at its coordinates, in the axes of its start: `u = p(z) + R(z) r` for a lever `r` at its end.
+    """Screw motion of a section in the axes of its start: `u = p(z) + R(z) r` for a lever `r` at its end.
 
     With the Stumpff functions `c_k` of `|w|^2` (see `softrobots.constant_curvature.screws`)
 
@@ -142,7 +142,7 @@ class Screw:
         self._twists = constants(np.eye(3)) + turn * c[2] + twice * c[3]
 
     def motion(self, loads: Sequence[Load], bodies: Any, axes: Vector) -> tuple[Motion, list[Vector]]:
-        """Motion under loads, and the levers from the start.
+        """Return the motion under loads, and the levers from the start.
 
         Args:
             loads: Loads beyond the end; levers from the end, in reference axes.
@@ -190,10 +190,10 @@ class Screw:
         w, c, length = self._w, self._c, self._length
         d = [k * c[k + 2] - c[k + 1] for k in range(4)]
         along = vector([0.0, 0.0, d[1]]) + vector([w[1], -w[0], 0.0]) * d[2] + w * (w[2] * d[3])
-        made = outer(along, w)
-        made = made + matrix([[0.0, c[2], 0.0], [-c[2], 0.0, 0.0], [0.0, 0.0, 0.0]])
-        made = made + outer(w, vector([0.0, 0.0, c[3]])) + constants(np.eye(3)) * (w[2] * c[3])
-        return np.concatenate([made * length, self._direction.reshape(3, 1)], axis=1)
+        slopes = outer(along, w)
+        slopes = slopes + matrix([[0.0, c[2], 0.0], [-c[2], 0.0, 0.0], [0.0, 0.0, 0.0]])
+        slopes = slopes + outer(w, vector([0.0, 0.0, c[3]])) + constants(np.eye(3)) * (w[2] * c[3])
+        return np.concatenate([slopes * length, self._direction.reshape(3, 1)], axis=1)
 
     def _curvature(self, local: Sequence[tuple[Vector, Vector, Scalar]]) -> Vector:
         r"""Second derivatives of `sum F . u` with respect to the section coordinates, shape (4, 4).
@@ -203,7 +203,7 @@ class Screw:
         """
         w, c, length = self._w, self._c, self._length
         unit, axis = constants(np.eye(3)), constants([0.0, 0.0, 1.0])
-        push = sum((force * share for force, _, share in local), constants(np.zeros(3)))  # what moves the end as a whole
+        push = sum((force * share for force, _, share in local), constants(np.zeros(3)))  # on the end as a whole
         swing = vector([-push[1], push[0], 0.0])  # e x push
         turning = sum((cross(lever, force) for force, lever, _ in local), constants(np.zeros(3)))
         g1, slope1 = turning @ w + push[2] * length, turning
@@ -217,19 +217,19 @@ class Screw:
         g3, slope3 = w[2] * pw * length, (axis * pw + push * w[2]) * length
         curve3 = (outer(axis, push) + outer(push, axis)) * length
         d = [k * c[k + 2] - c[k + 1] for k in range(6 if len(c) > 7 else 5)]
-        made = constants(np.zeros((3, 3)))
+        total = constants(np.zeros((3, 3)))
         for k, value, slope, curve in ((1, g1, slope1, None), (2, g2, slope2, curve2), (3, g3, slope3, curve3)):
-            if k == 3 and _is_zero(w[2]):  # the twist is locked, and nothing else of this term moves
+            if k == 3 and _is_zero(w[2]):  # the twist is locked, and the term is constant
                 continue
             e = k * d[k + 2] - d[k + 1]
-            made = made + unit * (value * d[k]) + outer(w, w) * (value * e)
-            made = made + outer(w, slope * d[k]) + outer(slope * d[k], w)
+            total = total + unit * (value * d[k]) + outer(w, w) * (value * e)
+            total = total + outer(w, slope * d[k]) + outer(slope * d[k], w)
             if curve is not None:
-                made = made + curve * c[k]
+                total = total + curve * c[k]
         # The elongation moves the end along the direction `p / l`; its slope is that of `push . p / l`.
         column = self._slopes_of_direction(push)
         return np.concatenate(
-            [np.concatenate([made, column.reshape(3, 1)], axis=1), np.append(column, 0.0).reshape(1, 4)], axis=0
+            [np.concatenate([total, column.reshape(3, 1)], axis=1), np.append(column, 0.0).reshape(1, 4)], axis=0
         )
 
     def _slopes_of_direction(self, push: Vector) -> Vector:

@@ -1,18 +1,18 @@
-r"""Newton steps in a time that grows with the length of the chain only: elimination from the tip to the base.
+r"""Newton steps in linear time: elimination of the coordinates from the tip to the base.
 
 The tangent stiffness couples a coordinate `j` with every coordinate `i` nearer to the base by :math:`-\omega_i \cdot c_j`
-(`softrobots.compiled.chain.elements`), three numbers: a matrix whose off-diagonal blocks have rank three. Eliminating the
-coordinates from the tip on keeps that form. With `P` (3 x 3) and `s` (3) gathered from those already eliminated, the next
-element has
+(`softrobots.compiled.chain.elements`), three numbers: a matrix whose off-diagonal blocks have rank three. Elimination
+of the coordinates from the tip on keeps that form. With the sums `P` (3 x 3) and `s` (3) of the coordinates already eliminated,
+the next element has
 
 .. math:: C = c + P \Omega, \quad D = K - \Omega^T P \Omega, \quad g' = g + \Omega^T s
 
-and hands on :math:`P + C D^{-1} C^T` and :math:`s + C D^{-1} g'`. On the way back the steps are
-:math:`x = D^{-1} (C^T \varphi - g')` with the turn :math:`\varphi = \sum \Omega x` of all nearer to the base.
-`D = L D' L^T` gives the pivots; all positive, the tangent stiffness is positive definite.
+and hands on :math:`P + C D^{-1} C^T` and :math:`s + C D^{-1} g'`. In the step pass
+:math:`x = D^{-1} (C^T \varphi - g')` with the turn :math:`\varphi = \sum \Omega x` of all elements nearer to the base.
+`D = L D' L^T` has the pivots: if all are positive, the tangent stiffness is positive definite.
 
-Given muscle lengths hold sums of coordinates. Their multipliers join the turn as further components of what is nearer to the
-base, until they are eliminated themselves at the base of their segment: with a pivot that must be negative.
+Given muscle lengths constrain sums of coordinates. Their multipliers are further components of the turn, until they are
+eliminated at the base of their segment, with a pivot that must be negative.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, lar
 
 @dataclass
 class Outboard:
-    """What the elements beyond hand on: `n` is three, and the multipliers of the segment."""
+    """Sums of the outboard elements; `n` is three plus the number of multipliers of the segment."""
 
     matrix: Any
     """`P`, shape (n, n), symmetric."""
@@ -38,17 +38,17 @@ class Outboard:
     min_pivot: Scalar
     """Smallest pivot in size, relative to the springs' own stiffness."""
     n_negative_pivots: Scalar
-    """How many pivots are not positive."""
+    """Number of pivots that are not positive."""
 
     @classmethod
     def tip(cls, right_hand_sides: int) -> Outboard:
-        """Nothing beyond the tip."""
+        """Return the sums at the tip: no elements."""
         return cls(constants(np.zeros((3, 3))), [constants(np.zeros(3)) for _ in range(right_hand_sides)], 1.0, 0.0)
 
 
 @dataclass
 class Eliminated:
-    """An element after elimination: what it needs to find its own step on the way back."""
+    """Factors of an element after elimination, for its own step."""
 
     lower: Any
     """`L`, unit lower triangular, shape (k, k)."""
@@ -60,26 +60,26 @@ class Eliminated:
     """`L^-1 g'` of each right-hand side (k)."""
 
     def steps(self, column: int, turn: Any) -> Any:
-        """Steps of the element's coordinates for one right-hand side, shape (k,); `turn` is that of all nearer to the base."""
+        """Return the steps for one right-hand side, shape (k,), from the turn of all elements nearer to the base."""
         k = len(self.inverse_pivots)
-        made = [
+        steps = [
             ((self.coupling[j] @ turn) - self.columns[column][j]) * self.inverse_pivots[j]  # backwards through L^T
             for j in range(k)
         ]
         for j in reversed(range(k)):
             for i in range(j + 1, k):
-                made[j] = made[j] - self.lower[i, j] * made[i]
+                steps[j] = steps[j] - self.lower[i, j] * steps[i]
         out = constants(np.zeros(k))
-        out[:] = made
+        out[:] = steps
         return out
 
     def reduced(self, gradient: Sequence[Scalar]) -> list[Scalar]:
-        """Another right-hand side `L^-1 g'` from `g'`."""
-        made = list(gradient)
-        for j in range(len(made)):
-            for i in range(j + 1, len(made)):
-                made[i] = made[i] - self.lower[i, j] * made[j]
-        return made
+        """Return another right-hand side `L^-1 g'` from `g'`."""
+        values = list(gradient)
+        for j in range(len(values)):
+            for i in range(j + 1, len(values)):
+                values[i] = values[i] - self.lower[i, j] * values[j]
+        return values
 
 
 def eliminate(
@@ -96,17 +96,17 @@ def eliminate(
     """Eliminate the coordinates of one element.
 
     Args:
-        beyond: What the elements beyond it hand on.
-        twists: Turn per coordinate, and zeros for multipliers, shape (n, k).
-        bends: `c`, and minus one where a multiplier holds the coordinate, shape (n, k).
+        beyond: Sums of the outboard elements.
+        twists: Turn per coordinate, with zeros for multipliers, shape (n, k).
+        bends: `c`, with minus one where a multiplier constrains the coordinate, shape (n, k).
         stiffness: Second derivatives of the energy within the element, shape (k, k).
         right_hand_sides: Gradient of each right-hand side (k).
         scales: The coordinates' own stiffness (k), to compare pivots with.
-        pivot_shift: Where positive, pivots are made so, and at least this in terms of the spring's own stiffness.
-        multipliers: Whether the coordinates are multipliers, whose pivots are negative and never guarded.
+        pivot_shift: If positive, pivots are replaced by their size, and at least by this times the spring's own stiffness.
+        multipliers: Whether the coordinates are multipliers, whose pivots are negative and never shifted.
 
     Returns:
-        The element, and what it hands on together with those beyond.
+        The factors of the element, and the sums including it.
     """
     k = len(scales)
     pushed = beyond.matrix @ twists
@@ -144,31 +144,31 @@ def eliminate(
 
 
 def _symmetric_outer(one: Any, scaled: Any) -> Any:
-    """Product of a vector with itself, scaled; computed once above the diagonal."""
+    """Return the outer product of a vector with a multiple of itself; computed once above the diagonal."""
     n = len(one)
-    made = constants(np.zeros((n, n)))
+    product = constants(np.zeros((n, n)))
     for i in range(n):
         for j in range(i, n):
-            made[i, j] = made[j, i] = one[i] * scaled[j]
-    return made
+            product[i, j] = product[j, i] = one[i] * scaled[j]
+    return product
 
 
 def eliminate_multipliers(beyond: Outboard, gaps: Sequence[Scalar], scales: Sequence[Scalar]) -> tuple[Eliminated, Outboard]:
-    """Eliminate the multipliers at the base of their segment: the last components, one for each gap.
+    """Eliminate the multipliers, the last components, at the base of their segment.
 
     Args:
-        beyond: What the elements beyond hand on.
-        gaps: How far each held sum is above where it should be; the first step closes them.
-        scales: Softness of the sums, to compare pivots with.
+        beyond: Sums of the outboard elements.
+        gaps: Difference of each constrained sum from its given value; the first step closes them.
+        scales: Compliance of the sums, to compare pivots with.
 
     Returns:
-        The multipliers, and what is handed on without them.
+        The factors of the multipliers, and the sums without them.
     """
     count = len(gaps)
     n = len(beyond.matrix) - count
     unit = constants(np.concatenate([np.zeros((n, count)), np.eye(count)]))
     zeros = constants(np.zeros((n + count, count)))
     values: list[Sequence[Scalar]] = [gaps, *([0.0] * count for _ in beyond.columns[1:])]
-    made, rest = eliminate(beyond, unit, zeros, constants(np.zeros((count, count))), values, scales, multipliers=True)
+    eliminated, rest = eliminate(beyond, unit, zeros, constants(np.zeros((count, count))), values, scales, multipliers=True)
     rest = Outboard(rest.matrix[:n, :n], [one[:n] for one in rest.columns], rest.min_pivot, rest.n_negative_pivots)
-    return Eliminated(made.lower, made.inverse_pivots, made.coupling[:, :n], made.columns), rest
+    return Eliminated(eliminated.lower, eliminated.inverse_pivots, eliminated.coupling[:, :n], eliminated.columns), rest

@@ -1,11 +1,10 @@
-"""Code for a long chain: a body for each kind of element, and loops over the elements.
+"""Code of a looped chain: functions for each kind of element, called in loops over the elements.
 
-Three ways per evaluation, each a loop: outwards with the axes (`outward`), back with the loads and the elimination (`inward`),
-outwards again with the steps (`step`). Elements of a kind share their code; numbers in which they differ stand in a table, and
-what an element needs again on a later way is kept in its record in the workspace. The cost is proportional to the number of
-elements.
+Three passes per evaluation, each a loop: outward with the axes, inward with loads and elimination, outward again with the
+steps. Elements of a kind share their code; numbers in which they differ stand in a table, and values for a later pass in the
+record of the element in the workspace. The cost is proportional to the number of elements.
 
-The response of the tip (`softrobots.compiled.chain.looped_tip`) comes of the same passes with three more right-hand sides.
+The response of the tip (`softrobots.compiled.chain.looped_tip`) takes the same passes with three more right-hand sides.
 """
 
 from __future__ import annotations
@@ -31,21 +30,21 @@ class Kind:
     """Elements that share their code."""
 
     number: int
-    """Number of the kind, in names of functions."""
+    """Its number, in names of functions."""
     rows: list[int]
     """Its elements."""
     blocks: list[Block]
-    """`outward`, `inward`, `step`; markers of segments lack the first."""
+    """Functions of the outward, inward and step pass."""
     table: list[float]
     """Numbers in which the elements differ, element by element."""
     width: int
-    """How many of them an element has."""
+    """Count of them for one element."""
     record: int
     """Size of the record of an element."""
 
 
 class TableColumns:
-    """Numbers of several elements of a kind: those that are the same in all are constants, others go into a table."""
+    """Numbers of the elements of a kind: equal ones are constants, others go into a table."""
 
     def __init__(self, block: Block, name: str, count: int) -> None:
         """Begin a table for `count` elements."""
@@ -53,7 +52,7 @@ class TableColumns:
         self._columns: list[tuple[float, ...]] = []
 
     def entry(self, values: Sequence[Any]) -> Scalar:
-        """The number of the element that the code is run for."""
+        """Return a number of an element: a constant, or a table entry for the row of the element."""
         if len(set(values)) == 1:
             return float(values[0])
         column = tuple(float(value) for value in values)
@@ -62,16 +61,16 @@ class TableColumns:
         return self._block.table(self._name, self._columns.index(column), "row")
 
     def entries(self, values: Any) -> Any:
-        """The same for arrays, shape (count, ...)."""
+        """Return the same for arrays, shape (count, ...)."""
         array = np.asarray(values, dtype=np.float64)
-        made = constants(np.zeros(array.shape[1:]))
+        entries = constants(np.zeros(array.shape[1:]))
         for index in np.ndindex(*array.shape[1:]):
-            made[index] = self.entry(array[(slice(None), *index)].tolist())
-        return made
+            entries[index] = self.entry(array[(slice(None), *index)].tolist())
+        return entries
 
     @property
     def width(self) -> int:
-        """Numbers an element."""
+        """Count of numbers for one element."""
         return len(self._columns)
 
     @property
@@ -88,9 +87,9 @@ def element_kinds(
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        recursion: Places of what elements pass on.
+        recursion: Places of the sums that elements hand on.
         weight: Whether there is gravity.
-        tip: For a look at the tip: the places of what that passes on and finds.
+        tip: Places of the response of the tip, to trace that.
 
     Returns:
         The kinds.
@@ -105,7 +104,7 @@ def element_kinds(
 
 
 def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
-    """What must be the same for two elements to share code."""
+    """Return the properties that elements with the same code share."""
     one = unknowns.traced(row, lambda _: 0.0, lambda _: 0.0, lambda _: 0.0)
     zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
     constraint = unknowns.multipliers_at(row)
@@ -123,10 +122,10 @@ def _trace_kind(
     tip: TipLayout | None,
 ) -> Kind:
     names, look = ("at", "row", "q"), "" if tip is None else "tip_"
-    out = Block(f"outward_{look}{number}", "Go through an element outwards.", names)
+    out = Block(f"outward_{look}{number}", "Outward pass of an element.", names)
     trace = out.trace
-    back = Block(f"inward_{look}{number}", "Go through it inwards and eliminate its coordinates.", names, trace)
-    step_pass = Block(f"step_{look}{number}", "Find its steps.", names, trace)
+    back = Block(f"inward_{look}{number}", "Inward pass: loads and elimination.", names, trace)
+    step_pass = Block(f"step_{look}{number}", "Steps of its coordinates.", names, trace)
     columns = TableColumns(out, f"TABLE_{number}", len(rows))
     element = _common(rows, unknowns, out, layout, columns)
     axes_loads = out.loads(recursion.axes, 9)
@@ -170,7 +169,7 @@ def _trace_kind(
 def _store_constraints(
     block: Block, element: TracedElement, result: InwardPass, recursion: RecursionLayout, multipliers: int
 ) -> list[Expression]:
-    """Add an element to the held sums of its segment, and to the torques that hold them; return what they were before."""
+    """Add an element to the constrained sums of its segment and to their torques; return the sums before."""
     gaps, torques = block.loads(recursion.gaps, multipliers), block.loads(recursion.constraint_torques, multipliers)
     with_own: list[list[Scalar]] = [list(gaps), list(torques)]
     for place, constraint in enumerate(element.constraints):
@@ -192,7 +191,7 @@ def _store_step(
     recursion: RecursionLayout,
     multipliers: int,
 ) -> list[Expression]:
-    """Find the Newton step of an element; return what it reads that the elements before have written."""
+    """Trace the Newton step of an element; return the sums of the elements before it."""
     turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + multipliers), step_pass.loads(recursion.steps, 3)
     if result.eliminated is not None:
         turn = vector(turn_loads)
@@ -219,7 +218,7 @@ def _store_tip_step(
     tip: TipLayout,
     multipliers: int,
 ) -> list[Expression]:
-    """Find how an element follows a force on the tip; for a motor, what is known of the Jacobian before the last element."""
+    """Trace the response of an element to a force on the tip; for a motor, its column of the Jacobian so far."""
     turn_loads = [step_pass.loads(place, 3 + multipliers) for place in sides(recursion.turn, tip.turn)]
     bend_loads = [step_pass.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
     if result.eliminated is None:
@@ -240,7 +239,7 @@ def _store_tip_step(
 
 
 def _common(rows: list[int], unknowns: Unknowns, block: Block, layout: Layout, columns: TableColumns) -> TracedElement:
-    """An element of a kind, with table entries for the numbers in which its elements differ."""
+    """Return an element of a kind, with table entries for the numbers in which its elements differ."""
     ones = [unknowns.traced(row, lambda _: 0.0, lambda _: 0.0, lambda _: 0.0) for row in rows]
     first = ones[0]
     unknown = iter(block.loads(0, max(len(first.moving), 1), "q"))
@@ -269,10 +268,10 @@ def _common(rows: list[int], unknowns: Unknowns, block: Block, layout: Layout, c
 
 
 def _relaxed(ones: Sequence[TracedElement], block: Block, layout: Layout, columns: TableColumns) -> list[Scalar]:
-    """Where the unknowns of a kind are relaxed.
+    """Return the rest values of the unknowns of a kind.
 
-    For held ones that is their start, which spreads the held sums as the stiffness wants it: from there the springs load all of
-    a sum alike. So only the multipliers feel what it takes to hold the sum, and the residual is not blurred by it.
+    For constrained ones that is their start, which distributes the given sums by stiffness, so that the springs load all terms
+    of a sum alike: only the multipliers carry the torque of the constraint, and it adds no rounding to the residual.
     """
     at_rest: list[Scalar] = columns.entries([one.rest for one in ones]).tolist()
     start = layout.start - layout.unknown
@@ -285,7 +284,7 @@ def _relaxed(ones: Sequence[TracedElement], block: Block, layout: Layout, column
 def _arriving(
     block: Block, element: TracedElement, recursion: RecursionLayout, multipliers: int, *, weight: bool, tip: TipLayout | None
 ) -> tuple[list[Expression], list[Load], Outboard, Balance]:
-    """What an element finds on the way back."""
+    """Return the sums before the inward pass of an element: workspace elements, loads, outboard sums, balance."""
     levers = block.loads(recursion.lever, 6 if weight else 3)
     forces = block.loads(recursion.force, 6 if weight else 3)
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0)]

@@ -1,14 +1,14 @@
-r"""A look at the tip of a long chain in equilibrium: how it follows the motors, the held sums and a force.
+r"""Response of the tip of a looped chain in equilibrium to the motors, the constrained sums and a force.
 
 The loops of `softrobots.compiled.chain.looped_chain` with tip columns, and straight-line functions around them. With the
 columns `X = K^-1 J_k^T` the elastostatic Jacobian of a motor `m` is (`softrobots.compiled.chain.tip_motion`)
 
 .. math:: E_m = J_m + \omega_m \cdot \sum_{k\,beyond} c_k X_k + c_m \cdot \varphi_m
 
-What is beyond a motor is known when the way out ends: until then the sum up to it stands there instead, subtracted.
+The sum beyond a motor is known at the end of the step pass; until then minus the sum up to the motor is stored.
 
-Held sums `A s = b` have multipliers: `K s' + A^T \lambda = ...`. Those of the balance are the loads on the sums, those of the
-three tip columns the derivative of the tip with respect to them: from `K X + A^T \Lambda = J_k^T`, `A X = 0` and
+Constrained sums `A s = b` have multipliers: `K s' + A^T \lambda = ...`. Those of the balance are loads on the sums, those of
+the three tip columns the derivative of the tip with respect to them: from `K X + A^T \Lambda = J_k^T`, `A X = 0` and
 `K s' + A^T \lambda' = 0`, `A s' = b'` it follows that `J_k s' = \Lambda^T b'`.
 """
 
@@ -25,7 +25,7 @@ from softrobots.compiled.chain.unrolled_chain import seen_backwards
 from softrobots.compiled.trace.blocks import Block
 
 CONTROL = '''def look_at_tip(w: Array) -> None:
-    """Look how the tip follows motors, held sums and a force, from an equilibrium that was settled."""
+    """Find the response of the tip to motors, constrained sums and a force, at an equilibrium."""
     start_outward(w)
     outward_tip_all(w)
     start_inward(w)
@@ -35,7 +35,7 @@ CONTROL = '''def look_at_tip(w: Array) -> None:
     finish_tip(w)
     for i in range(N):
         finish_column(w, i)'''
-"""The function that goes all the ways."""
+"""Function that makes all passes."""
 
 
 def tip_frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, tip: TipLayout, *, weight: bool) -> list[Block]:
@@ -44,8 +44,8 @@ def tip_frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, ti
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        recursion: Places of what elements pass on.
-        tip: Places of what the look passes on and finds.
+        recursion: Places of the sums that elements hand on.
+        tip: Places of the response of the tip.
         weight: Whether there is gravity.
 
     Returns:
@@ -55,14 +55,14 @@ def tip_frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, ti
 
 
 def _start_inward_tip(tip: TipLayout) -> Block:
-    block = Block("start_inward_tip", "Begin the sums of the tip columns.")
+    block = Block("start_inward_tip", "Clear the sums of the tip columns.")
     block.store_all(tip.column, [0.0] * (tip.end - tip.column))
     return block
 
 
 def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, tip: TipLayout, *, weight: bool) -> Block:
-    """Add what is beyond each motor, pass the leading motors, and turn all into world axes."""
-    block = Block("finish_tip", "Put together what the loops have found of motors and held sums.")
+    """Add the sums beyond each motor, pass the leading motors, and turn all into world axes."""
+    block = Block("finish_tip", "Compute the response to motors and constrained sums from the sums of the passes.")
     axes = vector(block.loads(recursion.base, 9)).reshape(3, 3)
     total = vector(block.loads(tip.bends, 9)).reshape(3, 3)
     leading = [

@@ -1,8 +1,8 @@
-"""From base to tip and back along a chain, traced element by element.
+"""Outward and inward passes of one element of a chain, traced.
 
-`outward` carries the axes outwards. `inward` comes back with the loads beyond the element, eliminates its coordinates and hands
-on. Short chains are traced as a whole (`softrobots.compiled.chain.unrolled_chain`), long ones a body for each kind of element
-(`softrobots.compiled.chain.looped_chain`); the mathematics here is the same for both.
+`outward` computes the axes behind the element. `inward` moves the loads to its base and eliminates its coordinates. Unrolled
+chains (`softrobots.compiled.chain.unrolled_chain`) trace them for all elements, looped ones
+(`softrobots.compiled.chain.looped_chain`) once for each kind of element.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from softrobots.compiled.trace.stumpff_series import LARGEST
 
 @dataclass
 class TracedElement:
-    """An element with its numbers: constants where they are known when the code is written, table entries where not."""
+    """Numbers of an element: constants where they are known when the code is generated, otherwise table entries."""
 
     kind: str
     """`turn`, `slide` or `section`."""
@@ -36,13 +36,13 @@ class TracedElement:
     coordinates: list[Scalar]
     """Joint position; section coordinates, locked ones included [rad or m]."""
     moving: tuple[int, ...]
-    """Which of the coordinates are unknown; none for a motor."""
+    """Indices of the unknown coordinates; none for a motor."""
     stiffness: list[Scalar]
     """Stiffness of the unknown ones [N m/rad or N/m]."""
     rest: list[Scalar]
-    """Where they are relaxed [rad or m]."""
+    """Rest values of those [rad or m]."""
     pull: list[Scalar]
-    """Constant load on them, of muscles with a given tension [N m or N]."""
+    """Constant load of muscle tensions on them [N m or N]."""
     constraints: tuple[int | None, ...]
     """Number of the multiplier of the segment that constrains each unknown coordinate, or None."""
     length: Scalar = 0.0
@@ -51,7 +51,7 @@ class TracedElement:
 
 @dataclass
 class OutwardPass:
-    """An element on the way out."""
+    """Result of the outward pass of an element."""
 
     start: Any
     """Axes of its frame before its own motion, shape (3, 3)."""
@@ -60,41 +60,41 @@ class OutwardPass:
     end: Any
     """Axes behind it, shape (3, 3)."""
     screw: Screw | None
-    """The motion of a section."""
+    """Screw motion of a section."""
 
 
 @dataclass
 class Balance:
-    """Sums over the elements that were left behind."""
+    """Sums over the elements of the inward pass so far."""
 
     energy: Scalar = 0.0
     """Elastic energy [J]."""
     weight: Scalar = 0.0
     """Squared torque of the weight on all unknown coordinates."""
     range_margin: Scalar = 1.0
-    """Negative where a section is beyond its range."""
+    """Negative if a section is beyond its range."""
 
 
 @dataclass
 class InwardPass:
-    """An element on the way back."""
+    """Result of the inward pass of an element."""
 
     motion: Motion
-    """How it moves what is beyond; unknown coordinates only, for a motor its joint."""
+    """Its motion: unknown coordinates only, for a motor its joint."""
     gradient: list[Scalar]
     """Derivative of the energy with respect to its unknown coordinates."""
     eliminated: Eliminated | None
-    """Its part of the factorisation; None for a motor."""
+    """Its factors; None for a motor."""
     loads: list[Load]
-    """The loads with levers from the origin of the element before."""
+    """The loads, with levers from the origin of the element before."""
     beyond: Outboard
-    """What it hands on."""
+    """Sums including it."""
     twists: Any = None
     """Turn per unknown coordinate, with zeros for multipliers, shape (n, k)."""
 
 
 def outward(element: TracedElement, axes: Any) -> OutwardPass:
-    """Go through an element outwards; `axes` are those behind the element before."""
+    """Outward pass of an element; `axes` are those behind the element before."""
     start, shift = axes @ element.rotation, axes @ element.translation
     if element.kind == "section":
         screw = Screw(element.coordinates, element.length)
@@ -113,19 +113,19 @@ def inward(
     tip_columns: bool = False,
     pivot_shift: Scalar = 0.0,
 ) -> InwardPass:
-    """Go through an element inwards.
+    """Inward pass of an element.
 
     Args:
         element: The element.
-        outward_pass: What the way out left.
+        outward_pass: Result of its outward pass.
         loads: The force on the tip, and the weight if there is gravity, with levers from the element's end.
-        beyond: What the elements beyond hand on.
-        balance: Sums, which are added to.
-        tip_columns: Whether the motion of the tip is solved for, too: three right-hand sides after that of the balance.
+        beyond: Sums of the outboard elements.
+        balance: Sums over elements, added to in place.
+        tip_columns: Whether to solve for the motion of the tip as well: three more right-hand sides.
         pivot_shift: See `elimination.eliminate`.
 
     Returns:
-        The element left behind.
+        The result.
     """
     motion, at_start = _motion(element, outward_pass, loads)
     moving = list(element.moving)
@@ -168,7 +168,7 @@ def inward(
 
 
 def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:
-    """Motion of an element, and the loads with levers from its origin at zero."""
+    """Return the motion of an element, and the loads with levers from its origin at zero."""
     if outward_pass.screw is not None:
         motion, levers = outward_pass.screw.motion(loads, element.bodies, outward_pass.start)
         own = sum((mass for mass, _ in element.bodies), 0.0)
@@ -189,7 +189,7 @@ def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[L
 
 
 def _range_margin(element: TracedElement, screw: Screw) -> Scalar:
-    """Positive while a section is in range: less than half a turn of bending and of twist, and some length left."""
+    """Return a number that is positive for a section in range: bending and twist below half a turn, positive length."""
     direction = screw.position
     at_end = screw.rotation[:, 2] @ direction
     size = (direction @ direction) * 1e-6

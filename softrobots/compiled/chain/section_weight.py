@@ -1,8 +1,8 @@
 """The weight of a section's own bodies.
 
-They hang on the frames behind the six rigid joints that carry the section (`softrobots.constant_curvature.strain_chain`). Those
+They are fixed to the frames behind the six rigid joints of the section (`softrobots.constant_curvature.strain_chain`). These
 frames follow from the end of the section without any angle: the chord frame `Rx(u1) Ry(u2)` has the chord as its z axis, and
-the frames of the spherical joint divide the turn from there to the end. Derivatives are taken by the trace.
+the frames of the spherical joint divide the turn from there to the end. Derivatives are those of the trace.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class OwnWeight(NamedTuple):
 
 
 def weight_moment(z: Sequence[Scalar], screw: Any, bodies: Sequence[tuple[Scalar, Any]], gravity: Any) -> OwnWeight:
-    """First moment of the bodies of a section.
+    """Return the first moment of the bodies of a section.
 
     Args:
         z: Section coordinates.
@@ -50,9 +50,9 @@ def weight_moment(z: Sequence[Scalar], screw: Any, bodies: Sequence[tuple[Scalar
     variables = [one for one in z if isinstance(one, Expression)]
 
     def spread(slopes: Sequence[Scalar]) -> list[Scalar]:
-        """Put zeros in the places of the coordinates that are constants."""
-        found = iter(slopes)
-        return [next(found) if isinstance(one, Expression) else 0.0 for one in z]
+        """Insert zeros for coordinates that are constants."""
+        values = iter(slopes)
+        return [next(values) if isinstance(one, Expression) else 0.0 for one in z]
 
     slopes = np.array([spread(gradient(one, variables)) for one in moment], dtype=object)
     work = spread(gradient(gravity @ moment, variables))
@@ -61,7 +61,7 @@ def weight_moment(z: Sequence[Scalar], screw: Any, bodies: Sequence[tuple[Scalar
 
 
 def _chord_axes(position: Any) -> Any:
-    """`Rx(u1) Ry(u2)`: z along the chord, y across it without a part along x."""
+    """Return `Rx(u1) Ry(u2)`: z along the chord, y across it without a component along x."""
     x, y, z = position
     across = square_root(y * y + z * z)
     length = square_root(x * x + y * y + z * z)
@@ -70,7 +70,7 @@ def _chord_axes(position: Any) -> Any:
 
 
 def _spherical_axes(chord: Any, rotation: Any) -> tuple[Any, Any, Any]:
-    """Axes behind `Rx(r1)`, `Ry(r2)` and `Rz(r3)`."""
+    """Return the axes behind `Rx(r1)`, `Ry(r2)` and `Rz(r3)`."""
     turn = chord.T @ rotation
     across = square_root(turn[1, 2] * turn[1, 2] + turn[2, 2] * turn[2, 2])
     sx, cx = -turn[1, 2] / across, turn[2, 2] / across

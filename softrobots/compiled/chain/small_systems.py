@@ -1,4 +1,4 @@
-"""Systems of up to three equations or unknowns in closed form, traced."""
+"""Closed-form solutions of systems with up to three equations or unknowns, traced."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _ROOT_STEPS = 5
 
 
 def solve_small(matrix: Any, right: Vector) -> Vector:
-    """Solve `matrix x = right`; least squares with more rows than columns, the smallest `x` with fewer.
+    """Solve `matrix x = right`; least squares with more rows than columns, minimum norm with fewer.
 
     Args:
         matrix: Shape (m, n), the smaller of the two at most three.
@@ -31,7 +31,7 @@ def solve_small(matrix: Any, right: Vector) -> Vector:
 
 
 def inverse_small(matrix: Any) -> Any:
-    """Inverse by cofactors, shape (n, n) with n up to three; huge but finite where there is none."""
+    """Return the inverse by cofactors, shape (n, n) with n up to three; huge but finite for singular matrices."""
     n = len(matrix)
     if n == 1:
         return np.array([[_reciprocal(matrix[0, 0])]], dtype=object)
@@ -47,10 +47,10 @@ def _reciprocal(value: Scalar) -> Scalar:
 
 
 def smallest_square(matrix: Any) -> Scalar:
-    """Square of the smallest singular value, shape (m, n) with the smaller of the two at most three.
+    """Return the square of the smallest singular value of a matrix, shape (m, n) with the smaller of the two at most three.
 
-    The smallest root of the characteristic polynomial of the smaller product with the transpose, by Newton from zero, which
-    comes from below; enough steps for all but a factor near one.
+    The smallest root of the characteristic polynomial of the smaller product with the transpose, by Newton's method from zero,
+    which converges from below; accurate to a factor near one.
     """
     product = matrix @ matrix.T if matrix.shape[0] <= matrix.shape[1] else matrix.T @ matrix
     n = len(product)
@@ -66,7 +66,7 @@ def smallest_square(matrix: Any) -> Scalar:
 
 
 def _smallest_root(coefficients: Vector) -> Scalar:
-    """Newton from zero on a polynomial with real, non-negative roots; coefficients from the constant one on."""
+    """Newton's method from zero for a polynomial with real, non-negative roots; coefficients from the constant one on."""
     root: Scalar = 0.0
     for _ in range(_ROOT_STEPS):
         value, slope = constants(np.zeros(2))

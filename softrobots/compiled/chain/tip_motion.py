@@ -1,12 +1,12 @@
-r"""How the tip of a chain follows its motors while the springs give way, traced; for load estimation and inverse kinematics.
+r"""Elastostatic Jacobian of an unrolled chain, traced; for load estimation and inverse kinematics.
 
 With the tip's columns `X = K^-1 J_k^T` of an evaluation, the elastostatic Jacobian of [Troise 2021] (see
-`softrobots.elastostatic_jacobian`) is `E = J_m - X^T H_km`. The second derivatives `H_km` of the energy couple a motor `m`
-strain `k` beyond it by `-omega_m . c_k` and nearer to the base by `-omega_k . c_m`, so that sums over the strains give
+`softrobots.elastostatic_jacobian`) is `E = J_m - X^T H_km`. The second derivatives `H_km` of the energy couple a motor `m` with
+a strain `k` beyond it by `-omega_m . c_k` and nearer to the base by `-omega_k . c_m`, so that sums over the strains give
 
 .. math:: E_m = J_m + \omega_m \cdot \sum_{k\,beyond} c_k X_k + c_m \cdot \varphi_m
 
-Its transpose tells how motor torques follow the force on the tip.
+Its transpose maps a change of the force on the tip to changes of the motor torques.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from softrobots.model.serial_chain import ChainJoint
 
 @dataclass
 class TipMotion:
-    """The tip and the motors at an evaluated point, in the axes behind the leading motors."""
+    """Response of tip and motors at an evaluated point, in the axes behind the leading motors."""
 
     jacobian: Any
     """Elastostatic Jacobian, shape (3, n_motors) [m/rad or m/m]."""
     motor_torques: Vector
     """Load on the motors, shape (n_motors,) [N m or N]."""
     torque_change: Vector
-    """Its change when the unknowns take their Newton step, shape (n_motors,)."""
+    """Its change by the Newton step of the unknowns, shape (n_motors,)."""
     tip_change: Vector
-    """Change of the tip when they do, shape (3,) [m]."""
+    """Change of the tip by that step, shape (3,) [m]."""
 
 
 def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
-    """Sum up how the tip follows the motors.
+    """Return the elastostatic Jacobian and the motor torques at a point.
 
     Args:
         unknowns: The chain.
         point: An evaluation with tip columns.
 
     Returns:
-        The Jacobian, and what a Newton step changes.
+        The Jacobian, the torques, and their changes by the Newton step.
     """
     count = unknowns.chain.n_motors
     jacobian = constants(np.zeros((3, count)))
@@ -66,7 +66,7 @@ def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
 
 
 def step_with_motors(unknowns: Unknowns, point: Evaluation, motors: Vector) -> list[Scalar]:
-    """Newton step of the unknowns when the motors move, too.
+    """Return the Newton step of the unknowns when the motors move as well.
 
     Args:
         unknowns: The chain.
@@ -96,6 +96,6 @@ def step_with_motors(unknowns: Unknowns, point: Evaluation, motors: Vector) -> l
 
 
 def motor_of(unknowns: Unknowns, row: int) -> int | None:
-    """Number of the motor at an element; None if it is none."""
+    """Return the number of the motor of an element; None for other elements."""
     element = unknowns.chain.elements[row]
     return element.motor if isinstance(element, ChainJoint) else None

@@ -1,4 +1,4 @@
-"""The unknowns of a chain: which strains are free to move, and its elements as they go into a trace."""
+"""Unknown strains of a chain, and its elements for a trace."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, E
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """A chain, and which of its strains are unknown."""
+    """A chain and its unknown strains."""
 
     chain: SerialChain
     """The chain."""
     locked: tuple[str, ...] = ()
-    """Section strains that keep their rest value; of `strain_chain.STRAINS`."""
+    """Section strains that keep their rest value, of `strain_chain.STRAINS`."""
 
     def __post_init__(self) -> None:
-        """Refuse names that are no strains, strains that muscle lengths hold, and all four at once."""
+        """Refuse unknown names, strains that muscle lengths constrain, and all four at once."""
         for name in self.locked:
             if name not in STRAINS:
                 raise NameNotFound("section strain", name, STRAINS)
@@ -36,19 +36,19 @@ class Unknowns:
         constrained = {strain for group in self.chain.held for strain in group}
         clash = sorted({STRAINS[(strain - self._first_section) % 4] for strain in constrained & self._locked_strains})
         if clash:
-            raise ParameterError("locked_strains", self.locked, f"free of {', '.join(clash)}: given muscle lengths hold it")
+            raise ParameterError("locked_strains", self.locked, f"without {', '.join(clash)}, which muscle lengths constrain")
         if self.chain.rest.size and float(np.abs(self.chain.rest).max()) > LARGEST_POSITION:
             raise ParameterError(
                 "model",
                 self.chain.name,
-                f"a robot whose springs are relaxed within +-{LARGEST_POSITION:g} rad or m, to be compiled",
+                f"a robot with rest positions of springs within +-{LARGEST_POSITION:g} rad or m, to be compiled",
             )
         if self.locked and not self._locked_strains:
             raise ParameterError("locked_strains", self.locked, "empty for a robot without sections of constant strain")
 
     @cached_property
     def strains(self) -> tuple[int, ...]:
-        """The unknown strains, in order."""
+        """Indices of the unknown strains, in order."""
         return tuple(row for row in range(len(self.chain.stiffness)) if row not in self._locked_strains)
 
     @cached_property
@@ -58,34 +58,34 @@ class Unknowns:
 
     @cached_property
     def multiplier(self) -> dict[int, tuple[int, int]]:
-        """By held strain: the segment and the number of its multiplier in it."""
-        made: dict[int, tuple[int, int]] = {}
+        """By constrained strain: the segment, and the number of its multiplier there."""
+        multipliers: dict[int, tuple[int, int]] = {}
         for row, group in enumerate(self.chain.held):
             segment = self.segment_of_group[row]
             number = sum(other == segment for other in self.segment_of_group[:row])
-            made |= {strain: (segment, number) for strain in group}
-        return made
+            multipliers |= {strain: (segment, number) for strain in group}
+        return multipliers
 
     @cached_property
     def segment_of_group(self) -> tuple[int, ...]:
-        """Segment of each held group, counted from 0: groups whose elements overlap share one."""
+        """Segment of each constrained group, from 0: groups with overlapping elements share one."""
         spans = [self._span(group) for group in self.chain.held]
-        made: list[int] = []
+        segments: list[int] = []
         for row, span in enumerate(spans):
-            same = [made[other] for other in range(row) if spans[other][0] <= span[1] and span[0] <= spans[other][1]]
-            made.append(same[0] if same else (max(made) + 1 if made else 0))
-        return tuple(made)
+            same = [segments[other] for other in range(row) if spans[other][0] <= span[1] and span[0] <= spans[other][1]]
+            segments.append(same[0] if same else max(segments, default=-1) + 1)
+        return tuple(segments)
 
     @cached_property
     def segment_spans(self) -> tuple[tuple[int, int], ...]:
-        """First and last element of each segment whose strains are held."""
-        made = []
+        """First and last element of each constrained segment."""
+        ends = []
         for segment in range(len(set(self.segment_of_group))):
             spans = [
                 self._span(group) for group, one in zip(self.chain.held, self.segment_of_group, strict=True) if one == segment
             ]
-            made.append((min(first for first, _ in spans), max(last for _, last in spans)))
-        return tuple(made)
+            ends.append((min(first for first, _ in spans), max(last for _, last in spans)))
+        return tuple(ends)
 
     @cached_property
     def masses_beyond(self) -> tuple[float, ...]:
@@ -95,7 +95,7 @@ class Unknowns:
 
     @cached_property
     def leading_motors(self) -> int:
-        """How many elements before the first unknown: all motors."""
+        """Number of elements, all motors, before the first unknown."""
         for row, element in enumerate(self.chain.elements):
             if isinstance(element, ChainSection) or element.motor is None:
                 return row
@@ -104,10 +104,10 @@ class Unknowns:
     def traced(
         self, row: int, motor: Callable[[int], Scalar], unknown: Callable[[int], Scalar], pull: Callable[[int], Scalar]
     ) -> TracedElement:
-        """An element with its constants.
+        """Return an element with its constants.
 
         Args:
-            row: Which one.
+            row: Index of the element.
             motor: Position of a motor by its number.
             unknown: An unknown by its place.
             pull: Constant load on an unknown by its place.
@@ -142,18 +142,18 @@ class Unknowns:
 
     @property
     def pulled(self) -> bool:
-        """Whether muscles pull with given tensions."""
+        """Whether muscles have given tensions."""
         return self.chain.muscle_input == "forces" and len(self.chain.muscle_rest) > 0
 
     @property
     def is_unrolled(self) -> bool:
-        """Whether the whole chain is traced in one straight line: few joints, no sections and no muscles."""
+        """Whether the chain is unrolled: few joints, no sections and no muscles."""
         sections = any(isinstance(element, ChainSection) for element in self.chain.elements)
         return not sections and len(self.chain.muscle_rest) == 0 and len(self.chain.elements) <= MAX_UNROLLED_JOINTS
 
     @property
     def moved_by_motors(self) -> bool:
-        """Whether the actuators are motor joints of a short chain, and there is at least one."""
+        """Whether the actuators are motor joints of an unrolled chain, at least one."""
         return self.is_unrolled and self.chain.n_motors > 0
 
     @property
@@ -163,14 +163,14 @@ class Unknowns:
         return 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(chain.stiffness[strains] * chain.rest[strains]))
 
     def multipliers_at(self, row: int) -> int:
-        """How many multipliers the segment of an element has; 0 outside of held segments."""
+        """Return the number of multipliers of the segment of an element; 0 outside of constrained segments."""
         for segment, (first, last) in enumerate(self.segment_spans):
             if first <= row <= last:
                 return sum(one == segment for one in self.segment_of_group)
         return 0
 
     def moving(self, row: int) -> tuple[int, ...]:
-        """The unknown strains of an element."""
+        """Return the unknown strains of an element."""
         return tuple(strain for strain in strains_of(self.chain.elements[row]) if strain in self.place)
 
     @property
@@ -191,18 +191,18 @@ class Unknowns:
 
 
 def strains_of(element: Element) -> tuple[int, ...]:
-    """Places of the strains of an element; none for a motor."""
+    """Return the indices of the strains of an element; none for a motor."""
     if isinstance(element, ChainSection):
         return tuple(element.strain + place for place in range(4))
     return () if element.strain is None else (element.strain,)
 
 
 def bodies_of(element: Element) -> tuple[ChainBody, ...]:
-    """The bodies of an element."""
+    """Return the bodies of an element."""
     return element.bodies if isinstance(element, ChainSection) else (element.body,)
 
 
-def softness_of(unknowns: Unknowns, segment: int) -> list[float]:
-    """Softness of the sums that each multiplier of a segment holds [rad/(N m) or m/N]."""
+def compliances_of(unknowns: Unknowns, segment: int) -> list[float]:
+    """Return the compliance of the sum of each multiplier of a segment [rad/(N m) or m/N]."""
     groups = [group for group, one in zip(unknowns.chain.held, unknowns.segment_of_group, strict=True) if one == segment]
     return [float(np.sum(1.0 / unknowns.chain.stiffness[list(group)])) for group in groups]

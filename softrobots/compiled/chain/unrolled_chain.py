@@ -1,7 +1,7 @@
-"""Code for a short chain: the whole robot in one straight line.
+"""Unrolled chains: the passes over all elements traced as straight-line code.
 
-All is traced in the axes behind the leading motors, which carry the rest of the robot as one rigid body: the load is turned
-into those axes once, and their joints cost nothing afterwards.
+Vectors are in the axes behind the leading motors, which carry the rest of the robot as one rigid body: the load is turned into
+those axes once, and their joints cost nothing afterwards.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ class Evaluation:
     """A chain at given coordinates, traced; vectors in the axes behind the leading motors."""
 
     inward_passes: list[InwardPass]
-    """What is known of each element, the leading motors included."""
+    """Result of each element, the leading motors included."""
     turns: list[list[Vector]]
-    """By element and right-hand side: the turn of all that is nearer to the base."""
+    """By element and right-hand side: the turn of all elements nearer to the base."""
     steps: list[list[Vector]]
     """By element and right-hand side: its part of the solution; the first side is the Newton step."""
     gradient: list[Scalar]
-    """Derivative of the energy with respect to the unknowns: their out-of-balance torque."""
+    """Derivative of the energy with respect to the unknowns: the out-of-balance torque."""
     step: list[Scalar]
     """Newton step of the unknowns."""
     balance: Balance
     """Sums over the elements."""
     beyond: Outboard
-    """Pivots."""
+    """Pivots of all elements."""
     energy: Scalar
     """Elastic energy plus potential of the loads, up to a constant [J]."""
     tip: Vector
@@ -66,16 +66,16 @@ def evaluate(
 
     Args:
         unknowns: The chain.
-        block: Where its expressions belong.
+        block: Block of the expressions.
         layout: The places in the workspace.
         weight: Whether there is gravity.
-        at_rest: Take the unknowns at rest, whatever the workspace says.
-        forceless: Take no force on the tip.
-        tip_columns: Solve for the motion of the tip, too.
-        shift_pivots: Make pivots positive if the workspace says so.
+        at_rest: Whether the unknowns are at rest, instead of in the workspace.
+        forceless: Whether there is no force on the tip.
+        tip_columns: Whether to solve for the motion of the tip as well.
+        shift_pivots: Whether pivots are shifted by the `pivot_shift` in the workspace.
 
     Returns:
-        Everything about that point.
+        The evaluation.
     """
     chain = unknowns.chain
     rest = [float(chain.rest[strain]) for strain in unknowns.strains]
@@ -123,7 +123,7 @@ def evaluate(
 
 
 def _solved(unknowns: Unknowns, inward_passes: list[InwardPass], sides: int, made: Evaluation) -> Evaluation:
-    """Find the steps on the second way out."""
+    """Trace the step pass."""
     turns = [constants(np.zeros(3)) for _ in range(sides)]
     by_strain: dict[int, tuple[Scalar, Scalar]] = {}
     for row, one in enumerate(inward_passes):
@@ -170,7 +170,7 @@ def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[
 
 
 def place_base(leading: list[TracedElement]) -> tuple[Any, Vector]:
-    """Axes, shape (3, 3), and origin, shape (3,) [m], of the frame behind the leading motors in the world."""
+    """Return axes, shape (3, 3), and origin, shape (3,) [m], of the frame behind the leading motors in the world."""
     axes, origin = constants(np.eye(3)), constants(np.zeros(3))
     for element in leading:
         origin, axes = origin + axes @ element.translation, axes @ element.rotation
@@ -182,7 +182,7 @@ def place_base(leading: list[TracedElement]) -> tuple[Any, Vector]:
 
 
 def seen_backwards(leading: list[TracedElement]) -> list[OutwardPass]:
-    """The leading motors as seen from behind the last of them."""
+    """Return the outward passes of the leading motors in the axes behind the last of them."""
     axes, made = constants(np.eye(3)), []
     for element in reversed(leading):
         start = turned(axes, -element.coordinates[0]) if element.kind == "turn" else axes

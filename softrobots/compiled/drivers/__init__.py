@@ -1,1 +1,1 @@
-"""The loops around the traced functions: Newton's method, energy descent, searches, batches; as text of the kernel language."""
+"""Loops around the traced functions, in the kernel language: Newton's method, energy descent, searches, paths, batches."""

@@ -1,7 +1,7 @@
-"""What generated code does with its evaluations: Newton passes, and descent on the energy for cases that they do not settle.
+"""Newton passes, and descent on the energy for the cases that they do not solve.
 
-Functions in the kernel language. Their text goes into every generated module as it stands here, behind the constants and
-functions that are declared first; so one text is run by Python, compiled for single cases and for lanes, and translated to C.
+Functions in the kernel language. Their text goes into every generated module behind its constants and straight-line functions
+(`generated_names`); the same text is run by Python, compiled for single cases and for lanes, and translated to C.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from softrobots.compiled.settings import *
 
 
 def is_usable(w: Array) -> bool:
-    """Tell whether motors and load are numbers that can be computed with."""
+    """Tell whether motors and load are finite and not too large to compute with."""
     for i in range(N_MOTORS):
         if not fabs(w[i]) <= LARGEST_POSITION:
             return False
@@ -32,7 +32,7 @@ def is_settled(w: Array, tolerance: float) -> bool:
 
 
 def is_stable(w: Array) -> bool:
-    """Tell whether all pivots of springs are clearly positive, and those of the multipliers negative: one for each."""
+    """Tell whether all pivots of springs are clearly positive, and those of the constraints negative."""
     return (
         w[MIN_PIVOT] > POSITIVE_PIVOT
         and w[N_NEGATIVE_PIVOTS] - N_CONSTRAINTS < 0.5
@@ -41,20 +41,20 @@ def is_stable(w: Array) -> bool:
 
 
 def move(w: Array, share: float) -> None:
-    """Go a share of the way from where a line search started."""
+    """Move the unknowns a share of the way along a line search."""
     for i in range(N):
         w[UNKNOWN + i] = w[LINE_ORIGIN + i] + share * w[LINE_DIRECTION + i]
 
 
 def keep(w: Array) -> None:
-    """Remember the unknowns and their step, for a line search."""
+    """Store the unknowns and their step as origin and direction of a line search."""
     for i in range(N):
         w[LINE_ORIGIN + i] = w[UNKNOWN + i]
         w[LINE_DIRECTION + i] = w[STEP + i]
 
 
 def leave_saddle(w: Array) -> None:
-    """Go away from an unstable equilibrium in a direction of no symmetry, soft springs more, without changing held sums."""
+    """Move away from an unstable equilibrium in an asymmetric direction, soft springs more, at constant constrained sums."""
     keep(w)
     for i in range(N):
         w[LINE_DIRECTION + i] = 0.1 * SOFTNESS[i] * (1.0 + 0.3 * i / N)
@@ -74,7 +74,7 @@ def leave_saddle(w: Array) -> None:
 def outcome(w: Array) -> int:
     """Return the status of the point that was evaluated last."""
     if w[ENERGY] - w[ENERGY] != 0.0 or not w[SIZE] < 1e300:
-        return NOT_A_NUMBER  # infinite, too: of a load whose square is infinite every residual is a small part
+        return NOT_A_NUMBER  # also infinite: every residual is small beside an infinite load
     if w[RANGE_MARGIN] < 0.0:
         return OUT_OF_RANGE
     if not is_settled(w, TOLERANCE):
@@ -85,9 +85,9 @@ def outcome(w: Array) -> int:
 
 
 def search_line(w: Array, longest: float) -> bool:
-    """Go along the step as far as the energy falls (Armijo); tell whether anything is gained by it.
+    """Search along the step for a lower energy (Armijo); tell whether it or the residual decreased.
 
-    And go on, twice as far each time, while it goes on falling and the way is shorter than `longest`.
+    The step is doubled while the energy falls and it stays shorter than `longest`.
     """
     keep(w)
     energy = w[ENERGY]
@@ -108,7 +108,7 @@ def search_line(w: Array, longest: float) -> bool:
         move(w, share)
         evaluate(w)
     if not w[ENERGY] <= energy + rounding or (-slope < rounding and not w[ERROR] < error):
-        move(w, 0.0)  # nothing is gained
+        move(w, 0.0)  # no progress
         evaluate(w)
         return False
     while 2.0 * share * length < longest:
@@ -124,7 +124,7 @@ def search_line(w: Array, longest: float) -> bool:
 
 
 def cross_valley(w: Array) -> bool:
-    """Take a guarded step for the residual alone: at the bottom of a curved valley a whole one leads out of it again."""
+    """Take a step with shifted pivots if it lowers the residual: a full one leaves the bottom of a curved valley again."""
     error = w[ERROR]
     w[PIVOT_SHIFT] = SMALL_PIVOT_SHIFT
     evaluate(w)
@@ -142,11 +142,11 @@ def cross_valley(w: Array) -> bool:
 def descend(w: Array) -> int:
     """Newton descent on the energy from the unknowns in the workspace; return the status.
 
-    Where pivots are not positive they are made so: by turns hardly, which is quick near a neutral equilibrium, and by the
-    springs' own stiffness, as pivots behind a tiny one are huge. A step that does not lower the energy is halved; a
-    short one with pivots made positive is doubled while that lowers the energy, as beside a saddle it leads hardly away.
-    Where nothing is gained any more although it is not stable, the saddle is left like one that it has settled on. It ends
-    in a stable equilibrium unless there is none, a section comes to the end of its range, or the steps are spent.
+    Pivots that are not positive are shifted: by turns to a small value, which is fast near a neutral equilibrium, and to
+    several times the springs' own stiffness, since pivots behind a tiny one are huge. A step that does not lower the energy
+    is halved; a short step with shifted pivots is doubled while that lowers the energy, since it hardly leaves a saddle. A
+    point that is not stable and makes no progress is left like a saddle. The descent ends in a stable equilibrium unless
+    there is none, a section comes to the end of its range, or the largest number of steps is reached.
     """
     saddles = 0
     strong = 0
@@ -187,7 +187,7 @@ def descend(w: Array) -> int:
 
 
 def go_to_start(w: Array) -> None:
-    """Put the unknowns where the springs are relaxed, or as given where muscle lengths hold sums of them."""
+    """Set the unknowns to rest, or to `START` where muscle lengths constrain sums of them."""
     for i in range(N):
         if N_CONSTRAINTS > 0:
             w[UNKNOWN + i] = w[START + i]
@@ -196,7 +196,7 @@ def go_to_start(w: Array) -> None:
 
 
 def settle_from(w: Array) -> int:
-    """Descend from given unknowns."""
+    """Find the equilibrium by descent from the unknowns in the workspace; return the status."""
     if not is_usable(w):
         return NOT_A_NUMBER
     prepare(w)
@@ -204,7 +204,7 @@ def settle_from(w: Array) -> int:
 
 
 def settle(w: Array) -> int:
-    """Find the equilibrium from rest: Newton passes while they go well, else descent from rest; return the status."""
+    """Find the equilibrium from rest by Newton passes, or by descent where they fail; return the status."""
     if not is_usable(w):
         return NOT_A_NUMBER
     if N_CONSTRAINTS > 0:
@@ -235,4 +235,4 @@ FUNCTIONS: tuple[Callable[..., object], ...] = (
     settle_from,
     settle,
 )
-"""All of them, each behind those that it uses."""
+"""All functions, each behind those that it uses."""

@@ -1,7 +1,7 @@
-"""What the kernel language has built in, for plain Python; other back ends bring their own.
+"""Built-in functions of the kernel language for plain Python; other back ends have their own.
 
-Functions in the kernel language import these names, so that they can be run, checked and tested where they are written. Their
-text alone goes into a generated module, which is then run with the names of its back end.
+Modules in the kernel language import these names for tests and type checks. Only the text of their functions goes into a
+generated module, which runs with the names of its back end.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ Places: TypeAlias = "tuple[int, ...]"
 
 
 def running(w: Array) -> bool:
-    """Tell whether any lane has yet to go on."""
+    """Tell whether any lane is not finished."""
     count = 0.0
     for lane in range(LANES):
         if w[MODE * LANES + lane] < 0.5:

@@ -1,7 +1,7 @@
 """Load estimation and inverse kinematics on top of the straight-line code; kernel language, see `equilibrium_drivers`.
 
-First Newton on everything at once. What that does not settle is searched: the springs settle by descent at every step, and the
-force or the motors take damped steps (Levenberg-Marquardt) that are kept only if they come nearer.
+First Newton's method on all unknowns at once. Where that fails a search follows: the springs settle by descent at every step,
+and the force or the motors take damped steps (Levenberg-Marquardt) that are kept only if the error decreases.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from softrobots.compiled.settings import *
 
 
 def look(w: Array, varied: int) -> None:
-    """Evaluate a search for the motors (`varied` is 0) or for the force (its place)."""
+    """Evaluate a search for the motors (`varied` is 0) or for the force (`varied` is its place)."""
     if varied == 0:
         look_for_target(w)
     else:
@@ -23,7 +23,7 @@ def look(w: Array, varied: int) -> None:
 
 
 def squared_tolerance(w: Array, varied: int) -> float:
-    """Return the squared distance or torque at which a search is done."""
+    """Return the squared distance or torque at which a search ends."""
     if varied == 0:
         return w[TOLERATED] * w[TOLERATED]
     size = LEAST_SIZE * LEAST_SIZE
@@ -38,7 +38,7 @@ def squared_tolerance(w: Array, varied: int) -> float:
 
 
 def step_within_limits(w: Array, varied: int, count: int) -> None:
-    """Remember the point and go where the last look led; motors no further than their limits."""
+    """Store the point and take the damped step; motors stop at their limits."""
     for i in range(count):
         w[PREVIOUS + i] = w[varied + i]
         w[varied + i] = w[NEXT_POINT + i]
@@ -53,7 +53,7 @@ def step_within_limits(w: Array, varied: int, count: int) -> None:
 
 
 def keep_point(w: Array) -> None:
-    """Keep motors and unknowns as the point before."""
+    """Store motors and unknowns as the previous point."""
     for i in range(N_MOTORS):
         w[PREVIOUS + i] = w[i]
     for i in range(N):
@@ -61,7 +61,7 @@ def keep_point(w: Array) -> None:
 
 
 def take_step(w: Array) -> None:
-    """Go where the last step to a target leads."""
+    """Take the last step to a target."""
     for i in range(N_MOTORS):
         w[i] = w[NEXT_POINT + i]
     for i in range(N):
@@ -69,7 +69,7 @@ def take_step(w: Array) -> None:
 
 
 def go_back(w: Array, varied: int, count: int) -> None:
-    """Go back to the point before."""
+    """Return to the previous point."""
     for i in range(count):
         w[varied + i] = w[PREVIOUS + i]
     for i in range(N):
@@ -84,7 +84,7 @@ def estimated(w: Array) -> int:
 
 
 def search(w: Array, varied: int, count: int) -> int:
-    """Search the force or the motors from the point in the workspace; return the status."""
+    """Search for the force or the motors from the point in the workspace; return the status."""
     prepare(w)
     status = descend(w)
     if varied > 0:
@@ -130,7 +130,7 @@ def search(w: Array, varied: int, count: int) -> int:
 
 
 def within_limits(w: Array, varied: int) -> int:
-    """Return the status of motors that have been sought."""
+    """Return the status of motors that were searched for."""
     if varied == 0:
         for i in range(N_MOTORS):
             if w[i] < LOWER[i] - 1e-9 or w[i] > UPPER[i] + 1e-9:
@@ -158,7 +158,7 @@ def estimate(w: Array) -> int:
 
 
 def step_to_target(w: Array) -> bool:
-    """Newton towards the target; tell whether it arrived. What leads to the one that follows is left ahead."""
+    """Newton's method towards the target; tell whether it arrived. `NEXT_POINT` becomes the step to the next target."""
     w[MODE] = 0.0
     for _ in range(PASSES):
         target_step(w)
@@ -169,7 +169,7 @@ def step_to_target(w: Array) -> bool:
 
 
 def reach(w: Array) -> int:
-    """Find motors that put the tip at the target in the workspace, from those there; return the status."""
+    """Find motors that put the tip at the target, from the motors in the workspace; return the status."""
     if not is_usable(w):
         return NOT_A_NUMBER
     keep_point(w)
@@ -195,4 +195,4 @@ FUNCTIONS: tuple[Callable[..., object], ...] = (
     step_to_target,
     reach,
 )
-"""All of them, each behind those that it uses."""
+"""All functions, each behind those that it uses."""

@@ -1,6 +1,6 @@
-"""What given muscles do, for callers of the C code; kernel language, see `softrobots.compiled.drivers.equilibrium_drivers`.
+"""Muscle inputs, for callers of the C code; kernel language, see `softrobots.compiled.drivers.equilibrium_drivers`.
 
-The Python solvers do the same with matrices in `softrobots.compiled.run.actuation`.
+The Python solvers use matrices instead, in `softrobots.compiled.run.actuation`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from softrobots.compiled.drivers.intrinsics import Array
 
 
 def put_muscles(w: Array, muscles: Array) -> None:
-    """Write what `N_MUSCLES` muscle lengths [m] or tensions [N] do, base to tip; call it before `settle`."""
+    """Write the effect of `N_MUSCLES` muscle lengths [m] or tensions [N], base to tip; call it before `settle`."""
     for i in range(N):
         total = MUSCLE_BASE[i]
         for j in range(N_MUSCLES):
@@ -21,4 +21,4 @@ def put_muscles(w: Array, muscles: Array) -> None:
 
 
 FUNCTIONS: tuple[Callable[..., object], ...] = (put_muscles,)
-"""All of them."""
+"""All functions."""

@@ -1,4 +1,4 @@
-"""Following a path with the tip, waypoint by waypoint; kernel language, see `equilibrium_drivers`."""
+"""Path following with the tip, waypoint by waypoint; kernel language, see `equilibrium_drivers`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from softrobots.compiled.drivers.motor_drivers import go_back, keep_point, reach
 
 
 def is_near(w: Array, place: int) -> bool:
-    """Tell whether no motor has gone further than a radian from those kept at a place: another elbow or turn would be."""
+    """Tell whether all motors are within a radian of those at a place: another elbow or turn would be farther."""
     furthest = 0.0
     for i in range(N_MOTORS):
         if fabs(w[i] - w[place + i]) > furthest:
@@ -19,7 +19,7 @@ def is_near(w: Array, place: int) -> bool:
 
 
 def predict(w: Array) -> None:
-    """Go where the last step leads, corrected by what the step before it was short of: then it is right to third order."""
+    """Predict the next waypoint: the last step plus the correction of the step before, accurate to third order."""
     for i in range(N_MOTORS):
         w[PREDICTED + i] = w[NEXT_POINT + i]
         w[i] = w[NEXT_POINT + i] + w[CORRECTION + i]
@@ -29,7 +29,7 @@ def predict(w: Array) -> None:
 
 
 def correct(w: Array, share: float) -> None:
-    """Remember what the last step was short of, or nothing."""
+    """Store a share of the prediction error as correction of the next step."""
     for i in range(N_MOTORS):
         w[CORRECTION + i] = share * (w[i] - w[PREDICTED + i])
     for i in range(N):
@@ -37,9 +37,9 @@ def correct(w: Array, share: float) -> None:
 
 
 def step_in_parts(w: Array, targets: Array, last: int, row: int) -> bool:
-    """Go from the last waypoint that was reached to this one through points between; tell whether it arrived.
+    """Move from the last reached waypoint to this one through intermediate points; tell whether it arrived.
 
-    `PREDICTED` keeps the motors at the last point between.
+    `PREDICTED` keeps the motors at the last intermediate point.
     """
     for doubling in range(1, 7):
         parts = 1
@@ -119,4 +119,4 @@ def follow(
 
 
 FUNCTIONS: tuple[Callable[..., object], ...] = (is_near, predict, correct, step_in_parts, follow)
-"""All of them, each behind those that it uses."""
+"""All functions, each behind those that it uses."""

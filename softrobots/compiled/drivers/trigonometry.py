@@ -1,4 +1,4 @@
-"""Sine and cosine in the kernel language: without a branch, a table or an integer, so that a compiler makes lanes of them.
+"""Sine and cosine in the kernel language, without branches, tables or integers, so that a compiler can vectorise them.
 
 x = q pi/2 + r with q whole and |r| <= pi/4. The multiple is taken off in three parts (W. J. Cody and W. Waite, Software Manual
 for the Elementary Functions, 1980): pi/2 = p1 + p2 + p3 with 33 bits each in p1 and p2, so that q p1 and q p2 are exact for
@@ -6,9 +6,9 @@ for the Elementary Functions, 1980): pi/2 = p1 + p2 + p3 with 33 bits each in p1
 Microsystems 1993, k_sin.c and k_cos.c). Which of the two, and its sign, follow from q modulo 4.
 
 The error is below 1.5 units in the last place for |x| <= 1e6, also where the answer is near zero. Beyond that q p1 is rounded,
-and the error jumps to about |x| 1e-16; above 1e15 the answer means nothing and may lie outside [-1, 1]. NaN and infinity give
-NaN (in plain Python `floor` refuses them). The functions share their helpers, so that a compiler that sees the sine and the
-cosine of one number does all but the last step once.
+and the error jumps to about |x| 1e-16; above 1e15 the result is meaningless and may lie outside [-1, 1]. NaN and infinity give
+NaN (in plain Python `floor` refuses them). The functions share their helpers, so that a compiler does all but the last step
+once for the sine and cosine of one number.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def quarter_turns(x: float) -> float:
 
 
 def beyond_quarters(x: float, q: float) -> float:
-    """Return r = x - q pi/2 [rad]; what the second difference loses in rounding joins the third."""
+    """Return r = x - q pi/2 [rad]; the rounding error of the second difference is added to the third."""
     first = x - q * 1.5707963267341256
     second = q * 6.077100506303966e-11
     difference = first - second
@@ -44,7 +44,7 @@ def sine_near_zero(r: float) -> float:
 
 
 def cosine_near_zero(r: float) -> float:
-    """Return cos r for |r| <= pi/4; what 1 - r^2/2 loses in rounding is added again."""
+    """Return cos r for |r| <= pi/4; the rounding error of 1 - r^2/2 is added again."""
     z = r * r
     high = 2.480158728947673e-05 + z * (-2.7557314351390663e-07 + z * (2.087572321298175e-09 + z * -1.1359647557788195e-11))
     half = 0.5 * z
@@ -77,4 +77,4 @@ FUNCTIONS: tuple[Callable[..., float], ...] = (
     sine,
     cosine,
 )
-"""All of them in an order in which each is defined before it is used; the text of each stands on its own."""
+"""All functions, each behind those that it uses."""

@@ -1,1 +1,1 @@
-"""The module that is generated for one robot: traced functions and drivers put together."""
+"""The generated module of a robot: constants, traced functions and drivers as one text."""

@@ -1,4 +1,4 @@
-"""The generated module of a robot: constants, straight-line functions and drivers as one text in the kernel language."""
+"""Generated module of a robot: constants, straight-line functions and drivers as one text in the kernel language."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class Program:
     text: str
     """Its text."""
     lane_text: str
-    """What follows it where many cases are worked on side by side."""
+    """Text that is appended to it for batches."""
     layout: Layout
     """Places in the workspace."""
     size: int
     """Size of the workspace of one case."""
     tip: TipLayout | None
-    """Places of what a look at the tip finds; None for short chains, which have no such look."""
+    """Places of the response of the tip; None for unrolled chains, which have searches of their own."""
     entry_points: tuple[str, ...]
-    """Functions that solve a case, and the places in the workspace that a caller needs."""
+    """Functions that solve a case, and constants that their callers need."""
 
 
 def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
@@ -78,8 +78,9 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         functions += motor_drivers.FUNCTIONS + path_drivers.FUNCTIONS
         lane_functions += lane_drivers.MOTOR_FUNCTIONS
     names += [*public_names(unknowns, layout, tip, weight=weight), *Status.__members__]
-    told = manual(unknowns, layout, tip, weight=weight).replace("\\", "\\\\").replace('"""', r"\"\"\"")  # names end no text
-    title = f'"""{told}\n"""'
+    # A name could end the text.
+    docstring = manual(unknowns, layout, tip, weight=weight).replace("\\", "\\\\").replace('"""', r"\"\"\"")
+    title = f'"""{docstring}\n"""'
     text = "\n\n\n".join(
         [
             title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
@@ -95,7 +96,7 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
 
 
 def _lanes(size: int) -> int:
-    """How many cases are worked on side by side: so many that their workspaces stay in the cache of a core."""
+    """Return the number of cases side by side, such that their workspaces fit in the cache of a core."""
     count = settings.MAX_LANES
     while count > settings.MIN_LANES and count * size * 8 > settings.LANE_MEMORY:
         count //= 2
@@ -103,7 +104,7 @@ def _lanes(size: int) -> int:
 
 
 def lane_block(block: Block) -> Block:
-    """The same block under the name that its form for lanes has."""
+    """Return the block under the name of its form for lanes."""
     return Block(f"{block.name}_lanes", block.purpose, block.parameters, block.trace, block.stores)
 
 
@@ -128,12 +129,12 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "SOFTNESS": tuple((min_pivot / float(chain.stiffness[strain])) ** 0.5 for strain in strains),
         "GROUP": tuple(group.get(strain, -1) for strain in strains),
     }
-    # A table has at least one number, also where nothing reads it: without motor joints, or without springs.
+    # Tables are not empty, even without motor joints or springs.
     return "\n".join(f"{name} = {(0.0,) if value == () else value!r}" for name, value in (values | tables).items())
 
 
 def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
-    """What `muscle_drivers` needs: lengths put the unknowns where they have them, tensions load them."""
+    """Return the tables of `muscle_drivers`: lengths set the start of the unknowns, tensions load them."""
     chain, strains = unknowns.chain, list(unknowns.strains)
     if unknowns.pulled:
         slope, base, rest = -chain.muscle_matrix[:, strains].T, np.zeros(len(strains)), np.zeros(len(chain.muscle_rest))

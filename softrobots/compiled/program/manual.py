@@ -1,7 +1,4 @@
-"""The docstring of a generated module: what a caller writes into the workspace, and what comes out.
-
-It is printed with the code, and stands at the head of the C file.
-"""
+"""Docstring of a generated module, also the head of its C file: inputs and results in the workspace."""
 
 from __future__ import annotations
 
@@ -15,22 +12,22 @@ from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.model.serial_chain import ChainJoint, ChainSection
 
-_WIDTH = 112  # of a line, with the asterisk of a comment in C before it
+_WIDTH = 112  # of a line, without the asterisk of a comment in C
 
 
 class Place(NamedTuple):
-    """Numbers of the workspace that a caller writes or reads."""
+    """Numbers of the workspace that callers write or read."""
 
     name: str
-    """Name of the constant that tells where they begin."""
+    """Name of the constant with the first place."""
     size: int
-    """How many they are."""
+    """Number of places."""
     meaning: str
-    """What they are, with the unit."""
+    """Meaning and unit."""
 
 
-def given(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
-    """What comes in.
+def inputs(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
+    """Return the inputs.
 
     Args:
         unknowns: The chain.
@@ -38,81 +35,81 @@ def given(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
         weight: Whether there is gravity.
     """
     n, searches = layout.unknowns, unknowns.moved_by_motors
-    made = [Place("MOTORS", layout.motors, f"motor joints [rad or m]: {_motors(unknowns)}")] if layout.motors else []
-    made.append(Place("FORCE", 3, "force on the tip [N], world axes"))
+    places = [Place("MOTORS", layout.motors, f"motor joints [rad or m]: {_motors(unknowns)}")] if layout.motors else []
+    places.append(Place("FORCE", 3, "force on the tip [N], world axes"))
     if weight:
-        made.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
+        places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
     if unknowns.pulled:
-        made.append(Place("PULL", n, "load of the muscle tensions on each unknown [N m or N]; put_muscles writes it"))
+        places.append(Place("PULL", n, "load of the muscle tensions on each unknown [N m or N]; put_muscles writes it"))
     if unknowns.chain.held:
-        made.append(Place("START", n, "unknowns that have the muscle lengths [rad or m]; put_muscles writes them"))
+        places.append(Place("START", n, "unknowns with the muscle lengths [rad or m]; put_muscles writes them"))
     starts = "for settle_from, reach and follow" if searches else "for settle_from"
-    held = ", with the muscle lengths in them, as START has" if unknowns.chain.held else ""
-    made.append(Place("UNKNOWN", n, f"where to start [rad or m]; {starts}{held}"))
+    held = ", with the muscle lengths, as in START" if unknowns.chain.held else ""
+    places.append(Place("UNKNOWN", n, f"start of the search [rad or m]; {starts}{held}"))
     if searches:
-        made.append(Place("TORQUES", layout.motors, "load on each motor, minus what it exerts [N m or N]; for estimate"))
-        made.append(Place("TARGET", 3, "target of the tip [m], world axes; for reach"))
-        made.append(Place("TOLERATED", 1, "largest distance from a target [m], such as 1e-9; for reach and follow"))
-    return made
+        places.append(Place("TORQUES", layout.motors, "load on each motor, minus what it exerts [N m or N]; for estimate"))
+        places.append(Place("TARGET", 3, "target of the tip [m], world axes; for reach"))
+        places.append(Place("TOLERATED", 1, "largest distance from a target [m], such as 1e-9; for reach and follow"))
+    return places
 
 
-def found(unknowns: Unknowns, layout: Layout, tip: TipLayout | None) -> list[Place]:
-    """What comes out.
+def results(unknowns: Unknowns, layout: Layout, tip: TipLayout | None) -> list[Place]:
+    """Return the results.
 
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        tip: Places of what a look at the tip finds; None without such a look.
+        tip: Places of the response of the tip; None without it.
     """
     n, m = layout.unknowns, layout.motors
-    made = [
+    places = [
         Place("UNKNOWN", n, f"the unknowns [rad or m]: {_strains(unknowns)}"),
         Place("TIP", 3, "the loaded tip [m], world axes"),
         Place("ERROR", 1, "square of the out-of-balance torque [N^2 m^2]"),
     ]
     if unknowns.moved_by_motors:
-        made += [
+        places += [
             Place("FORCE", 3, "the force [N], world axes; of estimate"),
-            Place("UNEXPLAINED", 1, "square of the motor torques that it does not explain [N^2 m^2]; of estimate"),
+            Place("UNEXPLAINED", 1, "square of the motor torques without its share [N^2 m^2]; of estimate"),
             Place("OBSERVED", 1, "square of the smallest singular value of the elastostatic Jacobian [m^2]; of estimate"),
             Place("MOTORS", m, "the motors [rad or m]; of reach"),
             Place("MISSING", 1, "square of the distance from the target [m^2]; of reach"),
         ]
     if tip is not None:
         rows = "row by row; of look_at_tip"
-        made += [Place("TIP_COLUMNS", 3 * n, f"how the unknowns follow a force on the tip, (3, N) {rows} [rad/N or m/N]")]
+        places += [Place("TIP_COLUMNS", 3 * n, f"derivative of the unknowns by a tip force, (3, N) {rows} [rad/N or m/N]")]
         if m:
-            made.append(Place("JACOBIAN", 3 * m, f"elastostatic Jacobian of the motor joints, (3, N_MOTORS) {rows} [m/rad]"))
-            made.append(Place("MOTOR_TORQUES", m, "load on each motor joint [N m or N]; of look_at_tip"))
+            places.append(Place("JACOBIAN", 3 * m, f"elastostatic Jacobian of the motor joints, (3, N_MOTORS) {rows} [m/rad]"))
+            places.append(Place("MOTOR_TORQUES", m, "load on each motor joint [N m or N]; of look_at_tip"))
         if tip.n_constraints:
             held = tip.n_constraints
-            made.append(Place("CONSTRAINT_LOADS", held, "load on each sum that muscle lengths hold [N m or N]; of look_at_tip"))
-            made.append(
-                Place("CONSTRAINT_COLUMNS", 3 * held, f"how the tip follows those sums, (3, {held}) {rows} [m/rad or -]")
+            places.append(Place("CONSTRAINT_LOADS", held, "load on each constrained sum [N m or N]; of look_at_tip"))
+            places.append(
+                Place("CONSTRAINT_COLUMNS", 3 * held, f"derivative of the tip by those sums, (3, {held}) {rows} [m/rad or -]")
             )
-    return made
+    return places
 
 
 def manual(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> str:
-    """The docstring.
+    """Return the docstring.
 
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        tip: Places of what a look at the tip finds; None without such a look.
+        tip: Places of the response of the tip; None without it.
         weight: Whether there is gravity.
     """
     places = layout.constants() | ({} if tip is None else tip.constants())
     lines = [
         f"Statics of {_on_a_line(unknowns.chain.name)}{', with gravity' if weight else ', weightless'}: generated code.",
         "",
-        "Functions work on an array of WORKSPACE_SIZE numbers that is all zeros at first and may be used again.",
-        "settle and its like return a status; only with 0 are the numbers an answer:",
+        "Functions work on an array of WORKSPACE_SIZE numbers, initially zero, which may be used for several cases.",
+        "settle, settle_from, estimate and reach return a status; the results are valid only if it is 0:",
         "",
         *(f"    {status.value}  {status.name:<14} {status.explanation}" for status in Status),
     ]
-    for title, rows in (("in", given(unknowns, layout, weight=weight)), ("out", found(unknowns, layout, tip))):
-        lines += ["", f"What comes {title}: name, first place, how many, what.", ""]
+    for title, rows in (("Inputs", inputs(unknowns, layout, weight=weight)), ("Results", results(unknowns, layout, tip))):
+        lines += ["", f"{title}: name, first place, number of places, meaning.", ""]
         for row in rows:
             head = f"    {row.name:<13} {places[row.name]:>5} {row.size:>5}  "
             lines += textwrap.wrap(head + row.meaning, _WIDTH, subsequent_indent=" " * len(head), break_on_hyphens=False)
@@ -120,15 +117,15 @@ def manual(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight:
 
 
 def public_names(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> list[str]:
-    """Names of all places that the manual explains, each once.
+    """Return the names of all places in the manual, each once.
 
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        tip: Places of what a look at the tip finds; None without such a look.
+        tip: Places of the response of the tip; None without it.
         weight: Whether there is gravity.
     """
-    return list(dict.fromkeys(row.name for row in (*given(unknowns, layout, weight=weight), *found(unknowns, layout, tip))))
+    return list(dict.fromkeys(row.name for row in (*inputs(unknowns, layout, weight=weight), *results(unknowns, layout, tip))))
 
 
 def _motors(unknowns: Unknowns) -> str:
@@ -147,10 +144,10 @@ def _strains(unknowns: Unknowns) -> str:
 
 
 def _listed(names: list[str]) -> str:
-    """All of a few; of many the first and the last."""
+    """Return all of a few names; of many the first eight and the last."""
     return ", ".join(map(_on_a_line, names if len(names) <= 12 else [*names[:8], "...", names[-1]]))
 
 
 def _on_a_line(name: str) -> str:
-    """A name out of somebody's file; what cannot be printed is told by its number."""
+    """Return a name from a file with escapes for characters that cannot be printed."""
     return name if name.isprintable() else name.encode("unicode_escape").decode()

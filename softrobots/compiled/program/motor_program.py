@@ -1,8 +1,8 @@
-"""Straight-line functions that let motors or the force vary, too: load estimation and inverse kinematics.
+"""Straight-line functions of load estimation and inverse kinematics.
 
-Newton on all unknowns at once. Springs must be in balance, `r = 0`, and either the motor torques be those measured, with the
-force unknown, or the tip be at its target, with the motors unknown. The strains are eliminated first
-(`softrobots.compiled.chain.elimination`); what remains are the three equations of the elastostatic Jacobian
+Newton's method on all unknowns at once: the springs in balance, `r = 0`, and either the motor torques equal to those measured,
+with unknown force, or the tip at its target, with unknown motors. Elimination of the strains
+(`softrobots.compiled.chain.elimination`) leaves three equations with the elastostatic Jacobian
 (`softrobots.compiled.chain.tip_motion`).
 """
 
@@ -39,7 +39,7 @@ def force_blocks(unknowns: Unknowns, layout: Layout, first: int, *, weight: bool
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
-        first: First free place behind those.
+        first: First free place in the workspace.
         weight: Whether there is gravity.
 
     Returns:
@@ -47,15 +47,15 @@ def force_blocks(unknowns: Unknowns, layout: Layout, first: int, *, weight: bool
     """
     prepare = Block("prepare_force", "Compute what depends on motors and torques only.")
     trace = prepare.trace
-    force_pass = Block("force_pass", "Evaluate the point, and go on to the next with another force.", trace=trace)
+    force_pass = Block("force_pass", "Evaluate the point, and take a Newton step with another force.", trace=trace)
     point = evaluate(unknowns, force_pass, layout, weight=weight, tip_columns=True)
     _force_step(force_pass, layout, unknowns, point, starts=False)
-    look = Block("look_for_force", "Evaluate an equilibrium, and where a damped step of the force leads.", trace=trace)
+    look = Block("look_for_force", "Evaluate an equilibrium, and the end of a damped step of the force.", trace=trace)
     _look_for_force(look, layout, unknowns, evaluate(unknowns, look, layout, weight=weight, tip_columns=True))
     singles = [look.load(layout.single(one)) for one in ("mode", "damping")]
     varying = [*look.loads(layout.unknown, layout.unknowns), *look.loads(layout.force, 3), *singles]
     count = hoist([force_pass, look], prepare, varying, first)
-    start = Block("first_force_pass", "Prepare, evaluate the relaxed robot without force, and go on.", trace=trace)
+    start = Block("first_force_pass", "Prepare, evaluate the relaxed robot without force, and take a Newton step.", trace=trace)
     start.stores = list(prepare.stores)
     relaxed = evaluate(unknowns, start, layout, weight=weight, at_rest=True, forceless=True, tip_columns=True)
     _force_step(start, layout, unknowns, relaxed, starts=True)
@@ -73,13 +73,11 @@ def target_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[B
     Returns:
         The functions.
     """
-    step = Block(
-        "target_step", "Evaluate the point, and where a step to the target leads; from the target to the one that follows."
-    )
+    step = Block("target_step", "Evaluate the point, and the end of a step to the target, or from the target to the next one.")
     point = evaluate(unknowns, step, layout, weight=weight, tip_columns=True)
-    lane = Block("target_pass", "Evaluate the point, and go on to the target.", trace=step.trace)
+    lane = Block("target_pass", "Evaluate the point, and take a Newton step to the target.", trace=step.trace)
     _target_step(step, lane, layout, unknowns, point)
-    look = Block("look_for_target", "Evaluate an equilibrium, and where a damped step to the target leads.", trace=step.trace)
+    look = Block("look_for_target", "Evaluate an equilibrium, and the end of a damped step to the target.", trace=step.trace)
     _look_for_target(look, layout, unknowns, point)
     return [step, lane, look]
 
@@ -90,7 +88,7 @@ def _force_step(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluat
     felt = motion.jacobian.T
     left = measured - motion.motor_torques
     change = solve_small(felt, left - motion.torque_change)
-    missing = _explicable(felt, left - motion.torque_change, unknowns)
+    missing = _explainable(felt, left - motion.torque_change, unknowns)
     step = _with_columns(unknowns, point, change)
     values = numbers(unknowns, layout, block, point)
     size = measured @ measured
@@ -117,18 +115,18 @@ def _look_for_force(block: Block, layout: Layout, unknowns: Unknowns, point: Eva
         for one, by in zip(block.loads(layout.unknown, layout.unknowns), _with_columns(unknowns, point, damped), strict=True)
     ]
     block.store_all(layout.next_point + max(layout.motors, 3), ahead)
-    _store_torques(block, layout, motion, left, _explicable(felt, left, unknowns))
+    _store_torques(block, layout, motion, left, _explainable(felt, left, unknowns))
 
 
-def _explicable(felt: Any, torques: Vector, unknowns: Unknowns) -> Vector:
-    """What a force can do about torques: of more than three motors, the part that a force can give."""
+def _explainable(felt: Any, torques: Vector, unknowns: Unknowns) -> Vector:
+    """Return the part of torques that a force can explain: all for up to three motors."""
     if len(torques) <= 3:
         return torques
     return felt @ _damped(felt, RANK_TOLERANCE * float(unknowns.chain.reach), torques)
 
 
 def _store_torques(block: Block, layout: Layout, motion: TipMotion, left: Vector, missing: Vector) -> None:
-    """Write what is left of the torques, and how strongly the motors feel a force; fewer than three never feel all of it."""
+    """Write the unexplained torques and the observability of the force; it is never observable with fewer than three motors."""
     block.store(layout.single("missing"), missing @ missing)
     block.store(layout.single("unexplained"), left @ left)
     block.store(layout.single("observed"), smallest_square(motion.jacobian) if layout.motors >= 3 else 0.0)
@@ -142,7 +140,7 @@ def _target_step(step: Block, lane: Block, layout: Layout, unknowns: Unknowns, p
     tolerated = step.load(layout.single("tolerated"))
     settled = if_less(tolerated * tolerated, distance, 0.0, _balanced(values, unknowns))
     for block in (step, lane):
-        # The next target is wanted as soon as this one is reached; a lane has only one.
+        # The step leads to the next target once this one is reached; a lane has only one.
         wanted = (
             missing
             if block is lane
@@ -175,12 +173,12 @@ def _look_for_target(block: Block, layout: Layout, unknowns: Unknowns, point: Ev
 
 
 def _missing(block: Block, place: int, point: Evaluation) -> Vector:
-    """From the tip to a target, in the axes behind the leading motors [m]."""
+    """Return the vector from the tip to a target, in the axes behind the leading motors [m]."""
     return point.base_axes.T @ (vector(block.loads(place, 3)) - point.base) - point.tip
 
 
 def _damped(matrix: object, damping: Scalar, right: Vector) -> Vector:
-    """Levenberg-Marquardt step `M^T (M M^T + damping^2)^-1 right`, in whichever of its two forms is smaller."""
+    """Levenberg-Marquardt step `M^T (M M^T + damping^2)^-1 right`, in the smaller of its two forms."""
     m = np.asarray(matrix, dtype=object)
     rows, columns = m.shape
     square = constants(np.eye(min(rows, columns))) * (damping * damping)
@@ -190,23 +188,23 @@ def _damped(matrix: object, damping: Scalar, right: Vector) -> Vector:
 
 
 def _with_columns(unknowns: Unknowns, point: Evaluation, force: Vector) -> list[Scalar]:
-    """Newton step of the unknowns when the force changes, too."""
-    made: dict[int, Scalar] = {}
+    """Return the Newton step of the unknowns when the force changes as well."""
+    by_strain: dict[int, Scalar] = {}
     for row, steps in enumerate(point.steps):
         for place, strain in enumerate(unknowns.moving(row)):
-            made[strain] = steps[0][place] + sum((steps[1 + axis][place] * force[axis] for axis in range(3)), 0.0)
-    return [made[strain] for strain in unknowns.strains]
+            by_strain[strain] = steps[0][place] + sum((steps[1 + axis][place] * force[axis] for axis in range(3)), 0.0)
+    return [by_strain[strain] for strain in unknowns.strains]
 
 
 def _balanced(values: dict[str, Scalar], unknowns: Unknowns) -> Scalar:
-    """1 where the springs are in balance, else 0."""
+    """Return 1 where the springs are in balance, else 0."""
     return if_less(values["error"], larger(values["size"] * NEWTON_TOLERANCE**2, unknowns.spring_rounding**2), 1.0, 0.0)
 
 
 def _mode(
     block: Block, layout: Layout, values: dict[str, Scalar], settled: Scalar, step: Sequence[Scalar], *, starts: bool
 ) -> tuple[Scalar, Scalar]:
-    """Write what becomes of a case; return that and the share of the step to go. See `softrobots.compiled.program.passes`."""
+    """Write the new mode of a case; return it and the share of the step; see `softrobots.compiled.program.passes`."""
     signs = if_less(absolute(values["n_negative_pivots"]), 0.5, 1.0, 0.0)
     stable = if_less(POSITIVE_PIVOT, values["min_pivot"], signs, 0.0)
     length = sum((one * one for one in step), 0.0)
@@ -222,6 +220,6 @@ def _mode(
 def _go(
     block: Block, place: int, here: Sequence[Scalar] | Vector, step: Sequence[Scalar] | Vector, mode: Scalar, share: Scalar
 ) -> None:
-    """Write where a case goes on, if it does."""
+    """Write the next point of a case, if it goes on."""
     for number, (one, by) in enumerate(zip(here, step, strict=True)):
         block.store(place + number, go_on(mode, one, share, by))

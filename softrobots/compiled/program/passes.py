@@ -1,4 +1,4 @@
-"""The state machine of a Newton pass, traced: what every lane does with the point that it has evaluated."""
+"""State machine of a Newton pass, traced: whether a case goes on, is solved, or is left to the descent."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def point_numbers(
     min_pivot: Scalar,
     n_negative_pivots: Scalar,
 ) -> dict[str, Scalar]:
-    """The single numbers of a point from sums over the chain.
+    """Return the single numbers of a point from sums over the chain.
 
     Args:
         slope: Derivative of the energy along the Newton step.
@@ -31,7 +31,7 @@ def point_numbers(
         energy: Elastic energy plus potential [J].
         elastic: Elastic energy [J].
         load: Squared size of the load [N^2 m^2].
-        range_margin: Room of the sections in their range.
+        range_margin: Negative if a section is beyond its range.
         min_pivot: Smallest pivot.
         n_negative_pivots: Number of pivots that are not positive.
     """
@@ -58,13 +58,13 @@ def decide(
     mode: Scalar,
     bound: Scalar,
 ) -> tuple[Scalar, Scalar]:
-    """Decide what becomes of a case.
+    """Trace the new mode of a case.
 
-    Mode 0 goes on, 1 is settled and stable, 2 is left to the descent: where pivots are not positive, a section is beyond its
-    range, the energy does not fall as it should, or a number is none.
+    Mode 0 goes on, 1 is in stable balance, 2 is left to the descent: where pivots are not positive, a section is beyond its
+    range, the energy does not decrease enough, or a number is NaN.
 
     Args:
-        block: The block that the pass is traced in.
+        block: The block of the pass.
         layout: The places in the workspace.
         point: The numbers of the point, see `point_numbers`.
         n_constraints: Number of multipliers.
@@ -73,7 +73,7 @@ def decide(
         bound: Largest energy that the point may have [J].
 
     Returns:
-        The mode, and the share of the step to go if it is 0.
+        The mode, and the share of the step that mode 0 takes.
     """
     error, length, energy = point["error"], point["length"], point["energy"]
     settled_to = larger(point["size"] * NEWTON_TOLERANCE**2, spring_rounding**2)
@@ -90,10 +90,10 @@ def decide(
 
 
 def go_on(mode: Scalar, here: Scalar, share: Scalar, step: Scalar) -> Scalar:
-    """Where a number goes: a share of its step on, if the case goes on."""
+    """Return a number after a share of its step, if the case goes on."""
     return if_less(mode, 0.5, here + share * step, here)
 
 
 def dot(one: Sequence[Scalar], other: Sequence[Scalar]) -> Scalar:
-    """Sum of products."""
+    """Return the sum of products."""
     return sum((a * b for a, b in zip(one, other, strict=True)), 0.0)

@@ -1,4 +1,4 @@
-"""From actuator and elastic coordinates to what generated code works on, and back."""
+"""Maps between actuator and elastic coordinates and the workspace of generated code."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from softrobots.model.soft_model import SoftModel
 
 
 class Actuation:
-    """Motors go in as they are. Muscle tensions become constant loads on the strains, muscle lengths a start that has them."""
+    """Maps of motors (identity), muscle tensions (constant loads on the strains) and muscle lengths (start of the strains)."""
 
     def __init__(self, model: SoftModel, unknowns: Unknowns) -> None:
-        """Prepare the maps, all linear."""
+        """Prepare the linear maps."""
         self._model, self._chain, self._strains = model, unknowns.chain, list(unknowns.strains)
         chain = unknowns.chain
         self._count = chain.n_motors
         self._plain = len(chain.held) == 0 and len(self._strains) == len(chain.stiffness)
         self._tensions = len(chain.muscle_rest) > 0 and chain.muscle_input == "forces"
         self._lengths = len(chain.muscle_rest) > 0 and not self._tensions
-        self._relaxed = chain.free @ model.rest  # strains of relaxed elastic coordinates, muscles at rest
+        self._relaxed = chain.free @ model.rest  # strains at rest of elastic coordinates and muscles
 
     def put(self, run: Any, w: Any, motors: FloatArray) -> None:
-        """Write one case into a workspace, with its start."""
+        """Write the actuators of one case into a workspace, with its start."""
         layout = run.layout
         run.put(w, 0, motors[: self._count])
         if self._tensions:
@@ -37,7 +37,7 @@ class Actuation:
             run.put(w, layout.start, self._starts(motors[None]))
 
     def jacobian(self, run: Any, w: Any) -> FloatArray:
-        """Elastostatic Jacobian of all actuators where a workspace has been looked at, shape (3, n_motors)."""
+        """Return the elastostatic Jacobian of all actuators after `look_at_tip`, shape (3, n_motors)."""
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.jacobian, self._count)
         if self._lengths:
@@ -48,9 +48,9 @@ class Actuation:
         return joints
 
     def loads(self, run: Any, w: Any) -> FloatArray:
-        """Load on motor joints and muscles of given length there, shape (n_motors,) [N m or N].
+        """Return the load on motor joints and muscles of given length after `look_at_tip`, shape (n_motors,) [N m or N].
 
-        The multipliers tell what holds the sums beyond what their even spread takes, see `looped_chain`.
+        The multipliers are the loads beyond those of the start, see `looped_chain`.
         """
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.motor_torques, self._count, 1)[0]
@@ -72,20 +72,20 @@ class Actuation:
         return inputs
 
     def unsuited(self, motors: FloatArray) -> Any:
-        """Which rows no shape of the robot has, or are too large to compute with, truth values."""
-        made = np.zeros(len(motors), dtype=bool)
+        """Return a mask of the rows that no shape of the robot has or that are too large to compute with."""
+        bad = np.zeros(len(motors), dtype=bool)
         joints = motors[:, : self._count]
         if joints.size and not (joints.min() >= -LARGEST_POSITION and joints.max() <= LARGEST_POSITION):
-            made |= ~np.all(np.abs(joints) <= LARGEST_POSITION, axis=1)
+            bad |= ~np.all(np.abs(joints) <= LARGEST_POSITION, axis=1)
         if self._lengths:
-            made |= [not (np.all(np.isfinite(row)) and self._model.actuators.admit(row)) for row in motors]
-        return made
+            bad |= [not (np.all(np.isfinite(row)) and self._model.actuators.admit(row)) for row in motors]
+        return bad
 
     def checked(self, q_motors: Any, field: str = "q_motors") -> FloatArray:
         """Return actuators of one case as `SoftModel.checked_motors` does.
 
         Raises:
-            ParameterError: If that refuses them, or a motor joint is too far to compute with.
+            ParameterError: If they are invalid, or a motor position is too large to compute with.
         """
         motors = self._model.checked_motors(q_motors, field)
         if np.any(np.abs(motors[: self._count]) > LARGEST_POSITION):
@@ -95,11 +95,11 @@ class Actuation:
         return motors
 
     def unknowns(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
-        """Unknown strains of one case from its elastic coordinates, shape (n,)."""
+        """Return the unknown strains of one case from its elastic coordinates, shape (n,)."""
         return np.asarray(self.of_elastic(motors[None], elastic[None])[0])
 
     def of_elastic(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
-        """Unknown strains of many cases, shape (n, n_unknowns)."""
+        """Return the unknown strains of many cases, shape (n, n_unknowns)."""
         if self._plain:
             return elastic
         strains = elastic @ self._chain.free.T
@@ -108,7 +108,7 @@ class Actuation:
         return np.asarray(strains[:, self._strains])
 
     def elastic(self, unknowns: FloatArray) -> FloatArray:
-        """Elastic coordinates from the unknowns, shape (..., n_springs); locked strains are at rest."""
+        """Return elastic coordinates from the unknowns, shape (..., n_springs); locked strains are at rest."""
         if self._plain:
             return unknowns
         strains = np.tile(self._chain.rest, (*unknowns.shape[:-1], 1))
@@ -124,5 +124,5 @@ class Actuation:
 
 
 def _rows(w: Any, place: int, count: int, rows: int = 3) -> FloatArray:
-    """Part of a workspace as a matrix."""
+    """Return part of a workspace as a matrix."""
     return np.array(w[place : place + rows * count], dtype=np.float64).reshape(rows, count)

@@ -1,4 +1,4 @@
-"""Ways to run a generated module: plain Python with NumPy blocks for batches, or compiled by numba."""
+"""Back ends that run a generated module: plain Python with NumPy for batches, or numba."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from softrobots.core.errors import MissingDependency, OutputError
 from softrobots.core.files import write_text
 
 BACKENDS = ("numba", "python")
-"""The back ends, the preferred one first."""
+"""Names of the back ends, the preferred one first."""
 
 _NUMBA_HEAD = """from __future__ import annotations
 
@@ -54,34 +54,34 @@ _JIT = "@njit(cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True
 
 
 def available_backend() -> str:
-    """The preferred back end that is installed."""
+    """Return the preferred back end that is installed."""
     return "numba" if importlib.util.find_spec("numba") is not None else "python"
 
 
 class Run:
-    """A program that runs: its functions, and arrays as they want them."""
+    """Functions of a program, and arrays of the type that they take."""
 
     def __init__(self, program: Program, functions: Any) -> None:
-        """Look the functions up; a short chain has no look at its tip, others no search of their own."""
+        """Look up the functions; those that the program lacks are None."""
         self.program, self.layout = program, program.layout
         single = ("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip")
         for name in (*single, "settle_batch", "estimate_batch", "reach_batch"):
             setattr(self, name, getattr(functions, name, None))
 
     def workspace(self) -> Any:
-        """A workspace of one case, all zeros."""
+        """Return a workspace of one case, all zeros."""
         return self.array(self.program.size)
 
     def array(self, count: int) -> Any:
-        """A flat array of zeros."""
+        """Return a flat array of zeros."""
         return np.zeros(count)
 
     def flat(self, values: Any) -> Any:
-        """Numbers one after the other."""
+        """Return the numbers as a flat array."""
         return np.ascontiguousarray(values, dtype=np.float64).ravel()
 
     def put(self, w: Any, place: int, values: FloatArray) -> None:
-        """Write numbers into a workspace, from a place on."""
+        """Write numbers into a workspace from a place on."""
         w[place : place + values.size] = self.flat(values)
 
 
@@ -102,19 +102,19 @@ class PythonRun(Run):
             setattr(self, name, getattr(batches, name))
 
     def array(self, count: int) -> Any:
-        """A list of zeros."""
+        """Return a list of zeros."""
         return [0.0] * count
 
     def flat(self, values: Any) -> Any:
-        """A list of numbers."""
+        """Return the numbers as a list."""
         return np.asarray(values, dtype=np.float64).ravel().tolist()
 
 
 class NumbaRun(Run):
-    """Compiled by numba; what it compiles is kept on disk for the next process."""
+    """Functions compiled by numba, cached on disk for the next process."""
 
     def __init__(self, program: Program) -> None:
-        """Compile a program, each function when it is first called.
+        """Prepare a program; each function is compiled on its first call.
 
         Raises:
             MissingDependency: If numba is not installed.
@@ -133,16 +133,16 @@ def _module_of(code: Any, **functions: Callable[[Any], Any]) -> ModuleType:
     vars(module).update({name: getattr(intrinsics, name) for name in ("Array", "fabs", "where", "zeros")})
     vars(module).update(functions)
     exec(code, vars(module))
-    vars(module).update(functions)  # it brings a sine and a cosine of its own
+    vars(module).update(functions)  # the code defines sine and cosine itself
     return module
 
 
 def _guarded(function: Callable[..., int], careful: Callable[..., int]) -> Callable[..., int]:
-    """Plain floats raise where compiled code goes on with infinities; such a case is done anew with NumPy's, which do not."""
+    """Repeat a case with NumPy floats, which turn into infinities as in compiled code, where plain floats raise."""
 
     def run(w: Any, *rest: Any) -> int:
         given = [float(number) for number in w]
-        w[:] = given  # plain ones are the fastest
+        w[:] = given  # plain floats are the fastest
         try:
             return function(w, *rest)
         except (ArithmeticError, ValueError):
@@ -156,7 +156,7 @@ def _guarded(function: Callable[..., int], careful: Callable[..., int]) -> Calla
 
 
 def make_run(program: Program, backend: str) -> Run:
-    """Make a program run.
+    """Load a program in a back end.
 
     Args:
         program: The generated module.
@@ -166,39 +166,39 @@ def make_run(program: Program, backend: str) -> Run:
         Its functions.
 
     Raises:
-        MissingDependency: If numba is wanted and not installed.
+        MissingDependency: If `backend` is "numba" and numba is not installed.
     """
     return NumbaRun(program) if backend == "numba" else PythonRun(program)
 
 
-_importing = threading.Lock()  # or two threads would compile the same text, each for itself
+_import_lock = threading.Lock()  # otherwise two threads could compile the same text
 
 
 def _module(text: str) -> ModuleType:
-    """Import a text from a file of its own, once in a process."""
-    with _importing:
+    """Import a text from a file of its own, once per process."""
+    with _import_lock:
         return _kept_module(text)
 
 
 @lru_cache(maxsize=64)
 def _kept_module(text: str) -> ModuleType:
-    name = "softrobots_" + hashlib.sha256(text.encode()).hexdigest()[:24]  # tells the content
+    name = "softrobots_" + hashlib.sha256(text.encode()).hexdigest()[:24]  # identifies the content
     path = cache_folder() / f"{name}.py"
     if not path.is_file() or path.read_bytes() != text.encode():
         try:
-            write_text(path, text, overwrite=True)  # whole or not at all: other processes may want it, too
+            write_text(path, text, overwrite=True)  # atomic: other processes may read it
         except OutputError:  # e.g. a full disk
             path = write_text(_temporary_folder() / path.name, text, overwrite=True)
     spec: Any = importlib.util.spec_from_file_location(name, path)
-    module = sys.modules[name] = importlib.util.module_from_spec(spec)  # there numba looks for it
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)  # numba looks it up there
     spec.loader.exec_module(module)
     return module
 
 
 def cache_folder() -> Path:
-    """Folder of generated modules and of what numba makes of them.
+    """Return the folder of generated modules and their compiled code.
 
-    `SOFTROBOTS_CACHE` if that is set, else the user's folder for caches; a temporary one where that cannot be written.
+    `SOFTROBOTS_CACHE` if that is set, else the user's cache folder; a temporary one where that cannot be written.
     """
     try:
         folder = _chosen_folder()
@@ -210,7 +210,7 @@ def cache_folder() -> Path:
 
 
 def cache_is_kept() -> bool:
-    """Whether `cache_folder` is there for the next process, and not a temporary one because no other can be written."""
+    """Tell whether `cache_folder` is permanent, and not temporary because no other folder can be written."""
     try:
         return cache_folder() == _chosen_folder()
     except RuntimeError:  # a user without a home

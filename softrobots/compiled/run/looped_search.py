@@ -1,8 +1,7 @@
-"""Load estimation and inverse kinematics of long chains and of those with muscles.
+"""Load estimation and inverse kinematics of looped chains.
 
-The searches of `softrobots.statics.force_search` and `softrobots.statics.tip_search`, which the solvers on Pinocchio use, too;
-here generated code settles the springs and looks at the tip (`softrobots.compiled.chain.looped_tip`). A step costs some tens of
-microseconds.
+The searches of `softrobots.statics.force_search` and `softrobots.statics.tip_search`, as in the solvers on Pinocchio, with
+equilibria and Jacobians of generated code (`softrobots.compiled.chain.looped_tip`). A step costs some tens of microseconds.
 """
 
 from __future__ import annotations
@@ -27,25 +26,25 @@ _ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]
 
 
 class ChainState(NamedTuple):
-    """A robot whose springs have settled."""
+    """Result of `LoopedSearch.settle`."""
 
     w: Any
-    """The workspace, its own."""
+    """The workspace, not shared."""
     q_springs: FloatArray
     """Elastic coordinates, shape (n_springs,) [rad or m]."""
 
 
 class LoopedSearch:
-    """Searches for the force or the actuators; the counterpart of the functions in `motor_drivers`."""
+    """Searches for the force or the actuators, like the functions in `motor_drivers`."""
 
     def __init__(self, model: SoftModel, actuation: Actuation, run: Any) -> None:
-        """Search with the functions of a program that looks at the tip."""
+        """Use the functions of a program with the response of the tip."""
         self.model, self.actuation, self.run = model, actuation, run
 
     def settle(
         self, q_motors: FloatArray, force: FloatArray, gravity: FloatArray, start: FloatArray
     ) -> tuple[Status, ChainState]:
-        """Let the springs settle from given elastic coordinates."""
+        """Find the equilibrium from given elastic coordinates."""
         run, layout = self.run, self.run.layout
         w = run.workspace()
         self.actuation.put(run, w, q_motors)
@@ -56,19 +55,19 @@ class LoopedSearch:
         return status, ChainState(w, self.actuation.elastic(self.unknowns(w)))
 
     def unknowns(self, w: Any) -> FloatArray:
-        """Unknown strains, shape (n,)."""
+        """Return the unknown strains, shape (n,)."""
         return self._part(w, self.run.layout.unknown, self.run.layout.unknowns)
 
     def tip(self, w: Any) -> FloatArray:
-        """The loaded tip, shape (3,) [m]."""
+        """Return the loaded tip, shape (3,) [m]."""
         return self._part(w, self.run.layout.tip, 3)
 
     def residual(self, w: Any) -> float:
-        """Norm of the out-of-balance torque [N m]."""
+        """Return the norm of the out-of-balance torque [N m]."""
         return math.sqrt(w[self.run.layout.single("error")])
 
     def jacobian(self, w: Any) -> FloatArray:
-        """Elastostatic Jacobian of all actuators, shape (3, n_motors); looks at the tip."""
+        """Return the elastostatic Jacobian of all actuators, shape (3, n_motors)."""
         self.run.look_at_tip(w)
         return self.actuation.jacobian(self.run, w)
 
@@ -81,7 +80,7 @@ class LoopedSearch:
             gravity: Gravity, shape (3,) [m/s^2].
 
         Returns:
-            The status, and a workspace as `motor_drivers.estimate` leaves it.
+            The status, and a workspace with the results as of `motor_drivers.estimate`.
         """
         problem = _MeasuredTorques(self, q_motors, torques, gravity)
         status, state = self.settle(q_motors, np.zeros(3), gravity, self.model.rest)
@@ -94,7 +93,7 @@ class LoopedSearch:
         missing = float(np.linalg.norm(left[:, : len(values)].T @ unexplained))
         size = max(float(np.linalg.norm(torques)), LEAST_SIZE)
         state.w[single("unexplained")], state.w[single("missing")] = float(unexplained @ unexplained), missing**2
-        whole = len(values) == 3  # fewer actuators never feel all of a force
+        whole = len(values) == 3  # with fewer actuators a force is never observable
         state.w[single("observed")] = float(values[-1]) ** 2 if whole else 0.0
         state.w[single("iterations")] = float(iterations)
         if not (whole and observable.all()) and missing <= HIDDEN * size:
@@ -121,7 +120,7 @@ class LoopedSearch:
             tolerance: Largest distance from the target [m].
 
         Returns:
-            The status, and where the search ended.
+            The status, and the end of the search.
         """
         tip = _SoughtTip(self.model, self, force, gravity, target)
         first = self.model.actuators.go(q_motors, np.zeros(len(q_motors)))  # within the limits
@@ -137,28 +136,28 @@ class LoopedSearch:
         """Move the tip through targets, shape (n, 3) [m], each step from the last; see `reach`.
 
         Returns:
-            One row a waypoint, with the last one that was reached where no continuous motion leads on; and the steps to the
-            first.
+            One row a waypoint, with the last reached pose where no continuous motion leads further; and the number of steps to
+            the first waypoint.
         """
         status, here = self.reach(targets[0], force, gravity, q_motors, self.model.rest, tolerance)
         tip, last, first = _SoughtTip(self.model, self, force, gravity, targets[0]), targets[0], here
-        made, statuses = [here], [status]
+        poses, statuses = [here], [status]
         for target in targets[1:] if status == Status.CERTIFIED else ():
             there = advance(tip, last, target, here, tolerance)
             if there is None:
-                away = float(np.linalg.norm(target - self.tip(here.state.w)))
-                made.append(replace(here, error=away))
+                distance = float(np.linalg.norm(target - self.tip(here.state.w)))
+                poses.append(replace(here, error=distance))
                 statuses.append(Status.NOT_REACHED)
             else:
                 here, last = there, target
-                made.append(here)
+                poses.append(here)
                 statuses.append(self._arrived(here, tolerance))
         batch = MotorBatch(
-            read_only(np.array([one.state.q_springs for one in made])),
+            read_only(np.array([one.state.q_springs for one in poses])),
             statuses_of(np.array(statuses, dtype=np.uint8)),
-            read_only(np.array([self.residual(one.state.w) for one in made])),
-            read_only(np.array([one.q_motors for one in made])),
-            read_only(np.array([one.error for one in made])),
+            read_only(np.array([self.residual(one.state.w) for one in poses])),
+            read_only(np.array([one.q_motors for one in poses])),
+            read_only(np.array([one.error for one in poses])),
         )
         return batch, first.iterations
 
@@ -227,7 +226,7 @@ class LoopedSearch:
 
 @dataclass(frozen=True, eq=False)
 class _MeasuredTorques:
-    """What `search_force` needs; states that it gets have been looked at."""
+    """Problem of `search_force`; its states have the response of the tip."""
 
     chain: LoopedSearch
     motors: FloatArray
@@ -259,7 +258,7 @@ class _MeasuredTorques:
 
 @dataclass(frozen=True, eq=False)
 class _SoughtTip:
-    """What `tip_search` needs: see `tip_search.SoughtTip`."""
+    """Problem of `tip_search`, see `tip_search.SoughtTip`."""
 
     model: SoftModel
     chain: LoopedSearch
@@ -286,5 +285,5 @@ class _SoughtTip:
         return np.asarray(self.target - self.chain.tip(state.w))
 
     def motion(self, state: ChainState) -> tuple[FloatArray, FloatArray]:
-        """How the tip follows; that the springs follow, too, is what their first Newton step finds by itself."""
+        """Return the Jacobian of the tip, and zeros for the springs, which follow by their first Newton step."""
         return self.chain.jacobian(state.w), np.zeros((len(state.q_springs), self.model.n_motors))

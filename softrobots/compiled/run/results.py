@@ -1,4 +1,4 @@
-"""Answers of the compiled solvers: plain arrays, one case or many."""
+"""Results of the compiled solvers, of one case or many."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from softrobots.core.checks import FloatArray, read_only
 class CompiledEquilibrium:
     """An equilibrium, certified stable.
 
-    For everything else about it (motor torques, tangent stiffness, pictures, files), hand its `q_springs` to
+    For motor torques, tangent stiffness, pictures or files pass its `q_springs` to
     `softrobots.solve_equilibrium(..., q_springs0=...)`, which then only checks them.
     """
 
     __slots__ = ("_actuation", "_layout", "_motors", "_workspace")
 
     def __init__(self, workspace: Any, layout: Layout, actuation: Actuation, motors: FloatArray | None = None) -> None:
-        """Keep the workspace of the solver, and the actuators where they are not all in it; both are the caller's own."""
+        """Store the workspace of the solver, and the actuators if they are not all in it, without copies."""
         self._workspace = workspace
         self._layout = layout
         self._actuation = actuation
@@ -83,28 +83,28 @@ class CompiledLoadEstimate(CompiledEquilibrium):
 
     @property
     def observability(self) -> float:
-        """Smallest singular value of the elastostatic Jacobian [m]: how strongly the motors feel the force at least."""
+        """Smallest singular value of the elastostatic Jacobian [m]: least sensitivity of the motor torques to the force."""
         return self._root("observed")
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """What all batches tell: one row a case."""
+    """Common results of all batches, one row a case."""
 
     q_springs: FloatArray
     """Elastic coordinates, shape (n, n_springs) [rad or m]."""
     status: Any
-    """`Status` of each case, shape (n,), small integers; only rows with `Status.CERTIFIED` are answers."""
+    """`Status` of each case, shape (n,), small integers; only rows with `Status.CERTIFIED` are valid."""
     residual: FloatArray
-    """Norm of the out-of-balance torque, shape (n,) [N m]; infinite where the input was no number."""
+    """Norm of the out-of-balance torque, shape (n,) [N m]; infinite for input that is not finite."""
 
     @property
     def certified(self) -> Any:
-        """Which cases are answered, shape (n,), truth values."""
+        """Mask of the valid rows, shape (n,)."""
         return self.status == Status.CERTIFIED
 
     def counts(self) -> dict[Status, int]:
-        """How many cases ended how; statuses that did not occur are left out."""
+        """Return the number of cases by status, without statuses that did not occur."""
         values, numbers = np.unique(self.status, return_counts=True)
         return {Status(value): int(number) for value, number in zip(values.tolist(), numbers.tolist(), strict=True)}
 

@@ -79,14 +79,14 @@ class UnrolledSearch:
         run.put(w, layout.gravity, gravity)
         run.put(w, layout.unknown, self._actuation.unknowns(q_motors, self._model.rest))
         w[layout.single("tolerated")] = float(tolerance)
-        found, unknowns = run.array(count * len(q_motors)), run.array(count * layout.unknowns)
+        motors, unknowns = run.array(count * len(q_motors)), run.array(count * layout.unknowns)
         residuals, errors, statuses = run.array(count), run.array(count), run.array(count)
-        run.follow(w, run.flat(targets), count, found, unknowns, residuals, errors, statuses)
+        run.follow(w, run.flat(targets), count, motors, unknowns, residuals, errors, statuses)
         batch = MotorBatch(
             read_only(self._actuation.elastic(np.reshape(unknowns, (count, layout.unknowns)))),
             statuses_of(np.asarray(statuses, dtype=np.uint8)),
             read_only(np.sqrt(residuals)),
-            read_only(np.reshape(found, (count, len(q_motors)))),
+            read_only(np.reshape(motors, (count, len(q_motors)))),
             read_only(np.sqrt(errors)),
         )
         return batch, int(w[layout.single("iterations")])

@@ -1,1 +1,1 @@
-"""Scalar expressions that are recorded instead of computed, and the straight-line code made of them."""
+"""Tracing: scalar expressions that are recorded instead of computed, and straight-line code made of them."""

@@ -1,8 +1,8 @@
 """Straight-line code from traced expressions: functions without branches, in the kernel language.
 
 A `Block` is a function `name(w: Array, ...)` that reads elements of the workspace `w` and of tables, and writes at its end.
-It is the unit that back ends vectorise: the text is the same for one case (`w[7]`), for a NumPy array per element, and for
-lanes (`w[7 * LANES + lane]` within a loop over `lane`).
+Back ends vectorise it: the text is the same for one case (`w[7]`), for a NumPy array per element, and for lanes
+(`w[7 * LANES + lane]` within a loop over `lane`).
 """
 
 from __future__ import annotations
@@ -16,51 +16,51 @@ from softrobots.compiled.trace.expressions import Expression, Scalar, Trace, in_
 WORKSPACE = "w"
 """Name of the workspace in generated code."""
 
-_WIDEST = 88  # characters of an expression, beyond which its parts get names
+_WIDEST = 88  # characters of an expression, beyond which it gets a name
 _STRENGTH = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3}  # how strongly an operation binds; calls and names most
 
 
 @dataclass
 class Block:
-    """A function without branches that is being traced."""
+    """A traced function without branches."""
 
     name: str
     """Name of the function."""
     purpose: str
-    """What it does, for its docstring."""
+    """Its docstring."""
     parameters: tuple[str, ...] = ()
     """Names of integer parameters after the workspace."""
     trace: Trace = field(default_factory=Trace)
     """Its expressions."""
     stores: list[tuple[str, int, Scalar]] = field(default_factory=list)
-    """What it writes: base, offset, value."""
+    """Its results: base, offset, value."""
 
     def load(self, offset: int, base: str = "") -> Expression:
-        """An element of the workspace."""
+        """Return an element of the workspace."""
         return self.trace.load(WORKSPACE, base, offset)
 
     def loads(self, offset: int, count: int, base: str = "") -> list[Expression]:
-        """Several of them, one after the other."""
+        """Return consecutive elements of the workspace."""
         return [self.load(offset + place, base) for place in range(count)]
 
     def table(self, table: str, offset: int, base: str) -> Expression:
-        """An element of a table."""
+        """Return an element of a table."""
         return self.trace.load(table, base, offset)
 
     def store(self, offset: int, value: Scalar, base: str = "") -> None:
-        """Write an element of the workspace, when all is computed."""
+        """Write an element of the workspace at the end of the function."""
         self.stores.append((base, offset, value))
 
     def store_all(self, offset: int, values: Sequence[Scalar], base: str = "") -> None:
-        """Write several, one after the other."""
+        """Write consecutive elements."""
         for place, value in enumerate(values):
             self.store(offset + place, value, base)
 
     def text(self, *, lanes: bool = False) -> str:
-        """The function.
+        """Return the text of the function.
 
         Args:
-            lanes: For many cases at once: every element of the workspace is `LANES` numbers, and a loop goes over them.
+            lanes: Write it for many cases: every element of the workspace is `LANES` numbers, with a loop over them.
         """
         head = ", ".join([f"{WORKSPACE}: Array", *(f"{name}: int" for name in self.parameters)])
         indent = "    "
@@ -72,7 +72,7 @@ class Block:
         return "\n".join([*lines, *(body or [f"{indent}pass"])])
 
     def operations(self) -> int:
-        """Number of arithmetic operations."""
+        """Return the number of arithmetic operations."""
         return sum(one.operation != "load" for one in in_order([value for _, _, value in self.stores]))
 
 
@@ -84,18 +84,18 @@ def hoist(
     base: str = "",
     overwritten: Sequence[Expression] = (),
 ) -> int:
-    """Take what does not depend on the `varying` elements out of blocks, into one that runs before them.
+    """Move computations that do not depend on the `varying` elements out of blocks, into one that runs before them.
 
     Args:
-        blocks: The blocks, of one trace; they read the values instead, from then on.
+        blocks: The blocks, of one trace; changed to read the values instead.
         before: The block that computes and stores them, of the same trace.
         varying: The elements of the workspace that change between two runs of the blocks.
-        first: Place in the workspace from which values can be kept.
+        first: Place in the workspace of the first kept value.
         base: Name of an integer parameter to which that place is relative, or empty.
-        overwritten: Elements that `before` can read, and that hold something else when the blocks run.
+        overwritten: Elements that `before` reads and that have other values when the blocks run.
 
     Returns:
-        How many values are kept.
+        The number of kept values.
     """
     trace = before.trace
     expressions = in_order([value for block in blocks for _, _, value in block.stores])
@@ -104,29 +104,29 @@ def hoist(
         if any(argument.number in moving for argument in operands(one)):
             moving.add(one.number)
     kept: dict[int, Expression] = {}
-    gone = {one.number for one in overwritten}
+    overwritten_numbers = {one.number for one in overwritten}
 
     def standing(value: Expression) -> Expression:
-        """The value itself if it moves or is an element anyway, else the element that keeps it."""
-        if value.number in moving or (value.operation == "load" and value.number not in gone):
+        """Return the value itself if it varies or is an element anyway, else the element that keeps it."""
+        if value.number in moving or (value.operation == "load" and value.number not in overwritten_numbers):
             return value
-        if value.operation == "neg":  # no work; keep what it is made of
+        if value.operation == "neg":  # no work; keep its argument
             return trace.make("neg", standing(value.arguments[0]))
         if value.number not in kept:
             before.store(first + len(kept), value, base)
             kept[value.number] = trace.load(WORKSPACE, base, first + len(kept))
         return kept[value.number]
 
-    made: dict[int, Expression] = {}
+    replaced: dict[int, Expression] = {}
 
     def changed(value: Scalar) -> Scalar:
         if not isinstance(value, Expression):
             return value
-        return made[value.number] if value.number in made else standing(value)
+        return replaced[value.number] if value.number in replaced else standing(value)
 
     for one in expressions:
         if one.number in moving and one.operation != "load":
-            made[one.number] = trace.make(one.operation, *(changed(argument) for argument in one.arguments))
+            replaced[one.number] = trace.make(one.operation, *(changed(argument) for argument in one.arguments))
     for block in blocks:
         block.stores = [(place, offset, changed(value)) for place, offset, value in block.stores]
     return len(kept)
@@ -141,7 +141,7 @@ def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool) -> Itera
     names = 0
     for expression in expressions:
         text, strength = _text(expression, texts, lanes)
-        # An element that is written at the end is read first, whatever its order in the text.
+        # An element that is written at the end must be read before.
         changed = (
             expression.operation == "load" and expression.arguments[0] == WORKSPACE and expression.arguments[1:] in written
         )
@@ -157,7 +157,7 @@ def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool) -> Itera
 
 
 def _text(expression: Expression, texts: dict[int, tuple[str, int]], lanes: bool) -> tuple[str, int]:
-    """Text of an expression from the texts of its arguments, and how strongly it binds."""
+    """Return the text of an expression from the texts of its arguments, and how strongly it binds."""
     operation, arguments = expression.operation, expression.arguments
     if operation == "load":
         array, base, offset = arguments

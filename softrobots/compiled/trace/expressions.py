@@ -1,8 +1,8 @@
-"""Scalar expressions that are traced instead of computed: constants fold, equal expressions are shared, slopes are exact.
+"""Traced scalar expressions: constants are folded, equal expressions shared, derivatives exact.
 
-A `Trace` makes the inputs; arithmetic on them makes `Expression` objects, each at most once. A constant is a plain float, so
-that ordinary code (also on NumPy arrays of objects, with `@`) computes with constants and expressions alike: what is zero or
-one in a robot costs nothing in the code that `softrobots.compiled.trace.blocks` writes.
+A `Trace` creates the inputs; arithmetic on them creates `Expression` objects, each at most once. A constant is a plain float,
+so that ordinary code (also on NumPy arrays of objects, with `@`) computes with constants and expressions alike: zeros and ones
+of a robot cost nothing in the code that `softrobots.compiled.trace.blocks` writes.
 """
 
 from __future__ import annotations
@@ -15,38 +15,38 @@ Scalar: TypeAlias = "Expression | float"
 """An expression, or a constant."""
 
 COMMUTATIVE = ("+", "*")
-"""Operations whose two arguments may change places."""
+"""Commutative operations."""
 
 
 class Trace:
-    """The expressions of one piece of code."""
+    """Expressions of one piece of code."""
 
     def __init__(self) -> None:
         """Begin without expressions."""
-        self._made: dict[tuple[Any, ...], Expression] = {}
+        self._expressions: dict[tuple[Any, ...], Expression] = {}
 
     def load(self, array: str, base: str, offset: int) -> Expression:
-        """Element `base + offset` of an array; `base` is the name of an integer parameter, or empty."""
+        """Return element `base + offset` of an array; `base` is the name of an integer parameter, or empty."""
         return self.make("load", array, base, offset)
 
     def make(self, operation: str, *arguments: Any) -> Expression:
-        """The expression of an operation, made anew only if there is none like it."""
+        """Return the expression of an operation, a new one only if there is no equal one."""
         if operation in COMMUTATIVE and _order(arguments[1]) < _order(arguments[0]):
             arguments = arguments[::-1]
         key = (operation, *((id(one) if isinstance(one, Expression) else one) for one in arguments))
-        found = self._made.get(key)
-        if found is None:
-            found = self._made[key] = Expression(self, operation, arguments, len(self._made))
-        return found
+        expression = self._expressions.get(key)
+        if expression is None:
+            expression = self._expressions[key] = Expression(self, operation, arguments, len(self._expressions))
+        return expression
 
 
 class Expression:
-    """A number that is known only when the code runs."""
+    """A number that is known only when the generated code runs."""
 
     __slots__ = ("arguments", "number", "operation", "trace")
 
     def __init__(self, trace: Trace, operation: str, arguments: tuple[Any, ...], number: int) -> None:
-        """Keep what makes it; `Trace.make` calls this."""
+        """Store operation and arguments; called by `Trace.make`."""
         self.trace = trace
         self.operation = operation
         self.arguments = arguments
@@ -118,38 +118,38 @@ class Expression:
 
 
 def _part(negated: Expression) -> Expression:
-    """What a negated expression is the negative of."""
+    """Return the argument of a negation."""
     part: Expression = negated.arguments[0]
     return part
 
 
 def _order(argument: Any) -> int:
-    """Place of an argument of a commutative operation: constants first, then by age."""
+    """Return the sort key of an argument of a commutative operation: constants first, then by age."""
     return argument.number if isinstance(argument, Expression) else -1
 
 
 def sine(angle: Scalar) -> Scalar:
-    """Sine of an angle [rad]."""
+    """Return the sine of an angle [rad]."""
     return angle.trace.make("sine", angle) if isinstance(angle, Expression) else math.sin(angle)
 
 
 def cosine(angle: Scalar) -> Scalar:
-    """Cosine of an angle [rad]."""
+    """Return the cosine of an angle [rad]."""
     return angle.trace.make("cosine", angle) if isinstance(angle, Expression) else math.cos(angle)
 
 
 def square_root(value: Scalar) -> Scalar:
-    """Square root."""
+    """Return the square root."""
     return value.trace.make("sqrt", value) if isinstance(value, Expression) else math.sqrt(value)
 
 
 def absolute(value: Scalar) -> Scalar:
-    """Absolute value."""
+    """Return the absolute value."""
     return value.trace.make("fabs", value) if isinstance(value, Expression) else abs(value)
 
 
 def if_less(one: Scalar, other: Scalar, then: Scalar, otherwise: Scalar) -> Scalar:
-    """`then` where `one < other`, else (and where one of them is no number) `otherwise`; both are computed."""
+    """Return `then` where `one < other`, else (also for NaN) `otherwise`; both are computed."""
     for side in (one, other):
         if isinstance(side, Expression):
             return side.trace.make("if_less", one, other, then, otherwise)
@@ -157,38 +157,38 @@ def if_less(one: Scalar, other: Scalar, then: Scalar, otherwise: Scalar) -> Scal
 
 
 def smaller(one: Scalar, other: Scalar) -> Scalar:
-    """The smaller of two numbers."""
+    """Return the smaller of two numbers."""
     return if_less(one, other, one, other)
 
 
 def larger(one: Scalar, other: Scalar) -> Scalar:
-    """The larger of two numbers."""
+    """Return the larger of two numbers."""
     return if_less(other, one, one, other)
 
 
 def operands(expression: Expression) -> list[Expression]:
-    """The arguments of an expression that are expressions."""
+    """Return the arguments of an expression that are expressions."""
     return [one for one in expression.arguments if isinstance(one, Expression)]
 
 
 def in_order(roots: Sequence[Scalar]) -> list[Expression]:
-    """All expressions that `roots` are made of, themselves included, each after its arguments."""
+    """Return `roots` and all expressions below them, each after its arguments."""
     seen: set[int] = set()
-    found: list[Expression] = []
+    ordered: list[Expression] = []
     pending: list[tuple[Expression, bool]] = [(root, False) for root in reversed(roots) if isinstance(root, Expression)]
     while pending:
         expression, ready = pending.pop()
         if ready:
-            found.append(expression)
+            ordered.append(expression)
         elif expression.number not in seen:
             seen.add(expression.number)
             pending.append((expression, True))
             pending += ((one, False) for one in reversed(operands(expression)))
-    return found
+    return ordered
 
 
 def gradient(value: Scalar, variables: Sequence[Expression]) -> list[Scalar]:
-    """Derivatives of an expression with respect to some of the expressions that it is made of (reverse accumulation)."""
+    """Return the derivatives of an expression with respect to expressions below it (reverse accumulation)."""
     slopes: dict[int, Scalar] = {}
     if isinstance(value, Expression):
         slopes[value.number] = 1.0
@@ -202,7 +202,7 @@ def gradient(value: Scalar, variables: Sequence[Expression]) -> list[Scalar]:
 
 
 def _shares(expression: Expression) -> list[tuple[Expression, Scalar]]:
-    """Derivative of an operation with respect to each argument that is an expression."""
+    """Return the derivative of an operation with respect to each argument that is an expression."""
     arguments = expression.arguments
     one, two = arguments[0], arguments[1] if len(arguments) > 1 else 0.0
     shares: tuple[Scalar, ...]

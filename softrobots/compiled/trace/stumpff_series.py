@@ -1,4 +1,4 @@
-"""Stumpff functions of a traced argument; see `softrobots.constant_curvature.stumpff` for what they are."""
+"""Stumpff functions of a traced argument; defined in `softrobots.constant_curvature.stumpff`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import math
 from softrobots.compiled.trace.expressions import Scalar
 
 LARGEST = 20.0
-"""Largest squared angle [rad^2] that the series are made for; a section that is bent and twisted by half a turn has 19.7."""
+"""Largest squared angle [rad^2] of the series; a section that is bent and twisted by half a turn has 19.7."""
 
-_TERMS = 14  # the first that is left out is below 1e-18 of the sum at the largest argument
+_TERMS = 14  # the first omitted one is below 1e-18 of the sum at the largest argument
 
 
 def stumpff(x: Scalar, highest: int) -> list[Scalar]:
