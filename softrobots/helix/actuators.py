@@ -62,14 +62,14 @@ class ActuatorTable:
             raise ParameterError("pressure", self.pressure, "at least two rows [Pa]")
         if np.any(np.diff(pressures) < 1.0 / LARGEST):
             raise ParameterError("pressure", self.pressure, f"increasing, by at least {1.0 / LARGEST:g} Pa a row")
-        shares = checked_contraction(self.contraction)
-        if shares.shape != pressures.shape:
+        contractions = checked_contraction(self.contraction)
+        if contractions.shape != pressures.shape:
             raise ParameterError("contraction", self.contraction, f"of the shape {pressures.shape} of the pressures")
-        steps = np.diff(shares)
+        steps = np.diff(contractions)
         if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
             raise ParameterError("contraction", self.contraction, "strictly rising or strictly falling with the pressure")
         object.__setattr__(self, "pressure", read_only(pressures))
-        object.__setattr__(self, "contraction", read_only(shares))
+        object.__setattr__(self, "contraction", read_only(contractions))
         if choice("interpolation", self.interpolation, INTERPOLATIONS) == "pchip":
             _ = self._cubic  # raises at once if SciPy is missing
 
@@ -147,10 +147,10 @@ class ActuatorTable:
         """
         pressures = _within("pressure", pressure, self.pressure_limits, "Pa")
         if self.interpolation == "pchip":
-            shares = self._cubic(pressures)
+            contractions = self._cubic(pressures)
         else:
-            shares = np.interp(pressures, self.pressure, self.contraction)
-        return np.asarray(np.clip(shares, *self.contraction_limits))  # rounding must not leave the table
+            contractions = np.interp(pressures, self.pressure, self.contraction)
+        return np.asarray(np.clip(contractions, *self.contraction_limits))  # rounding must not leave the table
 
     def pressure_for(self, contraction: Any) -> FloatArray:
         """Return the pressure for a contraction: the inverse of `contraction_at`.
@@ -164,17 +164,17 @@ class ActuatorTable:
         Raises:
             ParameterError: If a contraction is not finite or beyond the limits.
         """
-        shares = _within("contraction", contraction, self.contraction_limits, "-")
+        contractions = _within("contraction", contraction, self.contraction_limits, "-")
         rising = self.contraction[-1] > self.contraction[0]
         known = (self.pressure, self.contraction) if rising else (self.pressure[::-1], self.contraction[::-1])
         if self.interpolation == "linear":
-            return np.asarray(np.clip(np.interp(shares, known[1], known[0]), *self.pressure_limits))
+            return np.asarray(np.clip(np.interp(contractions, known[1], known[0]), *self.pressure_limits))
         cubic = self._cubic
-        above = np.clip(np.searchsorted(known[1], shares), 1, len(known[1]) - 1)
+        above = np.clip(np.searchsorted(known[1], contractions), 1, len(known[1]) - 1)
         low, high = known[0][above - 1], known[0][above]  # where the contraction is too small, and where it is not
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            enough = cubic(middle) >= shares
+            enough = cubic(middle) >= contractions
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
         return np.asarray(high)
 
@@ -256,9 +256,9 @@ def gap_for(contraction: Any, stopper: Any) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    shares, stoppers = checked_contraction(contraction), positive_array("stopper", stopper, "m")
-    common_shape("stopper", shares.shape, stoppers.shape)
-    return np.asarray(stoppers * (1.0 - shares) / shares)
+    contractions, stoppers = checked_contraction(contraction), positive_array("stopper", stopper, "m")
+    common_shape("stopper", contractions.shape, stoppers.shape)
+    return np.asarray(stoppers * (1.0 - contractions) / contractions)
 
 
 def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> FloatArray:
@@ -270,17 +270,17 @@ def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> Fl
 
 def _check_row(where: str, rows: Sequence[Sequence[float]], place: int) -> None:
     """Raise FileFormatError if a row is out of range or does not continue the rows before it."""
-    pressure, share = rows[place]
-    if not 0.0 < share <= 1.0:
-        raise FileFormatError(f"{where}: contraction = {share!r}; a number in (0, 1] is required")
+    pressure, contraction = rows[place]
+    if not 0.0 < contraction <= 1.0:
+        raise FileFormatError(f"{where}: contraction = {contraction!r}; a number in (0, 1] is required")
     if place == 0:
         return
     before = rows[place - 1]
     if pressure <= before[0]:
         raise FileFormatError(f"{where}: pressure_Pa = {pressure!r}; more than {before[0]!r}, the row before, is required")
-    if share == before[1]:
-        raise FileFormatError(f"{where}: contraction = {share!r} as in the row before; a change is required")
-    if (share > before[1]) != (rows[1][1] > rows[0][1]):
+    if contraction == before[1]:
+        raise FileFormatError(f"{where}: contraction = {contraction!r} as in the row before; a change is required")
+    if (contraction > before[1]) != (rows[1][1] > rows[0][1]):
         raise FileFormatError(
-            f"{where}: contraction = {share!r} turns back; rising throughout or falling throughout is required"
+            f"{where}: contraction = {contraction!r} turns back; rising throughout or falling throughout is required"
         )

@@ -74,9 +74,9 @@ class ShapeTable:
         lines = [f"| {names} |", "|" + "---|" * len(_COLUMNS)]
         for row in self.rows:
             apart = "none" if row.turn_distance is None else f"{row.turn_distance:.5f}"
-            sizes = f"{row.diameter:.5f} | {row.outer_radius:.5f} | {row.inner_radius:.5f} | {row.pitch:.5f} | {apart}"
+            lengths = f"{row.diameter:.5f} | {row.outer_radius:.5f} | {row.inner_radius:.5f} | {row.pitch:.5f} | {apart}"
             answers = " | ".join("yes" if answer else "no" for answer in (row.realisable, row.realisable_by_simple_rule))
-            lines.append(f"| {np.degrees(row.angle):.4g} | {row.contraction:.4g} | {sizes} | {answers} |")
+            lines.append(f"| {np.degrees(row.angle):.4g} | {row.contraction:.4g} | {lengths} | {answers} |")
         return "\n".join(lines) + "\n"
 
     def write_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
@@ -118,13 +118,13 @@ def shape_table(contraction: Any, angle: Any, diameter: Any) -> ShapeTable:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
         StraightTube: At contraction 1 and angle 0, where no helix exists.
     """
-    shares, angles, sizes = np.broadcast_arrays(*checked_actuator(contraction, angle, diameter))
-    shape = forward(shares, angles, sizes)
+    contractions, angles, diameters = np.broadcast_arrays(*checked_actuator(contraction, angle, diameter))
+    shape = forward(contractions, angles, diameters)
     contact = self_contact(shape)
     apart = contact.turn_distance.astype(object)
     apart[~contact.has_neighbours] = None
-    radii, by_rule = (shape.outer_radius, shape.inner_radius), shape.turn_height >= sizes
-    columns = (angles, shares, sizes, *radii, shape.pitch, apart, ~contact.touches, by_rule)
+    radii, by_rule = (shape.outer_radius, shape.inner_radius), shape.turn_height >= diameters
+    columns = (angles, contractions, diameters, *radii, shape.pitch, apart, ~contact.touches, by_rule)
     return ShapeTable(tuple(ShapeRow(*values) for values in zip(*(column.ravel().tolist() for column in columns), strict=True)))
 
 

@@ -219,8 +219,8 @@ def contraction_limit(angle: Any, diameter: Any = 1.0) -> FloatArray:
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    angles, sizes = checked_angle(angle), positive_array("diameter", diameter, "m")
-    shape = common_shape("diameter", angles.shape, sizes.shape)
+    angles, diameters = checked_angle(angle), positive_array("diameter", diameter, "m")
+    shape = common_shape("diameter", angles.shape, diameters.shape)
 
     def beyond(short: FloatArray) -> FloatArray:
         """Angle of the actuator on the curve minus the given one."""

@@ -135,27 +135,27 @@ def grasp_force(
     """
     pressures, depths = non_negative_array("pressure", pressure, "Pa"), finite_array("deflection", deflection, None, "m")
     radii, heights = positive_array("object_radius", object_radius, "m"), non_negative_array("turn_height", turn_height, "m")
-    counts, sizes = positive_array("turns", turns, "-"), positive_array("diameter", diameter, "m")
-    given = (pressures, radii, depths, heights, counts, sizes)
+    counts, diameters = positive_array("turns", turns, "-"), positive_array("diameter", diameter, "m")
+    given = (pressures, radii, depths, heights, counts, diameters)
     shape = common_shape("diameter", *(values.shape for values in given))
-    pressures, radii, depths, heights, counts, sizes = (np.array(np.broadcast_to(values, shape)) for values in given)
-    if np.any(depths < 0.0) or np.any(depths > np.minimum(0.5 * sizes, radii)):
-        most = np.minimum(0.5 * sizes, radii)
+    pressures, radii, depths, heights, counts, diameters = (np.array(np.broadcast_to(values, shape)) for values in given)
+    if np.any(depths < 0.0) or np.any(depths > np.minimum(0.5 * diameters, radii)):
+        most = np.minimum(0.5 * diameters, radii)
         raise ParameterError(
             "deflection", deflection, f"from 0 to {most.min():.6g} m, the radius of the tube or that of the object"
         )
-    if np.any((heights < sizes) & (counts > 1.0)):
+    if np.any((heights < diameters) & (counts > 1.0)):
         raise ParameterError(
-            "turn_height", turn_height, f"at least the diameter of the tube {sizes.max():.6g} m, or the turns collide"
+            "turn_height", turn_height, f"at least the diameter of the tube {diameters.max():.6g} m, or the turns collide"
         )
     pitch = heights / (2.0 * np.pi)
-    inner, centre = np.hypot(radii, pitch), np.hypot(radii + 0.5 * sizes, pitch)  # path length per turn angle
-    area = 0.25 * np.pi * sizes**2
+    inner, centre = np.hypot(radii, pitch), np.hypot(radii + 0.5 * diameters, pitch)  # path length per turn angle
+    area = 0.25 * np.pi * diameters**2
     volume = area * 2.0 * np.pi * counts * centre
     # d(centre/inner)/dR at a fixed inner length
-    change = 0.5 * sizes * (pitch / inner * (pitch / centre) - radii / inner * ((radii + 0.5 * sizes) / centre))
+    change = 0.5 * diameters * (pitch / inner * (pitch / centre) - radii / inner * ((radii + 0.5 * diameters) / centre))
     slope = 2.0 * counts * area * (change / inner)
-    width = 2.0 * np.sqrt(depths * (sizes - depths))
+    width = 2.0 * np.sqrt(depths * (diameters - depths))
     unwrapping, contact = pressures * np.maximum(-slope, 0.0), 2.0 * counts * pressures * width * inner
     force = np.minimum(unwrapping, contact)
-    return GraspForce(pressures, radii, depths, heights, counts, sizes, volume, slope, width, unwrapping, contact, force)
+    return GraspForce(pressures, radii, depths, heights, counts, diameters, volume, slope, width, unwrapping, contact, force)

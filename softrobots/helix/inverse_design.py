@@ -141,20 +141,20 @@ def _design(
 ) -> HelixDesign:
     """The design of the required helix, or of the realisable one nearest to it."""
     choice("on_unrealisable", on_unrealisable, ON_UNREALISABLE)
-    shares = checked_limits("contraction_limits", contraction_limits, "-")
-    angles = checked_limits("angle_limits", angle_limits, "rad")
+    contraction_range = checked_limits("contraction_limits", contraction_limits, "-")
+    angle_range = checked_limits("angle_limits", angle_limits, "rad")
     tube, count = positive_number("diameter", diameter, "m"), positive_number("turns", turns, "-")
     for name, length in (("radius", required.radius), ("turn_height", required.turn_height)):
         if not tube / _EXTREME <= length <= tube * _EXTREME:
             raise ParameterError(name, length, f"within a factor of {_EXTREME:g} of the diameter {tube} m")
-    search = _NearestHelix(required, tube, count, shares, angles)
+    search = _NearestHelix(required, tube, count, contraction_range, angle_range)
 
     def design_of(shape: HelixShape, *, clipped: bool) -> HelixDesign:
         contraction, angle, _ = (float(value) for value in inverse(shape))
         if clipped:
-            contraction = float(np.clip(contraction, *(shares or (contraction, contraction))))
-            angle = float(np.clip(angle, *(angles or (angle, angle))))
-        return HelixDesign(contraction, angle, tube, count, handedness, required, shares, angles)
+            contraction = float(np.clip(contraction, *(contraction_range or (contraction, contraction))))
+            angle = float(np.clip(angle, *(angle_range or (angle, angle))))
+        return HelixDesign(contraction, angle, tube, count, handedness, required, contraction_range, angle_range)
 
     design = design_of(search.required_shape, clipped=False)
     if design.realisable:
@@ -167,7 +167,7 @@ def _design(
     advice = "on_unrealisable='nearest' gives the nearest helix that can be made"
     if bool(design.contact.touches):
         raise SelfIntersection(f"{'; '.join(design.faults)}; {advice}", contact=design.contact)
-    reached = within(np.asarray(design.contraction), shares, LIMIT_ROUNDING)
+    reached = within(np.asarray(design.contraction), contraction_range, LIMIT_ROUNDING)
     name, faults = "angle_limits" if reached else "contraction_limits", "; ".join(design.faults)
     raise ParameterError(name, getattr(design, name), f"wide enough for the required helix ({faults}); {advice}")
 
@@ -249,21 +249,22 @@ class _NearestHelix(NamedTuple):
             return 0.25 * size * (1.0 + np.cos(turned)), 0.25 * size * np.sin(turned)
 
         def of_actuator(shrink: FloatArray | float, angle: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-            share = 1.0 - np.asarray(shrink)
-            square = np.asarray(shrink) ** 2 + 4.0 * share * np.sin(angle) ** 2 + 1e-300  # |1 - zeta|^2
-            return 0.5 * size * shrink * (1.0 + share) / square, size * share * np.sin(2.0 * np.asarray(angle)) / square
+            contraction = 1.0 - np.asarray(shrink)
+            square = np.asarray(shrink) ** 2 + 4.0 * contraction * np.sin(angle) ** 2 + 1e-300  # |1 - zeta|^2
+            radius = 0.5 * size * shrink * (1.0 + contraction) / square
+            return radius, size * contraction * np.sin(2.0 * np.asarray(angle)) / square
 
-        shares, angles = self.contraction_limits or (0.0, 1.0), self.angle_limits or (0.0, 0.5 * math.pi)
+        contractions, angles = self.contraction_limits or (0.0, 1.0), self.angle_limits or (0.0, 0.5 * math.pi)
 
-        def at_contraction(share: float) -> _Curve:
-            return lambda p: of_actuator(1.0 - share, angles[0] + (angles[1] - angles[0]) * _graded(p))
+        def at_contraction(contraction: float) -> _Curve:
+            return lambda p: of_actuator(1.0 - contraction, angles[0] + (angles[1] - angles[0]) * _graded(p))
 
         def at_angle(angle: float) -> _Curve:
-            return lambda p: of_actuator(1.0 - shares[1] + (shares[1] - shares[0]) * _graded(p), angle)
+            return lambda p: of_actuator(1.0 - contractions[1] + (contractions[1] - contractions[0]) * _graded(p), angle)
 
         curves: list[_Curve] = [touching, folding]
         curves += [ends] if 0.5 < self.turns < 1.0 else []
-        curves += [at_contraction(share) for share in self.contraction_limits or ()]
+        curves += [at_contraction(contraction) for contraction in self.contraction_limits or ()]
         curves += [at_angle(angle) for angle in self.angle_limits or ()]
         return curves
 

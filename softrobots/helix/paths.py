@@ -67,16 +67,16 @@ def actuator_curvature_torsion(
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    shares, angles, sizes = checked_actuator(contraction, angle, diameter)
+    contractions, angles, diameters = checked_actuator(contraction, angle, diameter)
     choice("path", path, PATHS)
-    shrink, twice = 1.0 - shares, 2.0 * np.sin(angles) ** 2  # 1 - lambda and 1 - cos(2 theta), without cancellation
+    shrink, twice = 1.0 - contractions, 2.0 * np.sin(angles) ** 2  # 1 - lambda and 1 - cos(2 theta), without cancellation
     sine = turning_sign(handedness) * np.sin(2.0 * angles)
     if path == "outer":
-        return np.asarray((shrink + shares * twice) / sizes), np.asarray(shares * sine / sizes)
+        return np.asarray((shrink + contractions * twice) / diameters), np.asarray(contractions * sine / diameters)
     if path == "inner":
-        return np.asarray((shrink - twice) / (sizes * shares)), np.asarray(sine / (sizes * shares))
-    scale = sizes * length_ratio(shares, angles) ** 2
-    return np.asarray(2.0 * shrink * (1.0 + shares) / scale), np.asarray(4.0 * shares * sine / scale)
+        return np.asarray((shrink - twice) / (diameters * contractions)), np.asarray(sine / (diameters * contractions))
+    scale = diameters * length_ratio(contractions, angles) ** 2
+    return np.asarray(2.0 * shrink * (1.0 + contractions) / scale), np.asarray(4.0 * contractions * sine / scale)
 
 
 def points(shape: HelixShape, s: Any, path: str = "centre", handedness: str = "right") -> FloatArray:

@@ -174,8 +174,8 @@ def _motions(curvature: float, torsion: float, lengths: FloatArray) -> FloatArra
 
 def _outer_in_base(plan: Pattern) -> FloatArray:
     """Pose of the outer path at the base in the frame of the smooth centre line: rotation by `arg(1 + zeta)` about x."""
-    share, twice = plan.contraction, 2.0 * plan.angle
-    turn = turning_sign(plan.handedness) * np.arctan2(share * np.sin(twice), 1.0 + share * np.cos(twice))
+    contraction, twice = plan.contraction, 2.0 * plan.angle
+    turn = turning_sign(plan.handedness) * np.arctan2(contraction * np.sin(twice), 1.0 + contraction * np.cos(twice))
     pose = np.eye(4)
     pose[1:3, 1:3] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
     pose[0, 3] = -0.5 * plan.diameter

@@ -223,17 +223,17 @@ def measure(outer_arc: Any, inner_arc: Any, diameter: Any, turns: Any = 1.0) -> 
 
 def checked_actuator(contraction: Any, angle: Any, diameter: Any) -> Actuator:
     """Return contraction, angle and diameter as arrays that broadcast, or raise ParameterError."""
-    shares, angles, sizes = checked_contraction(contraction), checked_angle(angle), positive_array("diameter", diameter, "m")
-    common_shape("diameter", shares.shape, angles.shape, sizes.shape)
-    return Actuator(shares, angles, sizes)
+    actuator = Actuator(checked_contraction(contraction), checked_angle(angle), positive_array("diameter", diameter, "m"))
+    common_shape("diameter", *(values.shape for values in actuator))
+    return actuator
 
 
 def checked_contraction(contraction: Any) -> FloatArray:
     """Return contractions in (0, 1] as an array, or raise ParameterError."""
-    shares = positive_array("contraction", contraction, "-")
-    if np.any(shares > 1.0):
+    contractions = positive_array("contraction", contraction, "-")
+    if np.any(contractions > 1.0):
         raise ParameterError("contraction", contraction, CONTRACTION_RANGE)
-    return shares
+    return contractions
 
 
 def checked_angle(angle: Any) -> FloatArray:

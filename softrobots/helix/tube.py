@@ -105,9 +105,9 @@ def volume(contraction: Any, angle: Any, diameter: Any, length: Any) -> FloatArr
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    sizes, lengths = positive_array("diameter", diameter, "m"), centre_length(contraction, angle, length)
-    common_shape("diameter", sizes.shape, lengths.shape)
-    return np.asarray(0.25 * np.pi * sizes**2 * lengths)
+    diameters, lengths = positive_array("diameter", diameter, "m"), centre_length(contraction, angle, length)
+    common_shape("diameter", diameters.shape, lengths.shape)
+    return np.asarray(0.25 * np.pi * diameters**2 * lengths)
 
 
 def material_twist(contraction: Any, angle: Any, diameter: Any, handedness: str = "right") -> FloatArray:
@@ -130,12 +130,13 @@ def material_twist(contraction: Any, angle: Any, diameter: Any, handedness: str 
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    shares, angles, sizes = checked_actuator(contraction, angle, diameter)
-    ratio = length_ratio(shares, angles)
+    contractions, angles, diameters = checked_actuator(contraction, angle, diameter)
+    ratio = length_ratio(contractions, angles)
     cosine = np.cos(angles)
     # |1 + zeta| - 2 lambda cos theta, as the difference of the squares over the sum: exactly 0 at lambda = 1
-    difference = (1.0 - shares) * ((1.0 - shares) + 4.0 * shares * cosine**2) / (ratio + 2.0 * shares * cosine)
-    return np.asarray(-2.0 * turning_sign(handedness) * np.sin(angles) * difference / (sizes * ratio * cosine))
+    shrink = 1.0 - contractions
+    difference = shrink * (shrink + 4.0 * contractions * cosine**2) / (ratio + 2.0 * contractions * cosine)
+    return np.asarray(-2.0 * turning_sign(handedness) * np.sin(angles) * difference / (diameters * ratio * cosine))
 
 
 def actuator_tension(contraction: Any, angle: Any, diameter: Any, pressure: Any) -> FloatArray:
@@ -159,9 +160,9 @@ def actuator_tension(contraction: Any, angle: Any, diameter: Any, pressure: Any)
     Raises:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    shares, angles, sizes = checked_actuator(contraction, angle, diameter)
+    contractions, angles, diameters = checked_actuator(contraction, angle, diameter)
     pressures = non_negative_array("pressure", pressure, "Pa")
-    common_shape("pressure", shares.shape, angles.shape, sizes.shape, pressures.shape)
-    area = 0.25 * np.pi * sizes**2
-    rate = 2.0 * np.cos(angles) ** 2 - (1.0 - shares)  # lambda + cos(2 theta), exact at lambda = 1
-    return np.asarray(pressures * area * rate / (2.0 * length_ratio(shares, angles)))
+    common_shape("pressure", contractions.shape, angles.shape, diameters.shape, pressures.shape)
+    area = 0.25 * np.pi * diameters**2
+    rate = 2.0 * np.cos(angles) ** 2 - (1.0 - contractions)  # lambda + cos(2 theta), exact at lambda = 1
+    return np.asarray(pressures * area * rate / (2.0 * length_ratio(contractions, angles)))

@@ -129,31 +129,31 @@ def bent_tube(
             integrator does not converge, for a function that is not smooth between breakpoints.
         MissingDependency: If SciPy is not installed.
     """
-    size, extent = positive_number("diameter", diameter, "m"), positive_number("length", length, "m")
+    diameter, length = positive_number("diameter", diameter, "m"), positive_number("length", length, "m")
     sign = turning_sign(handedness)
     accuracy = finite_number("tolerance", tolerance)
     if not _TIGHTEST <= accuracy <= _LOOSEST:
         raise ParameterError("tolerance", tolerance, f"from {_TIGHTEST:g} to {_LOOSEST:g}")
-    shares, angles = checked_profile("contraction", contraction, extent), checked_profile("angle", angle, extent)
-    positions = sample_positions(samples, extent)
+    contractions, angles = checked_profile("contraction", contraction, length), checked_profile("angle", angle, length)
+    positions = sample_positions(samples, length)
     cuts = finite_array("breakpoints", breakpoints, (None,), "m")
-    if np.any(cuts <= 0.0) or np.any(cuts >= extent) or np.any(np.diff(cuts) <= 0.0):
-        raise ParameterError("breakpoints", breakpoints, f"increasing, inside the tube, 0 to {extent!r} m")
-    ends = sorted({0.0, *shares.knots, *angles.knots, *cuts.tolist(), extent})
-    pieces = [_Piece(shares, angles, start, end, size, sign) for start, end in itertools.pairwise(ends)]
+    if np.any(cuts <= 0.0) or np.any(cuts >= length) or np.any(np.diff(cuts) <= 0.0):
+        raise ParameterError("breakpoints", breakpoints, f"increasing, inside the tube, 0 to {length!r} m")
+    ends = sorted({0.0, *contractions.knots, *angles.knots, *cuts.tolist(), length})
+    pieces = [_Piece(contractions, angles, start, end, diameter, sign) for start, end in itertools.pairwise(ends)]
     belongs = np.clip(np.searchsorted(ends, positions, side="right") - 1, 0, len(pieces) - 1)
     local = np.array([pieces[i].actuator(s) for i, s in zip(belongs.tolist(), positions.tolist(), strict=True)])
-    scale, rotation = _scale(pieces, positions, extent, size)
+    scale, rotation = _scale(pieces, positions, length, diameter)
     budget = _EVALUATIONS + int(_EVALUATIONS_PER_RAD * rotation) + _EVALUATIONS_PER_RAD * len(pieces)
-    smooth = shares.function is None and angles.function is None
+    smooth = contractions.function is None and angles.function is None
     states = _integrate(
         [(piece, positions[belongs == place]) for place, piece in enumerate(pieces)],
         scale=scale,
         accuracy=accuracy,
-        longest=math.inf if smooth else max(size, 1e-4 * extent),
+        longest=math.inf if smooth else max(diameter, 1e-4 * length),
         budget=budget,
     )
-    curvature, torsion = actuator_curvature_torsion(local[:, 0], local[:, 1], size, "centre", handedness)
+    curvature, torsion = actuator_curvature_torsion(local[:, 0], local[:, 1], diameter, "centre", handedness)
     return BentTube(
         rest_positions=positions,
         poses=_poses(states, scale),
@@ -162,8 +162,8 @@ def bent_tube(
         angle=local[:, 1],
         curvature=curvature,
         torsion=torsion,
-        diameter=size,
-        length=extent,
+        diameter=diameter,
+        length=length,
         handedness=handedness,
     )
 
@@ -174,23 +174,23 @@ _Change = Callable[[float, FloatArray], list[float]]
 class _Piece:
     """The tube between two neighbouring breakpoints."""
 
-    def __init__(self, shares: Profile, angles: Profile, start: float, end: float, diameter: float, sign: float) -> None:
+    def __init__(self, contractions: Profile, angles: Profile, start: float, end: float, diameter: float, sign: float) -> None:
         self.start, self.end = start, end
-        self._share, self._angle = shares.on_piece(start, end), angles.on_piece(start, end)
+        self._contraction, self._angle = contractions.on_piece(start, end), angles.on_piece(start, end)
         self._diameter, self._sign = diameter, sign
 
     def actuator(self, position: float) -> tuple[float, float]:
         """Contraction and angle."""
-        return self._share(position), self._angle(position)
+        return self._contraction(position), self._angle(position)
 
     def rates(self, position: float) -> tuple[float, float, float]:
         """Per length of the uninflated tube: length of the centre line [-], rotation about y and about z [rad/m]."""
-        share, angle = self._share(position), self._angle(position)
+        contraction, angle = self._contraction(position), self._angle(position)
         cosine = math.cos(angle)
-        ratio = math.hypot(1.0 - share, 2.0 * math.sqrt(share) * cosine)  # |1 + zeta|
+        ratio = math.hypot(1.0 - contraction, 2.0 * math.sqrt(contraction) * cosine)  # |1 + zeta|
         scale = self._diameter * ratio
-        bending = (1.0 - share) * (1.0 + share) / (scale * cosine)
-        return ratio / (2.0 * cosine), bending, self._sign * 4.0 * share * math.sin(angle) / scale
+        bending = (1.0 - contraction) * (1.0 + contraction) / (scale * cosine)
+        return ratio / (2.0 * cosine), bending, self._sign * 4.0 * contraction * math.sin(angle) / scale
 
     def change(self, scale: float) -> _Change:
         """Derivative of the state: quaternion (w, x, y, z), position and centre length by `scale`."""
