@@ -21,7 +21,7 @@ from softrobots.core.checks import finite_array, finite_number, read_only
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
-from softrobots.description.renaming import children, ours, prefix_names, shift_segments, used_names
+from softrobots.description.renaming import children, package_tags, prefix_names, shift_segments, used_names
 from softrobots.description.rigid_tree import Joint, Placement, RigidTree, number_text
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.sources import Robot, read_source
@@ -92,7 +92,7 @@ def mount(
             position, angles = pose.position, pose.rpy
     prefix_names(child.dom, prefix)  # first, so that references to the joint on the world get its new name, too
     _prepare_child(child, base, carrier, prefix)
-    for tag in ours(carrier.dom, "tip") if tip is not None else ():
+    for tag in package_tags(carrier.dom, "tip") if tip is not None else ():
         carrier.dom.removeChild(tag)
     _check_names(carrier, child, prefix, prefix + joint)
     _check_namespaces(carrier, child)
@@ -201,7 +201,7 @@ def _joint_on_world(part: _Part) -> Joint | None:
 
 def _prepare_child(child: _Part, base: Joint | None, carrier: _Part, prefix: str) -> None:
     """Remove what the whole has only once (tip, world, `<mujoco>`); names have their prefix already."""
-    removed = ours(child.dom, "tip")
+    removed = package_tags(child.dom, "tip")
     for element in children(child.dom):
         if base is not None and (element.tagName, element.getAttribute("name")) in (
             ("link", prefix + _WORLD),

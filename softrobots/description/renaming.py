@@ -22,7 +22,7 @@ def children(element: minidom.Element | minidom.Document) -> list[minidom.Elemen
     return [node for node in element.childNodes if node.nodeType == node.ELEMENT_NODE]
 
 
-def ours(robot: minidom.Element, name: str = "*") -> list[minidom.Element]:
+def package_tags(robot: minidom.Element, name: str = "*") -> list[minidom.Element]:
     """Return the tags of this package directly inside a description, all or those of one name."""
     tags = [element for element in children(robot) if element.namespaceURI == NAMESPACE]
     return [element for element in tags if name in ("*", element.localName)]
@@ -45,7 +45,7 @@ def used_names(robot: minidom.Element) -> dict[str, dict[str, str]]:
             names["material"][material.getAttribute("name")] = " ".join(inside.split())
     for tag in _NAMED_BY_US:
         kind = "section" if tag.endswith("section") else "muscle or line"
-        names[kind] |= {element.getAttribute("name"): tag for element in ours(robot, tag)}
+        names[kind] |= {element.getAttribute("name"): tag for element in package_tags(robot, tag)}
     return names
 
 
@@ -53,7 +53,7 @@ def prefix_names(robot: minidom.Element, prefix: str) -> None:
     """Put a prefix before every name in the root element of a description, in place."""
     known = {name for names in used_names(robot).values() for name in names}
     known |= {element.getAttribute("name") for element in robot.getElementsByTagName("actuator")} - {""}
-    for element in ours(robot):
+    for element in package_tags(robot):
         for attribute in _LISTS:
             if element.hasAttribute(attribute):
                 names = (prefix + name for name in element.getAttribute(attribute).split())
@@ -72,7 +72,7 @@ def prefix_names(robot: minidom.Element, prefix: str) -> None:
 def shift_segments(robot: minidom.Element, shift: int) -> None:
     """Add `shift` to the number of every segment of a description, in place."""
     for tag in _NAMED_BY_US:
-        for element in ours(robot, tag):
+        for element in package_tags(robot, tag):
             element.setAttribute("segment", str(int(element.getAttribute("segment")) + shift))
 
 

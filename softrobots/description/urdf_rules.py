@@ -62,7 +62,9 @@ def check_rules(urdf: str, source: str = "the URDF") -> tuple[Finding, ...]:
     for what, rule in RULES.items():
         broken = list(rule(document))
         problems = tuple(text for subject, text in broken if subject not in foreign)
-        findings.append(Finding(what, problems, tuple(f"{text} (not ours)" for subject, text in broken if subject in foreign)))
+        findings.append(
+            Finding(what, problems, tuple(f"{text} (third-party robot)" for subject, text in broken if subject in foreign))
+        )
     return tuple(findings)
 
 

@@ -92,33 +92,30 @@ def facts_of(robot: Any) -> dict[str, Facts]:
     return {field.name: field.metadata["facts"] for field in dataclasses.fields(robot)}
 
 
-def check_parameters(robot: Any, count: int = 1, parts: str = "parts") -> None:
+def check_parameters(robot: Any, parts: str = "parts", lengths: str | None = None) -> int:
     """Check every field of a robot against its facts and store it in its final type; values per part become tuples.
 
     Args:
-        robot: A frozen dataclass whose fields are made by `parameter`.
-        count: Number of links or segments.
-        parts: What these are called, for errors.
+        robot: A frozen dataclass of fields by `parameter`.
+        parts: What links or segments are called, for errors.
+        lengths: The field with a length for each of them; None if there is only one.
+
+    Returns:
+        Number of links or segments.
 
     Raises:
         ParameterError: If a value has another type or is out of bounds, or a list has the wrong length; names the field.
     """
+    count = 1
+    if lengths is not None:
+        value = getattr(robot, lengths)
+        count = len(numbers(lengths, value, None, "m"))
+        if not 0 < count <= MOST_PARTS:
+            raise ParameterError(lengths, value, f"at least one length [m], at most {MOST_PARTS}")
     for field in dataclasses.fields(robot):
         value, facts = getattr(robot, field.name), field.metadata["facts"]
         if facts.form != "special" and not (value is None and field.default is None):
             object.__setattr__(robot, field.name, _checked(field, facts, value, count, parts))
-
-
-def check_lengths(robot: Any, name: str, part: str) -> int:
-    """Return the number of parts of a robot: how many lengths its field `name` holds.
-
-    Raises:
-        ParameterError: If there are none, or more than `MOST_PARTS`, or one is no number.
-    """
-    value = getattr(robot, name)
-    count = len(numbers(name, value, None, "m"))
-    if not 0 < count <= MOST_PARTS:
-        raise ParameterError(name, value, f"at least one {part} length [m], at most {MOST_PARTS}")
     return count
 
 

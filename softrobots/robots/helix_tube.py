@@ -136,7 +136,7 @@ class HelixTube(XacroRobot):
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_parameters(self, 1, "tubes")
+        check_parameters(self)
         if self.wall_thickness > 0.05 * self.diameter:
             raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius, {self.radius} m")
         if self.upright == "axis" and self.shape is not None and self.shape.centre_radius > _LARGEST_RADIUS * self.length:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from softrobots import inflated_beam
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, check_lengths, check_parameters, parameter, per_part
+from softrobots.robots.fields import PerPart, check_parameters, parameter, per_part
 from softrobots.robots.xacro_robot import XacroRobot
 
 
@@ -104,7 +104,7 @@ class InflatableArm(XacroRobot):
 
     def __post_init__(self) -> None:
         """Check every field and repeat single numbers for all links."""
-        check_parameters(self, check_lengths(self, "link_lengths", "link"), "links")
+        check_parameters(self, "links", "link_lengths")
         lengths = self._each("link_lengths")
         for offset, length in zip(self._each("hinge_offset"), lengths, strict=True):
             if offset >= length:

@@ -12,7 +12,7 @@ import numpy as np
 from softrobots.constant_curvature import AZIMUTHS, muscle_residual
 from softrobots.core.checks import finite_array, finite_number, positive_array
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, check_lengths, check_parameters, numbers, parameter, per_part
+from softrobots.robots.fields import PerPart, check_parameters, numbers, parameter, per_part
 from softrobots.robots.xacro_robot import XacroRobot
 
 CHAINS = ("sections", "lumped")
@@ -122,8 +122,7 @@ class PccArm(XacroRobot):
 
     def __post_init__(self) -> None:
         """Check every field and repeat single numbers for all segments."""
-        count = check_lengths(self, "segment_lengths", "segment")
-        check_parameters(self, count, "segments")
+        count = check_parameters(self, "segments", "segment_lengths")
         object.__setattr__(self, "offset", self._checked_offset(count))
         object.__setattr__(self, "muscle_azimuths", self._checked_azimuths())
         most = max(1, 2 * MOST_SECTIONS // count)
@@ -151,7 +150,7 @@ class PccArm(XacroRobot):
         """
         lengths = numbers("segment_lengths", fields.get("segment_lengths", cls.segment_lengths), None, "m")
         if not lengths:
-            raise ParameterError("segment_lengths", lengths, "at least one segment length [m]")
+            raise ParameterError("segment_lengths", lengths, "at least one length [m]")
         stiffness = {}
         for name, field, value, unit in (
             ("bending", "bending_stiffness", bending, "N m/rad"),
