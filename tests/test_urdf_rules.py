@@ -164,8 +164,8 @@ def test_what_carries_a_robot_of_ours_is_not_ours() -> None:
     whole = mounted_by_hand(light)
     findings = {finding.what: finding for finding in check_rules(whole)}
     assert all(finding.ok for finding in findings.values()), findings
-    assert "the root is bottom; a link world without mass is required (third-party robot)" in findings[ROOT].remarks
-    assert "joint shoulder is continuous; revolute, prismatic or fixed is required (third-party robot)" in findings[JOINTS].remarks
+    assert "the root is bottom; a link world without mass is required (third-party)" in findings[ROOT].remarks
+    assert "joint shoulder is continuous; revolute, prismatic or fixed is required (third-party)" in findings[JOINTS].remarks
     hinge = re.search(r'<link name="hinge_1">.*?<mass value="([^"]*)"', whole, re.S)
     spoiled = whole[: hinge.start(1)] + "0.0" + whole[hinge.end(1) :]
     assert broken(spoiled) == {MASSES: ("link hinge_1 has the mass 0.0 kg; more than 1e-06 kg is required",)}

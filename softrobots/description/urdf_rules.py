@@ -63,7 +63,7 @@ def check_rules(urdf: str, source: str = "the URDF") -> tuple[Finding, ...]:
         broken = list(rule(document))
         problems = tuple(text for subject, text in broken if subject not in foreign)
         findings.append(
-            Finding(what, problems, tuple(f"{text} (third-party robot)" for subject, text in broken if subject in foreign))
+            Finding(what, problems, tuple(f"{text} (third-party)" for subject, text in broken if subject in foreign))
         )
     return tuple(findings)
 
