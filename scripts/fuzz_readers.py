@@ -135,13 +135,13 @@ def one_case(arguments: argparse.Namespace) -> bool:
 
 def given_files(arguments: argparse.Namespace) -> bool:
     """Read given files in this process, within the limits; imports count towards the first file that needs them."""
-    asked = [(name, Path(file)) for name, _, file in (word.partition(":") for word in arguments.read)]
-    for name, file in asked:
+    files = [(name, Path(file)) for name, _, file in (word.partition(":") for word in arguments.read)]
+    for name, file in files:
         if name not in READERS or not str(file):
             raise sr.ParameterError("--read", f"{name}:{file}", f"READER:FILE with one of {', '.join(READERS)}")
     limit_memory(arguments.megabytes)
     defects = 0
-    for name, file in asked:
+    for name, file in files:
         signal.setitimer(signal.ITIMER_PROF, arguments.seconds)
         outcome = tried(READERS[name], file)
         signal.setitimer(signal.ITIMER_PROF, 0.0)

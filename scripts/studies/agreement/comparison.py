@@ -45,14 +45,14 @@ def compare(study: Study, progress: Callable[[Sequence[Any]], Any], *, mujoco: b
             theirs = [mujoco_pose(one, robot) for one in found]
             in_mujoco.append({"n": n, **errors([form.axes.T @ one @ form.axes for one in theirs], exact)})
             apart.append({"n": n, **errors(theirs, ours)})
-    result["forms"] = {name: made(row) for name, row in rows.items()}
+    result["forms"] = {name: with_orders(row) for name, row in rows.items()}
     if apart:
-        result["mujoco"] = {"of": study.mujoco, **made(in_mujoco), "apart": apart}
+        result["mujoco"] = {"of": study.mujoco, **with_orders(in_mujoco), "apart": apart}
     return result
 
 
 def fits(robot: Any) -> bool:
-    """Whether Pinocchio's workspace is made for so many joints."""
+    """Whether Pinocchio supports the number of joints."""
     return isinstance(robot, sr.InflatableArm) or robot.n_joints <= MAX_DOF
 
 
@@ -63,8 +63,8 @@ def errors(found: Poses, exact: Poses) -> dict[str, float]:
     return {"error_m": mean, "largest_m": largest, "error_rad": angle, "largest_rad": largest_angle}
 
 
-def made(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Rows with the order between the last two."""
+def with_orders(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return rows with the order of convergence between the last two."""
     orders = {}
     if len(rows) > 1:
         last, ratio = rows[-2:], math.log(rows[-1]["n"] / rows[-2]["n"])

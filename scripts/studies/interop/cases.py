@@ -1,7 +1,8 @@
 """The cases on which simulators must agree with Pinocchio: three robots in five poses each, gravity off and on, a tip force.
 
 Loads stay within wrinkling. A pose of the inflatable arm is a set of motor angles; of the arm of muscles, a set of muscle
-lengths, held by the tensions that this needs; the helical tube has no motors, so its five poses are five tubes.
+lengths, given to simulators as the tensions of the equilibrium; the helical tube has no motors, so its five poses are five
+tubes.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
 
 TOLERANCE = 1e-13
-"""Relative residual of Pinocchio's equilibria here: far below what is compared."""
+"""Relative residual of Pinocchio's equilibria, far below the compared differences."""
 
 FORCES: Mapping[str, tuple[float, float, float]] = {
     "inflatable_arm": (0.0, 8.0, -6.0),
@@ -57,10 +58,10 @@ TUBES: Mapping[str, Mapping[str, float | str]] = {
     "wide": {"contraction": 0.8},
     "steep": {"angle": math.radians(10.0)},
 }
-"""What differs from the default helical tube."""
+"""Differences from the default helical tube."""
 
 WELDED = "welded"
-"""What exporters are told of the motors: they stand still."""
+"""Option of the exporters: motor joints are fixed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ class EquilibriumCase:
     """A robot, its motors and its load, with Pinocchio's answer."""
 
     robot: str
-    """Name of the robot, as of its URDF file."""
+    """Name of the robot and its URDF file."""
     pose: str
     """Name of the pose."""
     expected: Equilibrium
@@ -102,10 +103,10 @@ class EquilibriumCase:
         return {name: float(self.expected.q[place]) for name, place in places.items()}
 
     def difference(self, joints: Mapping[str, float]) -> float:
-        """Largest difference of joint coordinates from Pinocchio's [rad or m].
+        """Return the largest difference of joint coordinates from Pinocchio's [rad or m].
 
         Args:
-            joints: What a tool says, by joint name; every spring joint and nothing else.
+            joints: Coordinate by name of every spring joint and of no other.
 
         Raises:
             ParameterError: If the joints are others.

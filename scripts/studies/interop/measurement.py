@@ -30,11 +30,11 @@ def measure(arguments: argparse.Namespace) -> Results:
     missing = [name for name in arguments.tools or () if TOOLS[name].version is None]
     if missing:
         raise sr.MissingDependency(TOOLS[missing[0]].package, TOOLS[missing[0]].extra)
-    asked = arguments.tools or [name for name, tool in TOOLS.items() if tool.version is not None]
-    simulators = [name for name in SIMULATORS if name in asked]
+    tools = arguments.tools or [name for name, tool in TOOLS.items() if tool.version is not None]
+    simulators = [name for name in SIMULATORS if name in tools]
     if arguments.equilibrium_only and not simulators:
         requirement = f"tools with one of {', '.join(SIMULATORS)} among them: the others have no statics"
-        raise sr.ParameterError("--tools", asked, requirement)
+        raise sr.ParameterError("--tools", tools, requirement)
     if arguments.kinematics_only and (arguments.no_simulation or arguments.poses != POSES or arguments.robots != list(ROBOTS)):
         raise sr.ParameterError("--kinematics-only", True, "given without --robots, --poses and --no-simulation")
     results: Results = {"springs": [], "equilibrium": [], "kinematics": []}
@@ -48,7 +48,7 @@ def measure(arguments: argparse.Namespace) -> Results:
                 results["equilibrium"].append(dataclasses.asdict(row) | {"agrees": row.agrees})
     if not arguments.equilibrium_only:
         for file in tqdm(sorted(urdf_folder().glob("*.urdf")), desc="kinematics", unit="file"):
-            rows = compare_kinematics(file, asked)
+            rows = compare_kinematics(file, tools)
             results["kinematics"] += [dataclasses.asdict(row) | {"agrees": row.agrees} for row in rows]
     return results
 

@@ -1,6 +1,6 @@
 """Newton's method on the generalised forces that another tool computes, with a tangent by central differences.
 
-Nothing in it knows a robot: it finds where a function vanishes.
+It knows nothing of robots: it finds the zero of a function.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def balance_point(balance: Callable[[FloatArray], FloatArray], start: FloatArray
         Coordinates, shape (n,), after a step of at most `SMALLEST`; and the iterations.
 
     Raises:
-        NotConverged: If the steps do not get so small; `best` is where it ended, shape (n,).
+        NotConverged: If the steps do not become that small; `best` is the last iterate, shape (n,).
     """
     q, iteration = start.copy(), 0
     for iteration in range(1, most + 1):

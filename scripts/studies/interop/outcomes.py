@@ -1,4 +1,4 @@
-"""What a simulator is asked and what it answers, in the same form for all of them."""
+"""Input and output of a simulator, in the same form for all of them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from studies.interop.cases import Gravity
 
 SECONDS = 60.0
-"""How long a simulation lasts [s]."""
+"""Duration of a simulation [s]."""
 
 
 class Question(NamedTuple):
@@ -24,15 +24,15 @@ class Question(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Where a simulator says that the robot comes to rest."""
+    """Equilibrium of a simulator."""
 
     joints: dict[str, float]
-    """Coordinate of every joint that moves [rad or m]."""
+    """Coordinate of every movable joint [rad or m]."""
     speed: float
     """Largest speed of a joint there [rad/s or m/s]; 0 if it was not simulated."""
     contacts: int
-    """Most contacts that were seen."""
+    """Largest number of contacts."""
     steps: int
     """Iterations of Newton's method, or time steps."""
     wall_time: float
-    """How long the computation took, without loading the file [s]."""
+    """Time of the computation, without loading the file [s]."""

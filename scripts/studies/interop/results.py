@@ -61,10 +61,10 @@ def read_results(path: Path) -> Results:
 
 def write_docs(results: Results, checkout: Path) -> list[Path]:
     """Write results, picture and tables into a checkout; return the files."""
-    asked = {row["tool"] for row in results["equilibrium"]}, {row["tool"] for row in results["kinematics"]}
+    tools = {row["tool"] for row in results["equilibrium"]}, {row["tool"] for row in results["kinematics"]}
     cases = {(row["robot"], row["pose"], row["gravity"]) for row in results["equilibrium"]}
     simulated = all(row["simulated_difference"] is not None for row in results["equilibrium"])
-    if asked != (set(SIMULATORS), set(TOOLS)) or len(cases) != 2 * POSES * len(ROBOTS) or not simulated:
+    if tools != (set(SIMULATORS), set(TOOLS)) or len(cases) != 2 * POSES * len(ROBOTS) or not simulated:
         raise sr.ParameterError("--docs", str(checkout), "given for results of all tools, robots and poses, simulated")
     try:
         page = (checkout / PAGE).read_text(encoding="utf-8")

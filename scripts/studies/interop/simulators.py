@@ -1,4 +1,4 @@
-"""The simulators that are asked for the equilibrium: what each gets, how, and how near it must come to Pinocchio."""
+"""The simulators: the exported file, how each loads it, and the tolerance against Pinocchio."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ SIMULATED_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Simulator:
-    """A tool that knows springs, or is told of them."""
+    """A simulator with joint springs, its own or as torques."""
 
     name: str
-    """What it is called, as of `softrobots.cli.tools.known_tools.TOOLS`."""
+    """Name in `softrobots.cli.tools.known_tools.TOOLS`."""
     how: str
-    """What it gets from us and how it loads it."""
+    """The exported file, and how it is loaded."""
     simulated: str
-    """How it simulates."""
+    """Settings of the simulation."""
     export: Callable[[EquilibriumCase], str]
-    """Writes what it gets."""
+    """Writes the file."""
     static: Callable[[Question], Outcome] | None
-    """Where its own forces balance; None if it does not tell them."""
+    """Finds where its own forces balance; None if it does not expose them."""
     simulate: Callable[[Question], Outcome]
-    """Where its simulation comes to rest."""
+    """Simulates until rest."""
     static_tolerance: float = STATIC_TOLERANCE
-    """Largest difference of the first [rad or m]."""
+    """Tolerance of `static` [rad or m]."""
     simulated_tolerance: float = SIMULATED_TOLERANCE
-    """Largest difference of the second [rad or m]."""
+    """Tolerance of `simulate` [rad or m]."""
 
     @property
     def version(self) -> str | None:
@@ -81,7 +81,7 @@ SIMULATORS: Mapping[str, Simulator] = {simulator.name: simulator for simulator i
 
 @dataclass(frozen=True)
 class EquilibriumRow:
-    """What a simulator makes of a case."""
+    """Result of a simulator for a case."""
 
     tool: str
     """Name of the simulator."""
@@ -94,23 +94,23 @@ class EquilibriumRow:
     gravity: bool
     """Whether there is gravity."""
     static_difference: float | None = None
-    """Largest difference from Pinocchio where its forces balance [rad or m]; None if it was not asked or does not tell."""
+    """Largest difference from Pinocchio where its forces balance [rad or m]; None if not computed."""
     static_time: float | None = None
-    """How long that took [s]."""
+    """Time of that [s]."""
     simulated_difference: float | None = None
-    """Largest difference from Pinocchio after the simulation [rad or m]; None if it was not asked."""
+    """Largest difference from Pinocchio after the simulation [rad or m]; None if not computed."""
     simulated_time: float | None = None
-    """How long that took [s]."""
+    """Time of that [s]."""
     final_speed: float | None = None
-    """Largest speed of a joint at its end [rad/s or m/s]."""
+    """Largest speed of a joint at the end of the simulation [rad/s or m/s]."""
     contacts: int | None = None
-    """Most contacts that were seen."""
+    """Largest number of contacts."""
     problem: str = ""
-    """Why it has no answer; empty if it has."""
+    """Why there is no answer; empty if there is one."""
 
     @property
     def agrees(self) -> bool:
-        """Whether it answers, and comes as near to Pinocchio as it must."""
+        """Whether there is an answer within the tolerance."""
         simulator = find_simulator(self.tool)
         pairs = (
             (self.static_difference, simulator.static_tolerance),
@@ -120,7 +120,7 @@ class EquilibriumRow:
 
 
 def find_simulator(name: str) -> Simulator:
-    """The simulator of that name.
+    """Return the simulator of a name.
 
     Raises:
         NameNotFound: If there is none.
@@ -131,18 +131,18 @@ def find_simulator(name: str) -> Simulator:
 
 
 def compare_equilibrium(case: EquilibriumCase, tool: str, *, static: bool = True, simulated: bool = True) -> EquilibriumRow:
-    """Ask a simulator for the equilibrium of a case.
+    """Compare a simulator's equilibrium of a case with Pinocchio's.
 
-    It gets the file that our exporter writes, and the force; nothing else of this package stands on its side.
+    The simulator gets the exported file and the force, and nothing else of this package.
 
     Args:
         case: The case.
         tool: Name of the simulator, of `SIMULATORS`.
-        static: Whether to ask where its forces balance.
+        static: Whether to find where its forces balance.
         simulated: Whether to simulate, which takes seconds.
 
     Returns:
-        What it says, beside Pinocchio's answer.
+        The differences from Pinocchio.
 
     Raises:
         NameNotFound: If there is no such simulator.
@@ -154,18 +154,18 @@ def compare_equilibrium(case: EquilibriumCase, tool: str, *, static: bool = True
     row = EquilibriumRow(tool, str(simulator.version), case.robot, case.pose, case.gravity is not None)
     try:
         if static and simulator.static is not None:
-            found = simulator.static(question)
+            outcome = simulator.static(question)
             row = replace(
-                row, static_difference=case.difference(found.joints), static_time=found.wall_time, contacts=found.contacts
+                row, static_difference=case.difference(outcome.joints), static_time=outcome.wall_time, contacts=outcome.contacts
             )
         if simulated:
-            found = simulator.simulate(question)
+            outcome = simulator.simulate(question)
             row = replace(
                 row,
-                simulated_difference=case.difference(found.joints),
-                simulated_time=found.wall_time,
-                final_speed=found.speed,
-                contacts=found.contacts,
+                simulated_difference=case.difference(outcome.joints),
+                simulated_time=outcome.wall_time,
+                final_speed=outcome.speed,
+                contacts=outcome.contacts,
             )
     except NotConverged as error:
         return replace(row, problem=str(error))

@@ -1,4 +1,4 @@
-"""The robots and loads of the soak: random, and hard on purpose."""
+"""The robots and loads of the soak: random and deliberately hard ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from softrobots.statics.loads import EARTH_GRAVITY
 from studies.soak.plain_statics import Case
 
 LARGEST_FORCE = 1000.0
-"""Forces go from 0 to here [N]."""
+"""Largest force [N]."""
 
 RATIOS = (1e-3, 1e6)
 """Stiffness of a spring over that of the paper's arm or of the rod."""
@@ -37,28 +37,28 @@ class Family:
     """Cases of one kind."""
 
     name: str
-    """What it is called at the command line."""
-    told: str
-    """What it is, for the table."""
+    """Name at the command line."""
+    description: str
+    """Description in the table."""
     job: str
-    """What is asked, one of `studies.soak.jobs.JOBS`."""
+    """Solver call, one of `studies.soak.jobs.JOBS`."""
     share: float
-    """Part of all cases; those of all families make 1."""
+    """Share of all cases; the shares add up to 1."""
     chunk: int
-    """Cases of one robot."""
+    """Number of cases of one robot."""
     robot: Maker
     """Makes the robot of a chunk."""
     tangents: int = 1
-    """The tangent stiffness of one case in so many is made anew."""
+    """The tangent stiffness of one case in this number is computed again."""
     moments: bool = False
-    """Whether a moment turns the tip, too."""
+    """Whether a moment acts on the tip, too."""
     largest: float = LARGEST_FORCE
     """Largest force [N]."""
     compiler: bool = True
-    """Whether compiled solvers may use numba; for robots that change it takes too long."""
+    """Whether compiled solvers may use numba; compilation takes too long for robots that change."""
 
     def random(self, seed: int, chunk: int) -> Random:
-        """The generator of a chunk: the same in every run."""
+        """Return the generator of a chunk, the same in every run."""
         return np.random.default_rng([seed, zlib.crc32(self.name.encode()), chunk])
 
 
@@ -68,10 +68,10 @@ def draw_cases(family: Family, model: SoftModel, random: Random) -> Case:
     Args:
         family: The family.
         model: The robot of the chunk.
-        random: The generator, behind the robot.
+        random: The generator, after the robot was drawn.
 
     Returns:
-        As many cases as a chunk has.
+        The cases of a chunk.
     """
     n = family.chunk
     motors = np.array([draw_motors(model, random) for _ in range(n)]).reshape(n, model.n_motors)
@@ -84,7 +84,7 @@ def draw_cases(family: Family, model: SoftModel, random: Random) -> Case:
 
 
 def draw_motors(model: SoftModel, random: Random) -> FloatArray:
-    """Actuators: anywhere, at rest, with the elbow straight or folded, or with the tip on the axis of the first motor."""
+    """Draw actuator coordinates: anywhere, at rest, elbow straight or folded, or tip on the axis of the first motor."""
     joints = len(model.structure.motor_joints)
     result = np.array(model.relaxed_motors)
     kind = random.integers(6)
@@ -102,13 +102,13 @@ def draw_motors(model: SoftModel, random: Random) -> FloatArray:
         result[joints - 1] = random.choice([-1.0, 1.0]) * (math.pi - random.choice([0.0, 1e-9, 1e-3]))
     if kind == 4 and joints > 1:  # upright: the tip is on the axis of motor 1
         result[1], result[2:joints] = random.choice([-0.5, 0.5]) * math.pi, 0.0
-    if kind == 5 and joints == 3:  # bent, and on the axis all the same: links of equal length
+    if kind == 5 and joints == 3:  # bent, with the tip on the axis: links of equal length
         result[2] = (math.pi - 2.0 * result[1] + math.pi) % (2.0 * math.pi) - math.pi
     return result
 
 
 def _size(random: Random, largest: float) -> float:
-    """Nothing, next to nothing, or anything up to the largest."""
+    """Draw a size: zero, tiny, or anything up to the largest."""
     kind = random.integers(8)
     if kind == 0:
         return 0.0
@@ -116,7 +116,7 @@ def _size(random: Random, largest: float) -> float:
 
 
 def _direction(random: Random) -> FloatArray:
-    """Anywhere, along an axis, or next to one."""
+    """Draw a direction: anywhere, along an axis, or close to one."""
     kind = random.integers(6)
     result = random.normal(size=3)
     if kind < 2:

@@ -1,4 +1,4 @@
-"""What is asked of the solvers in a soak, and what they say."""
+"""The solver calls of a soak, and their answers."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from studies.soak.families import Family
 from studies.soak.plain_statics import Case, PlainStatics
 
 SECONDS = 30.0
-"""A call that takes longer counts as one that hangs [s]."""
+"""A call that takes longer counts as a hang [s]."""
 
 STABLE, UNSTABLE = "stable", "not stable"
-"""Outcomes of answers: certified stable, or in balance and said not to be stable."""
+"""Outcomes: certified stable, or in equilibrium and reported as not stable."""
 
 STARTS = 4
-"""Searches of an inverse kinematics."""
+"""Number of starts of an inverse kinematics."""
 
-_TOGETHER = 900.0  # seconds for a batch, with what numba takes for a robot that is new to it
-_ODD = 10  # every so many cases get torques that may come from no force, or a target that may be out of reach
+_BATCH_SECONDS = 900.0  # [s], for a batch, with the compilation by numba
+_ODD = 10  # every tenth case has torques that no force may explain, or a target that may be out of reach
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a solver said of a case."""
+    """Answer of a solver to a case."""
 
     row: int
     """Row of the case in its chunk."""
@@ -47,26 +47,26 @@ class Answer:
     springs: FloatArray | None = None
     """Elastic coordinates; None without an answer."""
     changed: dict[str, FloatArray] = field(default_factory=dict)
-    """What the solver sought of the case: "motors" or "forces"."""
+    """Unknowns of the case that the solver found: "motors" or "forces"."""
     claims: dict[str, FloatArray] = field(default_factory=dict)
-    """What must be true of it: "motor_torques", and "tip", with how exactly in `within`."""
+    """Values to be confirmed: "motor_torques" and "tip", within `within`."""
     within: float = 1e-9
-    """How exactly the claims hold [m or N m]."""
+    """Largest error of the claims [m or N m]."""
     iterations: int = 0
-    """What it took."""
+    """Number of iterations."""
     seconds: float = 0.0
-    """How long it took [s]."""
+    """Time [s]."""
     broken: str = ""
-    """The law that is broken already."""
+    """Law that the answer itself breaks; empty if none."""
 
 
 class Hang(BaseException):
-    """A call that takes too long; nobody but us catches it."""
+    """A call that takes too long; derived from `BaseException` so that no solver catches it."""
 
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Interrupt what takes too long, in the main thread of a process."""
+    """Interrupt a block that takes too long; main thread only."""
 
     def stop(number: int, frame: Any) -> None:
         raise Hang
@@ -80,32 +80,32 @@ def limited(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def _asked(row: int, ask: Callable[[int], dict[str, Any]]) -> Answer:
-    """Ask a solver about one case; whatever it raises becomes part of the answer."""
+def _answer(row: int, solve_case: Callable[[int], dict[str, Any]]) -> Answer:
+    """Solve one case; an error becomes part of the answer."""
     begun = time.perf_counter()
     try:
         with limited(SECONDS):
-            said = ask(row)
+            fields = solve_case(row)
     except Hang:
-        said = {"outcome": "hang", "broken": f"no answer after {SECONDS:g} s"}
+        fields = {"outcome": "hang", "broken": f"no answer after {SECONDS:g} s"}
     except SoftRobotsError as error:
-        said = {"outcome": type(error).__name__, "broken": _wrong_error(error)}
+        fields = {"outcome": type(error).__name__, "broken": _wrong_error(error)}
         if isinstance(error, NotConverged):
-            said["iterations"] = error.iterations
+            fields["iterations"] = error.iterations
     except Exception as error:
-        said = {"outcome": type(error).__name__, "broken": f"{type(error).__name__} is no error of softrobots: {error}"}
-    return Answer(row, seconds=time.perf_counter() - begun, **said)
+        fields = {"outcome": type(error).__name__, "broken": f"{type(error).__name__} is no error of softrobots: {error}"}
+    return Answer(row, seconds=time.perf_counter() - begun, **fields)
 
 
 def _wrong_error(error: SoftRobotsError) -> str:
-    """What is wrong with an error; nothing by default."""
+    """Return what is wrong with an error; an empty text if nothing is."""
     if not isinstance(error, NotConverged):
         return ""
     best = error.best
     if isinstance(best, IkSolution | LoadEstimate):
         best = best.equilibrium
     if not isinstance(best, Equilibrium):
-        return "the error carries no best iterate"
+        return "the error has no best iterate"
     numbers = (best.q_springs, best.q_motors, best.tip_position, best.residual, error.residual)
     return "" if all(np.all(np.isfinite(one)) for one in numbers) else "the best iterate of the error is not finite"
 
@@ -118,7 +118,7 @@ def _wrench(case: Case, row: int) -> FloatArray:
     return np.concatenate([case.forces[row], case.moments[row]])
 
 
-def _told(found: Equilibrium, iterations: int) -> dict[str, Any]:
+def _fields(found: Equilibrium, iterations: int) -> dict[str, Any]:
     numbers = (found.q_springs, found.q, found.spring_torques, found.motor_torques, found.tangent_stiffness, found.tip_position)
     broken = "" if all(np.isfinite(one).all() for one in numbers) else "a number that is not finite"
     torques = found.motor_torques[: len(found.model.structure.motor_joints)]
@@ -134,17 +134,17 @@ def _told(found: Equilibrium, iterations: int) -> dict[str, Any]:
 def solve(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
     """Equilibria one by one."""
 
-    def ask(row: int) -> dict[str, Any]:
+    def solve_case(row: int) -> dict[str, Any]:
         found = solve_equilibrium(statics.model, case.motors[row], wrench=_wrench(case, row), gravity=_gravity(case, row))
-        return _told(found, found.iterations)
+        return _fields(found, found.iterations)
 
-    return [_asked(row, ask) for row in rows]
+    return [_answer(row, solve_case) for row in rows]
 
 
 def estimate(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
-    """The load from the motor torques that it makes, or from some."""
+    """Loads from motor torques: those of an equilibrium, or random ones."""
 
-    def ask(row: int) -> dict[str, Any]:
+    def solve_case(row: int) -> dict[str, Any]:
         motors, gravity = case.motors[row], _gravity(case, row)
         torques = solve_equilibrium(statics.model, motors, case.forces[row], gravity=gravity, tolerance=1e-13).motor_torques
         if row % _ODD == 0:
@@ -152,34 +152,34 @@ def estimate(family: Family, statics: PlainStatics, case: Case, rows: Sequence[i
         found = estimate_load(statics.model, motors, torques, gravity=gravity)
         size = 1e-10 * max(float(np.linalg.norm(torques)), 1e-3)
         hidden = len(found.unobservable_directions) > 0
-        text = _told(found.equilibrium, found.iterations)
-        text["claims"] = {"tip": found.equilibrium.tip_position} | ({} if hidden else {"motor_torques": torques})
-        return text | {"changed": {"forces": found.force}, "within": 1e-9 + 2.0 * size}
+        fields = _fields(found.equilibrium, found.iterations)
+        fields["claims"] = {"tip": found.equilibrium.tip_position} | ({} if hidden else {"motor_torques": torques})
+        return fields | {"changed": {"forces": found.force}, "within": 1e-9 + 2.0 * size}
 
-    return [_asked(row, ask) for row in rows]
+    return [_answer(row, solve_case) for row in rows]
 
 
 def _target(statics: PlainStatics, case: Case, row: int) -> FloatArray:
-    """A point that the tip can reach, if the robot settles there; or some point."""
+    """A point that the tip can reach at an equilibrium, or a random one."""
     found = solve_equilibrium(statics.model, case.motors[row], case.forces[row], gravity=_gravity(case, row))
     away = np.random.default_rng(row).normal(size=3) if row % _ODD == 0 else np.zeros(3)
     return found.tip_position + away
 
 
 def reach(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
-    """Motors that put the tip somewhere."""
+    """Inverse kinematics one by one."""
 
-    def ask(row: int) -> dict[str, Any]:
+    def solve_case(row: int) -> dict[str, Any]:
         target = _target(statics, case, row)
         found = solve_ik(statics.model, target, case.forces[row], gravity=_gravity(case, row), starts=STARTS)
-        text = _told(found.equilibrium, found.iterations)
-        text["claims"]["tip"] = target
+        fields = _fields(found.equilibrium, found.iterations)
+        fields["claims"]["tip"] = target
         low, high = statics.model.motor_limits.T
         if np.any((found.q_motors < low) | (found.q_motors > high)):
-            text["broken"] = "a motor beyond its limits"
-        return text | {"changed": {"motors": found.q_motors}, "within": 2e-9}
+            fields["broken"] = "a motor beyond its limits"
+        return fields | {"changed": {"motors": found.q_motors}, "within": 2e-9}
 
-    return [_asked(row, ask) for row in rows]
+    return [_answer(row, solve_case) for row in rows]
 
 
 @lru_cache(maxsize=8)
@@ -187,13 +187,18 @@ def _compiled(model: SoftModel, compiler: bool) -> CompiledModel:
     return compile_model(model, backend=None if compiler else "python")
 
 
-Ask = Callable[[CompiledModel, Any, FloatArray | None], Any]
+SolveBatch = Callable[[CompiledModel, Any, FloatArray | None], Any]
 
 
-def _asked_together(
-    family: Family, statics: PlainStatics, case: Case, rows: Sequence[int], ask: Ask, text: Callable[..., dict[str, Any]]
+def _batch_answers(
+    family: Family,
+    statics: PlainStatics,
+    case: Case,
+    rows: Sequence[int],
+    solve_batch: SolveBatch,
+    fields: Callable[..., dict[str, Any]],
 ) -> list[Answer]:
-    """Ask a batch of the cases with weight, and one of those without."""
+    """Solve a batch of the cases with gravity, and one of those without."""
     result: list[Answer] = []
     chosen = np.array(rows)
     heavy = case.gravity[chosen].any(axis=1)
@@ -203,26 +208,26 @@ def _asked_together(
             continue
         begun = time.perf_counter()
         try:
-            with limited(_TOGETHER):
-                batch = ask(_compiled(statics.model, family.compiler), part, case.gravity[part[0]] if weight else None)
+            with limited(_BATCH_SECONDS):
+                batch = solve_batch(_compiled(statics.model, family.compiler), part, case.gravity[part[0]] if weight else None)
         except (Exception, Hang) as error:
             result += [Answer(row, type(error).__name__, broken=f"a batch raises {error!r}") for row in part.tolist()]
             continue
         seconds = (time.perf_counter() - begun) / len(part)
-        errors = ("residual", "unexplained", "tip_error")  # infinite where there is no answer
+        errors = ("residual", "unexplained", "tip_error")  # infinite if there is no answer
         for place, row in enumerate(part.tolist()):
             certified = bool(batch.certified[place])
             numbers = [np.asarray(getattr(batch, name))[place] for name in vars(batch) if certified or name not in errors]
             fine = all(np.isfinite(one).all() for one in numbers)
-            said = {"springs": batch.q_springs[place], **text(batch, place)} if certified else {}
+            found = {"springs": batch.q_springs[place], **fields(batch, place)} if certified else {}
             outcome = STABLE if certified else Status(int(batch.status[place])).name
-            result.append(Answer(row, outcome, seconds=seconds, broken="" if fine else "a number that is not finite", **said))
+            result.append(Answer(row, outcome, seconds=seconds, broken="" if fine else "a number that is not finite", **found))
     return result
 
 
 def batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
-    """Equilibria, compiled."""
-    return _asked_together(
+    """Equilibria in a batch, compiled."""
+    return _batch_answers(
         family,
         statics,
         case,
@@ -232,54 +237,54 @@ def batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]
     )
 
 
-def _settled(fast: CompiledModel, statics: PlainStatics, case: Case, part: Any, gravity: FloatArray | None) -> Any:
-    """Tips and motor torques of equilibria, by plain statics."""
+def _equilibrium_balance(fast: CompiledModel, statics: PlainStatics, case: Case, part: Any, gravity: FloatArray | None) -> Any:
+    """Balance at the equilibria of a batch, by plain statics."""
     found = fast.equilibria(case.motors[part], case.forces[part], gravity=gravity)
     return statics.balance(Case(*(array[part] for array in case)), found.q_springs)
 
 
 def estimate_batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
-    """Loads from motor torques, compiled."""
+    """Loads from motor torques in a batch, compiled."""
     measured = np.zeros((len(case.motors), statics.model.n_motors))
-    asked: list[int] = []
+    batch_rows: list[int] = []
 
-    def ask(fast: CompiledModel, part: Any, gravity: FloatArray | None) -> Any:
-        measured[part] = _settled(fast, statics, case, part, gravity).motor_torques
+    def solve_batch(fast: CompiledModel, part: Any, gravity: FloatArray | None) -> Any:
+        measured[part] = _equilibrium_balance(fast, statics, case, part, gravity).motor_torques
         for row in part[part % _ODD == 0].tolist():
             measured[row] += np.random.default_rng(row).normal(size=measured.shape[1]) * 10.0
-        asked[:] = part.tolist()
+        batch_rows[:] = part.tolist()
         return fast.estimate_loads(case.motors[part], measured[part], gravity=gravity)
 
-    def text(found: Any, place: int) -> dict[str, Any]:
-        torques = measured[asked[place]]
+    def fields(found: Any, place: int) -> dict[str, Any]:
+        torques = measured[batch_rows[place]]
         size = 1e-10 * max(float(np.linalg.norm(torques)), 1e-3)
         return {"claims": {"motor_torques": torques}, "changed": {"forces": found.forces[place]}, "within": 1e-9 + 2.0 * size}
 
-    return _asked_together(family, statics, case, rows, ask, text)
+    return _batch_answers(family, statics, case, rows, solve_batch, fields)
 
 
 def reach_batch(family: Family, statics: PlainStatics, case: Case, rows: Sequence[int]) -> list[Answer]:
-    """Motors that put the tip somewhere, compiled."""
+    """Inverse kinematics in a batch, compiled."""
     targets: dict[int, FloatArray] = {}
-    asked: list[int] = []
+    batch_rows: list[int] = []
 
-    def ask(fast: CompiledModel, part: Any, gravity: FloatArray | None) -> Any:
-        tips = _settled(fast, statics, case, part, gravity).tip
+    def solve_batch(fast: CompiledModel, part: Any, gravity: FloatArray | None) -> Any:
+        tips = _equilibrium_balance(fast, statics, case, part, gravity).tip
         for row, tip in zip(part.tolist(), tips, strict=True):
             targets[row] = tip + (np.random.default_rng(row).normal(size=3) if row % _ODD == 0 else 0.0)
-        asked[:] = part.tolist()
-        wanted = np.array([targets[row] for row in asked])
+        batch_rows[:] = part.tolist()
+        wanted = np.array([targets[row] for row in batch_rows])
         start = np.clip(case.motors[part] + 0.2, *statics.model.motor_limits.T)
         return fast.inverse_kinematics(wanted, case.forces[part], q_motors0=start, gravity=gravity)
 
-    return _asked_together(
+    return _batch_answers(
         family,
         statics,
         case,
         rows,
-        ask,
+        solve_batch,
         lambda found, place: {
-            "claims": {"tip": targets[asked[place]]},
+            "claims": {"tip": targets[batch_rows[place]]},
             "changed": {"motors": found.q_motors[place]},
             "within": 2e-9,
         },
@@ -289,4 +294,4 @@ def reach_batch(family: Family, statics: PlainStatics, case: Case, rows: Sequenc
 Job = Callable[[Family, PlainStatics, Case, Sequence[int]], list[Answer]]
 
 JOBS: dict[str, Job] = {job.__name__: job for job in (solve, batch, estimate, estimate_batch, reach, reach_batch)}
-"""By name."""
+"""The jobs by name."""

@@ -1,12 +1,11 @@
-"""The statics once more, written plainly: what answers of the solvers are checked against.
+"""Independent statics, written plainly, to check answers of the solvers.
 
-Of a model it takes the rigid bodies (placements, axes, masses), the names and numbers of springs, sections and muscles as the
-description has them, and nothing of the solvers: forces and moments are summed up from the tip to the base, a section is the
+It takes from a model the rigid bodies (placements, axes, masses), the names and numbers of springs, sections and muscles as the
+description has them, and nothing of the solvers: forces and moments are summed from the tip to the base, a section is the
 matrix exponential of its strain, its joints come from that pose by the formulas of
 `softrobots.constant_curvature.strain_chain`, and derivatives of those are complex steps. Where muscle lengths are given,
-strains come from the model's elastic coordinates as the solvers have them; whether these keep the lengths, and whether all that
-the lengths leave free is in balance, is seen by the rows of the muscles here. Whole batches of cases are worked on at once;
-there is no limit to the number of joints.
+strains come from the model's elastic coordinates; the lengths, and the balance of what they leave free, are checked with the
+muscle rows of this module. Whole batches of cases are evaluated at once, for any number of joints.
 """
 
 from __future__ import annotations
@@ -180,7 +179,7 @@ class PlainStatics:
         residual = self.balance(case.repeated(2 * count), around).residual
         return np.asarray((residual[:count] - residual[count:]).T / (2.0 * _STEP))
 
-    def softest(self, case: Case, springs: FloatArray) -> tuple[float, float]:
+    def least_eigenvalue(self, case: Case, springs: FloatArray) -> tuple[float, float]:
         """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, and how exact it is.
 
         Args:

@@ -1,4 +1,4 @@
-"""A soak from beginning to end: the cases spread over processes, and the table of what came of them."""
+"""Run a soak in several processes, and format its table."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.core.progress import with_progress
 from studies.soak.families import FAMILIES, Family, draw_cases
 from studies.soak.jobs import STABLE, UNSTABLE
-from studies.soak.verdicts import Tally, judge, said
+from studies.soak.verdicts import Tally, case_text, judge
 
-_AHEAD = 4  # parts that wait for each process
+_AHEAD = 4  # parts queued for each process
 PATIENCE = 1800.0
-"""When no part has been done for so long, compiled code hangs, which nothing in its process interrupts [s]."""
+"""If no part is done for this time, compiled code hangs, which its process cannot interrupt [s]."""
 
 
 class Part(NamedTuple):
@@ -29,11 +29,11 @@ class Part(NamedTuple):
     chunk: int
     """Number of the chunk."""
     rows: int
-    """How many of its rows, from the first."""
+    """Number of rows, from the first."""
 
 
 def family_of(name: str) -> Family:
-    """The family of a name.
+    """Return the family of a name.
 
     Raises:
         NameNotFound: If there is none.
@@ -52,7 +52,7 @@ def parts_of(cases: int, families: Sequence[Family]) -> list[Part]:
         families: The families.
 
     Returns:
-        The parts, dear ones first, so that no process ends long after the others.
+        The parts, the expensive ones first, so that all processes end at about the same time.
     """
     whole = sum(family.share for family in families)
     result: list[Part] = []
@@ -75,9 +75,9 @@ def soak(
     """Solve random cases and check every answer.
 
     Args:
-        cases: About how many.
-        seed: Of all random numbers.
-        processes: How many work on it; 1 stays in this one.
+        cases: Approximate number of cases.
+        seed: Seed of all random numbers.
+        processes: Number of processes; 1 is this one.
         families: The families.
         compiler: Whether compiled solvers may use numba.
         progress: Whether to show a progress bar.
@@ -101,25 +101,25 @@ def soak(
 
 
 def _each_row(done: Iterator[tuple[Part, Tally]], progress: bool) -> Iterator[tuple[Part | None, Tally]]:
-    """Parts as they come; for a progress bar one step for every case."""
+    """Yield the parts as they are done, and for a progress bar one item per case."""
     for part, tally in done:
         yield part, tally
         for _ in range(part.rows - 1 if progress else 0):
             yield None, tally
 
 
-def _judged(parts: Sequence[Part], processes: int, *asked: Any) -> Iterator[tuple[Part, Tally]]:
-    """The parts with their counts, as they are done."""
+def _judged(parts: Sequence[Part], processes: int, *arguments: Any) -> Iterator[tuple[Part, Tally]]:
+    """Yield the parts with their tallies as they are done."""
     if processes == 1:
         for part in parts:
-            yield part, _judge_part(part, *asked)
+            yield part, _judge_part(part, *arguments)
         return
     waiting, running = iter(parts), dict[Future[Tally], Part]()
     others = set(multiprocessing.active_children())
     with ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         while True:
             for part in waiting:
-                running[pool.submit(_judge_part, part, *asked)] = part
+                running[pool.submit(_judge_part, part, *arguments)] = part
                 if len(running) >= _AHEAD * processes:
                     break
             if not running:
@@ -135,7 +135,7 @@ def _judged(parts: Sequence[Part], processes: int, *asked: Any) -> Iterator[tupl
 
 
 def _hanging(running: Mapping[Future[Tally], Part]) -> Iterator[tuple[Part, Tally]]:
-    """A broken law for each part that processes had, or were to get, when they hung."""
+    """Yield a broken law for each part that was running or queued when the processes hung."""
     for part in running.values():
         law = (
             f"nothing was done for {PATIENCE:g} s: this case or one of the {part.rows} behind it hangs, and the soak ends here"
@@ -154,10 +154,10 @@ def again(name: str, number: int, *, seed: int = 0) -> tuple[Tally, str]:
     Args:
         name: Its family.
         number: Its number in the family, as the laws name it.
-        seed: Of all random numbers.
+        seed: Seed of all random numbers.
 
     Returns:
-        What came of it, and everything about it as text.
+        Its tally, and the case, answer and model as text.
 
     Raises:
         NameNotFound: If there is no such family.
@@ -170,18 +170,18 @@ def again(name: str, number: int, *, seed: int = 0) -> tuple[Tally, str]:
     tally, answers = judge(family, seed, chunk, [row])
     random = family.random(seed, chunk)
     model = family.robot(random)
-    return tally, said(model, draw_cases(family, model, random), answers)
+    return tally, case_text(model, draw_cases(family, model, random), answers)
 
 
 def table(tallies: Mapping[str, Tally]) -> str:
-    """The counts as Markdown."""
+    """Return the tallies as a Markdown table."""
     head = "| cases | number | certified stable | in balance, said not to be stable | errors | tangents made anew | "
     head += "residual over tolerance | most iterations | slowest [s] | laws broken |"
     lines = [head, "|---|" + "---:|" * 3 + "---|" + "---:|" * 5]
     whole = Tally()
     for name, tally in tallies.items():
         whole.add(tally)
-        lines.append(_row(family_of(name).told, tally))
+        lines.append(_row(family_of(name).description, tally))
     return "\n".join([*lines, _row("**all**", whole)])
 
 
@@ -203,7 +203,7 @@ def _row(text: str, tally: Tally) -> str:
 
 
 def as_json(tallies: Mapping[str, Tally], *, seed: int) -> dict[str, Any]:
-    """The counts as JSON has them."""
+    """Return the tallies for JSON."""
     return {
         "seed": seed,
         "cases": sum(tally.cases for tally in tallies.values()),

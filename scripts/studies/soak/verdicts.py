@@ -1,4 +1,4 @@
-"""The laws that every answer in a soak must obey, and the count of what was found."""
+"""The laws that every answer of a soak must obey, and the count of outcomes."""
 
 from __future__ import annotations
 
@@ -19,37 +19,37 @@ from studies.soak.plain_statics import Case, PlainStatics
 MOST_ITERATIONS = 200
 """Largest number of evaluations, or of steps of a search."""
 
-ROOM = 1.01
-"""Largest residual over its tolerance; a hundredth is left for the rounding of the second evaluation."""
+MARGIN = 1.01
+"""Largest residual over its tolerance; 1 % allows for the rounding of the second evaluation."""
 
 WORST = 1e300
-"""Stands for a residual that is no number."""
+"""Value in place of a residual that is not a number."""
 
 LARGEST_TANGENT = 200
-"""Springs of the largest robot whose tangent stiffness is made anew: its differences take some seconds."""
+"""Largest number of springs for which the tangent stiffness is computed again, by differences."""
 
-HELD = 1e-9
+MUSCLE_ERROR = 1e-9
 """Largest distance of a muscle from its given length [m]."""
 
 
 @dataclass
 class Tally:
-    """What a family came to."""
+    """Outcomes of a family."""
 
     cases: int = 0
     """Number of cases."""
     outcomes: Counter[str] = field(default_factory=Counter)
-    """How many ended how."""
+    """Number of cases by outcome."""
     residual: float = 0.0
     """Largest residual over its tolerance, by plain statics."""
     tangents: int = 0
-    """How many tangent stiffnesses were made anew."""
+    """Number of tangent stiffnesses computed again."""
     iterations: int = 0
-    """Most iterations."""
+    """Largest number of iterations."""
     slowest: float = 0.0
-    """Longest time of a case [s]; of a batch, its part."""
+    """Longest time of a case [s]; in a batch, the mean."""
     seconds: float = 0.0
-    """Time of all in the solvers [s]."""
+    """Total time in the solvers [s]."""
     broken: list[tuple[int, str]] = field(default_factory=list)
     """Cases that break a law: number and law."""
 
@@ -65,18 +65,18 @@ class Tally:
         self.broken += other.broken
 
     def as_json(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the tally for JSON."""
         return {**vars(self), "outcomes": dict(sorted(self.outcomes.items()))}
 
 
 def judge(family: Family, seed: int, chunk: int, rows: Sequence[int]) -> tuple[Tally, list[Answer]]:
-    """Draw the cases of a chunk, solve some of them, and check what is said.
+    """Draw the cases of a chunk, solve some of them, and check the answers.
 
     Args:
         family: The family.
-        seed: Of all random numbers.
+        seed: Seed of all random numbers.
         chunk: Number of the chunk.
-        rows: The rows that are asked for.
+        rows: The rows to be solved.
 
     Returns:
         The count, and the answers.
@@ -92,10 +92,10 @@ def judge(family: Family, seed: int, chunk: int, rows: Sequence[int]) -> tuple[T
         tally.outcomes[answer.outcome] += 1
         tally.iterations = max(tally.iterations, answer.iterations)
         tally.slowest = max(tally.slowest, answer.seconds)
-        found = [answer.broken] if answer.broken else []
+        laws = [answer.broken] if answer.broken else []
         if answer.iterations > MOST_ITERATIONS:
-            found.append(f"{answer.iterations} iterations")
-        tally.broken += [(family.chunk * chunk + answer.row, text) for text in found]
+            laws.append(f"{answer.iterations} iterations")
+        tally.broken += [(family.chunk * chunk + answer.row, law) for law in laws]
     answered = [answer for answer in answers if answer.springs is not None]
     if answered:
         _check(tally, family, chunk, statics, case, answered)
@@ -105,37 +105,37 @@ def judge(family: Family, seed: int, chunk: int, rows: Sequence[int]) -> tuple[T
 def _check(tally: Tally, family: Family, chunk: int, statics: PlainStatics, case: Case, answers: list[Answer]) -> None:
     """Check answers against plain statics."""
     rows = [answer.row for answer in answers]
-    asked = Case(*(array[rows] for array in case))
+    answered = Case(*(array[rows] for array in case))
     for place, answer in enumerate(answers):
         for name, value in answer.changed.items():
-            getattr(asked, name)[place] = value
+            getattr(answered, name)[place] = value
     springs = np.array([answer.springs for answer in answers])
-    balance = statics.balance(asked, springs)
+    balance = statics.balance(answered, springs)
     tolerance = np.maximum(TOLERANCE * np.maximum(balance.size, MOMENT_FLOOR), statics.model.rounding)
     residual = np.maximum(balance.imbalance - balance.rounding, 0.0) / tolerance
     residual = np.nan_to_num(residual, nan=WORST, posinf=WORST)
     tally.residual = max(tally.residual, float(residual.max()))
     for place, answer in enumerate(answers):
         broken = []
-        if not residual[place] <= ROOM:
-            broken.append(f"said to be {answer.outcome}, {residual[place]:.3g} times the tolerance out of balance")
-        if not balance.held[place] <= HELD:
+        if not residual[place] <= MARGIN:
+            broken.append(f"reported as {answer.outcome}, {residual[place]:.3g} times the tolerance out of balance")
+        if not balance.held[place] <= MUSCLE_ERROR:
             broken.append(f"a muscle is {balance.held[place]:.3g} m from its length")
         for name, claim in answer.claims.items():
             error = float(np.abs(getattr(balance, name)[place] - claim).max(initial=0.0))
-            room = answer.within + (1e-12 * float(balance.size[place]) if name == "motor_torques" else 0.0)
-            if not error <= room:
+            allowed = answer.within + (1e-12 * float(balance.size[place]) if name == "motor_torques" else 0.0)
+            if not error <= allowed:
                 broken.append(f"the {name.replace('_', ' ')} is off by {error:.3g}")
         if answer.row % family.tangents == 0 and springs.shape[1] <= LARGEST_TANGENT and residual[place] < WORST:
             tally.tangents += 1
-            softest, error = statics.softest(asked.row(place), springs[place])
-            if (softest < -error) if answer.outcome == STABLE else (softest > error):
-                broken.append(f"said to be {answer.outcome}, least eigenvalue {softest:.3g} within {error:.1g}")
-        tally.broken += [(family.chunk * chunk + answer.row, text) for text in broken]
+            eigenvalue, error = statics.least_eigenvalue(answered.row(place), springs[place])
+            if (eigenvalue < -error) if answer.outcome == STABLE else (eigenvalue > error):
+                broken.append(f"reported as {answer.outcome}, least eigenvalue {eigenvalue:.3g} within {error:.1g}")
+        tally.broken += [(family.chunk * chunk + answer.row, law) for law in broken]
 
 
-def said(model: SoftModel, case: Case, answers: Sequence[Answer]) -> str:
-    """What is printed of cases that are run again."""
+def case_text(model: SoftModel, case: Case, answers: Sequence[Answer]) -> str:
+    """Return cases, answers and the model as text."""
     lines = [repr(model)]
     for answer in answers:
         lines += [f"{name}: {array[answer.row].tolist()}" for name, array in case._asdict().items()]
