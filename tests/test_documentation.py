@@ -1,6 +1,6 @@
 """The code of README.md and of the pages in docs/ runs and prints what they say; and the site shows every page and every name.
 
-The rules are told in `tests/documentation.py`.
+The rules are in `tests/support/documentation.py`.
 """
 
 from __future__ import annotations
@@ -344,6 +344,12 @@ def test_links_and_pictures_lead_somewhere() -> None:
             path = (CHECKOUT / name).parent / target
             assert path.exists(), f"{name}: {target}"
             assert path.suffix not in (".png", ".gif", ".webp") or path.stat().st_size > 10_000, f"{name}: {target}"
+
+
+@pytest.mark.parametrize("name", [*PAGES, "CONTRIBUTING.md"])
+def test_pages_name_files_that_exist(name: str) -> None:
+    for target in re.findall(r"`((?:tests|scripts|softrobots|docs|xacro|urdf)/[\w./*-]*)`", page_text(name)):
+        assert list(CHECKOUT.glob(target.rstrip("/"))) or target == "tests/test_x.py", f"{name}: {target}"
 
 
 def test_the_start_page_tells_every_extra() -> None:
