@@ -96,6 +96,8 @@ ROOMS = {
     "cli": "core inflated_beam constant_curvature helix description robots model statics compiled export view",
 }
 """Every folder of the package, and the rooms that it may import."""
+TO_CODE = ("trace", "chain", "drivers", "program", "c", "run", "sweeps")
+"""Folders of `compiled/` in the order in which a robot becomes code; each imports only those before it."""
 SOLVERS = "trajectory load_estimation imposed_displacement stability workspace post_buckling sensitivity"
 LOADING = "softrobots.model.loader softrobots.description.tag_reader softrobots.description.sources"
 SEPARATE = {
@@ -199,6 +201,16 @@ def test_rooms_import_only_the_rooms_below_them() -> None:
             assert other in {"", room, *ROOMS[room].split()}, f"{name} imports {source}: not in the table"
             assert other == room or not part.startswith("_") or part == "__version__", f"{name} imports {part} of {source}"
             assert not source.startswith("studies"), f"{name} imports {source}, which is not in the wheel"
+
+
+def test_a_robot_becomes_code_in_one_direction() -> None:
+    assert {path.name for path in (PACKAGE / "compiled").iterdir() if path.is_dir()} - {"__pycache__"} == set(TO_CODE)
+    for name in in_package():
+        if within(name, "softrobots.compiled") and name.count(".") > 2:
+            folder = name.split(".")[2]
+            others = {source.split(".")[2] for source in sources_of(name) if within(source, "softrobots.compiled")}
+            later = others & set(TO_CODE[TO_CODE.index(folder) + 1 :])
+            assert not later, f"{name} imports {later}"
 
 
 def test_no_room_and_no_module_is_too_large() -> None:

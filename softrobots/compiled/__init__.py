@@ -1,4 +1,4 @@
-"""Compiled solvers of serial chains: equilibria, loads and inverse kinematics, single and in batches."""
+"""Fast solvers of serial chains as generated code (trace -> chain -> drivers -> program -> c or run), and sweeps."""
 
 from softrobots.compiled.statuses import Status
 

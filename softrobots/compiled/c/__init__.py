@@ -1,1 +1,1 @@
-"""Generated modules as freestanding C99."""
+"""Translation of generated modules from the kernel language, a subset of Python, to freestanding C99."""

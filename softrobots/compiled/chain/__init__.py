@@ -1,1 +1,1 @@
-"""The statics of a serial chain, element by element, as traced expressions."""
+"""Statics of a chain in traced expressions: passes over its elements, elimination, Newton step, response of the tip."""

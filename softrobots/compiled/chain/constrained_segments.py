@@ -4,39 +4,37 @@ from __future__ import annotations
 
 from softrobots.compiled.chain.elements import vector
 from softrobots.compiled.chain.elimination import eliminate_multipliers
-from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout, load_outboard, sides, store_outboard
-from softrobots.compiled.chain.unknowns import Unknowns, compliances_of
+from softrobots.compiled.chain.looped_plan import LoopedPlan
+from softrobots.compiled.chain.recursion_layout import load_outboard, sides, store_outboard
+from softrobots.compiled.chain.unknowns import compliances_of
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar
 
 
-def segment_blocks(
-    unknowns: Unknowns, recursion: RecursionLayout, segment: int, tip: TipLayout | None = None
-) -> tuple[list[Block], int]:
+def segment_blocks(plan: LoopedPlan, segment: int) -> tuple[list[Block], int]:
     """Trace the functions at the ends of a constrained segment.
 
     Args:
-        unknowns: The chain.
-        recursion: Places of the sums that elements hand on.
-        segment: Its number.
-        tip: Places of the response of the tip, to trace that.
+        plan: The chain and its places.
+        segment: Number of the segment.
 
     Returns:
         Functions that add the multipliers at its tip, eliminate them at its base, and solve for them there on the step pass;
         and the size of the record.
     """
-    softness, look = compliances_of(unknowns, segment), "" if tip is None else "tip_"
+    unknowns, recursion, tip, infix = plan.unknowns, plan.recursion, plan.tip, plan.infix
+    softness = compliances_of(unknowns, segment)
     count = len(softness)
     column_places = sides(recursion.column, None if tip is None else tip.column)
     turn_places = sides(recursion.turn, None if tip is None else tip.turn)
-    add = Block(f"add_multipliers_{look}{segment}", "Add the multipliers of a segment, without coupling.")
+    add = Block(f"add_multipliers_{infix}{segment}", "Add the multipliers of a segment, without coupling.")
     add.store_all(recursion.matrix + 6, [0.0] * (count * (count + 7) // 2))
     if tip is None:
         add.store_all(recursion.gaps, [0.0] * count)
         add.store_all(recursion.constraint_torques, [0.0] * count)
     for place in column_places:
         add.store_all(place + 3, [0.0] * count)
-    eliminate = Block(f"eliminate_multipliers_{look}{segment}", "Eliminate the multipliers of a segment.", ("at",))
+    eliminate = Block(f"eliminate_multipliers_{infix}{segment}", "Eliminate the multipliers of a segment.", ("at",))
     outboard, state = load_outboard(eliminate, recursion, 3 + count, tip)
     gaps: list[Scalar] = [0.0] * count
     if tip is None:
@@ -46,7 +44,7 @@ def segment_blocks(
     eliminated, beyond = eliminate_multipliers(outboard, gaps, softness)
     store_outboard(eliminate, recursion, beyond, tip)
     eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
-    solve = Block(f"solve_multipliers_{look}{segment}", "Find the multipliers of a segment.", ("at",), eliminate.trace)
+    solve = Block(f"solve_multipliers_{infix}{segment}", "Find the multipliers of a segment.", ("at",), eliminate.trace)
     turns = [solve.loads(place, 3) for place in turn_places]
     groups = [row for row, one in enumerate(unknowns.segment_of_group) if one == segment]
     sums = solve.loads(recursion.steps, 3)

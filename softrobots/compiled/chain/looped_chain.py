@@ -18,6 +18,7 @@ import numpy as np
 from softrobots.compiled.chain.elements import Load, constants, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.looped_plan import LoopedPlan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout, load_outboard, sides, store_outboard
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -79,28 +80,13 @@ class TableColumns:
         return [column[row] for row in range(self._count) for column in self._columns]
 
 
-def element_kinds(
-    unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, *, weight: bool, tip: TipLayout | None = None
-) -> list[Kind]:
-    """Trace the code of every kind of element behind the leading motors.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        recursion: Places of the sums that elements hand on.
-        weight: Whether there is gravity.
-        tip: Places of the response of the tip, to trace that.
-
-    Returns:
-        The kinds.
-    """
+def element_kinds(plan: LoopedPlan) -> list[Kind]:
+    """Trace the code of every kind of element behind the leading motors."""
+    unknowns = plan.unknowns
     groups: dict[Any, list[int]] = {}
     for row in range(unknowns.leading_motors, len(unknowns.chain.elements)):
         groups.setdefault(_signature(unknowns, row), []).append(row)
-    return [
-        _trace_kind(number, rows, unknowns, layout, recursion, weight=weight, tip=tip)
-        for number, rows in enumerate(groups.values())
-    ]
+    return [_trace_kind(number, rows, plan) for number, rows in enumerate(groups.values())]
 
 
 def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
@@ -111,29 +97,21 @@ def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0))
 
 
-def _trace_kind(
-    number: int,
-    rows: list[int],
-    unknowns: Unknowns,
-    layout: Layout,
-    recursion: RecursionLayout,
-    *,
-    weight: bool,
-    tip: TipLayout | None,
-) -> Kind:
-    names, look = ("at", "row", "q"), "" if tip is None else "tip_"
-    out = Block(f"outward_{look}{number}", "Outward pass of an element.", names)
+def _trace_kind(number: int, rows: list[int], plan: LoopedPlan) -> Kind:
+    layout, recursion, tip, infix = plan.layout, plan.recursion, plan.tip, plan.infix
+    names = ("at", "row", "q")
+    out = Block(f"outward_{infix}{number}", "Outward pass of an element.", names)
     trace = out.trace
-    back = Block(f"inward_{look}{number}", "Inward pass: loads and elimination.", names, trace)
-    step_pass = Block(f"step_{look}{number}", "Steps of its coordinates.", names, trace)
+    back = Block(f"inward_{infix}{number}", "Inward pass: loads and elimination.", names, trace)
+    step_pass = Block(f"step_{infix}{number}", "Steps of its coordinates.", names, trace)
     columns = TableColumns(out, f"TABLE_{number}", len(rows))
-    element = _common(rows, unknowns, out, layout, columns)
+    element = _common(rows, plan, out, columns)
     axes_loads = out.loads(recursion.axes, 9)
     outward_pass = outward(element, vector(axes_loads).reshape(3, 3))
     out.store_all(recursion.axes, outward_pass.end.ravel().tolist())
 
-    multipliers = unknowns.multipliers_at(rows[0])
-    state, loads, beyond, balance = _arriving(back, element, recursion, multipliers, weight=weight, tip=tip)
+    multipliers = plan.unknowns.multipliers_at(rows[0])
+    state, loads, beyond, balance = _arriving(back, element, plan, multipliers)
     pivot_shift = back.load(layout.single("pivot_shift"))
     result = inward(
         element,
@@ -158,9 +136,9 @@ def _trace_kind(
                 result.beyond.n_negative_pivots,
             ],
         )
-        second = _store_step(step_pass, element, result, layout, recursion, multipliers)
+        second = _store_step(step_pass, element, result, plan, multipliers)
     else:
-        second = _store_tip_step(step_pass, back, result, layout, recursion, tip, multipliers)
+        second = _store_tip_step(step_pass, back, result, plan, tip, multipliers)
     size = hoist([back, step_pass], out, [*state, pivot_shift, *second], 0, "at", overwritten=axes_loads)
     size += hoist([step_pass], back, second, size, "at", overwritten=state)
     return Kind(number, rows, [out, back, step_pass], columns.numbers, columns.width, size)
@@ -184,14 +162,10 @@ def _store_constraints(
 
 
 def _store_step(
-    step_pass: Block,
-    element: TracedElement,
-    result: InwardPass,
-    layout: Layout,
-    recursion: RecursionLayout,
-    multipliers: int,
+    step_pass: Block, element: TracedElement, result: InwardPass, plan: LoopedPlan, multipliers: int
 ) -> list[Expression]:
     """Trace the Newton step of an element; return the sums of the elements before it."""
+    layout, recursion = plan.layout, plan.recursion
     turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + multipliers), step_pass.loads(recursion.steps, 3)
     if result.eliminated is not None:
         turn = vector(turn_loads)
@@ -210,15 +184,10 @@ def _store_step(
 
 
 def _store_tip_step(
-    step_pass: Block,
-    back: Block,
-    result: InwardPass,
-    layout: Layout,
-    recursion: RecursionLayout,
-    tip: TipLayout,
-    multipliers: int,
+    step_pass: Block, back: Block, result: InwardPass, plan: LoopedPlan, tip: TipLayout, multipliers: int
 ) -> list[Expression]:
     """Trace the response of an element to a force on the tip; for a motor, its column of the Jacobian so far."""
+    layout, recursion = plan.layout, plan.recursion
     turn_loads = [step_pass.loads(place, 3 + multipliers) for place in sides(recursion.turn, tip.turn)]
     bend_loads = [step_pass.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
     if result.eliminated is None:
@@ -238,8 +207,9 @@ def _store_tip_step(
     return [one for part in (*turn_loads, *bend_loads) for one in part]
 
 
-def _common(rows: list[int], unknowns: Unknowns, block: Block, layout: Layout, columns: TableColumns) -> TracedElement:
+def _common(rows: list[int], plan: LoopedPlan, block: Block, columns: TableColumns) -> TracedElement:
     """Return an element of a kind, with table entries for the numbers in which its elements differ."""
+    unknowns, layout = plan.unknowns, plan.layout
     ones = [unknowns.traced(row, lambda _: 0.0, lambda _: 0.0, lambda _: 0.0) for row in rows]
     first = ones[0]
     unknown = iter(block.loads(0, max(len(first.moving), 1), "q"))
@@ -282,14 +252,14 @@ def _relaxed(ones: Sequence[TracedElement], block: Block, layout: Layout, column
 
 
 def _arriving(
-    block: Block, element: TracedElement, recursion: RecursionLayout, multipliers: int, *, weight: bool, tip: TipLayout | None
+    block: Block, element: TracedElement, plan: LoopedPlan, multipliers: int
 ) -> tuple[list[Expression], list[Load], Outboard, Balance]:
     """Return the sums before the inward pass of an element: workspace elements, loads, outboard sums, balance."""
-    levers = block.loads(recursion.lever, 6 if weight else 3)
-    forces = block.loads(recursion.force, 6 if weight else 3)
+    recursion, count = plan.recursion, 6 if plan.weight else 3
+    levers, forces = block.loads(recursion.lever, count), block.loads(recursion.force, count)
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0)]
-    if weight:
+    if plan.weight:
         loads.append(Load(vector(forces[3:]), vector(levers[3:]), element.mass_beyond))
     sums = block.loads(recursion.sums, 5)
-    beyond, state = load_outboard(block, recursion, 3 + multipliers, tip)
+    beyond, state = load_outboard(block, recursion, 3 + multipliers, plan.tip)
     return [*levers, *state, *sums], loads, beyond, Balance(sums[0], sums[1], sums[2])

@@ -16,11 +16,10 @@ from __future__ import annotations
 
 from softrobots.compiled.chain.elements import Load, vector
 from softrobots.compiled.chain.elimination import Outboard
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.looped_plan import LoopedPlan
 from softrobots.compiled.chain.recursion import Balance, inward
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
 from softrobots.compiled.chain.tip_motion import motor_of
-from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.chain.unrolled_chain import seen_backwards
 from softrobots.compiled.trace.blocks import Block
 
@@ -38,20 +37,9 @@ CONTROL = '''def look_at_tip(w: Array) -> None:
 """Function that makes all passes."""
 
 
-def tip_frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, tip: TipLayout, *, weight: bool) -> list[Block]:
-    """Trace the straight-line functions around the loops.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        recursion: Places of the sums that elements hand on.
-        tip: Places of the response of the tip.
-        weight: Whether there is gravity.
-
-    Returns:
-        The functions.
-    """
-    return [_start_inward_tip(tip), _finish(unknowns, layout, recursion, tip, weight=weight), _finish_column(recursion, tip)]
+def tip_frame(plan: LoopedPlan, tip: TipLayout) -> list[Block]:
+    """Trace the straight-line functions around the loops."""
+    return [_start_inward_tip(tip), _finish(plan, tip), _finish_column(plan.recursion, tip)]
 
 
 def _start_inward_tip(tip: TipLayout) -> Block:
@@ -60,8 +48,9 @@ def _start_inward_tip(tip: TipLayout) -> Block:
     return block
 
 
-def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, tip: TipLayout, *, weight: bool) -> Block:
+def _finish(plan: LoopedPlan, tip: TipLayout) -> Block:
     """Add the sums beyond each motor, pass the leading motors, and turn all into world axes."""
+    unknowns, recursion = plan.unknowns, plan.recursion
     block = Block("finish_tip", "Compute the response to motors and constrained sums from the sums of the passes.")
     axes = vector(block.loads(recursion.base, 9)).reshape(3, 3)
     total = vector(block.loads(tip.bends, 9)).reshape(3, 3)
@@ -71,7 +60,7 @@ def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, tip:
     ]
     motors = [motor for row in range(len(leading)) if (motor := motor_of(unknowns, row)) is not None]
     loads = []
-    for place in (0, 3) if weight else (0,):
+    for place in (0, 3) if plan.weight else (0,):
         force, lever = block.loads(recursion.force + place, 3), block.loads(recursion.lever + place, 3)
         loads.append(Load(vector(force), vector(lever), 1.0))
     jacobian = {}

@@ -16,7 +16,7 @@ from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
 from softrobots.compiled.drivers import lane_drivers, motor_drivers, muscle_drivers, path_drivers, trigonometry
 from softrobots.compiled.program.looped_program import looped_program
-from softrobots.compiled.program.manual import manual, public_names
+from softrobots.compiled.program.manual import manual
 from softrobots.compiled.program.motor_program import force_blocks, target_blocks
 from softrobots.compiled.program.unrolled_program import equilibrium_blocks
 from softrobots.compiled.statuses import Status
@@ -65,7 +65,7 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         lanes, lane_size = blocks[1:3], size
     else:
         parts = looped_program(unknowns, layout, weight=weight)
-        blocks, size, lanes, lane_size = parts.blocks + parts.look, parts.size, parts.blocks, parts.lane_size
+        blocks, size, lanes, lane_size = parts.blocks + parts.tip_blocks, parts.size, parts.blocks, parts.lane_size
         tables |= {**parts.places, **parts.tables}
         tip, entries = parts.tip, [*entries, "look_at_tip"]
         loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
@@ -77,9 +77,10 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
         functions += motor_drivers.FUNCTIONS + path_drivers.FUNCTIONS
         lane_functions += lane_drivers.MOTOR_FUNCTIONS
-    names += [*public_names(unknowns, layout, tip, weight=weight), *Status.__members__]
+    docstring, places = manual(unknowns, layout, tip, weight=weight)
+    names += [*places, *Status.__members__]
     # A name could end the text.
-    docstring = manual(unknowns, layout, tip, weight=weight).replace("\\", "\\\\").replace('"""', r"\"\"\"")
+    docstring = docstring.replace("\\", "\\\\").replace('"""', r"\"\"\"")
     title = f'"""{docstring}\n"""'
     text = "\n\n\n".join(
         [

@@ -6,8 +6,8 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Load, constants, vector
 from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.looped_plan import LoopedPlan
 from softrobots.compiled.chain.recursion_layout import RecursionLayout
-from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.program.passes import decide, dot, go_on, point_numbers
 from softrobots.compiled.settings import LEAST_SIZE
@@ -15,33 +15,23 @@ from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, larger
 
 
-def looped_frame(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, count: int, *, weight: bool) -> list[Block]:
-    """Trace the straight-line functions around the loops.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        recursion: Places of the sums that elements hand on.
-        count: Number of steps of a loop.
-        weight: Whether there is gravity.
-
-    Returns:
-        The functions.
-    """
+def looped_frame(plan: LoopedPlan, count: int) -> list[Block]:
+    """Trace the straight-line functions around loops of `count` steps."""
     return [
-        _prepare(unknowns, layout, recursion, count),
-        _start_outward(recursion),
-        _start_inward(unknowns, recursion, weight=weight),
-        _finish(unknowns, layout, recursion, weight=weight),
-        _decide(unknowns, layout, recursion),
-        _advance(layout, recursion),
-        _start(layout),
-        _relax(unknowns, layout),
+        _prepare(plan, count),
+        _start_outward(plan.recursion),
+        _start_inward(plan),
+        _finish(plan),
+        _decide(plan),
+        _advance(plan),
+        _start(plan.layout),
+        _relax(plan),
     ]
 
 
-def _prepare(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, count: int) -> Block:
+def _prepare(plan: LoopedPlan, count: int) -> Block:
     block = Block("prepare", "Compute what depends on motors and load only.")
+    unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
     leading = [
         unknowns.traced(row, lambda motor: block.load(motor), lambda _: 0.0, lambda _: 0.0)
         for row in range(unknowns.leading_motors)
@@ -60,11 +50,12 @@ def _start_outward(recursion: RecursionLayout) -> Block:
     return block
 
 
-def _start_inward(unknowns: Unknowns, recursion: RecursionLayout, *, weight: bool) -> Block:
+def _start_inward(plan: LoopedPlan) -> Block:
     block = Block("start_inward", "Start the inward pass at the tip, and clear all sums.")
+    recursion = plan.recursion
     axes = vector(block.loads(recursion.axes, 9)).reshape(3, 3)
-    lever = (axes @ constants(unknowns.chain.tip_translation)).tolist()
-    block.store_all(recursion.lever, [*lever, 0.0, 0.0, 0.0] if weight else lever)
+    lever = (axes @ constants(plan.unknowns.chain.tip_translation)).tolist()
+    block.store_all(recursion.lever, [*lever, 0.0, 0.0, 0.0] if plan.weight else lever)
     block.store_all(recursion.matrix, [0.0] * 6)
     block.store_all(recursion.column, [0.0] * 3)
     block.store_all(recursion.turn, [0.0] * 3)
@@ -73,12 +64,13 @@ def _start_inward(unknowns: Unknowns, recursion: RecursionLayout, *, weight: boo
     return block
 
 
-def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, *, weight: bool) -> Block:
+def _finish(plan: LoopedPlan) -> Block:
     block = Block("finish", "Compute energy, residual, step and tip from the sums of the passes.")
+    unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
     sums, steps = block.loads(recursion.sums, 5), block.loads(recursion.steps, 3)
     levers, forces = block.loads(recursion.lever, 6), block.loads(recursion.force, 6)
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0), Load(vector(forces[3:]), vector(levers[3:]), 0.0)]
-    energy: Scalar = sums[0] - sum((one.force @ one.lever for one in loads[: 2 if weight else 1]), 0.0)
+    energy: Scalar = sums[0] - sum((one.force @ one.lever for one in loads[: 2 if plan.weight else 1]), 0.0)
     force = block.loads(layout.force, 3)
     load = dot(force, force) * unknowns.chain.reach**2 + sums[1]
     if unknowns.pulled:
@@ -102,8 +94,9 @@ def _finish(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout, *, w
     return block
 
 
-def _decide(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout) -> Block:
+def _decide(plan: LoopedPlan) -> Block:
     block = Block("decide", "Decide whether the case goes on.")
+    unknowns, layout = plan.unknowns, plan.layout
     names = ("energy", "slope", "error", "length", "size", "rounding", "min_pivot", "n_negative_pivots", "range_margin")
     point: dict[str, Scalar] = {name: block.load(layout.single(name)) for name in names}
     _, share = decide(
@@ -115,14 +108,15 @@ def _decide(unknowns: Unknowns, layout: Layout, recursion: RecursionLayout) -> B
         mode=block.load(layout.single("mode")),
         bound=block.load(layout.single("bound")),
     )
-    block.store(recursion.end, share)
+    block.store(plan.recursion.end, share)
     return block
 
 
-def _advance(layout: Layout, recursion: RecursionLayout) -> Block:
+def _advance(plan: LoopedPlan) -> Block:
     block = Block("advance", "Take the step of one unknown, if the case goes on.", ("i",))
+    layout = plan.layout
     unknown, step = block.load(layout.unknown, "i"), block.load(layout.step, "i")
-    share, mode = block.load(recursion.end), block.load(layout.single("mode"))
+    share, mode = block.load(plan.recursion.end), block.load(layout.single("mode"))
     block.store(layout.unknown, go_on(mode, unknown, share, step), "i")
     return block
 
@@ -134,8 +128,9 @@ def _start(layout: Layout) -> Block:
     return block
 
 
-def _relax(unknowns: Unknowns, layout: Layout) -> Block:
+def _relax(plan: LoopedPlan) -> Block:
     block = Block("relax", "Put an unknown where its spring is relaxed.", ("i",))
+    unknowns = plan.unknowns
     rest = {float(unknowns.chain.rest[strain]) for strain in unknowns.strains}
-    block.store(layout.unknown, rest.pop() if len(rest) == 1 else block.table("REST", 0, "i"), "i")
+    block.store(plan.layout.unknown, rest.pop() if len(rest) == 1 else block.table("REST", 0, "i"), "i")
     return block

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from softrobots.compiled.chain.constrained_segments import segment_blocks
 from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.looped_chain import Kind, element_kinds
+from softrobots.compiled.chain.looped_plan import LoopedPlan
 from softrobots.compiled.chain.looped_tip import CONTROL as TIP_CONTROL
 from softrobots.compiled.chain.looped_tip import tip_frame
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
@@ -22,7 +23,7 @@ class LoopedProgram:
 
     blocks: list[Block]
     """Straight-line functions that find equilibria."""
-    look: list[Block]
+    tip_blocks: list[Block]
     """Straight-line functions of the response of the tip."""
     tables: dict[str, tuple[float, ...] | tuple[int, ...]]
     """Tables of numbers that differ between elements."""
@@ -34,7 +35,7 @@ class LoopedProgram:
     """Size of the workspace."""
     tip: TipLayout
     """Places of the response of the tip in it."""
-    stages: dict[str, list[tuple[int, str]]]
+    calls: dict[str, list[tuple[int, str]]]
     """By pass (`outward`, `inward`, `step`, and with `_tip` those of the response of the tip): kind of element and call."""
 
     def loops(self, suffix: str = "") -> str:
@@ -43,7 +44,7 @@ class LoopedProgram:
         Args:
             suffix: End of all function names: "_lanes" for batches, which have no response of the tip.
         """
-        passes = [name for name in self.stages if not suffix or name in _PASSES]
+        passes = [name for name in self.calls if not suffix or name in _PASSES]
         texts = [*(self._loop(name, suffix) for name in passes), _CONTROL.replace("_SUFFIX", suffix)]
         return "\n\n\n".join(texts if suffix else [*texts, TIP_CONTROL])
 
@@ -59,7 +60,7 @@ class LoopedProgram:
             "        kind = KIND[i]",
         ]
         word = "if"
-        for kind, call in self.stages[name]:
+        for kind, call in self.calls[name]:
             lines += [f"        {word} kind == {kind}:", f"            {call.replace('(', suffix + '(', 1)}"]
             word = "elif"
         return "\n".join([*lines, f"        i {'-' if back else '+'}= 1"])
@@ -111,62 +112,55 @@ def looped_program(unknowns: Unknowns, layout: Layout, *, weight: bool) -> Loope
         The program.
     """
     recursion = RecursionLayout(layout.prepared)
-    tables: dict[str, tuple[float, ...] | tuple[int, ...]] = {}
-    stages: dict[str, list[tuple[int, str]]] = {}
-    kinds = element_kinds(unknowns, layout, recursion, weight=weight)
+    plan = LoopedPlan(unknowns, layout, recursion, weight)
+    calls: dict[str, list[tuple[int, str]]] = {}
+    kinds = element_kinds(plan)
     # Before the records stand the share of the step, and the bounds of the loops.
-    blocks, sequence, lane_size = _sequence(unknowns, layout, recursion, kinds, recursion.end + 3, stages)
+    blocks, sequence, lane_size = _sequence(plan, kinds, recursion.end + 3, calls)
     tip = TipLayout(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.held))
-    looking = element_kinds(unknowns, layout, recursion, weight=weight, tip=tip)
-    look, look_sequence, size = _sequence(unknowns, layout, recursion, looking, tip.end, stages, tip)
-    tables |= {f"TABLE_{kind.number}": tuple(kind.table) for kind in kinds if kind.table}
-    for name, column in zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True):
-        tables[name] = tuple(column)
-    tables["AT_TIP"] = tuple(at for _, at, _, _ in look_sequence)
+    tip_plan = replace(plan, tip=tip)
+    tip_blocks, tip_sequence, size = _sequence(tip_plan, element_kinds(tip_plan), tip.end, calls)
+    tables: dict[str, tuple[float, ...] | tuple[int, ...]] = {
+        f"TABLE_{kind.number}": tuple(kind.table) for kind in kinds if kind.table
+    }
+    tables |= dict(zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True))
+    tables["AT_TIP"] = tuple(at for _, at, _, _ in tip_sequence)
     bounds = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}
-    frame = looped_frame(unknowns, layout, recursion, len(sequence), weight=weight)
-    look = tip_frame(unknowns, layout, recursion, tip, weight=weight) + look
-    return LoopedProgram(frame + blocks, look, tables, bounds | tip.constants(), lane_size, size, tip, stages)
+    blocks = looped_frame(plan, len(sequence)) + blocks
+    tip_blocks = tip_frame(plan, tip) + tip_blocks
+    return LoopedProgram(blocks, tip_blocks, tables, bounds | tip.constants(), lane_size, size, tip, calls)
 
 
 def _sequence(
-    unknowns: Unknowns,
-    layout: Layout,
-    recursion: RecursionLayout,
-    kinds: list[Kind],
-    record: int,
-    stages: dict[str, list[tuple[int, str]]],
-    tip: TipLayout | None = None,
+    plan: LoopedPlan, kinds: list[Kind], record: int, calls: dict[str, list[tuple[int, str]]]
 ) -> tuple[list[Block], list[tuple[int, int, int, int]], int]:
     """Put the elements in order, with the ends of constrained segments between them.
 
     Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        recursion: Places of the sums that elements hand on.
+        plan: The chain and its places.
         kinds: The kinds of elements.
         record: Place of the first record.
-        stages: Calls of each pass, extended here.
-        tip: Places of the response of the tip, to trace that.
+        calls: Calls of each pass, extended here.
 
     Returns:
         The straight-line functions; kind, place of the record, row of the table and coordinate of each step of a loop; and the
         first place behind the records.
     """
-    suffix, infix, at = ("", "", "AT[i]") if tip is None else ("_tip", "tip_", "AT_TIP[i]")
-    outward_calls, inward_calls, step_calls = (stages.setdefault(name + suffix, []) for name in _PASSES)
+    unknowns, layout, infix = plan.unknowns, plan.layout, plan.infix
+    suffix, at = ("", "AT[i]") if plan.tip is None else ("_tip", "AT_TIP[i]")
+    outward_calls, inward_calls, step_calls = (calls.setdefault(name + suffix, []) for name in _PASSES)
     steps: dict[int, tuple[int, int, int, int]] = {}  # by element
     for kind in kinds:
         for place, row in enumerate(kind.rows):
             steps[row] = (kind.number, record, place * kind.width, _coordinate(unknowns, layout, row))
             record += kind.record
-        for name, calls in (("outward", outward_calls), ("inward", inward_calls), ("step", step_calls)):
-            calls.append((kind.number, f"{name}_{infix}{kind.number}(w, {at}, ROW[i], PLACE[i])"))
+        for name, pass_calls in (("outward", outward_calls), ("inward", inward_calls), ("step", step_calls)):
+            pass_calls.append((kind.number, f"{name}_{infix}{kind.number}(w, {at}, ROW[i], PLACE[i])"))
     blocks = [block for kind in kinds for block in kind.blocks]
     sequence = [steps[row] for row in sorted(steps)]
     ends = list(zip(range(len(unknowns.segment_spans)), unknowns.segment_spans, strict=True))
     for segment, (first, last) in reversed(ends):
-        ends_of_segment, size = segment_blocks(unknowns, recursion, segment, tip)
+        ends_of_segment, size = segment_blocks(plan, segment)
         blocks += ends_of_segment
         base, end = len(kinds) + 2 * segment, len(kinds) + 2 * segment + 1
         leading = unknowns.leading_motors

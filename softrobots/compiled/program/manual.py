@@ -26,14 +26,35 @@ class Place(NamedTuple):
     """Meaning and unit."""
 
 
-def inputs(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
-    """Return the inputs.
+def manual(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> tuple[str, list[str]]:
+    """Return the docstring, and the names of all places in it.
 
     Args:
         unknowns: The chain.
         layout: The places in the workspace.
+        tip: Places of the response of the tip; None without it.
         weight: Whether there is gravity.
     """
+    places = layout.constants() | ({} if tip is None else tip.constants())
+    given, found = _inputs(unknowns, layout, weight=weight), _results(unknowns, layout, tip)
+    lines = [
+        f"Statics of {_on_a_line(unknowns.chain.name)}{', with gravity' if weight else ', weightless'}: generated code.",
+        "",
+        "Functions work on an array of WORKSPACE_SIZE numbers, initially zero, which may be used for several cases.",
+        "settle, settle_from, estimate and reach return a status; the results are valid only if it is 0:",
+        "",
+        *(f"    {status.value}  {status.name:<14} {status.explanation}" for status in Status),
+    ]
+    for title, rows in (("Inputs", given), ("Results", found)):
+        lines += ["", f"{title}: name, first place, number of places, meaning.", ""]
+        for row in rows:
+            head = f"    {row.name:<13} {places[row.name]:>5} {row.size:>5}  "
+            lines += textwrap.wrap(head + row.meaning, _WIDTH, subsequent_indent=" " * len(head), break_on_hyphens=False)
+    return "\n".join(lines), list(dict.fromkeys(row.name for row in (*given, *found)))
+
+
+def _inputs(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
+    """Return the inputs."""
     n, searches = layout.unknowns, unknowns.moved_by_motors
     places = [Place("MOTORS", layout.motors, f"motor joints [rad or m]: {_motors(unknowns)}")] if layout.motors else []
     places.append(Place("FORCE", 3, "force on the tip [N], world axes"))
@@ -53,14 +74,8 @@ def inputs(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
     return places
 
 
-def results(unknowns: Unknowns, layout: Layout, tip: TipLayout | None) -> list[Place]:
-    """Return the results.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        tip: Places of the response of the tip; None without it.
-    """
+def _results(unknowns: Unknowns, layout: Layout, tip: TipLayout | None) -> list[Place]:
+    """Return the results."""
     n, m = layout.unknowns, layout.motors
     places = [
         Place("UNKNOWN", n, f"the unknowns [rad or m]: {_strains(unknowns)}"),
@@ -88,44 +103,6 @@ def results(unknowns: Unknowns, layout: Layout, tip: TipLayout | None) -> list[P
                 Place("CONSTRAINT_COLUMNS", 3 * held, f"derivative of the tip by those sums, (3, {held}) {rows} [m/rad or -]")
             )
     return places
-
-
-def manual(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> str:
-    """Return the docstring.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        tip: Places of the response of the tip; None without it.
-        weight: Whether there is gravity.
-    """
-    places = layout.constants() | ({} if tip is None else tip.constants())
-    lines = [
-        f"Statics of {_on_a_line(unknowns.chain.name)}{', with gravity' if weight else ', weightless'}: generated code.",
-        "",
-        "Functions work on an array of WORKSPACE_SIZE numbers, initially zero, which may be used for several cases.",
-        "settle, settle_from, estimate and reach return a status; the results are valid only if it is 0:",
-        "",
-        *(f"    {status.value}  {status.name:<14} {status.explanation}" for status in Status),
-    ]
-    for title, rows in (("Inputs", inputs(unknowns, layout, weight=weight)), ("Results", results(unknowns, layout, tip))):
-        lines += ["", f"{title}: name, first place, number of places, meaning.", ""]
-        for row in rows:
-            head = f"    {row.name:<13} {places[row.name]:>5} {row.size:>5}  "
-            lines += textwrap.wrap(head + row.meaning, _WIDTH, subsequent_indent=" " * len(head), break_on_hyphens=False)
-    return "\n".join(lines)
-
-
-def public_names(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> list[str]:
-    """Return the names of all places in the manual, each once.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        tip: Places of the response of the tip; None without it.
-        weight: Whether there is gravity.
-    """
-    return list(dict.fromkeys(row.name for row in (*inputs(unknowns, layout, weight=weight), *results(unknowns, layout, tip))))
 
 
 def _motors(unknowns: Unknowns) -> str:
