@@ -80,12 +80,13 @@ def killed_after_first_block(words: list[str], folder: Path, block: str) -> None
 
     It waits at the fourth block, or it might be done before we look.
     """
+    script = CHECKOUT / "scripts" / "workspace_map.py"
     code = (
-        "import runpy, sys, time; from softrobots.core import checkpoint\n"
+        f"import runpy, sys, time; sys.path.insert(0, {str(script.parent)!r}); from softrobots.core import checkpoint\n"
         "from softrobots.compiled.sweeps import mapping; mapping.BLOCK = 3\n"
         "keep = checkpoint.Checkpoint.keep\n"
         "checkpoint.Checkpoint.keep = lambda self, n, block: time.sleep(300) if n == 3 else keep(self, n, block)\n"
-        f"sys.exit(runpy.run_path({str(CHECKOUT / 'scripts' / 'workspace_map.py')!r})['main'](sys.argv[1:]))"
+        f"sys.exit(runpy.run_path({str(script)!r})['main'](sys.argv[1:]))"
     )
     process = subprocess.Popen([sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     give_up = time.monotonic() + 240.0

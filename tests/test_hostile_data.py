@@ -662,6 +662,7 @@ ALLOWED = {
     ("scripts/environments.py", "json.loads"): "what pip prints",
     ("scripts/studies/fuzzing/worker.py", "json.loads"): "what a process of its own prints",
     ("scripts/measure_coverage.py", "json.loads"): "what coverage writes",
+    ("scripts/draw_architecture.py", "json.loads"): "what the picture of the checkout records",
 }
 
 
@@ -732,6 +733,7 @@ DOORWAYS = {
     "studies.interop.results": "a page of the checkout, and the results that the study itself wrote",
     "studies.benchmark.processes": "a file of the kernel",
     "view.meshcat_page.server_process": "a page of ours",
+    "view.meshcat_page.page_text": "a template of ours",
 }
 """Modules that read files, and the readers of the campaign that go through them, or why there is none."""
 

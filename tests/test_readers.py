@@ -305,7 +305,7 @@ TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/></fixed></tendon
         (bodies("", joint='<joint name="j"/>'), "the text has no joint springs; give springs="),
         (
             bodies(SLIDE.format("") + SLIDE.format("").replace('"c"', '"d"').replace('"s"', '"t"')),
-            "has 2 ends .c, d.; say which",
+            "has 2 ends .c, d.; give the name of the tip frame",
         ),
     ],
 )
@@ -667,7 +667,7 @@ def test_names_of_nested_models(tool: Tool) -> None:
         ),
         (
             chain(more=link("c") + sdf_joint("k", "b", "c") + link("d") + sdf_joint("l", "b", "d")),
-            "has 2 ends .c, d.; say which",
+            "has 2 ends .c, d.; give the name of the tip frame",
         ),
         (chain(""), "the text has no joint springs; give springs="),
         (sdf(""), "Drake refuses the text"),
