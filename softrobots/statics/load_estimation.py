@@ -123,10 +123,10 @@ def estimate_load(
     noise = None if torque_std is None else _noise(torque_std, model.n_motors)
     at = model.tip if frame is None else frame
     base = Load.of(model, frame=at, gravity=gravity)
-    default = 100 if method == "newton" else 1000
-    most = default if max_iterations is None else positive_integer("max_iterations", max_iterations)
+    solve, most = (_newton, 100) if method == "newton" else (_alternation, 1000)
+    most = most if max_iterations is None else positive_integer("max_iterations", max_iterations)
     problem = _Problem(model, motors, torques, base, at)
-    force, state, iterations = (_newton if method == "newton" else _alternation)(problem, most)
+    force, state, iterations = solve(problem, most)
     result = _estimate(problem, force, state, method, iterations, noise)
     if not (_explained(problem, state, noise) and result.equilibrium.converged):
         raise LoadNotFound(
@@ -174,11 +174,7 @@ class _Problem:
 
     def equilibrium(self, force: FloatArray, near: ElasticState) -> ElasticState | None:
         """Solve for the equilibrium under a force, from a nearby state; None if it does not converge."""
-        return self.balanced(force, near.q_springs)
-
-    def balanced(self, force: FloatArray, start: FloatArray) -> ElasticState | None:
-        """Solve for the equilibrium under a force, from given springs; None if it does not converge."""
-        return balanced_state(self.model, self.motors, self.load(force), start, tolerance=_INNER)
+        return balanced_state(self.model, self.motors, self.load(force), near.q_springs, tolerance=_INNER)
 
     def unexplained(self, state: ElasticState) -> FloatArray:
         """Return the measured torques minus those of a state."""
@@ -208,9 +204,9 @@ def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None)
 
 def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
     """Damped Newton, see `softrobots.statics.force_search`."""
-    rest, none = problem.model.rest, np.zeros(3)
-    state = problem.balanced(none, rest) or elastic_state(problem.model, problem.motors, rest, problem.load(none))
-    return search_force(problem, state, most)
+    no_force = np.zeros(3)
+    relaxed = elastic_state(problem.model, problem.motors, problem.model.rest, problem.load(no_force))
+    return search_force(problem, problem.equilibrium(no_force, relaxed) or relaxed, most)
 
 
 def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
@@ -272,18 +268,7 @@ def estimate_at(
     torque_std: FloatArray | None,
     method: str,
 ) -> LoadEstimate:
-    """Compute a load estimate from its equilibrium and the measurement, as saved in a file.
-
-    Args:
-        equilibrium: The robot under the estimated force.
-        frame: Frame at which the force acts.
-        motor_torques: Measured torques, shape (n_motors,) [N m].
-        force: The estimated force, shape (3,) [N], part of the equilibrium's load.
-        torque_std: Standard deviation of the torques, shape (n_motors,) [N m], or None.
-        method: The solver that found it.
-
-    Returns:
-        The estimate.
+    """Compute a load estimate, as saved in a file, from the equilibrium under the force and the measured torques.
 
     Raises:
         ParameterError: If the force is not the one in the equilibrium's load.
