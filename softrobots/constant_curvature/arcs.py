@@ -119,17 +119,7 @@ def checked_arc(arc: Arc) -> Arc:
 
 
 def stack_arcs(arcs: Arc | Sequence[Arc]) -> Arc:
-    """Return the arcs of a chain as one `Arc` whose last axis is the segment.
-
-    Args:
-        arcs: One `Arc` a segment, base to tip, of shapes that broadcast; or one `Arc` of shape (..., S) already.
-
-    Returns:
-        Arc of shape (..., S).
-
-    Raises:
-        ParameterError: If it is neither, there is no segment, or the shapes do not broadcast.
-    """
+    """Return the arcs of a chain, one a segment from base to tip, as one `Arc` of shape (..., S), or raise ParameterError."""
     if isinstance(arcs, Arc):
         if not arcs.shape or arcs.shape[-1] == 0:
             raise ParameterError("arcs", arcs, f"an Arc whose last axis is the segment (it has shape {arcs.shape})")

@@ -136,18 +136,7 @@ def muscle_residual(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS) -> Fl
 
 
 def strains_per_muscle(distance: Any, azimuths: Any) -> FloatArray:
-    """Return the derivative of `strains_from_muscles` with respect to the lengths, which is constant.
-
-    Args:
-        distance: Distance of the muscles from the backbone [m], positive, shape (...).
-        azimuths: Azimuths of the muscles [rad], shape (N,), N >= 3.
-
-    Returns:
-        Shape (..., 4, N) [rad/m, rad/m, rad/m, -].
-
-    Raises:
-        ParameterError: If the distance is not positive, or the azimuths are wrong as in `muscles_from_arc`.
-    """
+    """Return the constant Jacobian of `strains_from_muscles` in the lengths, shape (..., 4, N) [rad/m, rad/m, rad/m, -]."""
     distance = positive_array("distance", distance, "m")[..., None]
     weights = _weights(_checked_azimuths(azimuths))
     matrix = np.zeros((*distance.shape[:-1], 4, weights.shape[1]))

@@ -123,19 +123,7 @@ def chain_transform(arcs: Arc | Sequence[Arc], offsets: Any = None, frame: str =
 
 
 def chain_frames(arcs: Arc | Sequence[Arc], offsets: Any, frame: str) -> tuple[FloatArray, FloatArray]:
-    """Return the poses of both ends of all segments: the starts after the offset, and the ends.
-
-    Args:
-        arcs: As for `chain_transforms`.
-        offsets: As for `chain_transforms`.
-        frame: As for `chain_transforms`.
-
-    Returns:
-        Two arrays of shape (..., S, 4, 4), translation in metres.
-
-    Raises:
-        ParameterError: As `chain_transforms`.
-    """
+    """Return the poses of the start (after the offset) and the end of all segments, (..., S, 4, 4); see `chain_transforms`."""
     local = transform(stack_arcs(arcs), frame)
     count = local.shape[-3]
     if offsets is None:

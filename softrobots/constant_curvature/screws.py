@@ -36,12 +36,7 @@ class Screw:
     """Pose of the end of a section in the frame of its start, with derivatives with respect to the section coordinates."""
 
     def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
-        """Evaluate the motion.
-
-        Args:
-            z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
-            rest_length: Rest length `h`, shape (...) [m].
-        """
+        """Evaluate the motion at section coordinates `z`, shape (..., 4), and rest length `h`, shape (...) [m]."""
         self._omega = omega = z[..., :3]
         self._length = np.asarray(rest_length + z[..., 3])[..., None]
         self._c = c = stumpff(np.asarray((omega * omega).sum(axis=-1)), 7)[..., None]
@@ -74,14 +69,8 @@ class Screw:
     def curvature(self, twists: FloatArray, covector: FloatArray) -> FloatArray:
         r"""Return the derivative of `covector . twists` with respect to the section coordinates at constant covector.
 
-        Element `[a, b]` is :math:`\lambda \cdot \partial S_a / \partial z_b`: the second derivative contracted with a covector.
-
-        Args:
-            twists: Result of `twists`, shape (..., 6, 4).
-            covector: Wrench in the axes of the end, linear part first, shape (..., 6).
-
-        Returns:
-            Shape (..., 4, 4); not symmetric.
+        Element `[a, b]` is :math:`\lambda \cdot \partial S_a / \partial z_b`, shape (..., 4, 4), not symmetric. The
+        covector is a wrench in the axes of the end, linear part first, shape (..., 6); `twists` comes from the method `twists`.
         """
         force, moment = covector[..., :3], covector[..., 3:]
         result = np.zeros((*covector.shape[:-1], 4, 4))

@@ -41,12 +41,7 @@ class SectionChain:
     """Joint positions of sections at given section coordinates, with derivatives."""
 
     def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
-        """Evaluate the map.
-
-        Args:
-            z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
-            rest_length: Rest length of a section, shape (...) [m].
-        """
+        """Evaluate the map at section coordinates `z`, shape (..., 4) [rad, rad, rad, m], and rest lengths, shape (...) [m]."""
         self._screw = Screw(z, rest_length)
         self.positions = _positions(self._screw.rotation, self._screw.position)
         """Joint positions `m`, shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad]."""
@@ -62,13 +57,8 @@ class SectionChain:
         r"""Return the weighted sum of the second derivatives of the joint positions, `sum_j torque_j d^2 m_j`.
 
         With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise,
-        so `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`; everything is contracted with `J_b^-T torque` first.
-
-        Args:
-            torque: Weight of each joint, shape (..., 6).
-
-        Returns:
-            Shape (..., 4, 4), symmetric.
+        so `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`; everything is contracted with `J_b^-T torque` first. The weights
+        of the joints have the shape (..., 6), the symmetric result (..., 4, 4).
         """
         covector = (torque[..., None, :] @ self._inverse)[..., 0, :]
         linear, angular = self._jacobian[..., :3, :], self._jacobian[..., 3:, :]
@@ -93,28 +83,16 @@ class SectionChain:
 
 
 def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArray:
-    """Return the joint positions of sections.
-
-    Args:
-        z: Section coordinates, shape (..., 4) [rad, rad, rad, m], in range (see `in_range`).
-        rest_length: Rest length of a section, shape (...) [m].
-
-    Returns:
-        Shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad].
-    """
+    """Return the joint positions of sections, shape (..., 6), at section coordinates within range; see `SectionChain`."""
     return SectionChain(z, rest_length).positions
 
 
 def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
-    """Return whether the chain can represent all sections.
+    """Return whether the chain can represent all sections at these section coordinates; see `SectionChain`.
 
     Required of each: positive length; total rotation below a whole turn; a chord that points forwards at both ends (without
     twist: bending below 180 degrees); and less than half a turn about the axis of its end, in the twist and in the joint r3,
     which rotates a little further than the twist.
-
-    Args:
-        z: Section coordinates, shape (..., 4) [rad, rad, rad, m].
-        rest_length: Rest length of a section, shape (...) [m].
     """
     return SectionChain(z, rest_length).valid
 

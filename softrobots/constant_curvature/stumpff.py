@@ -20,17 +20,10 @@ _TERMS = ((1.0, 9), (_SERIES_UP_TO, 24))  # (largest x, number of terms)
 
 
 def stumpff(x: FloatArray, highest: int) -> FloatArray:
-    """Evaluate `c_0` to `c_highest`.
+    """Evaluate `c_0` to `c_highest` at squares of the angle [rad^2], not negative: shape (highest + 1, *x.shape).
 
     Up to an angle of 2 pi the two highest functions come from their alternating series, the others from the downward recursion
     `c_k = 1/k! - x c_{k+2}`; beyond, all come from sine and cosine by upward recursion. Both are accurate to rounding.
-
-    Args:
-        x: Squares of the angle, any shape [rad^2], not negative.
-        highest: Largest index, at least 1.
-
-    Returns:
-        Shape (highest + 1, *x.shape).
     """
     values = np.zeros((highest + 1, *x.shape))
     small = np.minimum(x, _SERIES_UP_TO)

@@ -45,12 +45,7 @@ class Profile:
     def on_piece(self, start: float, end: float) -> Callable[[float], float]:
         """Return the profile between two neighbouring breakpoints, at both ends with the limits from inside.
 
-        Args:
-            start: Start of the piece [m].
-            end: End of the piece [m].
-
-        Returns:
-            Function of the position in [start, end], which raises ParameterError where the value is invalid.
+        The function of the position [m] that is returned raises ParameterError where the value is invalid.
         """
         if self.function is not None:
             first = start if start == 0.0 else math.nextafter(start, math.inf)  # a function may jump at a breakpoint
@@ -81,12 +76,7 @@ class Profile:
 
 
 def checked_profile(name: str, given: Any, length: float) -> Profile:
-    """Return contraction or angle along the tube.
-
-    Args:
-        name: "contraction" or "angle".
-        given: A number, a function of the position [m], or a pair (positions, values).
-        length: Length of the tube [m].
+    """Return "contraction" or "angle" along a tube, from a number, a function of the position [m], or (positions, values).
 
     Raises:
         ParameterError: If it is none of these, a value is out of range, or the positions do not extend from 0 to the length,
@@ -119,15 +109,7 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
 
 
 def sample_positions(samples: Any, length: float) -> FloatArray:
-    """Return the positions of samples along the tube, shape (n,) [m].
-
-    Args:
-        samples: Number of equally spaced samples including both ends, or their positions [m].
-        length: Length of the tube [m].
-
-    Raises:
-        ParameterError: If it is neither.
-    """
+    """Return positions along the tube, shape (n,) [m], from their number (both ends included) or the positions themselves."""
     if not isinstance(samples, tuple | list | np.ndarray):
         count = positive_integer("samples", samples, _MOST_SAMPLES)
         if count < 2:
