@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.view.meshcat_page.page_commands import RESOLUTION
-from softrobots.view.meshcat_page.page_text import scene_of
 from tests.support.law_robots import ROBOTS, Case, cases, model, triples
 from tests.support.laws import law
 from tests.support.oracles import flexible_table
+from tests.support.packed_pages import scene_of
 
 angles = st.tuples(*[st.one_of(st.sampled_from([0.0, math.pi, -math.pi / 2]), st.floats(-9.0, 9.0))] * 3)
 

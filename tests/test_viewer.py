@@ -17,10 +17,10 @@ import pytest
 import softrobots as sr
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.browser import find_chromium, show_share, take_picture
-from softrobots.view.meshcat_page.page_text import scene_of
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 from softrobots.view.viewer import Viewer, view
+from tests.support.packed_pages import scene_of
 from tests.support.pictures import coloured, listening, pictures_of, pixels
 
 FORCE = (0.0, 10.0, -15.0)

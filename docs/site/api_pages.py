@@ -93,7 +93,7 @@ PAGES = {
         "Viewer",
         "The robot in a browser: as a page on loopback, as a file of its own, with sliders, or following commands.",
         (
-            *_top("view", "Viewer", "view.meshcat_page.inline_page.InlinePage", "view.slider_page.SliderPage"),
+            *_top("view", "Viewer", "view.meshcat_page.page_text.InlinePage", "view.slider_page.SliderPage"),
             *_top("view.live.loop.LiveView", "view.live.commands.Wanted", "view.live.commands.GRAMMAR", "view.live.keys.KEYS"),
         ),
     ),

@@ -16,8 +16,7 @@ from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.trajectory import Trajectory
-from softrobots.view.meshcat_page.inline_page import InlinePage
-from softrobots.view.meshcat_page.page_text import legend_rows, live_page, page_text
+from softrobots.view.meshcat_page.page_text import InlinePage, legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
 from softrobots.view.meshcat_page.server import connect, end_server, send_html, start_server
 from softrobots.view.meshcat_page.stage import Stage

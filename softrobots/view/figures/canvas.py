@@ -79,6 +79,26 @@ def new_figure(size: tuple[float, float]) -> Any:
     return require_matplotlib()(figsize=size, layout="constrained", dpi=120)
 
 
+def new_plot(size: tuple[float, float], **texts: str) -> tuple[Any, Any]:
+    """Return a figure of a size in inches with one pair of axes and a grid, and its axes; `texts` are labels and title."""
+    figure = new_figure(size)
+    axes = figure.add_subplot(**texts)
+    axes.grid(alpha=0.3)
+    return figure, axes
+
+
+def new_space(size: tuple[float, float], title: str) -> tuple[Any, Any]:
+    """Return a figure of a size in inches with axes in space, in metres, and its axes."""
+    figure = new_figure(size)
+    return figure, figure.add_subplot(projection="3d", xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title=title)
+
+
+def grid_and_legend(axes: Any, **style: Any) -> None:
+    """Draw a grid and a legend in small print; `style` is matplotlib's of a legend."""
+    axes.grid(alpha=0.3)
+    axes.legend(**{"fontsize": 9, **style})
+
+
 def equal_box(axes: Any, points: FloatArray) -> None:
     """Give 3D axes equal scales around points, shape (n, 3) [m]."""
     centre, half = (points.max(0) + points.min(0)) / 2.0, max(float(np.ptp(points, axis=0).max()) / 2.0, 1e-3)

@@ -12,7 +12,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.statics.post_buckling import EquilibriumBranch
-from softrobots.view.figures.canvas import line_style, new_figure
+from softrobots.view.figures.canvas import grid_and_legend, line_style, new_figure, new_plot
 
 
 def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, *, critical: float | None = None) -> Any:
@@ -45,8 +45,7 @@ def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, 
             force = positive_number("critical", critical, "N")
             axes.axvline(force, color="black", lw=1.0, label=f"buckling load, {force:.2f} N")
         axes.set_xlabel("force at the tip [N]")
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=9)
+        grid_and_legend(axes)
     left.set(ylabel="way of the tip [mm]", title="Where the tip goes")
     right.set(ylabel="smallest eigenvalue of the tangent stiffness [N m/rad]", title="What stiffness is left")
     return figure
@@ -82,8 +81,7 @@ def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
             axes.plot(branch.forces, np.where(dashed, values, np.nan), **(style | {"ls": "--", "marker": ""}))
     for axes in (left, right):
         axes.set_xlabel("force [N]")
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=7)
+        grid_and_legend(axes, fontsize=7)
     left.set(ylabel="way of the tip across the push [mm]", title="Where the tip goes (dashed: not stable)")
     right.set(ylabel="softest eigenvalue over the springs' stiffness [-]", title="How stable it is")
     return figure
@@ -105,8 +103,8 @@ def reaction(runs: Mapping[str, Sequence[ImposedDisplacement]]) -> Any:
         MissingDependency: If matplotlib is not installed.
     """
     _check(runs, ImposedDisplacement)
-    figure = new_figure((8.0, 4.6))
-    axes = figure.add_subplot()
+    labels = {"xlabel": "displacement of the probe [mm]", "ylabel": "force on the robot [N]"}
+    figure, axes = new_plot((8.0, 4.6), title="Imposed displacement", **labels)
     for number, (label, run) in enumerate(runs.items()):
         ways = 1e3 * np.array([state.displacement for state in run])
         forces = np.array([state.reaction for state in run])
@@ -118,8 +116,6 @@ def reaction(runs: Mapping[str, Sequence[ImposedDisplacement]]) -> Any:
         axes.plot(ways[~dead], forces[~dead], ls="", marker=marker, ms=5, color=colour, mfc="white")
     for face, label in (("black", "stable under the force alone, too"), ("white", "held by the probe only")):
         axes.plot([], [], ls="", marker="o", ms=5, color="black", mfc=face, label=label)
-    axes.set(xlabel="displacement of the probe [mm]", ylabel="force on the robot [N]", title="Imposed displacement")
-    axes.grid(alpha=0.3)
     axes.legend(fontsize=9)
     return figure
 

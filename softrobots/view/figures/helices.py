@@ -13,7 +13,7 @@ import numpy as np
 from softrobots import helix
 from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.errors import ParameterError
-from softrobots.view.figures.canvas import COLOURS, MARKERS, new_figure
+from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure
 from softrobots.view.figures.helix_sheet import draw, sheet
 
 MOST_HELICES = 60
@@ -84,14 +84,17 @@ def radius_and_pitch(angles: Any, diameter: float) -> Any:
     for number, tilt in enumerate(tilts):
         _against_contraction((radius, pitch, close), float(tilt), size, number)
     limits = helix.contraction_limit(tilts)
-    for axes, name in ((radius, "outer radius $R_o$ [cm]"), (pitch, "normalised pitch $b$ [cm/rad]"), (close, "$b$ [cm/rad]")):
+    for axes, name, title in (
+        (radius, "outer radius $R_o$ [cm]", "Outer radius"),
+        (pitch, "normalised pitch $b$ [cm/rad]", "Pitch"),
+        (close, "$b$ [cm/rad]", "Pitch near self-contact"),
+    ):
         axes.set(xlabel=r"contraction $\lambda$ [-]", ylabel=name, xlim=(0.0, 1.0))
+        axes.set_title(title, fontsize=11)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
     close.set(xlim=(max(0.0, limits.min() - 0.1), min(1.0, limits.max() + 0.1)), ylim=(0.0, 3.0 * below))
     close.locator_params(axis="x", nbins=6)
-    for axes, name in ((radius, "Outer radius"), (pitch, "Pitch"), (close, "Pitch near self-contact")):
-        axes.set_title(name, fontsize=11)
     _name_lines(figure, pitch)
     figure.suptitle(f"Shape of a tube {100 * size:.3g} cm thick against the contraction of its actuator")
     return figure
@@ -140,8 +143,7 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     right.set(xlabel=f"deflection of the inner radius at {most / 1e3:.3g} kPa [mm]", xlim=(0.0, 1e3 * deepest))
     for axes in (left, right):
         axes.set_ylim(bottom=0.0)
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=9, loc="upper left" if axes is left else "lower right")
+        grid_and_legend(axes, loc="upper left" if axes is left else "lower right")
     case = f"object {200 * test.object_radius:.3g} cm thick, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
     figure.suptitle(f"Grasp force: our model, not data of the paper ({case}, {100 * test.turn_height:.3g} cm rise per turn)")
     return figure

@@ -12,7 +12,7 @@ from softrobots import inflated_beam
 from softrobots.core.checks import finite_number, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam import CharacterisationRow
-from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, line_style, new_figure
+from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, grid_and_legend, line_style, new_figure, new_plot
 
 _FAINT = "#7f7f7f"
 
@@ -53,13 +53,8 @@ def deflection(
     offset = positive_number("hinge_offset", hinge_offset, "m")
     if offset >= positive_number("length", length, "m"):
         raise ParameterError("hinge_offset", hinge_offset, f"below the length of the link, {length} m")
-    tube = {
-        "pressure": pressure,
-        "length": length,
-        "radius": radius,
-        "wall_thickness": wall_thickness,
-        "poisson_ratio": poisson_ratio,
-    }
+    tube = {"length": length, "radius": radius, "wall_thickness": wall_thickness, "poisson_ratio": poisson_ratio}
+    tube["pressure"] = pressure
     modulus = inflated_beam.young_modulus_from_stiffness(stiffness, **tube)
     x = np.linspace(0.0, length, 121)
     beam = inflated_beam.deflection(x, finite_number("force", force, "N"), young_modulus=modulus, **tube)
@@ -68,8 +63,8 @@ def deflection(
     bending = curvature * (length * x**2 / 2.0 - x**3 / 6.0)
     printed = beam + curvature * x**3 / 3.0
     rigid = force * (length - offset) / stiffness * np.maximum(x - offset, 0.0)
-    figure = new_figure((8.0, 4.6))
-    axes = figure.add_subplot()
+    title = f"An inflated link under {force:g} N at its end, {pressure / 1e3:g} kPa"
+    figure, axes = new_plot((8.0, 4.6), xlabel="distance from the clamp [mm]", ylabel="deflection [mm]", title=title)
     lines = (
         (beam, "beam (1), sign corrected"),
         (bending, "the same without shear"),
@@ -78,12 +73,6 @@ def deflection(
     )
     for number, (line, label) in enumerate(lines):
         axes.plot(1e3 * x, 1e3 * line, markevery=20, label=label, **line_style(number))
-    axes.set(
-        xlabel="distance from the clamp [mm]",
-        ylabel="deflection [mm]",
-        title=f"An inflated link under {force:g} N at its end, {pressure / 1e3:g} kPa",
-    )
-    axes.grid(alpha=0.3)
     axes.legend(fontsize=9)
     return figure
 
@@ -106,8 +95,8 @@ def moment_angle_laws(rows: Sequence[CharacterisationRow], radius: float) -> Any
     limits = [inflated_beam.wrinkling_moment(row.pressure, radius) for row in rows]
     tops = [limit if row.max_moment is None else row.max_moment for row, limit in zip(rows, limits, strict=True)]
     last = 1.25 * max(top / row.stiffness for row, top in zip(rows, tops, strict=True))
-    figure = new_figure((8.0, 5.2))
-    axes = figure.add_subplot()
+    title = "Moment-angle law of a link by gauge pressure"
+    figure, axes = new_plot((8.0, 5.2), xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
     for number, (row, limit, top) in enumerate(zip(rows, limits, tops, strict=True)):
         angles = np.linspace(0.0, last if row.max_moment is not None else limit / row.stiffness, 101)
         moments = inflated_beam.moment(angles, stiffness=row.stiffness, max_moment=top)
@@ -115,19 +104,12 @@ def moment_angle_laws(rows: Sequence[CharacterisationRow], radius: float) -> Any
         style = line_style(number)
         marker = {"marker": style.pop("marker"), "ms": 7, "color": style["color"], "mec": "black", "ls": ""}
         del style["ms"]
-        axes.plot(
-            angles, moments, lw=1.8, label=name if row.max_moment is not None else f"{name}, no plateau measured", **style
-        )
+        label = name if row.max_moment is not None else f"{name}, no plateau measured"
+        axes.plot(angles, moments, lw=1.8, label=label, **style)
         axes.plot(limit / row.stiffness, limit, **marker)
-        end = {"xytext": (-4, 5), "textcoords": "offset points", "ha": "right", "fontsize": 9}
-        axes.annotate(name, (angles[-1], moments[-1]), **end)
+        axes.annotate(name, (angles[-1], moments[-1]), (-4, 5), textcoords="offset points", ha="right", fontsize=9)
     axes.plot([], [], color="0.6", marker="o", mec="black", ms=7, ls="", label="wrinkling moment (3)")
-    axes.set(
-        xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title="Moment-angle law of a link by gauge pressure"
-    )
-    axes.set_xlim(0.0, 1.02 * last)
-    axes.set_ylim(0.0, 1.1 * max(tops))
-    axes.grid(alpha=0.3)
+    axes.set(xlim=(0.0, 1.02 * last), ylim=(0.0, 1.1 * max(tops)))
     axes.legend(fontsize=9, loc="upper left")
     return figure
 
@@ -183,8 +165,7 @@ def pressure_effects(
     right.set(xlabel="gauge pressure [kPa]", ylabel="moment [N m]", title="What a link can carry does")
     for axes in (left, right):
         axes.set_xlim(0.0, None)
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=9, loc="lower right")
+        grid_and_legend(axes, loc="lower right")
     return figure
 
 

@@ -11,7 +11,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone
 from softrobots.view.body import body, body_at
-from softrobots.view.figures.canvas import COLOURS, equal_box, force_arrow, new_figure, plain_words
+from softrobots.view.figures.canvas import COLOURS, equal_box, force_arrow, new_space, plain_words
 
 _PULL, _PUSH = COLOURS[0], COLOURS[1]
 _LOADED = "#303030"
@@ -36,13 +36,11 @@ def loaded_shape(equilibrium: Equilibrium) -> Any:
     model = equilibrium.model
     if model.structure.section_table:
         return shape(equilibrium)
-    figure = new_figure((7.0, 6.4))
-    axes = figure.add_subplot(projection="3d")
+    figure, axes = new_space((7.0, 6.4), f"{plain_words(model.pinocchio.name)} under load")
     loaded, relaxed = backbone(model, equilibrium.q), backbone(model, model.configuration(equilibrium.q_motors))
     axes.plot(*relaxed.T, color=_RELAXED, lw=1.2, ls=":", label="relaxed springs, same motors")
     axes.plot(*loaded.T, color=_LOADED, lw=2.5, marker="o", ms=4.0, label="loaded")
     arrow = force_arrow(axes, equilibrium)
-    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title=f"{plain_words(model.pinocchio.name)} under load")
     equal_box(axes, np.vstack([loaded, relaxed, arrow]))
     axes.legend(loc="upper left", fontsize=9)
     return figure
@@ -63,8 +61,7 @@ def shape(equilibrium: Equilibrium) -> Any:
     """
     if not isinstance(equilibrium, Equilibrium) or not equilibrium.model.structure.section_table:
         raise ParameterError("equilibrium", equilibrium, "an Equilibrium of a robot with sections")
-    figure = new_figure((7.0, 7.0))
-    axes = figure.add_subplot(projection="3d")
+    figure, axes = new_space((7.0, 7.0), "Shape under load")
     forces = dict(zip((muscle.name for muscle in equilibrium.model.muscles), equilibrium.muscle_forces, strict=True))
     segments, labelled = body(equilibrium), set()
 
@@ -91,7 +88,6 @@ def shape(equilibrium: Equilibrium) -> Any:
             axes.plot(*_circle(pose, segment.radius).T, color="0.7", lw=0.8)
         axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label=label("end of a segment"))
     arrow = force_arrow(axes, equilibrium)
-    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Shape under load")
     equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
     axes.legend(loc="upper left", fontsize=9)
     return figure

@@ -12,7 +12,7 @@ from softrobots.constant_curvature.arcs import stack_arcs
 from softrobots.constant_curvature.poses import chain_frames
 from softrobots.core.checks import finite_array, positive_array
 from softrobots.core.errors import ParameterError
-from softrobots.view.figures.canvas import COLOURS, LINES, equal_box, new_figure
+from softrobots.view.figures.canvas import COLOURS, LINES, equal_box, new_space
 
 _POINTS = 41  # of a segment
 
@@ -47,8 +47,7 @@ def arm(
         raise ParameterError("distance", distance, f"one number, or one for each of {stacked.shape[0]} segments")
     directions = finite_array("azimuths", azimuths, (None,), "rad")
     starts, ends = chain_frames(stacked, offsets, frame)[0], chain_transforms(stacked, offsets, frame)
-    figure = new_figure((7.0, 7.0))
-    axes = figure.add_subplot(projection="3d")
+    figure, axes = new_space((7.0, 7.0), f"Constant curvature in closed form, {frame.replace('_', '-')} frames")
     share, drawn = np.linspace(0.0, 1.0, _POINTS), []
     for segment, reach in enumerate(np.broadcast_to(apart, stacked.shape)):
         first = segment == 0
@@ -72,8 +71,6 @@ def arm(
         axes.plot(*np.stack([tip[:3, 3], end]).T, color="0.1", lw=1.0)
         axes.text(*(end + 0.2 * size * tip[:3, axis]), name, fontsize=10, ha="center", va="center")
         points = np.vstack([points, end])
-    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
-    axes.set_title(f"Constant curvature in closed form, {frame.replace('_', '-')} frames")
     equal_box(axes, points)
     axes.legend(loc="upper left", fontsize=9)
     return figure

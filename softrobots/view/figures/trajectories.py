@@ -14,7 +14,16 @@ from softrobots.core.checks import FloatArray, finite_array, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.statics.kinematics import backbone
 from softrobots.statics.trajectory import Trajectory
-from softrobots.view.figures.canvas import COLOURS, MARKERS, equal_box, force_arrow, line_style, new_figure, plain_words
+from softrobots.view.figures.canvas import (
+    COLOURS,
+    MARKERS,
+    equal_box,
+    force_arrow,
+    line_style,
+    new_plot,
+    new_space,
+    plain_words,
+)
 
 
 def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
@@ -32,8 +41,8 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
         MissingDependency: If matplotlib is not installed.
     """
     positive_integer("shown", shown)
-    figure = _figure(trajectory, (8.0, 6.4))
-    axes = figure.add_subplot(projection="3d")
+    _check(trajectory)
+    figure, axes = new_space((8.0, 6.4), "Loaded arm along the path")
     model = trajectory.model
     chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, shown).round().astype(int))
     everything = [trajectory.tip_positions]
@@ -44,18 +53,11 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
         rigid = backbone(model, model.configuration(equilibrium.q_motors))
         first = count == 0
         axes.plot(*rigid.T, color="#7f7f7f", lw=1.0, ls=":", label="rigid arm, same motor angles" if first else None)
-        axes.plot(
-            *loaded.T,
-            color=(shade, shade, shade),
-            lw=2.5,
-            marker="o",
-            ms=3.5,
-            label="loaded arm, later is darker" if first else None,
-        )
+        label = "loaded arm, later is darker" if first else None
+        axes.plot(*loaded.T, color=(shade, shade, shade), lw=2.5, marker="o", ms=3.5, label=label)
         everything.append(loaded)
     axes.plot(*trajectory.tip_positions.T, color=COLOURS[1], lw=2.0, ls="--", label="path of the tip")
     everything.append(force_arrow(axes, trajectory.equilibria[-1]))
-    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Loaded arm along the path")
     equal_box(axes, np.vstack(everything))
     axes.legend(loc="upper left", fontsize=9)
     return figure
@@ -75,19 +77,18 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
         ParameterError: If one of them is no trajectory, or they differ in length.
         MissingDependency: If matplotlib is not installed.
     """
-    figure = _figure(trajectory, (8.0, 5.0))
+    _check(trajectory)
     _check(rigid)
     if len(rigid.times) != len(trajectory.times):
         raise ParameterError("rigid", len(rigid.times), f"a trajectory with {len(trajectory.times)} waypoints")
-    axes = figure.add_subplot()
+    figure, axes = new_plot(
+        (8.0, 5.0), xlabel="time [s]", ylabel="motor angle [rad]", title="Motor angles: elastic and rigid inverse kinematics"
+    )
     every = max(len(trajectory.times) // 10, 1)
     for number, name in enumerate(trajectory.model.motor_joints):
-        colour, marker = COLOURS[number % 6], MARKERS[number % 6]
-        style = {"color": colour, "marker": marker, "markevery": every, "ms": 5}
+        style = {"color": COLOURS[number % 6], "marker": MARKERS[number % 6], "markevery": every, "ms": 5}
         axes.plot(trajectory.times, trajectory.q_motors[:, number], label=f"{plain_words(name)}, elastic", **style)
         axes.plot(rigid.times, rigid.q_motors[:, number], ls="--", mfc="white", label=f"{plain_words(name)}, rigid", **style)
-    axes.set(xlabel="time [s]", ylabel="motor angle [rad]", title="Motor angles: elastic and rigid inverse kinematics")
-    axes.grid(alpha=0.3)
     axes.legend(ncols=min(trajectory.model.n_motors, 3), fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     return figure
 
@@ -108,19 +109,11 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
     """
     moments = finite_array("times", times, (None,), "s")
     lines = {label: finite_array(f"errors[{label!r}]", error, moments.shape, "m") for label, error in errors.items()}
-    figure = new_figure((8.0, 4.4))
-    axes = figure.add_subplot()
+    title = "Distance of the loaded tip from its target"
+    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel="tip error [mm]", title=title)
     every = max(len(moments) // 10, 1)
     for number, (label, error) in enumerate(lines.items()):
-        axes.semilogy(
-            moments,
-            np.maximum(error, 1e-16) * 1e3,
-            markevery=every,
-            label=label,
-            **line_style(number),
-        )
-    axes.set(xlabel="time [s]", ylabel="tip error [mm]", title="Distance of the loaded tip from its target")
-    axes.grid(alpha=0.3)
+        axes.semilogy(moments, np.maximum(error, 1e-16) * 1e3, markevery=every, label=label, **line_style(number))
     axes.legend(fontsize=9)
     return figure
 
@@ -138,34 +131,23 @@ def link_moments(trajectory: Trajectory) -> Any:
         ParameterError: If it is no trajectory or its robot names no inflated links.
         MissingDependency: If matplotlib is not installed.
     """
-    figure = _figure(trajectory, (8.0, 4.4))
+    _check(trajectory)
     moments = trajectory.link_moments
     if moments is None:
         raise ParameterError("trajectory", trajectory.model, "of a robot with inflated links")
-    axes = figure.add_subplot()
+    title = "Moment at the springs of each link"
+    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel="moment [N m]", title=title)
     every = max(len(trajectory.times) // 10, 1)
     for number, moment in enumerate(moments.T):
         axes.plot(trajectory.times, moment, markevery=every, label=f"link {number + 1}", **line_style(number))
     limits = {(group.wrinkling_moment, group.pressure) for group in trajectory.model.spring_groups}
     for limit, pressure in sorted(limits):
         axes.axhline(limit, color="black", lw=1.0)
-        axes.annotate(
-            f"wrinkling moment at {pressure / 1e3:g} kPa",
-            (trajectory.times[0], limit),
-            xytext=(4, 4),
-            textcoords="offset points",
-            fontsize=9,
-        )
-    top = 1.12 * max(float(moments.max()), *(limit for limit, _ in limits))
-    axes.set(xlabel="time [s]", ylabel="moment [N m]", title="Moment at the springs of each link", ylim=(0.0, top))
-    axes.grid(alpha=0.3)
+        place = {"xy": (trajectory.times[0], limit), "xytext": (4, 4), "textcoords": "offset points"}
+        axes.annotate(f"wrinkling moment at {pressure / 1e3:g} kPa", **place, fontsize=9)
+    axes.set_ylim(0.0, 1.12 * max(float(moments.max()), *(limit for limit, _ in limits)))
     axes.legend(fontsize=9)
     return figure
-
-
-def _figure(trajectory: Trajectory, size: tuple[float, float]) -> Any:
-    _check(trajectory)
-    return new_figure(size)
 
 
 def _check(trajectory: Trajectory) -> None:

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from softrobots.core.errors import ViewerError
-from softrobots.core.json_text import parse_json
 
 RESOLUTION = 2.0**-18
 """Numbers on a page are multiples of this: of lengths it is 4 um, of directions 4 urad."""
@@ -25,7 +24,6 @@ _SCRIPT = re.compile(r"<script>\s*(/\*!.*?)</script>", re.DOTALL)
 _UUID = re.compile(rb"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}")
 _FLOATS = 0x17  # meshcat's number of the extension type of msgpack that holds numbers of 32 bits
 _HEAD = re.compile(rb"(?:\xc8(..)|\xc9(....))[\x12-\x17]", re.DOTALL)  # of an array of meshcat's, with its length in bytes
-_LARGEST = 500_000_000  # bytes of an unpacked page
 _REPEATED = 256  # bytes of an array from which it is looked for among the others
 
 
@@ -79,27 +77,6 @@ def packed(script: str, commands: Sequence[bytes]) -> str:
     numbered = [[pieces.setdefault(part, len(pieces)) for part in _parts(command)] for command in commands]
     head = json.dumps({"lengths": [len(piece) for piece in pieces], "commands": numbered}, separators=(",", ":"))
     return base64.b64encode(zlib.compress(head.encode() + b"\n" + b"".join(pieces), 9)).decode()
-
-
-def unpacked(text: str) -> tuple[str, list[bytes]]:
-    """Return script and commands from the text of `packed`.
-
-    Raises:
-        ViewerError: If it is no such text.
-    """
-    try:
-        unpacker = zlib.decompressobj()
-        inflated = unpacker.decompress(base64.b64decode(text, validate=True), _LARGEST)
-        if not unpacker.eof:
-            raise ValueError(f"it is cut off, or has more than {_LARGEST} bytes")
-        head, _, rest = inflated.partition(b"\n")
-        index, pieces = parse_json(head.decode()), []
-        for length in index["lengths"]:
-            pieces.append(rest[:length])
-            rest = rest[length:]
-        return pieces[0].decode(), [b"".join(pieces[number] for number in numbers) for numbers in index["commands"]]
-    except (ValueError, KeyError, IndexError, TypeError, zlib.error) as error:
-        raise ViewerError(f"this is no packed page: {error}") from error
 
 
 def _rounded(value: Any) -> Any:

@@ -1,23 +1,45 @@
-"""The HTML of a page with title and legend: self-contained and offline, or served."""
+"""The HTML of a page with title and legend: self-contained and offline, served, or in a cell of a notebook."""
 
 from __future__ import annotations
 
 import html
-import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
-from softrobots.core.errors import ViewerError
 from softrobots.version import __version__
-from softrobots.view.meshcat_page.page_commands import packed, read_page, tidied, unpacked
+from softrobots.view.meshcat_page.page_commands import packed, read_page, tidied
 
 Colour = tuple[float, ...] | int
 """Red, green, blue and perhaps opacity in [0, 1], or a number as in HTML."""
 
-_SCENE = re.compile(r'<script id="softrobots-scene" type="text/plain">([^<]*)</script>')
-
 _HINT = "Drag: turn. Wheel or two fingers: nearer."
+
+
+@dataclass(frozen=True)
+class InlinePage:
+    """A self-contained page that Jupyter shows if it is the last expression of a cell.
+
+    It is an iframe that holds the whole page: it needs no server, Jupyter extension or network, and is saved with the
+    notebook.
+    """
+
+    page: str
+    """HTML text of the page."""
+    height: int = 480
+    """Height in the notebook [px]; it is as wide as the cell."""
+
+    def _repr_html_(self) -> str:
+        """Return the iframe for Jupyter."""
+        return (
+            f'<iframe title="softrobots" srcdoc="{html.escape(self.page)}" '
+            f'style="width:100%;height:{self.height}px;border:0"></iframe>'
+        )
+
+    def __repr__(self) -> str:
+        """Return a short text for consoles; the page itself is a megabyte."""
+        return f"InlinePage({len(self.page)} characters, height={self.height})"
 
 
 def page_text(static: str, title: str, legend: Sequence[tuple[Colour, str]]) -> str:
@@ -61,18 +83,6 @@ def legend_rows(legend: Sequence[tuple[Colour, str]]) -> str:
     """Return the HTML of a legend: one line for each colour and meaning, the colour as background of an empty `span`."""
     rows = (f'\n<div><span style="background:{_css(colour)}"></span>{html.escape(text)}</div>' for colour, text in legend)
     return "".join(rows)
-
-
-def scene_of(page: str) -> tuple[str, list[bytes]]:
-    """Return script and drawing commands of a page of `page_text`, for comparisons.
-
-    Raises:
-        ViewerError: If it is no such page.
-    """
-    match = _SCENE.search(page)
-    if match is None:
-        raise ViewerError("this page was not made by softrobots: it holds no packed scene")
-    return unpacked(match[1])
 
 
 def _page(title: str, rows: str, hint: str, scene: str, head: str = "") -> str:
