@@ -275,7 +275,7 @@ def test_the_exit_status_tells_what_kind_of_end_it_was(text: str, joints: int, p
     large = command_line.exit_status(lambda: command_line.refuse_too_large(Robot(), "--sections", joints))
     assert large == (0 if joints <= 300 else 2)  # Pinocchio's workspace
     page = _Page(port)
-    lines = command_line.address_lines(page)
+    lines = command_line.address_lines(page.url, page.tunnel)
     assert page.url in lines[0]
     assert page.tunnel in lines[1]
     assert command_line.exit_status(lambda: serve(page)) == 0

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from softrobots.cli.options.command_line import add_gravity, gravity_of
-from softrobots.cli.options.robot_argument import add_model, model_of, motors_of, source_of
+from softrobots.cli.options.robot_argument import add_model, add_motors, model_of, motors_of, source_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.files import new_file
 from softrobots.export.damping import DAMPING
@@ -36,9 +36,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="the file to write (required)")
     help_text = "; ".join(f"{name} ({row.suffix}): {row.meaning}" for name, row in FORMATS.items())
     parser.add_argument("--format", choices=FORMATS, help=f"{help_text} (by the suffix of FILE)")
-    parser.add_argument(
-        "--motors", type=float, nargs="+", metavar="Q", help="motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
-    )
+    add_motors(parser)
     parser.add_argument(
         "--welded", action="store_true", help="fix the motors where they are, put tensions of muscles into the springs"
     )

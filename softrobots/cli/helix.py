@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from softrobots import helix
+from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
-from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, lines_of, print_answer, written_lines
+from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, lines_of, print_answer
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
 from softrobots.helix.template import write_template
@@ -45,39 +46,35 @@ def add_parser(subparsers: Any) -> None:
 
     forward = _form(forms, "forward", _forward, "actuator -> helix")
     help_text = "contracted over original length of the actuator, in (0, 1] [-] (%(default)s)"
-    forward.add_argument("--contraction", type=float, default=HelixTube.contraction, metavar="C", help=help_text)
+    add_numbers(forward, "--contraction", "C", help_text, default=HelixTube.contraction)
     help_text = f"angle of the actuator to the axis of the tube, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
-    forward.add_argument("--angle", type=float, default=HelixTube.angle, metavar="A", help=help_text)
+    add_numbers(forward, "--angle", "A", help_text, default=HelixTube.angle)
     _add_diameter(forward)
 
     inverse = _form(forms, "inverse", _inverse, "helix -> actuator")
-    help_text = "radius of the path opposite the actuator [m] (required)"
-    inverse.add_argument("--outer-radius", type=float, required=True, metavar="R", help=help_text)
+    add_numbers(inverse, "--outer-radius", "R", "radius of the path opposite the actuator [m] (required)", required=True)
     help_text = "radius of the path of the actuator, negative beyond the axis of the helix [m] (required)"
-    inverse.add_argument("--inner-radius", type=float, required=True, metavar="R", help=help_text)
+    add_numbers(inverse, "--inner-radius", "R", help_text, required=True)
     rise = inverse.add_mutually_exclusive_group(required=True)
-    rise.add_argument(
-        "--pitch", type=float, metavar="B", help="rise per turn angle [m/rad] (this or --turn-height is required)"
-    )
-    rise.add_argument("--turn-height", type=float, metavar="H", help="rise of a whole turn, 2 pi times the pitch [m]")
+    add_numbers(rise, "--pitch", "B", "rise per turn angle [m/rad] (this or --turn-height is required)")
+    add_numbers(rise, "--turn-height", "H", "rise of a whole turn, 2 pi times the pitch [m]")
 
     measure = _form(forms, "measure", _measure, "lengths of both paths, as a tape measures them -> helix, actuator")
-    help_text = "length of the path opposite the actuator [m] (required)"
-    measure.add_argument("--outer-arc", type=float, required=True, metavar="L", help=help_text)
-    measure.add_argument("--inner-arc", type=float, required=True, metavar="L", help="length of the actuator [m] (required)")
-    measure.add_argument("--turns", type=float, default=1.0, metavar="N", help="turns that were measured [-] (%(default)g)")
+    add_numbers(measure, "--outer-arc", "L", "length of the path opposite the actuator [m] (required)", required=True)
+    add_numbers(measure, "--inner-arc", "L", "length of the actuator [m] (required)", required=True)
+    add_numbers(measure, "--turns", "N", "turns that were measured [-] (%(default)g)", default=1.0)
     _add_diameter(measure)
 
     design = _form(forms, "design", _design, "purpose of the helix -> actuator and length of the tube")
-    purpose, names = design.add_mutually_exclusive_group(required=True), ("RADIUS", "RISE", "TURNS")
+    purpose, names = design.add_mutually_exclusive_group(required=True), "RADIUS RISE TURNS"
     help_text = (
         "helix whose centre line has this radius [m], rise per turn [m] and number of turns [-] (this or --grasp is required)"
     )
-    purpose.add_argument("--antenna", type=float, nargs=3, metavar=names, help=help_text)
+    add_numbers(purpose, "--antenna", names, help_text)
     help_text = "helix around an object of this radius [m], with this rise per turn [m] and number of turns [-]"
-    purpose.add_argument("--grasp", type=float, nargs=3, metavar=names, help=help_text)
+    add_numbers(purpose, "--grasp", names, help_text)
     help_text = "by how much the radius of the helix of --grasp is smaller than that of the object [m] (0)"
-    design.add_argument("--squeeze", type=float, metavar="S", help=help_text)
+    add_numbers(design, "--squeeze", "S", help_text)
     help_text = "take the nearest helix without self-contact if the required one touches itself (an error)"
     design.add_argument("--nearest", action="store_true", help=help_text)
     _add_diameter(design)
@@ -85,7 +82,7 @@ def add_parser(subparsers: Any) -> None:
     help_text = "draw the unrolled tube to scale, with where to pinch it, into a new file (none)"
     design.add_argument("--template", type=Path, metavar="FILE.svg", help=help_text)
     help_text = "spacing of the pinches along the actuator, adjusted to a whole number of them [m] (%(default)s)"
-    design.add_argument("--spacing", type=float, default=0.02, metavar="S", help=help_text)
+    add_numbers(design, "--spacing", "S", help_text, default=0.02)
     help_text = "how the actuator is fabricated (%(default)s)"
     design.add_argument("--method", choices=helix.METHODS, default=helix.METHODS[0], help=help_text)
 
@@ -97,7 +94,7 @@ def add_parser(subparsers: Any) -> None:
         epilog=_JSON,
     )
     help_text = f"angle of the actuator to the axis of the tube, one or more, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
-    limit.add_argument("--angle", type=float, nargs="+", default=[HelixTube.angle], metavar="A", help=help_text)
+    add_numbers(limit, "--angle", "A", help_text, nargs="+", default=[HelixTube.angle])
     _add_diameter(limit)
     add_plot(limit, "radius and pitch over contraction with the limits (up to three angles, above 0 and at most pi/4)")
     add_json(limit)
@@ -111,9 +108,9 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
     )
     if name != "design":
         help_text = "length of the uninflated tube, for turns, height and volume [m] (%(default)s)"
-        parser.add_argument("--length", type=float, default=HelixTube.length, metavar="L", help=help_text)
+        add_numbers(parser, "--length", "L", help_text, default=HelixTube.length)
     help_text = "gauge pressure, for the tension of the actuator [Pa] (%(default)g)"
-    parser.add_argument("--pressure", type=float, default=HelixTube.pressure, metavar="P", help=help_text)
+    add_numbers(parser, "--pressure", "P", help_text, default=HelixTube.pressure)
     help_text = "handedness of the helix (%(default)s)"
     parser.add_argument("--handedness", choices=helix.HANDEDNESS, default=HelixTube.handedness, help=help_text)
     add_plot(parser, "the tube")
@@ -123,8 +120,7 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
 
 
 def _add_diameter(parser: argparse.ArgumentParser) -> None:
-    help_text = "diameter of the tube [m] (%(default)s)"
-    parser.add_argument("--diameter", type=float, default=HelixTube.diameter, metavar="D", help=help_text)
+    add_numbers(parser, "--diameter", "D", "diameter of the tube [m] (%(default)s)", default=HelixTube.diameter)
 
 
 def _forward(arguments: argparse.Namespace) -> None:
@@ -132,7 +128,7 @@ def _forward(arguments: argparse.Namespace) -> None:
     check_plot(arguments)
     shape = helix.forward(arguments.contraction, arguments.angle, arguments.diameter)
     actuator = helix.Actuator(*map(np.asarray, (arguments.contraction, arguments.angle, arguments.diameter)))
-    _answer(arguments, _tube_facts(shape, actuator, arguments.length, arguments.pressure, arguments.handedness))
+    _answer(arguments, _tube_facts(arguments, shape, actuator, arguments.length))
 
 
 def _inverse(arguments: argparse.Namespace) -> None:
@@ -140,18 +136,14 @@ def _inverse(arguments: argparse.Namespace) -> None:
     check_plot(arguments)
     pitch = arguments.turn_height / (2.0 * np.pi) if arguments.pitch is None else arguments.pitch
     shape = helix.HelixShape(*map(np.asarray, (arguments.outer_radius, arguments.inner_radius, pitch)))
-    _of_shape(arguments, shape)
+    _answer(arguments, _tube_facts(arguments, shape, helix.inverse(shape), arguments.length))
 
 
 def _measure(arguments: argparse.Namespace) -> None:
     """Measured arcs to helix and actuator."""
     check_plot(arguments)
-    _of_shape(arguments, helix.measure(arguments.outer_arc, arguments.inner_arc, arguments.diameter, arguments.turns))
-
-
-def _of_shape(arguments: argparse.Namespace, shape: helix.HelixShape) -> None:
-    facts = _tube_facts(shape, helix.inverse(shape), arguments.length, arguments.pressure, arguments.handedness)
-    _answer(arguments, facts)
+    shape = helix.measure(arguments.outer_arc, arguments.inner_arc, arguments.diameter, arguments.turns)
+    _answer(arguments, _tube_facts(arguments, shape, helix.inverse(shape), arguments.length))
 
 
 def _design(arguments: argparse.Namespace) -> None:
@@ -167,7 +159,7 @@ def _design(arguments: argparse.Namespace) -> None:
     if arguments.template is not None:
         pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method, remainder="respace")
     actuator = helix.Actuator(*map(np.asarray, (design.contraction, design.angle, design.diameter)))
-    facts = _tube_facts(design.shape, actuator, design.tube_length, arguments.pressure, design.handedness)
+    facts = _tube_facts(arguments, design.shape, actuator, design.tube_length)
     deviation = design.deviation
     if deviation is not None:
         off = (round(part, 12) + 0.0 for part in deviation[:2])  # without rounding errors
@@ -219,10 +211,10 @@ def _limit(arguments: argparse.Namespace) -> None:
 
         return helices.radius_and_pitch(arguments.angle, arguments.diameter)
 
-    written = write_plot(arguments, draw)
+    files = write_plot(arguments, draw)
     rows = [("angle [rad]", "smallest contraction [-]", "by the simple rule [-]")]
     rows += [tuple(f"{number:.6f}" for number in row) for row in zip(arguments.angle, exact, simple, strict=True)]  # type: ignore[misc]
-    print_answer(arguments, answer_of(facts) | {"files": written}, [*aligned(rows), *written_lines(written)])
+    print_answer(arguments, answer_of(facts), aligned(rows), files)
 
 
 def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Path] = ()) -> None:
@@ -235,16 +227,14 @@ def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Pa
         tilt, share = [float(values["angle"])], [float(values["contraction"])]
         return helices.grid(share, tilt, float(values["diameter"]), values["length"], values["handedness"])
 
-    written = [*files, *write_plot(arguments, draw)]
-    print_answer(arguments, answer_of(facts) | {"files": written}, [*lines_of(facts), *written_lines(written)])
+    print_answer(arguments, answer_of(facts), lines_of(facts), [*files, *write_plot(arguments, draw)])
 
 
-def _tube_facts(
-    shape: helix.HelixShape, actuator: helix.Actuator, length: float, pressure: float, handedness: str
-) -> list[Fact]:
-    """Facts of a tube of an uninflated length [m] at a gauge pressure [Pa], by its helix and its actuator."""
-    contraction, angle, diameter = actuator
-    turns = helix.turns(shape, angle, length)
+def _tube_facts(arguments: argparse.Namespace, shape: helix.HelixShape, actuator: helix.Actuator, length: float) -> list[Fact]:
+    """Facts of a tube of an uninflated length [m], by its helix and its actuator."""
+    (contraction, angle, diameter), handedness = actuator, arguments.handedness
+    tension = helix.actuator_tension(contraction, angle, diameter, arguments.pressure)
+    turns, limit = helix.turns(shape, angle, length), helix.contraction_limit(angle)
     contact = helix.self_contact(shape, turns)
     facts = [
         Fact("contraction", contraction, "-", "contraction of the actuator"),
@@ -271,16 +261,9 @@ def _tube_facts(
     return [
         *facts,
         Fact("material_twist", helix.material_twist(contraction, angle, diameter, handedness), "rad/m", "twist of the wall"),
-        Fact("pressure", pressure, "Pa", "gauge pressure"),
-        Fact(
-            "actuator_tension",
-            helix.actuator_tension(contraction, angle, diameter, pressure),
-            "N",
-            "tension of the actuator",
-        ),
-        Fact(
-            "contraction_limit", helix.contraction_limit(angle), "-", "smallest contraction without self-contact, endless tube"
-        ),
+        Fact("pressure", arguments.pressure, "Pa", "gauge pressure"),
+        Fact("actuator_tension", tension, "N", "tension of the actuator"),
+        Fact("contraction_limit", limit, "-", "smallest contraction without self-contact, endless tube"),
         Fact("touches", contact.touches, "", "runs into itself"),
         Fact("contact", contact.describe(), "", "self-contact"),
     ]

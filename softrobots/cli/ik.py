@@ -8,10 +8,11 @@ from typing import Any
 
 import pinocchio as pin
 
+from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, shape_figure, write_plot
 from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
-from softrobots.cli.reports.answers import add_json, print_answer, written_lines
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
@@ -44,18 +45,15 @@ def add_parser(subparsers: Any) -> None:
     )
     add_model(parser)
     what = parser.add_mutually_exclusive_group(required=True)
-    help_text = "position of the loaded tip, world axes [m] (this or --waypoints is required)"
-    what.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    add_numbers(what, "--target", "X Y Z", "position of the loaded tip, world axes [m] (this or --waypoints is required)")
     help_text = "CSV file of positions of the loaded tip, columns t, x, y, z [s, m]; without t 0.05 s apart"
     what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=help_text)
     how = parser.add_mutually_exclusive_group()
-    help_text = "direction of the tip's z axis at --target, of any length [-] (any direction)"
-    how.add_argument("--orientation", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
-    help_text = "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)"
-    how.add_argument("--rpy", type=float, nargs=3, metavar=("R", "P", "Y"), help=help_text)
+    add_numbers(how, "--orientation", "X Y Z", "direction of the tip's z axis at --target, of any length [-] (any direction)")
+    add_numbers(how, "--rpy", "R P Y", "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)")
     add_loads(parser)
     help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
-    parser.add_argument("--start", type=float, nargs="+", metavar="Q", help=help_text)
+    add_numbers(parser, "--start", "Q", help_text, nargs="+")
     help_text = (
         "side of the last motor joint, above or below the line from the first one to the tip; of a path at its start (either)"
     )
@@ -63,9 +61,9 @@ def add_parser(subparsers: Any) -> None:
     help_text = "newton, fixed_point of the paper, or paper: its closed loop, for --waypoints (%(default)s)"
     parser.add_argument("--method", choices=METHODS, default="newton", help=help_text)
     help_text = f"largest distance of the tip from a target [m] ({POSITION_TOLERANCE:g}); not for --method paper"
-    parser.add_argument("--tolerance", type=float, metavar="D", help=help_text)
+    add_numbers(parser, "--tolerance", "D", help_text)
     parser.add_argument("--starts", type=int, metavar="N", help=f"number of searches for --target [-] ({_STARTS})")
-    parser.add_argument("--gain", type=float, metavar="K", help=f"gain of --method paper [1/s] ({_GAIN:g})")
+    add_numbers(parser, "--gain", "K", f"gain of --method paper [1/s] ({_GAIN:g})")
     help_text = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
     parser.add_argument("--allow-jumps", action="store_true", help=help_text)
     add_output(parser, "the solution or trajectory as NPZ, for softrobots.load_result, or a trajectory as a .csv table")
@@ -102,8 +100,7 @@ def run(arguments: argparse.Namespace) -> None:
         progress="waypoints",
     )
     files = save(arguments, trajectory) + write_plot(arguments, lambda: _path_figure(trajectory))
-    lines = [*trajectory_lines(trajectory), *written_lines(files)]
-    print_answer(arguments, {**trajectory_answer(trajectory), "files": files}, lines)
+    print_answer(arguments, trajectory_answer(trajectory), trajectory_lines(trajectory), files)
 
 
 def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, Any]) -> None:
@@ -113,8 +110,7 @@ def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, A
     starts = _STARTS if arguments.starts is None else arguments.starts
     solution = solve_ik(model, arguments.target, orientation=orientation, starts=starts, **options)
     files = save(arguments, solution) + write_plot(arguments, lambda: shape_figure(solution.equilibrium))
-    lines = [*solution_lines(solution), *written_lines(files)]
-    print_answer(arguments, {**solution_answer(solution), "files": files}, lines)
+    print_answer(arguments, solution_answer(solution), solution_lines(solution), files)
 
 
 def _refuse_contradictions(arguments: argparse.Namespace) -> None:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.options.command_line import add_gravity, gravity_of
+from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.output_files import add_output, check_output, save
-from softrobots.cli.options.robot_argument import add_model, check_one_each, motors_of, statics_model_of
-from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, formatted, print_answer, written_lines
-from softrobots.cli.reports.coordinate_units import joined_units, load_units, motor_units
+from softrobots.cli.options.robot_argument import add_model, add_motors, check_one_each, motors_of, statics_model_of
+from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, formatted, print_answer
+from softrobots.cli.reports.coordinate_units import joined_units, load_units
 from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load
 
@@ -33,12 +33,11 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EXAMPLES,
     )
     add_model(parser)
-    help_text = "motor joints, then muscles, base to tip [rad or m] (relaxed)"
-    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=help_text)
+    add_motors(parser, "motor joints, then muscles, base to tip [rad or m] (relaxed)")
     help_text = "load on each motor, the negative of what it exerts, as motor_torques of softrobots solve [N m or N] (required)"
-    parser.add_argument("--torques", type=float, nargs="+", metavar="TAU", required=True, help=help_text)
+    add_numbers(parser, "--torques", "TAU", help_text, nargs="+", required=True)
     help_text = "standard deviation of the torques, one for all or one for each [N m or N], for that of the force (unknown)"
-    parser.add_argument("--torque-std", type=float, nargs="+", metavar="S", help=help_text)
+    add_numbers(parser, "--torque-std", "S", help_text, nargs="+")
     parser.add_argument("--frame", metavar="LINK", help="where the force acts (the tip)")
     add_gravity(parser)
     parser.add_argument(
@@ -57,7 +56,7 @@ def run(arguments: argparse.Namespace) -> None:
     model = statics_model_of(arguments)
     check_feels(model)
     motors = motors_of(model, arguments.motors)
-    units, noise = load_units(motor_units(model)), arguments.torque_std
+    units, noise = load_units(model.actuators.units), arguments.torque_std
     check_one_each("--torques", arguments.torques, model.motor_joints, units)
     if noise is not None and len(noise) > 1:
         check_one_each("--torque-std", noise, model.motor_joints, units)
@@ -72,12 +71,12 @@ def run(arguments: argparse.Namespace) -> None:
         max_iterations=arguments.max_iterations,
     )
     files = save(arguments, estimate)
-    lines = [*equilibrium_lines(estimate.equilibrium), "", *_lines(estimate), *written_lines(files)]
-    print_answer(arguments, {**_answer(estimate), "files": files}, lines)
+    lines = [*equilibrium_lines(estimate.equilibrium), "", *_lines(estimate)]
+    print_answer(arguments, _answer(estimate), lines, files)
 
 
 def _answer(estimate: LoadEstimate) -> dict[str, Any]:
-    units = joined_units(load_units(motor_units(estimate.equilibrium.model)))
+    units = joined_units(load_units(estimate.equilibrium.model.actuators.units))
     facts = [
         Fact("force", estimate.force, "N"),
         Fact("force_std", _deviations(estimate), "N"),

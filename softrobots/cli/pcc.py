@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from softrobots import constant_curvature
-from softrobots.cli.options.command_line import refuse_too_large
+from softrobots.cli.options.command_line import add_numbers, refuse_too_large
 from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
-from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, print_answer, written_lines
+from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, print_answer
 from softrobots.constant_curvature import Arc
 from softrobots.constant_curvature.poses import FRAMES
 from softrobots.core.checks import FloatArray, positive_array
@@ -41,25 +41,6 @@ the tip, linear rows first; null without --jacobian), target and error with reac
 """
 
 
-class Chain(NamedTuple):
-    """A chain of segments."""
-
-    lengths: FloatArray
-    """Muscle lengths, shape (S, N) [m]."""
-    arcs: Arc
-    """Their arcs, shape (S,)."""
-    distance: FloatArray
-    """Distance of the muscles from the backbone, shape (S,) [m]."""
-    azimuths: Sequence[float]
-    """Azimuths of the muscles of a segment, N [rad]."""
-    offsets: Sequence[float] | None
-    """Turn before each segment, S [rad]; None: the paper's."""
-    rest: FloatArray
-    """Rest length of each segment, shape (S,) [m]."""
-    frame: str
-    """The frame at the end of a segment."""
-
-
 def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
     parser = subparsers.add_parser(
@@ -72,34 +53,29 @@ def add_parser(subparsers: Any) -> None:
 
     forward = _form(forms, "forward", _forward, "muscle lengths -> arcs and poses")
     help_text = "muscle lengths, segment by segment from the base, as many a segment as --azimuths has [m]"
-    forward.add_argument("lengths", type=float, nargs="+", metavar="L", help=help_text)
+    add_numbers(forward, "lengths", "L", help_text, nargs="+")
     help_text = "largest difference of more than three muscle lengths from those of an arc [m] (%(default)g)"
-    forward.add_argument("--tolerance", type=float, default=1e-6, metavar="T", help=help_text)
+    add_numbers(forward, "--tolerance", "T", help_text, default=1e-6)
 
     inverse = _form(forms, "inverse", _inverse, "arcs -> muscle lengths and poses")
     help_text = (
-        "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once a segment, base to tip"
+        "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once a segment, base to tip "
+        "(required)"
     )
-    help_text += " (required)"
-    names = ("LENGTH", "BENDING", "AZIMUTH")
-    inverse.add_argument(
-        "--arc", type=float, nargs=3, action="append", required=True, dest="arcs", metavar=names, help=help_text
-    )
+    add_numbers(inverse, "--arc", "LENGTH BENDING AZIMUTH", help_text, action="append", required=True, dest="arcs")
 
     reach = _form(forms, "reach", _reach, "position of the tip -> muscle lengths, without load")
     reach.description = f"{reach.description} The lengths that differ least from --start, of segments that bend by less than "
     reach.description += "170 degrees. Exit status 1 if the tip cannot get there."
     for axis in "xyz":
-        reach.add_argument(axis, type=float, metavar=axis.upper(), help=f"position of the tip along {axis} [m]")
-    help_text = "number of segments (as many as --rest has, else %(const)s)"
-    reach.add_argument("--segments", type=int, metavar="N", help=help_text % {"const": len(PccArm.segment_lengths)})
-    help_text = "direction in which the tip points, any length but zero [-] (any direction)"
-    reach.add_argument("--direction", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
-    help_text = "muscle lengths to change least, as in forward [m] (rest)"
-    reach.add_argument("--start", type=float, nargs="+", metavar="L", help=help_text)
+        add_numbers(reach, axis, axis.upper(), f"position of the tip along {axis} [m]")
+    help_text = f"number of segments (as many as --rest has, else {len(PccArm.segment_lengths)})"
+    reach.add_argument("--segments", type=int, metavar="N", help=help_text)
+    add_numbers(reach, "--direction", "X Y Z", "direction in which the tip points, any length but zero [-] (any direction)")
+    add_numbers(reach, "--start", "L", "muscle lengths to change least, as in forward [m] (rest)", nargs="+")
     for name, default in (("contraction", PccArm.muscle_contraction), ("extension", PccArm.muscle_extension)):
         help_text = f"largest {name} of a muscle, relative to its rest length [-] (%(default)s)"
-        reach.add_argument(f"--{name}", type=float, default=default, metavar="C", help=help_text)
+        add_numbers(reach, f"--{name}", "C", help_text, default=default)
 
 
 def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summary: str) -> argparse.ArgumentParser:
@@ -108,19 +84,16 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
         name, help=summary, description=f"Constant curvature in closed form: {summary}.", epilog=_JSON
     )
     help_text = f"distance of the muscles from the backbone, one number or one a segment [m] ({PccArm.muscle_distance})"
-    parser.add_argument("--distance", type=float, nargs="+", default=[PccArm.muscle_distance], metavar="D", help=help_text)
+    add_numbers(parser, "--distance", "D", help_text, nargs="+", default=[PccArm.muscle_distance])
     azimuths = " ".join(f"{azimuth:.4f}".rstrip("0").rstrip(".") for azimuth in constant_curvature.AZIMUTHS)
     help_text = f"azimuths of the muscles of a segment in its base frame, from x towards y, three or more [rad] ({azimuths})"
-    parser.add_argument(
-        "--azimuths", type=float, nargs="+", default=list(constant_curvature.AZIMUTHS), metavar="A", help=help_text
-    )
+    add_numbers(parser, "--azimuths", "A", help_text, nargs="+", default=list(constant_curvature.AZIMUTHS))
     help_text = "turn about the backbone before each segment, one a segment [rad] (0, then pi/3 each)"
-    parser.add_argument("--offsets", type=float, nargs="+", metavar="A", help=help_text)
+    add_numbers(parser, "--offsets", "A", help_text, nargs="+")
     help_text = f"rest length of a segment and its muscles, one number or one a segment [m] ({REST})"
-    parser.add_argument("--rest", type=float, nargs="+", metavar="L", help=help_text)
-    if name == "reach":
-        parser.set_defaults(frame=FRAMES[0])
-    else:
+    add_numbers(parser, "--rest", "L", help_text, nargs="+")
+    parser.set_defaults(run=run, frame=FRAMES[0])
+    if name != "reach":
         help_text = (
             "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
         )
@@ -129,7 +102,6 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
     parser.add_argument("--jacobian", action="store_true", help=help_text)
     add_plot(parser, "the smooth backbone with its muscles")
     add_json(parser)
-    parser.set_defaults(run=run)
     return parser
 
 
@@ -142,7 +114,7 @@ def _forward(arguments: argparse.Namespace) -> None:
     lengths = lengths.reshape(-1, count)
     distance = _per_segment("--distance", arguments.distance, len(lengths))
     arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths, arguments.tolerance)
-    _answer(arguments, _chain(arguments, lengths, arcs, distance), [])
+    _answer(arguments, lengths, arcs, distance)
 
 
 def _inverse(arguments: argparse.Namespace) -> None:
@@ -151,7 +123,7 @@ def _inverse(arguments: argparse.Namespace) -> None:
     arcs = Arc(*np.array(arguments.arcs).T)
     distance = _per_segment("--distance", arguments.distance, len(arguments.arcs))
     lengths = constant_curvature.muscles_from_arc(arcs, distance, arguments.azimuths)
-    _answer(arguments, _chain(arguments, lengths, arcs, distance), [])
+    _answer(arguments, lengths, arcs, distance)
 
 
 def _reach(arguments: argparse.Namespace) -> None:
@@ -178,19 +150,12 @@ def _reach(arguments: argparse.Namespace) -> None:
     solution = solve_ik(load_model(robot), target, orientation=arguments.direction, q_motors0=arguments.start)
     lengths = solution.q_motors.reshape(count, -1)
     arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths)
-    chain = _chain(arguments, lengths, arcs, distance)
-    tip = constant_curvature.chain_transform(arcs, chain.offsets)[:3, 3]
+    tip = constant_curvature.chain_transform(arcs, arguments.offsets)[:3, 3]
     facts = [
         Fact("target", solution.target, "m", "target"),
         Fact("error", float(np.linalg.norm(tip - solution.target)), "m", "distance of the tip from it"),
     ]
-    _answer(arguments, chain, facts)
-
-
-def _chain(arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, distance: FloatArray) -> Chain:
-    """The chain of segments with the frame, offsets and rest lengths of the options."""
-    rest = _per_segment("--rest", arguments.rest or [REST], len(lengths))
-    return Chain(lengths, arcs, distance, arguments.azimuths, arguments.offsets, rest, arguments.frame)
+    _answer(arguments, lengths, arcs, distance, facts)
 
 
 def _per_segment(name: str, values: Sequence[float], count: int) -> FloatArray:
@@ -200,42 +165,48 @@ def _per_segment(name: str, values: Sequence[float], count: int) -> FloatArray:
     return np.array(np.broadcast_to(positive_array(name, values, "m"), (count,)))
 
 
-def _answer(arguments: argparse.Namespace, chain: Chain, facts: list[Fact]) -> None:
-    """Print the facts of the segments, and draw them."""
-    transforms = constant_curvature.chain_transforms(chain.arcs, chain.offsets, chain.frame)
-    jacobian = None
+def _answer(
+    arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, distance: FloatArray, further: Sequence[Fact] = ()
+) -> None:
+    """Print the facts of the segments, and draw them.
+
+    Args:
+        arguments: The options.
+        lengths: Muscle lengths, shape (segments, muscles) [m].
+        arcs: Their arcs, shape (segments,).
+        distance: Distance of the muscles from the backbone, shape (segments,) [m].
+        further: Facts of one form alone.
+    """
+    azimuths, offsets, frame = arguments.azimuths, arguments.offsets, arguments.frame
+    rest = _per_segment("--rest", arguments.rest or [REST], len(lengths))
+    transforms = constant_curvature.chain_transforms(arcs, offsets, frame)
+    residual = constant_curvature.muscle_residual(lengths, distance, azimuths)
+    jacobian, unit = None, ""
     if arguments.jacobian:
         tolerance = getattr(arguments, "tolerance", 1e-6)
-        jacobian = constant_curvature.chain_muscle_jacobian(
-            chain.lengths, chain.distance, chain.azimuths, chain.offsets, chain.frame, tolerance
-        )
+        jacobian = constant_curvature.chain_muscle_jacobian(lengths, distance, azimuths, offsets, frame, tolerance)
+        unit = "m/m (rows 1 to 3), rad/m (rows 4 to 6)"
     facts = [
-        Fact("muscle_lengths", chain.lengths, "m", "muscle lengths"),
-        Fact("muscle_extension", chain.lengths / chain.rest[:, None] - 1.0, "-", "extension of the muscles"),
-        Fact(
-            "muscle_residual",
-            constant_curvature.muscle_residual(chain.lengths, chain.distance, chain.azimuths),
-            "m",
-            "miss of the muscles",
-        ),
-        Fact("arc_length", chain.arcs.length, "m", "length of the backbone"),
-        Fact("arc_bending", chain.arcs.bending, "rad", "bending angle"),
-        Fact("arc_azimuth", chain.arcs.azimuth, "rad", "azimuth of the bending plane"),
+        Fact("muscle_lengths", lengths, "m", "muscle lengths"),
+        Fact("muscle_extension", lengths / rest[:, None] - 1.0, "-", "extension of the muscles"),
+        Fact("muscle_residual", residual, "m", "miss of the muscles"),
+        Fact("arc_length", arcs.length, "m", "length of the backbone"),
+        Fact("arc_bending", arcs.bending, "rad", "bending angle"),
+        Fact("arc_azimuth", arcs.azimuth, "rad", "azimuth of the bending plane"),
         Fact("transforms", transforms, "m", "poses of the ends of the segments"),
         Fact("tip_position", transforms[-1, :3, 3], "m", "tip"),
         Fact("tip_direction", transforms[-1, :3, 2], "-", "tip points along"),
-        Fact("jacobian", jacobian, "m/m (rows 1 to 3), rad/m (rows 4 to 6)" if arguments.jacobian else "", "Jacobian"),
-        *facts,
-        Fact("frame", chain.frame, "", "frame"),
+        Fact("jacobian", jacobian, unit, "Jacobian"),
+        *further,
+        Fact("frame", frame, "", "frame"),
     ]
 
     def draw() -> Any:
         from softrobots.view.figures import segments
 
-        return segments.arm(chain.arcs, chain.distance, chain.azimuths, chain.offsets, chain.frame)
+        return segments.arm(arcs, distance, azimuths, offsets, frame)
 
-    written = write_plot(arguments, draw)
-    print_answer(arguments, answer_of(facts) | {"files": written}, [*_lines(facts), *written_lines(written)])
+    print_answer(arguments, answer_of(facts), _lines(facts), write_plot(arguments, draw))
 
 
 def _lines(facts: list[Fact]) -> list[str]:
@@ -248,15 +219,9 @@ def _lines(facts: list[Fact]) -> list[str]:
     for number, (lengths, shares) in enumerate(zip(values["muscle_lengths"], values["muscle_extension"], strict=True), start=1):
         muscles = (f"{length:.6f} ({100 * share:+.1f} %)" for length, share in zip(lengths, shares, strict=True))
         muscle_rows.append((str(number), "  ".join(muscles)))
-    pose = values["transforms"][-1]
-    lines = [
-        *aligned(rows),
-        "",
-        *aligned(muscle_rows),
-        "",
-        f"pose of the tip in the base, {values['frame'].replace('_', '-')} frames [-, m]",
-    ]
-    lines += _matrix(pose)
+    lines = [*aligned(rows), "", *aligned(muscle_rows), ""]
+    lines += [f"pose of the tip in the base, {values['frame'].replace('_', '-')} frames [-, m]"]
+    lines += _matrix(values["transforms"][-1])
     if values["jacobian"] is not None:
         lines += ["", "Jacobian of the tip, a column a muscle: linear [m/m], then angular [rad/m]"]
         lines += _matrix(values["jacobian"])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, shape_figure, write_plot
-from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
-from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer, written_lines
+from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
+from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer
 from softrobots.cli.reports.equilibrium_report import coordinate_lines, equilibrium_answer, summary_lines
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import NeutralEquilibrium, NoCriticalLoad
@@ -40,16 +41,15 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EXAMPLES,
     )
     add_model(parser)
-    help_text = "motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
-    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=help_text)
+    add_motors(parser)
     add_loads(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="newton", help="the solver; fixed_point is the paper's (%(default)s)"
     )
     help_text = "elastic coordinates where the descent starts, in the order of the answer [rad or m] (relaxed)"
-    parser.add_argument("--start", type=float, nargs="+", metavar="Y", help=help_text)
+    add_numbers(parser, "--start", "Y", help_text, nargs="+")
     help_text = f"largest residual, relative to the size of the load [-] ({TOLERANCE:g})"
-    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="T", help=help_text)
+    add_numbers(parser, "--tolerance", "T", help_text, default=TOLERANCE)
     help_text = "most evaluations [-] (200 for newton, 1000 for fixed_point)"
     parser.add_argument("--max-iterations", type=int, metavar="N", help=help_text)
     help_text = "also the motion of the tip per wrench added there, 6 by 6 [m/N, m/(N m); rad/N, rad/(N m)] (left out)"
@@ -57,7 +57,7 @@ def add_parser(subparsers: Any) -> None:
     help_text = (
         "also the smallest force [N] in this direction that buckles the robot, at --frame, with --gravity alone (left out)"
     )
-    parser.add_argument("--critical-load", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    add_numbers(parser, "--critical-load", "X Y Z", help_text)
     add_output(parser, "the equilibrium as NPZ, for softrobots.load_result")
     add_plot(parser, "the loaded shape")
     add_json(parser)
@@ -87,8 +87,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.critical_load is not None:
         _add_critical_load(model, equilibrium, arguments, answer, summary)
     files = save(arguments, equilibrium) + write_plot(arguments, lambda: shape_figure(equilibrium))
-    answer["files"] = files
-    print_answer(arguments, answer, [*lines, "", *summary, *written_lines(files)])
+    print_answer(arguments, answer, [*lines, "", *summary], files)
 
 
 def _add_compliance(model: SoftModel, equilibrium: Equilibrium, answer: dict[str, Any], lines: list[str]) -> None:

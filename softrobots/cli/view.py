@@ -10,9 +10,10 @@ import webbrowser
 from pathlib import Path
 from typing import Any
 
-from softrobots.cli.options.command_line import Served, address_lines
+from softrobots.cli.options.command_line import add_numbers, address_lines
 from softrobots.cli.options.load_argument import add_loads, loads_of
-from softrobots.cli.options.robot_argument import add_model, model_of, motors_of, source_of
+from softrobots.cli.options.output_files import check_ending
+from softrobots.cli.options.robot_argument import add_model, add_motors, model_of, motors_of, source_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import finite_number
 from softrobots.core.errors import ParameterError
@@ -28,6 +29,7 @@ from softrobots.statics.trajectory import Trajectory
 from softrobots.view.browser import find_chromium, take_picture
 from softrobots.view.live.input import commands_from
 from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
+from softrobots.view.served_page import ServedPage
 from softrobots.view.viewer import Viewer, view
 
 _EXAMPLES = """examples:
@@ -62,10 +64,9 @@ def add_parser(subparsers: Any) -> None:
     )
     add_model(parser, optional=True)
     help_text = "motor joints, then muscles, base to tip [rad, m or N]; with --target, where the search starts (relaxed)"
-    parser.add_argument("--motors", type=float, nargs="+", metavar="Q", help=help_text)
+    add_motors(parser, help_text)
     add_loads(parser)
-    help_text = "put the loaded tip there by inverse kinematics [m] (no target)"
-    parser.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=help_text)
+    add_numbers(parser, "--target", "X Y Z", "put the loaded tip there by inverse kinematics [m] (no target)")
     help_text = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
     parser.add_argument("--result", type=Path, metavar="FILE.npz", help=help_text)
     parser.add_argument("--growth", action="store_true", help="show how a helical tube grows, without load")
@@ -78,8 +79,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--html", type=Path, metavar="FILE", help="write the page instead of serving it (served)")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="take a picture of the page with Chromium (served)")
-    help_text = "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)"
-    parser.add_argument("--at", type=float, metavar="SHARE", help=help_text)
+    add_numbers(parser, "--at", "SHARE", "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)")
     parser.add_argument("--overwrite", action="store_true", help="allow --html and --picture to replace files")
     parser.add_argument("--open", action="store_true", help="open the page in the browser of this machine")
     parser.add_argument("--port", type=int, metavar="N", help="port of the page (the first free one from 7000; sliders: 8080)")
@@ -90,8 +90,8 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Show the robot until Ctrl-C, or write a page or a picture."""
     _refuse_contradictions(arguments)
-    if arguments.picture is not None and arguments.picture.suffix.lower() != ".png":
-        raise ParameterError("--picture", str(arguments.picture), "a file name that ends in .png")
+    if arguments.picture is not None:
+        check_ending("--picture", arguments.picture, ".png")
     for file in (arguments.html, arguments.picture):
         if file is not None:
             new_file(file, overwrite=arguments.overwrite)  # refused before the work
@@ -180,7 +180,7 @@ def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, state
     print_answer(arguments, {"files": files}, [state, *(f"{file}: written" for file in files)])
 
 
-def _serve(arguments: argparse.Namespace, page: Served, state: str) -> None:
+def _serve(arguments: argparse.Namespace, page: ServedPage, state: str) -> None:
     """Print the address of a page, and serve it until Ctrl-C."""
     with contextlib.suppress(KeyboardInterrupt):
         _print_address(arguments, page, state)
@@ -195,9 +195,9 @@ def _follow(arguments: argparse.Namespace, viewer: Viewer, live: LiveView) -> No
             follow(live, commands, _print_line, _print_error)
 
 
-def _print_address(arguments: argparse.Namespace, page: Served, state: str) -> None:
+def _print_address(arguments: argparse.Namespace, page: ServedPage, state: str) -> None:
     answer = {"url": page.url, "port": page.port, "tunnel": page.tunnel}
-    print_answer(arguments, answer, [state, *address_lines(page)])
+    print_answer(arguments, answer, [state, *address_lines(page.url, page.tunnel)])
     if arguments.open and not webbrowser.open(page.url):
         _print_error("no browser of this machine could be opened")
 

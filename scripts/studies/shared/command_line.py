@@ -7,8 +7,9 @@ import contextlib
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Protocol
 
-from softrobots.cli.options.command_line import Served, address_lines
+from softrobots.cli.options.command_line import address_lines
 from softrobots.core.checkpoint import discard
 from softrobots.core.errors import FileFormatError, OutputExists, ParameterError
 
@@ -58,8 +59,23 @@ def tell_written(folder: Path) -> None:
     sys.stdout.write(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}\n")
 
 
+class Served(Protocol):
+    """A page that a browser can open, such as a `softrobots.Viewer`."""
+
+    @property
+    def url(self) -> str:
+        """Its address."""
+
+    @property
+    def tunnel(self) -> str:
+        """The command that makes it reachable from another machine."""
+
+    def wait(self) -> None:
+        """Serve until Ctrl-C."""
+
+
 def serve(page: Served) -> None:
     """Print the address of a page and serve it until Ctrl-C, for `--meshcat`."""
-    sys.stdout.write("".join(f"{line}\n" for line in ("", *address_lines(page))))
+    sys.stdout.write("".join(f"{line}\n" for line in ("", *address_lines(page.url, page.tunnel))))
     sys.stdout.flush()
     page.wait()

@@ -10,38 +10,12 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from softrobots.core.errors import NotConverged, ParameterError, SoftRobotsError
 from softrobots.model.pinocchio_data import MAX_DOF
+from softrobots.robots import XacroRobot
 from softrobots.statics.loads import EARTH_GRAVITY
-
-
-class Sized(Protocol):
-    """A robot whose size is known before its URDF is generated."""
-
-    @property
-    def n_joints(self) -> int:
-        """Number of movable joints."""
-
-
-class Served(Protocol):
-    """A page that a browser can open, such as a `softrobots.Viewer`."""
-
-    @property
-    def url(self) -> str:
-        """Its address."""
-
-    @property
-    def port(self) -> int:
-        """Its port."""
-
-    @property
-    def tunnel(self) -> str:
-        """The command that makes it reachable from another machine."""
-
-    def wait(self) -> None:
-        """Serve until Ctrl-C."""
 
 
 def take_negative_numbers(parser: argparse.ArgumentParser) -> None:
@@ -49,21 +23,24 @@ def take_negative_numbers(parser: argparse.ArgumentParser) -> None:
     parser._negative_number_matcher = re.compile(r"-\.?\d")
 
 
+def add_numbers(parser: argparse._ActionsContainer, option: str, names: str, help_text: str, **settings: Any) -> None:
+    """Add an option of a number, called `names` in the help, or of as many numbers as `names` has words."""
+    metavar = tuple(names.split())
+    count = {"nargs": len(metavar), "metavar": metavar} if len(metavar) > 1 else {"metavar": names}
+    parser.add_argument(option, type=float, help=help_text, **count, **settings)
+
+
 def add_load(parser: argparse.ArgumentParser, force: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
     """Add `--force` [N] with a default, and `--gravity` [m/s^2]; see `gravity_of`."""
     default = " ".join(f"{number:g}" for number in force)
-    axes = ("FX", "FY", "FZ")
-    parser.add_argument(
-        "--force", type=float, nargs=3, metavar=axes, default=tuple(force), help=f"force on the tip [N] ({default})"
-    )
+    add_numbers(parser, "--force", "FX FY FZ", f"force on the tip [N] ({default})", default=tuple(force))
     add_gravity(parser)
 
 
 def add_gravity(parser: argparse.ArgumentParser) -> None:
     """Add `--gravity` [m/s^2], which takes negative numbers in any form; see `gravity_of`."""
     take_negative_numbers(parser)
-    help_text = "gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)"
-    parser.add_argument("--gravity", type=float, nargs="*", metavar="G", help=help_text)
+    add_numbers(parser, "--gravity", "G", "gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)", nargs="*")
 
 
 def gravity_of(arguments: argparse.Namespace) -> Any:
@@ -71,24 +48,19 @@ def gravity_of(arguments: argparse.Namespace) -> Any:
     return arguments.gravity if arguments.gravity != [] else EARTH_GRAVITY
 
 
-def refuse_too_large(robot: Sized, option: str, value: Any) -> None:
+def refuse_too_large(robot: XacroRobot, option: str, value: Any) -> None:
     """Refuse a robot that is too large for Pinocchio's workspace, before xacro spends minutes on it.
 
-    Args:
-        robot: The robot.
-        option: The option that sets its size, for the error.
-        value: The value of the option.
-
     Raises:
-        ParameterError: If the robot has more than `MAX_DOF` joints.
+        ParameterError: If the robot has more than `MAX_DOF` joints; names the option that sets its size, and its value.
     """
     if robot.n_joints > MAX_DOF:
         raise ParameterError(option, value, f"so few that the chain has at most {MAX_DOF} joints, not {robot.n_joints}")
 
 
-def address_lines(page: Served) -> tuple[str, str]:
-    """Return two lines with the address of a page, from this machine and from another one."""
-    return f"serving {page.url} (Ctrl-C ends)", f"from another machine: {page.tunnel}"
+def address_lines(url: str, tunnel: str) -> tuple[str, str]:
+    """Return two lines: the address of a page on this machine, and the command that makes it reachable from another one."""
+    return f"serving {url} (Ctrl-C ends)", f"from another machine: {tunnel}"
 
 
 def exit_status(run: Callable[[], object]) -> int:

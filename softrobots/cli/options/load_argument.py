@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.options.command_line import add_load, gravity_of
+from softrobots.cli.options.command_line import add_load, add_numbers, gravity_of
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
@@ -18,8 +18,7 @@ _WORDS = ("LINK", "FX", "FY", "FZ", "MX", "MY", "MZ")
 def add_loads(parser: argparse.ArgumentParser) -> None:
     """Add the options of a load; see `loads_of`. Loads are dead: they keep their direction in the world."""
     add_load(parser)
-    help_text = "moment on the tip, world axes [N m] (0 0 0)"
-    parser.add_argument("--moment", type=float, nargs=3, metavar=("MX", "MY", "MZ"), help=help_text)
+    add_numbers(parser, "--moment", "MX MY MZ", "moment on the tip, world axes [N m] (0 0 0)")
     parser.add_argument("--frame", metavar="LINK", help="link on which --force and --moment act (the tip)")
     help_text = "another force [N] and moment [N m] at the origin of a link, world axes; may be given several times (none)"
     parser.add_argument("--wrench", nargs=7, action="append", default=[], metavar=_WORDS, help=help_text)

@@ -28,7 +28,8 @@ def check_output(arguments: argparse.Namespace, *endings: str) -> None:
         OutputError: If its folder cannot be created.
     """
     if arguments.output is not None:
-        _check("-o", arguments.output, endings, arguments.overwrite)
+        check_ending("-o", arguments.output, *endings)
+        new_file(arguments.output, overwrite=arguments.overwrite)
 
 
 def save(arguments: argparse.Namespace, result: Any) -> list[Path]:
@@ -64,7 +65,9 @@ def check_plot(arguments: argparse.Namespace) -> None:
         return
     from softrobots.view.figures.canvas import require_matplotlib
 
-    _check("--plot", arguments.plot, (".png",), arguments.overwrite, require_matplotlib)
+    check_ending("--plot", arguments.plot, ".png")
+    require_matplotlib()
+    new_file(arguments.plot, overwrite=arguments.overwrite)
 
 
 def write_plot(arguments: argparse.Namespace, draw: Callable[[], Any]) -> list[Path]:
@@ -92,11 +95,11 @@ def shape_figure(equilibrium: Equilibrium) -> Any:
     return loaded_shape(equilibrium)
 
 
-def _check(
-    option: str, file: Path, endings: tuple[str, ...], overwrite: bool, require: Callable[[], object] | None = None
-) -> None:
+def check_ending(option: str, file: Path, *endings: str) -> None:
+    """Refuse the file of an option whose name has none of the endings.
+
+    Raises:
+        ParameterError: If it has none.
+    """
     if file.suffix.lower() not in endings:
         raise ParameterError(option, str(file), f"a file name that ends in {' or '.join(endings)}")
-    if require is not None:
-        require()
-    new_file(file, overwrite=overwrite)

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.options.command_line import refuse_too_large
+from softrobots.cli.options.command_line import add_numbers, refuse_too_large
 from softrobots.cli.options.robot_parameters import check_names, make_robot, parse_parameters, xacro_parameters
-from softrobots.cli.reports.coordinate_units import motor_units
 from softrobots.cli.tools.kinematics import is_urdf_file
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NameNotFound, ParameterError
@@ -62,6 +61,13 @@ def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
     parser.add_argument("--tip", metavar="LINK", help="link that is the tip (the one that the file names, or its only end)")
     help_text = "input of muscles: lengths [m] or tensions [N] (%(default)s)"
     parser.add_argument("--muscles", choices=MUSCLE_INPUTS, default="lengths", help=help_text)
+
+
+def add_motors(
+    parser: argparse.ArgumentParser, help_text: str = "motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+) -> None:
+    """Add `--motors`; see `motors_of`."""
+    add_numbers(parser, "--motors", "Q", help_text, nargs="+")
 
 
 def assignment(word: str) -> str:
@@ -169,7 +175,7 @@ def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--
     """
     if words is None:
         return np.array(model.relaxed_motors)
-    check_one_each(option, words, model.motor_joints, motor_units(model))
+    check_one_each(option, words, model.motor_joints, model.actuators.units)
     return model.checked_motors(words, option)
 
 

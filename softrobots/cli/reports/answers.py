@@ -42,14 +42,19 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help=help_text)
 
 
-def print_answer(arguments: argparse.Namespace, answer: Mapping[str, Any], lines: Iterable[str]) -> None:
+def print_answer(
+    arguments: argparse.Namespace, answer: Mapping[str, Any], lines: Iterable[str], files: Sequence[Path] | None = None
+) -> None:
     """Print an answer: as JSON if `--json` is given, else as lines.
 
     Args:
         arguments: Arguments of a parser with `add_json`.
         answer: The answer for a machine; see `plain` for what it may hold.
         lines: The same for a person.
+        files: The files that were written, for a command that writes some: both forms end with them.
     """
+    if files is not None:
+        answer, lines = {**answer, "files": files}, [*lines, *written_lines(files)]
     if arguments.json:
         sys.stdout.write(json.dumps(plain(answer), indent=2, allow_nan=False) + "\n")
     else:

@@ -10,11 +10,6 @@ LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
 """Unit of the load on a coordinate, by the unit of the coordinate; the load on a given tension is the tension."""
 
 
-def motor_units(model: SoftModel) -> tuple[str, ...]:
-    """Unit of each actuator coordinate: rad or m of a joint, m or N of a muscle."""
-    return model.actuators.units
-
-
 def spring_units(model: SoftModel) -> tuple[str, ...]:
     """Unit of each elastic coordinate, rad or m."""
     return tuple("rad" if turns else "m" for turns in model.springs.turning.tolist())

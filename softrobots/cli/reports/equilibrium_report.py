@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
-from softrobots.cli.reports.coordinate_units import joined_units, load_units, motor_units, spring_units
+from softrobots.cli.reports.coordinate_units import joined_units, load_units, spring_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
@@ -19,8 +19,8 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     model = equilibrium.model
     load = equilibrium.load
     facts = [
-        Fact("q_motors", equilibrium.q_motors, joined_units(motor_units(model))),
-        Fact("motor_torques", equilibrium.motor_torques, joined_units(load_units(motor_units(model)))),
+        Fact("q_motors", equilibrium.q_motors, joined_units(model.actuators.units)),
+        Fact("motor_torques", equilibrium.motor_torques, joined_units(load_units(model.actuators.units))),
         Fact("q_springs", equilibrium.q_springs, joined_units(spring_units(model))),
         Fact("spring_torques", equilibrium.spring_torques, joined_units(load_units(spring_units(model)))),
         Fact("tip_position", equilibrium.tip_position, "m"),
@@ -57,7 +57,7 @@ def equilibrium_lines(equilibrium: Equilibrium) -> list[str]:
 def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
     """Tables of the load, of motors, springs and inflated links."""
     model = equilibrium.model
-    motors = _table("motor", model.motor_joints, equilibrium.q_motors, motor_units(model), equilibrium.motor_torques)
+    motors = _table("motor", model.motor_joints, equilibrium.q_motors, model.actuators.units, equilibrium.motor_torques)
     springs = _table("spring", model.spring_joints, equilibrium.q_springs, spring_units(model), equilibrium.spring_torques)
     parts = [motors, springs, _links(equilibrium)]
     return [*head_lines(model, equilibrium.load), *(line for part in parts if part for line in ("", *part))]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
-from softrobots.cli.reports.coordinate_units import joined_units, load_units, motor_units, spring_units
+from softrobots.cli.reports.coordinate_units import joined_units, load_units, spring_units
 from softrobots.cli.reports.equilibrium_report import (
     coordinate_lines,
     equilibrium_answer,
@@ -24,7 +24,7 @@ from softrobots.statics.trajectory import Trajectory
 
 def solution_answer(solution: IkSolution) -> dict[str, Any]:
     """A solution by the names of its attributes, with `units`."""
-    units = joined_units(motor_units(solution.equilibrium.model))
+    units = joined_units(solution.equilibrium.model.actuators.units)
     facts = [
         Fact("q_motors", solution.q_motors, units),
         Fact("target", solution.target, "m"),
@@ -42,7 +42,7 @@ def solution_lines(solution: IkSolution) -> list[str]:
     rows = [("target", f"{formatted(solution.target)} m")]
     turned = f", {solution.orientation_error:.2g} rad" if solution.orientation is not None else ""
     rows.append(("tip error", f"{solution.error:.2g} m{turned}, {solution.iterations} steps"))
-    rows.append(("motors", f"{formatted(solution.q_motors)} {joined_units(motor_units(solution.equilibrium.model))}"))
+    rows.append(("motors", f"{formatted(solution.q_motors)} {joined_units(solution.equilibrium.model.actuators.units)}"))
     rows += [("another solution", formatted(other)) for other in solution.alternatives]
     return [*coordinate_lines(solution.equilibrium), "", *summary_lines(solution.equilibrium), "", *aligned(rows)]
 
@@ -55,8 +55,8 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         Fact("targets", trajectory.targets, "m"),
         Fact("tip_positions", trajectory.tip_positions, "m"),
         Fact("tip_error", trajectory.tip_error, "m"),
-        Fact("q_motors", trajectory.q_motors, joined_units(motor_units(model))),
-        Fact("motor_torques", _motor_torques(trajectory), joined_units(load_units(motor_units(model)))),
+        Fact("q_motors", trajectory.q_motors, joined_units(model.actuators.units)),
+        Fact("motor_torques", _motor_torques(trajectory), joined_units(load_units(model.actuators.units))),
         Fact("q_springs", trajectory.q_springs, joined_units(spring_units(model))),
         Fact("link_moments", trajectory.link_moments, "N m"),
         Fact("wrinkling_moments", wrinkling_moments(model), "N m"),
@@ -78,7 +78,7 @@ def trajectory_lines(trajectory: Trajectory) -> list[str]:
     motors, torques = trajectory.q_motors, _motor_torques(trajectory)
     rows: list[tuple[str, ...]] = [("motor", "first", "last", "least", "largest", "", "largest load", "")]
     for place, (name, unit, load) in enumerate(
-        zip(model.motor_joints, motor_units(model), load_units(motor_units(model)), strict=True)
+        zip(model.motor_joints, model.actuators.units, load_units(model.actuators.units), strict=True)
     ):
         column = motors[:, place]
         ends = (f"{value:.6f}" for value in (column[0], column[-1], column.min(), column.max()))
