@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+import operator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from softrobots.compiled.c.kernel_language import INTRINSICS, Function, Module, literal_number
+from softrobots.compiled.c.kernel_language import INTRINSICS, Function, Module
 
 _ARITHMETIC: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-_ON_INTS: dict[type[ast.operator], str] = {ast.FloorDiv: "int_quotient", ast.Mod: "int_remainder"}
+_ON_KNOWN: dict[type[ast.operator], Callable[[int, int], int]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+}
 _COMPARISONS: dict[type[ast.cmpop], str] = {
     ast.Eq: "==",
     ast.NotEq: "!=",
@@ -35,6 +40,10 @@ class Part(NamedTuple):
         """Return its text as an operand, bare if it is a chain of the operator `chained` or has no operator."""
         return self.text if self.operator in ("", chained) else f"({self.text})"
 
+    def as_float(self) -> Part:
+        """Return it where C wants a double: an int literal as a float literal; C converts other ints by itself."""
+        return Part(f"{self.text}.0", "float") if self.text.isdigit() else self
+
 
 @dataclass
 class Scope:
@@ -48,10 +57,6 @@ class Scope:
     """Prefix of the names at the level of the file."""
     kinds: dict[str, str] = field(default_factory=dict)
     """Types of parameters and locals so far: `int`, `float`, `bool` or `array`."""
-    sizes: dict[str, int] = field(default_factory=dict)
-    """Lengths of local arrays."""
-    local_names: set[str] = field(default_factory=set)
-    """All parameters and locals; in the function they hide names of the module."""
     needs: set[str] = field(default_factory=set)
     """Functions, constants and intrinsics that the function uses."""
 
@@ -66,7 +71,7 @@ class Scope:
         Raises:
             ParameterError: If it is outside the kernel language.
         """
-        literal = literal_number(self.module.text, node)
+        literal = self.module.literal(node)
         if literal is not None:
             return Part(repr(literal), type(literal).__name__)
         match node:
@@ -81,70 +86,57 @@ class Scope:
                 if called.kind == "none":
                     self.module.refuse(node, "a function that returns None is called as a statement of its own")
                 return called
-            case ast.BinOp(left=left, op=operator, right=right):
-                return self.arithmetic(node, self.value(left), operator, self.value(right))
+            case ast.BinOp(left=left, op=operation, right=right):
+                return self.arithmetic(node, self.value(left), operation, self.value(right))
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 negated = self._number(operand)
                 return Part(f"-{negated.operand()}", negated.kind, "negation")
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Part(f"!{self.condition(operand).operand()}", "bool", "!")
-            case ast.Compare(left=left, ops=[operator], comparators=[right]) if type(operator) in _COMPARISONS:
-                sign = _COMPARISONS[type(operator)]
-                one, other = _alike(self._number(left), self._number(right))
+            case ast.Compare(left=left, ops=[comparison], comparators=[right]) if type(comparison) in _COMPARISONS:
+                sign = _COMPARISONS[type(comparison)]
+                one, other = self._number(left), self._number(right)
+                if one.kind != other.kind:
+                    one, other = one.as_float(), other.as_float()
                 return Part(f"{one.operand()} {sign} {other.operand()}", "bool", sign)
             case ast.BoolOp(op=operation, values=values):
-                parts = [self.value(value) for value in values]
-                if any(part.kind != "bool" for part in parts):
-                    self.module.refuse(node, "`and` and `or` join comparisons and other bools")
-                return _joined(operation, iter(parts))
-            case ast.IfExp(test=test, body=body, orelse=otherwise):
-                chosen = self.condition(test).operand()
-                one, other = _alike(self.value(body), self.value(otherwise))
-                if "bool" in (one.kind, other.kind) and one.kind != other.kind:
-                    self.module.refuse(node, "`a if c else b` gives a number, or a bool")
-                return Part(f"{chosen} ? {one.operand()} : {other.operand()}", one.kind, "?")
+                sign = "&&" if isinstance(operation, ast.And) else "||"
+                return Part(f" {sign} ".join(self.condition(value).operand() for value in values), "bool", sign)
         self.module.refuse(
             node,
-            "numbers, names, array[index], calls by position, + - * / // % on numbers, one comparison at a time, and, or, not, "
-            "`a if c else b`",
+            "numbers, names, array[index], calls by position, + - * / on numbers, one comparison at a time, and, or, not",
         )
 
     def condition(self, node: ast.expr) -> Part:
-        """Translate the condition of a branch or a loop: a bool, or an int that may be zero."""
-        if isinstance(node, ast.BoolOp):
-            return _joined(node.op, map(self.condition, node.values))
+        """Translate a condition."""
         part = self.value(node)
-        if part.kind not in ("bool", "int"):
-            self.module.refuse(node, "a condition is a comparison, a bool or an int")
+        if part.kind != "bool":
+            self.module.refuse(node, "a condition is a comparison or another bool")
         return part
 
-    def arithmetic(self, node: ast.AST, left: Part, operator: ast.operator, right: Part) -> Part:
+    def arithmetic(self, node: ast.AST, left: Part, operation: ast.operator, right: Part) -> Part:
         """Translate an operation on two numbers; `node` is its place in the text."""
         if "bool" in (left.kind, right.kind):
             self.module.refuse(node, "arithmetic is on numbers; where(condition, a, b) makes a number of a bool")
+        if type(operation) not in _ARITHMETIC:
+            self.module.refuse(node, "operations on numbers are + - * /")
+        sign = _ARITHMETIC[type(operation)]
         ints = left.kind == right.kind == "int"
-        if type(operator) in _ON_INTS:
-            if not ints:
-                self.module.refuse(node, "// and % are for ints; floor(x / y) serves for floats")
-            return Part(f"{self.global_name(_ON_INTS[type(operator)])}({left.text}, {right.text})", "int")
-        if type(operator) not in _ARITHMETIC:
-            self.module.refuse(node, "operations on numbers are + - * /, on ints also // and %")
-        sign = _ARITHMETIC[type(operator)]
         if ints and sign == "/":
             ints, left = False, Part(f"(double){left.operand()}", "float", "cast")
         if not ints:
-            left, right = as_float(left), as_float(right)
+            left, right = left.as_float(), right.as_float()
         return Part(f"{left.operand(sign)} {sign} {right.operand()}", "int" if ints else "float", sign)
 
     def element(self, node: ast.Subscript, *, store: bool = False) -> Part:
         """Translate an element of an array or a table."""
         if not isinstance(node.value, ast.Name):
             self.module.refuse(node, "an element is name[index]")
-        name = node.value.id
+        name, size = node.value.id, None
         table = self.module.constants.get(name)
         if self.kinds.get(name) == "array":
-            size, kind, shown = self.sizes.get(name), "float", name
-        elif name not in self.local_names and isinstance(table, tuple) and not store:
+            kind, shown = "float", name
+        elif isinstance(table, tuple) and not store:
             size, kind, shown = len(table), type(table[0]).__name__, self.global_name(name)
         else:
             self.module.refuse(node, f"an element of an array{'' if store else ' or a table'}; {name!r} is none here")
@@ -159,36 +151,25 @@ class Scope:
     def call(self, node: ast.Call) -> Part:
         """Translate a call of a function of the module or of an intrinsic."""
         name = node.func.id if isinstance(node.func, ast.Name) else ""
-        if node.keywords or name in self.local_names or (name not in self.earlier and name not in INTRINSICS):
+        function = self.earlier.get(name)
+        if node.keywords or (function is None and name not in INTRINSICS):
             known = ", ".join((*INTRINSICS, *self.earlier))
             self.module.refuse(node, f"a call, by position, of a function that is defined above; here: {known}")
-        if name in INTRINSICS:
-            condition = 1 if name == "where" else 0
-            self._count(node, name, INTRINSICS[name])
-            shown = [self.condition(argument).text for argument in node.args[:condition]]
-            shown += [as_float(self._number(argument)).text for argument in node.args[condition:]]
-            return Part(f"{self.global_name(name)}({', '.join(shown)})", "float")
-        function = self.earlier[name]
-        self._count(node, name, len(function.parameters))
-        shown = []
-        for argument, parameter in zip(node.args, function.parameters, strict=True):
-            if parameter.kind == "array":
-                if not isinstance(argument, ast.Name) or self.kinds.get(argument.id) != "array":
-                    self.module.refuse(node, f"for {parameter.name} of {name} the name of an array")
-                shown.append(argument.id)
-            else:
-                shown.append(self.fitting(argument, self.value(argument), parameter.kind, parameter.name).text)
-        return Part(f"{self.global_name(name)}({', '.join(shown)})", function.returns)
+        kinds = INTRINSICS[name] if function is None else [parameter.kind for parameter in function.parameters]
+        if len(node.args) != len(kinds) or any(isinstance(argument, ast.Starred) for argument in node.args):
+            self.module.refuse(node, f"{name} takes {len(kinds)} argument{'' if len(kinds) == 1 else 's'}")
+        shown = [self._argument(argument, kind, name) for argument, kind in zip(node.args, kinds, strict=True)]
+        return Part(f"{self.global_name(name)}({', '.join(shown)})", "float" if function is None else function.returns)
 
     def fitting(self, node: ast.AST, part: Part, kind: str, name: str) -> Part:
         """Return the part as a value of type `kind`, for `name`.
 
         Raises:
-            ParameterError: If it is of another type; a float takes ints, an int takes bools.
+            ParameterError: If it is of another type; a float takes ints.
         """
         if kind == "float" and part.kind == "int":
-            return as_float(part)
-        if part.kind != kind and (kind, part.kind) != ("int", "bool"):
+            return part.as_float()
+        if part.kind != kind:
             self.module.refuse(node, f"{name} has one type, here {kind}; this is of type {part.kind}")
         return part
 
@@ -197,29 +178,32 @@ class Scope:
         match node:
             case ast.Constant(value=value) if type(value) is int:
                 return value
-            case ast.Name(id=name) if name not in self.local_names:
+            case ast.Name(id=name):
                 named = self.module.constants.get(name)
                 return named if isinstance(named, int) else None
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 inner = self.known_int(operand)
                 return None if inner is None else -inner
-            case ast.BinOp(left=left, op=operator, right=right):
+            case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _ON_KNOWN:
                 one, other = self.known_int(left), self.known_int(right)
-                if one is not None and other is not None:
-                    match operator:
-                        case ast.Add():
-                            return one + other
-                        case ast.Sub():
-                            return one - other
-                        case ast.Mult():
-                            return one * other
+                return None if one is None or other is None else _ON_KNOWN[type(operation)](one, other)
         return None
+
+    def _argument(self, node: ast.expr, kind: str, name: str) -> str:
+        """Return an argument of type `kind` of the function `name`."""
+        if kind == "bool":
+            return self.condition(node).text
+        if kind != "array":
+            return self.fitting(node, self.value(node), kind, f"an argument of {name}").text
+        if not isinstance(node, ast.Name) or self.kinds.get(node.id) != "array":
+            self.module.refuse(node, f"{name} takes the name of an array")
+        return node.id
 
     def _name(self, node: ast.expr, name: str) -> Part:
         constant = self.module.constants.get(name)
         if self.kinds.get(name, "array") != "array":
             return Part(name, self.kinds[name])
-        if name not in self.local_names and constant is not None and not isinstance(constant, tuple):
+        if constant is not None and not isinstance(constant, tuple):
             return Part(self.global_name(name), type(constant).__name__)
         self.module.refuse(node, f"a number that is given above in the text; {name!r} is none here")
 
@@ -228,25 +212,3 @@ class Scope:
         if part.kind == "bool":
             self.module.refuse(node, "a number; where(condition, a, b) makes one of a bool")
         return part
-
-    def _count(self, node: ast.Call, name: str, count: int) -> None:
-        if len(node.args) != count or any(isinstance(argument, ast.Starred) for argument in node.args):
-            self.module.refuse(node, f"{name} takes {count} argument{'' if count == 1 else 's'}")
-
-
-def _joined(operation: ast.boolop, parts: Iterator[Part]) -> Part:
-    sign = "&&" if isinstance(operation, ast.And) else "||"
-    return Part(f" {sign} ".join(part.operand() for part in parts), "bool", sign)
-
-
-def as_float(part: Part) -> Part:
-    """Return the part where C wants a double: an int literal as a float literal; C converts other ints by itself."""
-    return Part(f"{part.text}.0", "float") if part.text.isdigit() else part
-
-
-def _alike(one: Part, other: Part) -> tuple[Part, Part]:
-    """Return two numbers as C compares or chooses them: both floats if one of them is."""
-    if one.kind == other.kind:
-        return one, other
-    one, other = (as_float(part)._replace(kind="float") if part.kind == "int" else part for part in (one, other))
-    return one, other

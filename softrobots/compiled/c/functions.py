@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from softrobots.compiled.c.expressions import Part, Scope
-from softrobots.compiled.c.kernel_language import WORDS, Function
+from softrobots.compiled.c.kernel_language import WORDS, Function, Parameter
 from softrobots.compiled.c.lines import INDENT, comment, wrapped
 
 C_TYPES = {"none": "void", "int": "int", "bool": "int", "float": "double"}
@@ -38,7 +38,6 @@ class FunctionWriter:
     def __init__(self, function: Function, scope: Scope) -> None:
         """Prepare to write `function`; `scope` is that of the module, with all that is defined before the function."""
         self.function, self.scope, self._module = function, scope, scope.module
-        self._counts = _counts(function.body)
         self._at_top: list[str] = []  # locals to declare there
         self._lines: list[str] = []
         self._bounds = 0  # of loops, so far
@@ -49,14 +48,10 @@ class FunctionWriter:
         self._check_loops(parameters)
         for name in (*parameters, *self._stored):
             self._check_name(name)
-        scope.local_names.update(parameters, self._stored)
         scope.kinds.update({parameter.name: parameter.kind for parameter in function.parameters})
 
     def text(self, *, external: bool) -> str:
-        """Return the function in C.
-
-        Args:
-            external: Whether it can be called from other files.
+        """Return the function in C; `external`: it can be called from other files.
 
         Raises:
             ParameterError: If a statement is outside the kernel language.
@@ -68,10 +63,7 @@ class FunctionWriter:
         lines = comment(function.docstring.splitlines()).splitlines() if function.docstring else []
         head = ("" if external else "static ") + prototype(function, self.scope.prefix)
         declared = [
-            f"{INDENT}double {name}[{self.scope.sizes[name]}];"
-            if kinds[name] == "array"
-            else f"{INDENT}{C_TYPES[kinds[name]]} {name} = {'0.0' if kinds[name] == 'float' else '0'};"
-            for name in self._at_top
+            f"{INDENT}{C_TYPES[kinds[name]]} {name} = {'0.0' if kinds[name] == 'float' else '0'};" for name in self._at_top
         ]
         local = [*(parameter.name for parameter in function.parameters), *self._at_top]
         unused = [f"{INDENT}(void){name};" for name in local if name not in self._read]
@@ -79,14 +71,12 @@ class FunctionWriter:
         return "\n".join([*lines, *body])
 
     def _check_name(self, name: str) -> None:
-        if name in WORDS:
-            self._module.refuse(self.function.node, f"no parameter or local is called {name}")
-        if not name.isascii():
-            self._module.refuse(self.function.node, f"names are ASCII; {name!r} is not")
-        if name in _RESERVED or re.match(rf"_[_A-Z]|stop_|{self.scope.prefix}", name):
+        taken = name in (*WORDS, *_RESERVED, *self._module.constants, *self._module.functions)
+        if taken or not name.isascii() or re.match(rf"_[_A-Z]|stop_|{self.scope.prefix}", name):
             self._module.refuse(
                 self.function.node,
-                f"no parameter or local is a keyword of C or begins with _A, __, stop_ or {self.scope.prefix}; {name} does",
+                "a parameter or local has an ASCII name that is no keyword of C, no word of the language, no other name of the "
+                f"module, and does not begin with _A, __, stop_ or {self.scope.prefix}; {name} does not fit",
             )
 
     def _check_loops(self, parameters: Sequence[str]) -> None:
@@ -100,45 +90,39 @@ class FunctionWriter:
                 if stored or name in parameters or _counts([loop.iter])[name]:
                     self._module.refuse(loop, f"{name} counts this loop, and is neither a parameter nor assigned in it")
                 inside[name] += _counts([loop])[name]
+        counts = _counts(self.function.body)
         for loop in loops:
-            if isinstance(loop.target, ast.Name) and inside[loop.target.id] != self._counts[loop.target.id]:
+            if isinstance(loop.target, ast.Name) and inside[loop.target.id] != counts[loop.target.id]:
                 self._module.refuse(loop, f"{loop.target.id} counts this loop, and is used in such loops only")
 
     def _block(self, block: Sequence[ast.stmt], indent: str) -> None:
-        for place, statement in enumerate(block):
-            self._statement(statement, block[place:], indent)
+        for statement in block:
+            self._statement(statement, indent)
 
-    def _statement(self, node: ast.stmt, rest: Sequence[ast.stmt], indent: str) -> None:
+    def _statement(self, node: ast.stmt, indent: str) -> None:
         match node:
             case ast.Pass():
                 pass
             case ast.Break():
                 self._lines.append(f"{indent}break;")
-            case ast.Continue():
-                self._lines.append(f"{indent}continue;")
             case ast.Return(value=value):
                 self._return(node, value, indent)
             case ast.Expr(value=ast.Call() as called):
                 self._ordered(node)
                 part = self.scope.call(called)
                 self._lines.append(f"{indent}{'' if part.kind == 'none' else '(void)'}{part.text};")
-            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=ast.Name(id="zeros")) as called):
-                self._clear(node, name, called, rest, indent)
-            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+            case ast.Assign(targets=[ast.Name() | ast.Subscript() as target], value=value):
                 self._ordered(node)
-                self._assign(node, name, self.scope.value(value), indent)
-            case ast.Assign(targets=[ast.Subscript() as target], value=value):
+                self._assign(node, target, self.scope.value(value), indent)
+            case ast.AugAssign(target=ast.Name() | ast.Subscript() as target, op=operation, value=value):
                 self._ordered(node)
-                self._store(node, target, self.scope.value(value), indent)
-            case ast.AugAssign(target=target, op=operator, value=value):
-                self._ordered(node)
-                self._update(node, target, operator, value, indent)
+                part = self.scope.arithmetic(node, self.scope.value(target), operation, self.scope.value(value))
+                self._assign(node, target, part, indent)
             case ast.If():
                 self._branch(node, indent, "if")
             case ast.While(test=test, body=body, orelse=[]):
                 self._ordered(test)
-                always = isinstance(test, ast.Constant) and test.value is True
-                self._lines.append(f"{indent}while ({'1' if always else self.scope.condition(test).text}) {{")
+                self._lines.append(f"{indent}while ({self.scope.condition(test).text}) {{")
                 self._block(body, indent + INDENT)
                 self._lines.append(f"{indent}}}")
             case ast.For(
@@ -148,8 +132,8 @@ class FunctionWriter:
             case _:
                 self._module.refuse(
                     node,
-                    "statements are name = value, array[index] = value, name = zeros(N), += -= *= /=, calls, if, while, "
-                    "for name in range(...), break, continue, return and pass",
+                    "statements are name = value, array[index] = value, += -= *= /=, calls, if, while, for name in range(...), "
+                    "break, return and pass",
                 )
 
     def _return(self, node: ast.stmt, value: ast.expr | None, indent: str) -> None:
@@ -165,44 +149,21 @@ class FunctionWriter:
         part = self.scope.fitting(node, self.scope.value(value), wanted, f"the value of {self.function.name}")
         self._lines.append(f"{indent}return {part.text};")
 
-    def _assign(self, node: ast.stmt, name: str, part: Part, indent: str) -> None:
-        known = self.scope.kinds.get(name)
-        if known == "array":
-            self._module.refuse(node, f"{name} is an array: only its elements are assigned")
-        fitting, declaration = self.scope.fitting(node, part, known or part.kind, name), ""
-        if known is None:
+    def _assign(self, node: ast.stmt, target: ast.Name | ast.Subscript, part: Part, indent: str) -> None:
+        if isinstance(target, ast.Subscript):
+            element = self.scope.element(target, store=True)
+            fitting = self.scope.fitting(node, part, "float", element.text)
+            self._lines.append(f"{indent}{element.text} = {fitting.text};")
+            return
+        name, declaration = target.id, ""
+        fitting = self.scope.fitting(node, part, self.scope.kinds.get(name, part.kind), name)
+        if name not in self.scope.kinds:
             self.scope.kinds[name] = part.kind
             if indent == INDENT and name in self._read:
                 declaration = f"{'const ' if self._stored[name] == 1 else ''}{C_TYPES[part.kind]} "
             else:
                 self._at_top.append(name)
         self._lines.append(f"{indent}{declaration}{name} = {fitting.text};")
-
-    def _store(self, node: ast.stmt, target: ast.Subscript, part: Part, indent: str) -> None:
-        element = self.scope.element(target, store=True)
-        fitting = self.scope.fitting(node, part, "float", element.text)
-        self._lines.append(f"{indent}{element.text} = {fitting.text};")
-
-    def _update(self, node: ast.AugAssign, target: ast.expr, operator: ast.operator, value: ast.expr, indent: str) -> None:
-        if isinstance(target, ast.Subscript):
-            before = self.scope.element(target, store=True)
-            self._store(node, target, self.scope.arithmetic(node, before, operator, self.scope.value(value)), indent)
-        elif isinstance(target, ast.Name):
-            before = self.scope.value(ast.copy_location(ast.Name(target.id, ast.Load()), target))
-            self._assign(node, target.id, self.scope.arithmetic(node, before, operator, self.scope.value(value)), indent)
-        else:
-            self._module.refuse(node, "what is updated is a name or an element of an array")
-
-    def _clear(self, node: ast.stmt, name: str, called: ast.Call, rest: Sequence[ast.stmt], indent: str) -> None:
-        """Write the call that clears a local array; `rest` is the block from here on."""
-        size = self.scope.known_int(called.args[0]) if len(called.args) == 1 and not called.keywords else None
-        if size is None or size < 1:
-            self._module.refuse(node, "a local array is made by zeros(N) with a positive int N, written out or a constant")
-        if name in self.scope.kinds or self._stored[name] != 1 or _counts(rest)[name] != self._counts[name]:
-            self._module.refuse(node, f"{name}, a local array, is assigned once, in the block that uses it and before its use")
-        self.scope.kinds[name], self.scope.sizes[name] = "array", size
-        self._at_top.append(name)
-        self._lines.append(f"{indent}{self.scope.global_name('clear_array')}({name}, {size});")
 
     def _branch(self, node: ast.If, indent: str, word: str) -> None:
         self._ordered(node.test)
@@ -219,20 +180,18 @@ class FunctionWriter:
                 self._lines.append(f"{indent}}}")
 
     def _for(self, node: ast.For, name: str, limits: Sequence[ast.expr], indent: str) -> None:
-        step = self.scope.known_int(limits[2]) if len(limits) == 3 else 1
-        if not 1 <= len(limits) <= 3 or not step:
-            self._module.refuse(node, "a range has one to three ints; the third is written out or a constant, and not zero")
-        parts = [self.scope.value(limit) for limit in limits[:2]]
+        if not 1 <= len(limits) <= 2:
+            self._module.refuse(node, "a range has one or two ints")
+        parts = [self.scope.value(limit) for limit in limits]
         if any(part.kind != "int" for part in parts):
             self._module.refuse(node, "a range is of ints")
         start, bound = ("0" if len(parts) == 1 else parts[0].text), parts[-1].text
-        if self.scope.known_int(limits[len(parts) - 1]) is None:  # Python looks at it once
+        if self.scope.known_int(limits[-1]) is None:  # Python looks at it once
             self._bounds += 1
             bound = f"stop_{self._bounds}"
             self._lines.append(f"{indent}const int {bound} = {parts[-1].text};")
         self.scope.kinds[name] = "int"
-        compared = f"{name} {'<' if step > 0 else '>'} {bound}"
-        self._lines.append(f"{indent}for (int {name} = {start}; {compared}; {name} += {step}) {{")
+        self._lines.append(f"{indent}for (int {name} = {start}; {name} < {bound}; {name} += 1) {{")
         self._block(node.body, indent + INDENT)
         self._lines.append(f"{indent}}}")
 
@@ -246,20 +205,23 @@ class FunctionWriter:
                 self._ordered(value)
             return
         parts = list(ast.walk(node))
-        calls = [part for part in parts if isinstance(part, ast.Call) and self._called(part).writes]
+        calls = [part for part in parts if any(one.written for one in self._parameters(part))]
         if not calls:
             return
         inside = {id(part) for part in ast.walk(calls[0])}
         for part in parts:
             reads = isinstance(part, ast.Subscript) and isinstance(part.ctx, ast.Load)
-            reads = reads or (isinstance(part, ast.Call) and any(one.kind == "array" for one in self._called(part).parameters))
+            reads = reads or any(one.kind == "array" for one in self._parameters(part))
             reads = reads or (isinstance(part, ast.AugAssign) and isinstance(part.target, ast.Subscript))
             if len(calls) > 1 or (reads and id(part) not in inside):
                 self._module.refuse(calls[0], "a call that writes an array stands in a statement without other array accesses")
 
-    def _called(self, call: ast.Call) -> Function:
-        nothing = Function("", (), "none", "", (), self.function.node)
-        return self.scope.earlier.get(call.func.id, nothing) if isinstance(call.func, ast.Name) else nothing
+    def _parameters(self, node: ast.AST) -> tuple[Parameter, ...]:
+        """Return the parameters of the function that is called here, if any is."""
+        match node:
+            case ast.Call(func=ast.Name(id=name)) if name in self.scope.earlier:
+                return self.scope.earlier[name].parameters
+        return ()
 
 
 def _ends(block: Sequence[ast.stmt]) -> bool:
@@ -269,8 +231,6 @@ def _ends(block: Sequence[ast.stmt]) -> bool:
             return True
         case ast.If(body=body, orelse=otherwise):
             return _ends(body) and _ends(otherwise)
-        case ast.While(test=ast.Constant(value=True), body=body):
-            return not any(isinstance(inner, ast.Break) for statement in body for inner in ast.walk(statement))
     return False
 
 

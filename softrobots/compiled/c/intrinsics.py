@@ -1,102 +1,17 @@
-"""What the kernel language has built in, written in freestanding C99: no libm, no tables.
-
-Each text has `@` where the prefix of the generated file goes.
-"""
+"""Intrinsics of the kernel language as C functions, from `intrinsics.c`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-C_INTRINSICS: Mapping[str, str] = {
-    "where": """\
-/* a where the condition holds, else b; both have been evaluated. */
-static double @where(int condition, double a, double b)
-{
-    return condition ? a : b;
-}""",
-    "fabs": """\
-/* x without its sign. */
-static double @fabs(double x)
-{
-    return x <= 0.0 ? 0.0 - x : x;
-}""",
-    "floor": """\
-/* The largest whole number not above x. From 2^52 on all numbers are whole; infinities and NaN stay. */
-static double @floor(double x)
-{
-    double whole;
-    if (!(x > -4503599627370496.0 && x < 4503599627370496.0)) {
-        return x;
-    }
-    whole = (double)(int64_t)x;
-    return whole > x ? whole - 1.0 : whole;
-}""",
-    "sqrt": """\
-/*
- * The square root of x, correctly rounded; NaN for x < 0.
- *
- * x = m 4^e with 1 <= m < 4. Four steps of Heron's method bring the root of m to one unit in the last place. The last
- * unit is decided in integers: with y in units of 2^-52 and m in units of 2^-104, the root is nearer to y + 1 than to y
- * if m - y^2 > y, and nearer to y - 1 if m - y^2 <= -y. The differences are small, so that they are right modulo 2^64.
- */
-static double @sqrt(double x)
-{
-    union {
-        double number;
-        uint64_t bits;
-    } pattern;
-    uint64_t mantissa, root, rest;
-    int exponent = -512;
-    double m, y;
-    if (!(x > 0.0 && x <= DBL_MAX)) {
-        return x < 0.0 ? (x - x) / (x - x) : x; /* 0, infinity and NaN are their own roots */
-    }
-    if (x < DBL_MIN) {
-        x *= 18014398509481984.0; /* 4^27 */
-        exponent -= 27;
-    }
-    pattern.number = x;
-    exponent += (int)(((pattern.bits >> 52) + 1U) >> 1);
-    mantissa = (pattern.bits & 0xFFFFFFFFFFFFFU) | 0x10000000000000U;
-    mantissa <<= ~(pattern.bits >> 52) & 1U; /* an odd power of two has an even biased exponent */
-    m = (double)mantissa * DBL_EPSILON;
-    y = 0.8346 + 0.2951 * m;
-    y = 0.5 * (y + m / y);
-    y = 0.5 * (y + m / y);
-    y = 0.5 * (y + m / y);
-    y = 0.5 * (y + m / y);
-    root = (uint64_t)(y * 4503599627370496.0);
-    rest = (mantissa << 52) - root * root;
-    if (rest - root - 1U < 0x8000000000000000U) {
-        root += 1U;
-    } else if (0U - rest - root < 0x8000000000000000U) {
-        root -= 1U;
-    }
-    pattern.bits = root + ((uint64_t)(exponent + 1022) << 52);
-    return pattern.number;
-}""",
-    "int_quotient": """\
-/* a // b, rounded down. */
-static int @int_quotient(int a, int b)
-{
-    return a / b - (a % b != 0 && (a % b < 0) != (b < 0));
-}""",
-    "int_remainder": """\
-/* a % b, with the sign of b. */
-static int @int_remainder(int a, int b)
-{
-    const int rest = a % b;
-    return rest != 0 && (rest < 0) != (b < 0) ? rest + b : rest;
-}""",
-    "clear_array": """\
-static void @clear_array(double *array, int count)
-{
-    for (int place = 0; place < count; ++place) {
-        array[place] = 0.0;
-    }
-}""",
-}
-"""Text of a static function by name, in the order in which they are to stand."""
+import re
+from functools import cache
+from pathlib import Path
 
 NEEDS_WIDE_INTEGERS = ("floor", "sqrt")
 """Those that need <stdint.h>."""
+
+
+@cache
+def c_intrinsics() -> dict[str, str]:
+    """Return the text of each static function by its name, with `PREFIX_` before it, in the order of the file."""
+    _, *functions = Path(__file__).with_name("intrinsics.c").read_text(encoding="utf-8").strip().split("\n\n")
+    return {re.findall(r"PREFIX_(\w+)\(", function)[0]: function for function in functions}

@@ -8,15 +8,13 @@ memcpy out of loops.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 
 from softrobots.compiled.c.expressions import Scope
-from softrobots.compiled.c.functions import FunctionWriter, prototype
-from softrobots.compiled.c.intrinsics import C_INTRINSICS, NEEDS_WIDE_INTEGERS
-from softrobots.compiled.c.kernel_language import Module, Number, read_module
+from softrobots.compiled.c.functions import C_TYPES, FunctionWriter, prototype
+from softrobots.compiled.c.intrinsics import NEEDS_WIDE_INTEGERS, c_intrinsics
+from softrobots.compiled.c.kernel_language import Module, read_module
 from softrobots.compiled.c.lines import comment, wrapped
-from softrobots.core.errors import NameNotFound, ParameterError
 
 _CHECKS = """\
 #if INT_MAX < 2147483647
@@ -43,17 +41,10 @@ def to_c(text: str, *, prefix: str, exported: Sequence[str]) -> str:
         Text of a C file. The comment at its top has the declarations and docstrings of what is exported.
 
     Raises:
-        ParameterError: If the text is outside the kernel language (the error names the line), or the prefix or the choice of
-            names is not acceptable.
-        NameNotFound: If the module has no function or int constant of an exported name.
+        ParameterError: If the text is outside the kernel language; the error names the line.
     """
-    if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
-        raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
     module = read_module(text)
-    for name in (*module.constants, *module.functions):
-        if name in C_INTRINSICS:
-            raise ParameterError("text", name, f"without a function or constant called {', '.join(C_INTRINSICS)}")
-    functions = _exported(module, exported)
+    functions = [name for name in module.functions if name in exported]
     scopes: dict[str, Scope] = {}
     bodies = {}
     for name, function in module.functions.items():
@@ -75,24 +66,10 @@ def to_c(text: str, *, prefix: str, exported: Sequence[str]) -> str:
         _CHECKS,
         "\n".join(_constants(module, prefix, needed)),
         "\n".join(line for head in heads.values() for line in wrapped(f"{head};")),
-        *(made.replace("@", prefix) for name, made in C_INTRINSICS.items() if name in needed),
+        *(function.replace("PREFIX_", prefix) for name, function in c_intrinsics().items() if name in needed),
         *(body for name, body in bodies.items() if name in needed),
     ]
     return "\n\n".join(piece for piece in pieces if piece) + "\n"
-
-
-def _exported(module: Module, exported: Sequence[str]) -> list[str]:
-    """Names of the exported functions, in the order of the text."""
-    sizes = [name for name, value in module.constants.items() if isinstance(value, int)]
-    if isinstance(exported, str) or not len(exported) == len(set(exported)) > 0:
-        raise ParameterError("exported", exported, "a sequence of different names, of at least one function")
-    for name in exported:
-        if name not in module.functions and name not in sizes:
-            raise NameNotFound("function or int constant", name, [*module.functions, *sizes])
-    functions = [name for name in module.functions if name in exported]
-    if not functions:
-        raise ParameterError("exported", exported, "a sequence of different names, of at least one function")
-    return functions
 
 
 def _about(module: Module, prefix: str, exported: Iterable[str], heads: dict[str, str]) -> str:
@@ -116,13 +93,9 @@ def _constants(module: Module, prefix: str, needed: set[str]) -> Iterable[str]:
         if name in needed:
             shown = prefix + name
             if isinstance(value, tuple):
-                kind = _c_type(value[0])
+                kind = C_TYPES[type(value[0]).__name__]
                 yield from wrapped(f"static const {kind} {shown}[{len(value)}] = {{ {', '.join(map(repr, value))} }};")
             elif isinstance(value, int):
                 yield f"enum {{ {shown} = {value} }};"
             else:
                 yield f"static const double {shown} = {value!r};"
-
-
-def _c_type(value: Number) -> str:
-    return "int" if isinstance(value, int) else "double"
