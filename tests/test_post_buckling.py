@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots.statics import force_path, post_buckling
@@ -212,6 +213,52 @@ def test_a_branch_goes_on_where_the_link_comes_onto_its_plateau(plateau: float) 
         beyond = stiffness * a > plateau
         assert branch.stable[1:].tolist() == (~beyond | (a > np.pi / 2)).tolist()
         assert branch.softest[1:][beyond] == pytest.approx(-(forces * LEVER * np.cos(a))[beyond] / stiffness, abs=1e-9)
+
+
+PLATEAUS = (*np.linspace(3.0, 25.0, 20).tolist(), 14.99, 21.76)
+"""Largest moments of a link [N m]; the last two are [Troise 2021]'s Table 3 at two pressures."""
+
+
+@pytest.mark.parametrize(
+    ("links", "plateaus"),
+    [
+        (1, (25.0,)),
+        (2, (21.76,)),
+        (3, (14.99,)),
+        *(pytest.param(links, PLATEAUS, marks=pytest.mark.study) for links in (1, 2, 3)),
+    ],
+)
+def test_no_branch_is_lost_at_a_plateau(links: int, plateaus: tuple[float, ...]) -> None:
+    """Wherever the points of a branch lie before its links come onto their plateaus, it goes on to the largest force."""
+    lengths = (0.6, 0.6, 0.5)[:links]
+    for plateau in plateaus:
+        model = sr.load_model(sr.InflatableArm(link_lengths=lengths, max_moment=plateau))
+        found = by_label(sr.post_buckling_branches(model, (0,) * model.n_motors, PUSH, largest_step=0.1))
+        assert len(found) == 9
+        for branch in found.values():
+            assert branch.ended == "largest force"
+            assert all(one.converged for one in branch.equilibria)
+            assert np.linalg.norm(np.diff(springs_of(branch), axis=0), axis=1).max() <= 0.1 / 0.95 + 1e-9  # no jump
+
+
+@pytest.mark.parametrize("plateau", PLATEAUS[::3] + PLATEAUS[-2:])
+def test_an_arm_of_two_links_folds_at_its_plateau_as_its_plane_says(plateau: float) -> None:
+    """Two hinges in a plane, the first on its plateau M: M = F (0.6 sin a + 0.57 sin(a + b)), k b = F 0.57 sin(a + b)."""
+    model = sr.load_model(sr.InflatableArm(max_moment=plateau))
+    stiffness = float(model.stiffness[0])
+    branch = by_label(sr.post_buckling_branches(model, (0, 0, 0), PUSH))["+spring_1_up"]
+    a, b = springs_of(branch)[:, 1], springs_of(branch)[:, 3]
+    folded = stiffness * a > plateau
+    assert a[folded].min() < 0.2 < 2.8 < a[folded].max()
+    for angle, other, force in zip(a[folded].tolist(), b[folded].tolist(), branch.forces[folded].tolist(), strict=True):
+
+        def unbalanced(second: float, first: float = angle) -> float:
+            lever = LEVER * np.sin(first + second)
+            return stiffness * second * (0.6 * np.sin(first) + lever) - plateau * lever
+
+        balanced = brentq(unbalanced, 0.0, plateau / stiffness, xtol=1e-15)
+        assert other == pytest.approx(balanced, abs=1e-9)
+        assert force == pytest.approx(plateau / (0.6 * np.sin(angle) + LEVER * np.sin(angle + balanced)), rel=1e-8)
 
 
 def test_branches_are_found_before_a_plateau_that_begins_early() -> None:

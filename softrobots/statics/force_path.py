@@ -150,7 +150,7 @@ class ForcePath:
             if there is None or not way @ moved >= _TURN * np.linalg.norm(moved):
                 step *= 0.5
                 if step < _SHORTEST:
-                    turned = None if knee == len(points) else self._behind_knee(points[-1], way)
+                    turned = None if knee == len(points) else self._behind_knee(points[-2:], way)
                     if turned is not None:
                         knee, way, step = len(points), turned, _BEHIND
                         continue
@@ -167,14 +167,15 @@ class ForcePath:
             way, step = moved / np.linalg.norm(moved), min(1.5 * step, largest_step)
         return points, "points"
 
-    def _behind_knee(self, here: PathPoint, way: FloatArray) -> FloatArray | None:
+    def _behind_knee(self, last: list[PathPoint], way: FloatArray) -> FloatArray | None:
         """Direction of the path behind the knee of a link, at either end of its plateau; None if there is no knee.
 
         The tangent stiffness jumps there. The direction is in the null space behind the knee, with the link bending on as
         before.
         """
-        law, beyond = self.model.springs, here.springs + 10.0 * _SHORTEST * way[:-1]
-        places = sorted(law.saturated(here.springs) ^ law.saturated(beyond))
+        here, law = last[-1], self.model.springs
+        beyond = here.springs + 10.0 * _SHORTEST * way[:-1]
+        places = sorted(law.saturated(last[0].springs) ^ law.saturated(beyond))
         ahead = self.point(beyond, here.force)
         if not places or not math.isfinite(ahead.state.error):
             return None
