@@ -22,13 +22,14 @@ from typing import Any
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.view.figures import canvas
 from studies.beam_validity.arm import study_arm
 from studies.beam_validity.link import study_link
 from studies.beam_validity.pictures import arm_figure, link_figure
 from studies.beam_validity.tables import table
 from studies.shared.checkout import CHECKOUT, test_support
+from studies.shared.folders import free_folder
 from studies.shared.recorded_run import check_page, command_of, write_record
 
 PAGE = "agreement.md"

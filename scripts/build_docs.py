@@ -19,9 +19,10 @@ from typing import Any
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.core.files import free_folder, make_folder
+from softrobots.core.files import make_folder
 from softrobots.view.served_page import LOOPBACK, tunnel_to
 from studies.shared.command_line import serve
+from studies.shared.folders import free_folder
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 MARK = ".softrobots-site"

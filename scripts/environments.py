@@ -27,10 +27,11 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.core.json_text import read_json
 from softrobots.core.progress import with_progress
 from studies.shared.clean_checkout import copy_checkout, find_uv, make_environment
+from studies.shared.folders import free_folder
 from studies.shared.recorded_run import FOLDER, check_page, write_record
 
 CHECKOUT = Path(__file__).resolve().parent.parent

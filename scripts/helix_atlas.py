@@ -20,9 +20,10 @@ import softrobots as sr
 from softrobots import helix
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import positive_number
-from softrobots.core.files import csv_text, free_folder, make_folder, write_text
+from softrobots.core.files import csv_text, make_folder, write_text
 from softrobots.helix import atlas
 from softrobots.view.figures import canvas, helices
+from studies.shared.folders import free_folder
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
 PICTURES = ("helix_grid", "helix_shapes", "helix_grasp")

@@ -23,10 +23,11 @@ from tqdm import tqdm
 import softrobots as sr
 from softrobots import helix
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.view.figures import canvas, loaded_robot
 from studies.shared.command_line import serve, tell_written
+from studies.shared.folders import free_folder
 
 PIECES = {"pinch": "pinches", "tape": "tapes", "stoppers": "gaps"}
 """Names of the repeated marks of the template, by method."""

@@ -22,11 +22,12 @@ from tqdm import tqdm
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.view.figures import canvas
 from studies.helix_validation.comparison import measure, summary
 from studies.helix_validation.report import csv_of, figure, table
 from studies.helix_validation.tubes import committed, drawn, grid
+from studies.shared.folders import free_folder
 
 NAMES = ("helix_validation.json", "helix_validation.csv", "helix_validation.png")
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"

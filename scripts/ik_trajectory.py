@@ -17,12 +17,13 @@ from pathlib import Path
 import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import METHODS
 from softrobots.view.figures import canvas, trajectories
 from studies.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 from studies.shared.command_line import serve, tell_written
+from studies.shared.folders import free_folder
 
 LINE = {"start": START, "end": END, "duration": DURATION, "steps": STEPS}
 """The default path."""

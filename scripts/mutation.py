@@ -30,9 +30,10 @@ from tqdm import tqdm
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import positive_integer
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from studies.mutation.mutants import SURVIVED, TIMED_OUT, Explanation, Mutant, Verdict, judge, read_explanations, read_mutants
 from studies.shared.clean_checkout import copy_checkout, find_uv, make_environment
+from studies.shared.folders import free_folder
 from studies.shared.recorded_run import FOLDER, check_page, write_record
 
 CHECKOUT = Path(__file__).resolve().parent.parent

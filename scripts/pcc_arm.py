@@ -17,11 +17,12 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.robots.pcc_arm import CHAINS
 from softrobots.statics.loads import Load
 from softrobots.view.figures import canvas, loaded_robot
 from studies.shared.command_line import serve, tell_written
+from studies.shared.folders import free_folder
 
 LENGTHS = (0.50, 0.53, 0.55, 0.54, 0.51, 0.52)
 """The default muscle lengths [m]."""

@@ -16,9 +16,10 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large
-from softrobots.core.files import free_folder, make_folder
+from softrobots.core.files import make_folder
 from softrobots.view.figures import canvas, workspaces
 from studies.shared.command_line import add_resume, blocks_beside, tell_written
+from studies.shared.folders import free_folder
 
 
 def parser() -> argparse.ArgumentParser:

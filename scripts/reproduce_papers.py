@@ -13,7 +13,7 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.core.progress import with_progress
 from softrobots.view.figures import canvas
 from studies.papers import rendering
@@ -21,6 +21,7 @@ from studies.papers.curves import write_curves
 from studies.papers.pictures import PICTURES
 from studies.papers.reproduction import PAPERS, reproduce
 from studies.shared.command_line import tell_written
+from studies.shared.folders import free_folder
 from studies.shared.markdown import marked
 
 CHECKOUT = Path(__file__).resolve().parent.parent

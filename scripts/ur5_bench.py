@@ -25,10 +25,11 @@ import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import non_negative_number, positive_integer
-from softrobots.core.files import csv_text, free_folder, make_folder, write_text
+from softrobots.core.files import csv_text, make_folder, write_text
 from softrobots.inflated_beam import CharacterisationRow, fit_characterisation
 from softrobots.view.figures import canvas
 from studies.shared.command_line import serve, tell_written
+from studies.shared.folders import free_folder
 from studies.ur5 import bench_plots
 from studies.ur5.bench import UR5_JOINTS, UR5Bench
 from studies.ur5.bench_run import BenchRun, Measurement, push_link

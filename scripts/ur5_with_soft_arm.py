@@ -18,10 +18,11 @@ from pathlib import Path
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import finite_array, non_negative_number, positive_integer, positive_number
-from softrobots.core.files import free_folder, make_folder, write_text
+from softrobots.core.files import make_folder, write_text
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.view.figures import canvas, trajectories
 from studies.shared.command_line import serve, tell_written
+from studies.shared.folders import free_folder
 from studies.ur5.soft_arm import PAYLOAD, Load, compensate, follow_line, mounted, soft_arm, within_limits
 from studies.ur5.soft_arm_report import summarise, table
 

@@ -19,9 +19,10 @@ import pytest
 
 import softrobots as sr
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace, mapping
-from softrobots.core.checkpoint import CASE, Checkpoint, discard
+from softrobots.core.checkpoint import CASE, Checkpoint
 from softrobots.statics import workspace
 from studies.shared.command_line import blocks_beside
+from studies.shared.folders import discard
 from tests.conftest import CHECKOUT
 from tests.support.load_cases import fingerprint
 from tests.support.scripts import run_script

@@ -22,8 +22,9 @@ import pytest
 import softrobots as sr
 from softrobots.cli.main import main
 from softrobots.core.checkpoint import Checkpoint
-from softrobots.core.files import free_folder, make_folder, new_file, write_atomically, write_bytes, write_text
+from softrobots.core.files import make_folder, new_file, write_atomically, write_bytes, write_text
 from softrobots.view.figures import canvas, trajectories
+from studies.shared.folders import free_folder
 from tests.conftest import CHECKOUT, missing
 from tests.support.scripts import run_script
 

@@ -114,25 +114,6 @@ class Checkpoint:
         raise ParameterError("checkpoint", str(self._folder), requirement)
 
 
-def discard(folder: str | os.PathLike[str]) -> None:
-    """Delete a folder of finished blocks; a folder with other files stays, with those files.
-
-    Raises:
-        ParameterError: If it is not a path.
-        OutputError: If a file cannot be deleted.
-    """
-    place = as_path("checkpoint", folder)
-    try:
-        if (place / CASE).is_file():
-            for file in [*place.glob("block_*.npz"), *place.glob(".*.part")]:
-                file.unlink()
-            (place / CASE).unlink()  # last: until then the folder is known as a checkpoint
-            if not any(place.iterdir()):
-                place.rmdir()
-    except OSError as error:
-        raise OutputError(f"cannot delete the blocks in {place}: {error}") from error
-
-
 def _has_case(folder: Path) -> bool:
     """Whether a folder is a checkpoint rather than new or empty; raise OutputExists if it is neither."""
     try:

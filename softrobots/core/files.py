@@ -56,39 +56,11 @@ def new_file(path: str | os.PathLike[str], *, overwrite: bool) -> Path:
         if mode is not None and not mode & 0o222:
             raise OutputError(f"cannot write {target}: it is write-protected")
         place.parent.mkdir(parents=True, exist_ok=True)
-        _check_writable(place.parent)
+        check_writable(place.parent)
     except OutputError:
         raise
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot write {target}: {error}") from error
-    return target
-
-
-def free_folder(path: str | os.PathLike[str]) -> Path:
-    """Return `path` if it can be used as an output folder; nothing is created yet.
-
-    Args:
-        path: A folder that does not exist or is empty.
-
-    Raises:
-        ParameterError: If it is not a path.
-        OutputExists: If it or one of its parents is a file, or if it is not empty.
-        OutputError: If it cannot be read or written to.
-    """
-    target = as_path("path", path)
-    try:
-        blocking = next((p for p in (target, *target.parents) if p.exists() and not p.is_dir()), None)
-        existing = next((p for p in (target, *target.parents) if p.is_dir()), None)
-        names = sorted(p.name for p in target.iterdir()) if target.is_dir() else []
-    except (OSError, ValueError) as error:
-        raise OutputError(f"cannot read the folder {target}: {error}") from error
-    if blocking is not None:
-        raise OutputExists(f"{blocking} is a file; an output folder must be new or empty")
-    if names:
-        content = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
-        raise OutputExists(f"{target} is not empty (it contains {content}); an output folder must be new or empty")
-    if existing is not None:
-        _check_writable(existing)
     return target
 
 
@@ -196,7 +168,7 @@ def _place(target: Path) -> Path:
     return place
 
 
-def _check_writable(folder: Path) -> None:
+def check_writable(folder: Path) -> None:
     """Raise OutputError if no files can be created in a folder, before hours of work."""
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids):
         raise OutputError(f"cannot write in {folder}: no permission, or a read-only disk")

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Protocol
 
 from softrobots.cli.options.command_line import address_lines
-from softrobots.core.checkpoint import discard
 from softrobots.core.errors import FileFormatError, OutputExists, ParameterError
+from studies.shared.folders import discard
 
 
 def add_resume(parser: argparse.ArgumentParser) -> None:
