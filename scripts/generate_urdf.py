@@ -9,7 +9,7 @@ from pathlib import Path
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import make_folder, write_bytes
 from softrobots.description.paths import urdf_folder
-from softrobots.robots.generated import generated_files
+from softrobots.robots import ROBOTS
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -27,10 +27,12 @@ def main(argv: list[str] | None = None) -> int:
 def update(folder: Path, *, check: bool) -> int:
     """Write or compare the files in a folder; return how many differed."""
     stale = 0
-    for path, text, same in generated_files(folder):
+    for name, robot in ROBOTS.items():
+        path, content = folder / f"{name}.urdf", robot().urdf().encode("utf-8")
+        same = path.is_file() and path.read_bytes() == content
         if not check and not same:
             make_folder(folder)
-            write_bytes(path, text, overwrite=True)
+            write_bytes(path, content, overwrite=True)
         stale += not same
         print(f"{path}: {'up to date' if same else 'differs' if check else 'written'}")
     return stale

@@ -24,7 +24,6 @@ ARM = urdf_folder() / "inflatable_arm.urdf"
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Look at one file, and at no page: all of them are looked at once, which is enough."""
     monkeypatch.setattr("softrobots.cli.doctor.ROBOTS", {"inflatable_arm": sr.InflatableArm})
-    monkeypatch.setattr("softrobots.robots.generated.ROBOTS", {"inflatable_arm": sr.InflatableArm})
     monkeypatch.setattr("softrobots.cli.doctor._page", lambda report: None)
 
 
@@ -62,7 +61,6 @@ def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: 
     """A server that starts and ends, one that does not start, and one that serves something else."""
     started, ended = [], []
     monkeypatch.setattr("softrobots.cli.doctor.ROBOTS", {})
-    monkeypatch.setattr("softrobots.robots.generated.ROBOTS", {})
     monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # nobody is there; loopback needs no proxy
     monkeypatch.setattr("softrobots.cli.doctor.start_server", lambda: started.append(start_server()) or started[-1])
     monkeypatch.setattr("softrobots.cli.doctor.end_server", lambda server: ended.append(end_server(server)))

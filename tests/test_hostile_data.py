@@ -723,7 +723,7 @@ DOORWAYS = {
     "view.live.input": ("watched file",),
     "export.meshes": ("STL",),
     "description.argument_notes": "our own xacro files",
-    "robots.generated": "compares a file with what is generated, byte for byte",
+    "cli.doctor": "compares a file with what is generated, byte for byte",
     "studies.shared.recorded_run": "a page of the checkout",
     "studies.mutation.mutants": "what the tool has just written",
     "compiled.c.intrinsics": "a file of ours in C",

@@ -48,7 +48,6 @@ class SelfContactWarning(UserWarning):
     """
 
     def __init__(self, message: str, *, contact: SelfContact) -> None:
-        """Create the warning with the contact."""
         super().__init__(message)
         self.contact = contact
 
@@ -105,9 +104,7 @@ class SelfContact:
         count = f"{np.count_nonzero(self.touches)} of {margin.size} tubes run into themselves"
         return f"{count}; the tightest, at index {worst}: {self._sentence(worst)}"
 
-    def __str__(self) -> str:
-        """Return `describe()`."""
-        return self.describe()
+    __str__ = describe
 
     def _sentence(self, index: tuple[int, ...]) -> str:
         """Sentence about one tube."""

@@ -65,7 +65,6 @@ class DesignWarning(UserWarning):
     """
 
     def __init__(self, message: str, *, design: HelixDesign) -> None:
-        """Create the warning with the design that it is about."""
         super().__init__(message)
         self.design = design
 
@@ -105,18 +104,18 @@ class HelixDesign:
 
     def __post_init__(self) -> None:
         """Check the numbers and compute the derived ones."""
-        numbers = {
+        checked = {
             "contraction": positive_number("contraction", self.contraction, "-"),
             "angle": non_negative_number("angle", self.angle, "rad"),
             "diameter": positive_number("diameter", self.diameter, "m"),
             "turns": positive_number("turns", self.turns, "-"),
+            "handedness": choice("handedness", self.handedness, HANDEDNESS),
+            "wish": _checked_wish(self.wish),
+            "contraction_limits": checked_limits("contraction_limits", self.contraction_limits, "-"),
+            "angle_limits": checked_limits("angle_limits", self.angle_limits, "rad"),
         }
-        for name, number in numbers.items():
-            object.__setattr__(self, name, number)
-        choice("handedness", self.handedness, HANDEDNESS)
-        object.__setattr__(self, "wish", _checked_wish(self.wish))
-        object.__setattr__(self, "contraction_limits", checked_limits("contraction_limits", self.contraction_limits, "-"))
-        object.__setattr__(self, "angle_limits", checked_limits("angle_limits", self.angle_limits, "rad"))
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         shape = forward(self.contraction, self.angle, self.diameter)
         if self.wish is not None and not (shape.radius(self.wish.path) > 0.0 and shape.pitch > 0.0):
             raise ParameterError("wish", self.wish, f"None for a helix without radius or rise to compare it with: {shape}")
@@ -181,9 +180,7 @@ class HelixDesign:
         lines += [f"CANNOT BE MADE: {fault}" for fault in self.faults]
         return "\n".join(lines)
 
-    def __str__(self) -> str:
-        """Return `summary()`."""
-        return self.summary()
+    __str__ = summary
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Save the design as JSON: numbers in SI units and radians, full precision.

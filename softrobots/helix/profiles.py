@@ -14,10 +14,9 @@ from softrobots.core.errors import ParameterError
 from softrobots.helix.shapes import ANGLE_RANGE, CONTRACTION_RANGE
 
 _RANGES = {
-    "contraction": (1.0 / LARGEST, 1.0, CONTRACTION_RANGE),
-    "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), ANGLE_RANGE),
+    "contraction": (1.0 / LARGEST, 1.0, CONTRACTION_RANGE, "-"),
+    "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), ANGLE_RANGE, "rad"),
 }
-_UNITS = {"contraction": "-", "angle": "rad"}
 _MOST_SAMPLES = 1_000_000
 _ROUNDING = 1e-12  # of the length: how much too early a table may end
 
@@ -59,7 +58,7 @@ class Profile:
 
     def _call(self, position: float) -> float:
         """Value of the function, checked."""
-        low, high, requirement = _RANGES[self.name]
+        low, high, requirement, _ = _RANGES[self.name]
         where = f" at the position {position!r} m"
         try:
             value = self.function(position) if self.function is not None else None
@@ -82,14 +81,14 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         ParameterError: If it is none of these, a value is out of range, or the positions do not extend from 0 to the length,
             decrease, or occur more than twice, or twice at an end.
     """
-    low, high, requirement = _RANGES[name]
+    low, high, requirement, unit = _RANGES[name]
     if callable(given):
         return Profile(name, length, given, np.zeros(0), np.zeros(0))
     if isinstance(given, tuple | list) or (isinstance(given, np.ndarray) and given.ndim > 0):
         if len(given) != 2:
             raise ParameterError(name, given, "a number, a function of the position, or a pair (positions, values)")
         positions = finite_array(f"{name} positions", given[0], (None,), "m")
-        values = finite_array(name, given[1], positions.shape, _UNITS[name])
+        values = finite_array(name, given[1], positions.shape, unit)
         if len(positions) < 2 or positions[0] > 0.0 or positions[-1] < length * (1.0 - _ROUNDING):
             raise ParameterError(f"{name} positions", given[0], f"a table of the whole tube, 0 to {length!r} m")
         steps = np.diff(positions)
@@ -99,7 +98,7 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         if np.any((steps < 1.0 / LARGEST) & ~twice):
             raise ParameterError(f"{name} positions", given[0], f"different by at least {1.0 / LARGEST:g} m, or equal")
     else:
-        number = finite_number(name, given, _UNITS[name])
+        number = finite_number(name, given, unit)
         positions, values = np.array([0.0, length]), np.array([number, number])
     wrong = np.flatnonzero((values < low) | (values > high))
     if wrong.size:

@@ -23,6 +23,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import yaml
+
 from softrobots.core.bounded_reading import read_text
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
 from softrobots.core.files import as_path, write_text
@@ -175,8 +177,6 @@ def _yaml(value: Any) -> str:
 
 def _parse_yaml(text: str) -> Any:
     """Value of a YAML text, from the events of PyYAML's parser; reading ends at the first event that is refused."""
-    import yaml
-
     try:
         events = yaml.parse(text, Loader=yaml.SafeLoader)
         document = (event for event in events if not isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent))
@@ -195,8 +195,6 @@ def _parse_yaml(text: str) -> Any:
 
 def _value(event: Any, events: Iterator[Any], counter: Iterator[int], depth: int) -> Any:
     """Value of the node that begins with an event; takes the other events of the node."""
-    import yaml
-
     where = f"line {event.start_mark.line + 1}: "
     if next(counter) > MOST_VALUES:
         raise FileFormatError(f"{where}at most {MOST_VALUES} names and values are read")
