@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.statics.displacement_control import Probe
-from softrobots.statics.imposed_displacement import imposed_at
+from softrobots.statics.displacement_control import DisplacementControl, Probe
+from softrobots.statics.imposed_displacement import imposed_result
 from softrobots.statics.loads import Load
 from tests.support.tables import each_row
 
@@ -175,11 +175,10 @@ def test_stable_means_positive_definite_on_what_the_probe_leaves_free(limp: sr.S
     random, seen = np.random.default_rng(3), set()
     motors = np.zeros(3)
     probe = sr.solve_imposed_displacement(limp, motors, 0.01, direction=(0.3, 0.2, 1.0)).probe
+    problem = DisplacementControl(limp, motors, Load.of(limp), probe, 1e-10)
     for _ in range(60):
         y, reaction = 0.3 * random.normal(size=4), float(random.uniform(-600.0, 600.0))
-        held = imposed_at(
-            limp, motors, Load.of(limp), probe, q_springs=y, reaction=reaction, displacement=0.0, iterations=0
-        )  # fmt: skip
+        held = imposed_result(problem, problem.at(y, reaction), 0.0, 0)
         free = null_space(held.gradient[None, :])
         smallest = float(np.linalg.eigvalsh(free.T @ held.tangent_stiffness @ free)[0])
         assert held.stable == (smallest > 0.0)

@@ -277,7 +277,7 @@ def test_a_knee_at_which_stability_is_lost_is_no_crossing() -> None:
     assert not critical.crosses
     (path,) = sr.post_buckling_branches(model, motors, direction)
     top = int(np.argmax(np.diff(path.forces) < 0.0))
-    assert path.forces[top] == pytest.approx(critical.force, rel=1e-3)
+    assert path.forces[top] == pytest.approx(critical.path.force, rel=1e-3)
     assert path.stable[: top + 1].all()
     assert not path.stable[top + 1]
 

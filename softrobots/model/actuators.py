@@ -61,15 +61,7 @@ class Actuators:
         self._unit = "rad" if not muscles else "N" if lengths is None else "m"
 
     def checked(self, value: Any, field: str) -> FloatArray:
-        """Return positions that the robot can have, as a new array.
-
-        Args:
-            value: Positions, shape (n_motors,) [rad, m or N].
-            field: Name of the parameter, for the error.
-
-        Raises:
-            ParameterError: If the shape differs, a number is not finite, or the robot cannot have such muscle lengths.
-        """
+        """Return positions that the robot can have, as a new array; see `SoftModel.checked_motors`."""
         motors = finite_array(field, value, (len(self.names),), self._unit)
         if self._lengths is not None:
             self._lengths.check(field, motors)
@@ -91,17 +83,10 @@ class Actuators:
         return sample if self.admit(sample) and np.all((sample >= low) & (sample <= high)) else None
 
     def go(self, motors: FloatArray, step: FloatArray) -> FloatArray:
-        """Return the positions after a step that is shortened to the limits.
+        """Return the positions after a step from within the limits that is shortened to them.
 
         Independent actuators are clipped one by one; muscle lengths that depend on each other share one factor. The bending of
         segments is limited to the range of their sections.
-
-        Args:
-            motors: Positions within the limits, shape (n_motors,).
-            step: The step, shape (n_motors,).
-
-        Returns:
-            Shape (n_motors,).
         """
         low, high = self.limits.T
         if self.independent:
@@ -114,9 +99,6 @@ class Actuators:
 
     def active_limits(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the limits that are reached: of actuators, and of the range of sections with given muscle lengths.
-
-        Args:
-            motors: Positions, shape (n_motors,).
 
         Returns:
             Outward normals, and rows whose outer products are the second derivatives of the limited quantities (zero for

@@ -23,20 +23,11 @@ _ROUNDING = 4e-16  # of sines and cosines of quarter turns, as URDF's roll, pitc
 
 
 def read_chain(pinocchio_model: Any, structure: Structure, tip_frame: int, *, limits: FloatArray, reach: float) -> SerialChain:
-    """Read a robot as a serial chain.
+    """Read a robot as a serial chain from base to tip.
 
     Pinocchio's workspace is not allocated, so the chain may have any length. `load_model` has checked that the six joints of a
-    section are the chain of `strain_chain`, one behind the other with the rest shape in their origins.
-
-    Args:
-        pinocchio_model: The rigid bodies.
-        structure: Motors, springs and sections; the muscles.
-        tip_frame: Number of the tip among Pinocchio's frames.
-        limits: Limits of the actuators, shape (n_motors, 2) [rad, m or N].
-        reach: Scale of residuals [m].
-
-    Returns:
-        The chain from base to tip.
+    section are the chain of `strain_chain`, one behind the other with the rest shape in their origins. Limits of the actuators,
+    shape (n_motors, 2) [rad, m or N], and reach [m] are copied.
 
     Raises:
         DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides.
@@ -68,36 +59,24 @@ def read_chain(pinocchio_model: Any, structure: Structure, tip_frame: int, *, li
 
 
 def chain_length(pinocchio_model: Any, tip_frame: int, strained: Collection[str]) -> float:
-    """Sum of the link lengths from base to tip, and of the travel of slides [m].
+    """Sum of the link lengths from base to tip, and of the travel of slides, at least 1e-6 m.
 
-    Args:
-        pinocchio_model: The rigid bodies.
-        tip_frame: Number of the tip among Pinocchio's frames.
-        strained: Joints of sections; their travel is strain and does not count.
-
-    Returns:
-        The length, at least 1e-6 m. A slide without limits counts as 1 m.
+    A slide without limits counts as 1 m. The travel of `strained` joints, those of sections, is strain and does not count.
     """
     frame = pinocchio_model.frames[tip_frame]
     length = float(np.linalg.norm(frame.placement.translation))
-    number = frame.parentJoint
-    while number > 0:
+    for number in list(pinocchio_model.supports[frame.parentJoint])[:0:-1]:
         length += float(np.linalg.norm(pinocchio_model.jointPlacements[number].translation))
         joint = pinocchio_model.joints[number]
         if joint.shortname().startswith("JointModelP") and pinocchio_model.names[number] not in strained:
             low, high = pinocchio_model.lowerPositionLimit[joint.idx_q], pinocchio_model.upperPositionLimit[joint.idx_q]
             length += float(high - low) if high - low < LARGEST else 1.0
-        number = pinocchio_model.parents[number]
     return max(length, 1e-6)
 
 
 def _path(model: Any, last: int, tip: str) -> list[int]:
     """Numbers of the joints from base to `last`."""
-    path: list[int] = []
-    while last > 0:
-        path.append(last)
-        last = model.parents[last]
-    path.reverse()
+    path = list(model.supports[last])[1:]
     stray = [str(model.names[number]) for number in sorted(set(range(1, model.njoints)) - set(path))]
     if stray:
         raise DescriptionError(

@@ -62,13 +62,9 @@ class JointLoad(NamedTuple):
         return matrix
 
     def within(self, columns: FloatArray) -> FloatArray:
-        """Return the diagonal blocks of the derivative of forces and moments for groups of joints.
+        """Return the diagonal blocks, shape (n, m, m), of the derivative of forces and moments for groups of joints.
 
-        Args:
-            columns: The joints of each group, base to tip, shape (n, m), integers.
-
-        Returns:
-            Shape (n, m, m).
+        The joints of each group, base to tip, are a row of `columns`, shape (n, m), integers.
         """
         upper, strictly_upper = _triangles(columns.shape[1])
         angular, by_force = (matrix[:, columns].transpose(1, 0, 2) for matrix in (self.angular, self.by_force))

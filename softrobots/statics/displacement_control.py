@@ -86,15 +86,10 @@ class Contact(NamedTuple):
 
 
 def touch(probe: Probe, pose: Any, jacobian: FloatArray) -> Contact:
-    """Evaluate the contact of a probe at one pose of the robot.
+    """Evaluate the contact of a probe at a pose of its frame, a `pinocchio.SE3`, with its Jacobian, shape (6, n).
 
-    Args:
-        probe: The probe.
-        pose: Pose of its frame, a `pinocchio.SE3`.
-        jacobian: Geometric Jacobian of the frame per elastic coordinate, world axes, linear rows first, shape (6, n).
-
-    Returns:
-        The contact; its displacement is NaN where the face runs along the probe's line or has turned away from it.
+    The Jacobian is geometric, per elastic coordinate, in world axes, linear rows first. The displacement is NaN where the face
+    runs along the probe's line or has turned away from it.
     """
     linear, angular = jacobian[:3], jacobian[3:]
     lever, n = pose.rotation @ probe.point, probe.direction
@@ -121,18 +116,10 @@ def touch(probe: Probe, pose: Any, jacobian: FloatArray) -> Contact:
 
 
 def face_normal(line: FloatArray, axis: FloatArray, along: Any) -> FloatArray:
-    """Normal of the face that contains an axis and faces a line most.
-
-    Args:
-        line: Direction of the line in the frame, shape (3,), of length 1.
-        axis: The axis in the frame, shape (3,), of length 1.
-        along: The argument as given, for the error.
-
-    Returns:
-        The normal in the frame, shape (3,), of length 1.
+    """Unit normal of the face that contains a unit axis and faces a line, a unit vector, most; all in the frame, shape (3,).
 
     Raises:
-        ParameterError: If the axis runs along the line.
+        ParameterError: If the axis runs along the line; it names `along`, the argument as given.
     """
     across = line - float(line @ axis) * axis
     length = float(np.linalg.norm(across))
@@ -158,9 +145,8 @@ class ProbedState(NamedTuple):
 
         Shape (n + 1,); None where the matrix is singular (the path turns back).
         """
-        n = len(torque)
-        matrix: FloatArray = np.zeros((n + 1, n + 1))
-        matrix[:n, :n], matrix[:n, n], matrix[n, :n] = self.tangent, -self.contact.gradient, self.contact.gradient
+        gradient = self.contact.gradient
+        matrix = np.block([[self.tangent, -gradient[:, None]], [gradient, 0.0]])
         try:
             return np.asarray(np.linalg.solve(matrix, np.append(torque, way)))
         except np.linalg.LinAlgError:
@@ -214,13 +200,7 @@ class DisplacementControl:
 
 
 def follow(problem: DisplacementControl, here: ProbedState, wanted: float, most: int) -> tuple[ProbedState, int]:
-    """Follow the path to a displacement, in one step if possible.
-
-    Args:
-        problem: Robot, load and probe.
-        here: A point of the path.
-        wanted: The displacement [m].
-        most: Most evaluations.
+    """Follow the path from a point of it to a displacement [m], in one step if possible, in at most `most` evaluations.
 
     Returns:
         The farthest point reached, and the evaluations spent.
@@ -261,13 +241,7 @@ def _same_path(problem: DisplacementControl, here: ProbedState, there: ProbedSta
 
 
 def stable_under_constraint(model: SoftModel, tangent: FloatArray, gradient: FloatArray) -> bool:
-    """Whether a symmetric tangent stiffness is positive definite on the null space of a constraint.
-
-    Args:
-        model: The robot.
-        tangent: Tangent stiffness, shape (n, n) [N m/rad or N/m].
-        gradient: Derivative of the constrained quantity, shape (n,) [m/rad or -].
-    """
+    """Whether a symmetric tangent stiffness, shape (n, n), is positive definite on the null space of a gradient, shape (n,)."""
     softness = 1.0 / np.sqrt(model.stiffness)
     free = np.linalg.qr((softness * gradient)[:, None], mode="complete")[0][:, 1:]
     on_free = free.T @ scaled(tangent, model.stiffness) @ free

@@ -103,17 +103,7 @@ class ElasticProblem:
 
 
 def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
-    """Evaluate residual, tangent stiffness and energy at given coordinates.
-
-    Args:
-        model: The robot.
-        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
-        q_springs: Spring coordinates, shape (n_springs,) [rad or m].
-        load: The load.
-
-    Returns:
-        The state.
-    """
+    """Evaluate residual, tangent stiffness and energy at actuator and elastic coordinates; see `ElasticProblem.state`."""
     with one_blas_thread(model.n_springs):
         return ElasticProblem(model, q_motors, load).state(q_springs)
 
@@ -129,12 +119,8 @@ def _out_of_range(model: SoftModel, q_springs: FloatArray, q: FloatArray, point:
 def largest_residual(model: SoftModel, scale: float, tolerance: float) -> float:
     """Largest residual that counts as equilibrium: `tolerance * max(|f| reach + |moment| + |g|, 1e-3 N m)` [N m].
 
-    Never below the rounding of the spring torques, which matters for stiff springs with rest angles only.
-
-    Args:
-        model: The robot.
-        scale: Size of the load, `ElasticState.scale` [N m].
-        tolerance: Relative tolerance.
+    The maximum is that of `ElasticState.scale`. Never below the rounding of the spring torques, which matters for stiff springs
+    with rest angles only.
     """
     return max(tolerance * max(scale, MOMENT_FLOOR), model.rounding)
 
@@ -150,7 +136,7 @@ def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool, factors
 
     Args:
         model: The robot.
-        tangent: Tangent stiffness, shape (n_springs, n_springs); one that is not finite is not stable.
+        tangent: Tangent stiffness; one that is not finite is not stable.
         symmetric: Whether it is symmetric.
         factors: An `eigenpy.LDLT` of its size to reuse; None: a new one.
     """

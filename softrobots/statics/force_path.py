@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
-from softrobots.model.soft_model import SoftModel
+from softrobots.core.checks import FloatArray, unit_vector
+from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
@@ -67,6 +67,14 @@ class ForcePath:
     force: float
     """Force of the reference point, above zero [N]."""
 
+    @classmethod
+    def of(cls, model: SoftModel, q_motors: Any, direction: Any, *, frame: str | None, gravity: Any) -> ForcePath:
+        """Check the arguments of `critical_load`; the reference point is the relaxed robot and 1 N."""
+        check_model(model)
+        motors, unit = model.checked_motors(q_motors), unit_vector("direction", direction)
+        constant = Load.of(model, frame=frame, gravity=gravity)
+        return cls(model, motors, constant, model.tip if frame is None else frame, unit, model.rest, 1.0)
+
     def load(self, force: float) -> Load:
         """Return the load with a force [N]."""
         return self.constant.plus(self.frame, np.concatenate([force * self.unit, np.zeros(3)]))
@@ -114,9 +122,8 @@ class ForcePath:
             balanced = np.linalg.norm(residual) <= largest_residual(self.model, here.state.scale, TOLERANCE)
             if balanced and np.abs(gap).max() <= _GAP:
                 return here._replace(across=float(torques[0]) if len(torques) else 0.0)
-            matrix = np.zeros((n + len(rows), n + 1 + len(guides)))
-            matrix[:n, :n], matrix[:n, n], matrix[:n, n + 1 :] = here.state.tangent, -self.force * here.push, guides.T
-            matrix[n:, : n + 1] = rows
+            equilibrium = [here.state.tangent, -self.force * here.push[:, None], guides.T]
+            matrix = np.block([equilibrium, [rows, np.zeros((len(rows), len(guides)))]])
             try:
                 step = np.linalg.solve(matrix, np.concatenate([-residual, gap]))
             except np.linalg.LinAlgError:

@@ -148,8 +148,8 @@ def solve_imposed_displacement(
     here, spent = follow(problem, here, wanted, most)
     reached = here.contact.displacement
     if abs(reached - wanted) <= problem.largest_gap:
-        return _result(problem, here, wanted, spent)
-    best = _result(problem, here, reached, spent)
+        return imposed_result(problem, here, wanted, spent)
+    best = imposed_result(problem, here, reached, spent)
     raise EquilibriumNotFound(
         f"a displacement of {wanted:g} m was not reached in {spent} evaluations: the path was followed to {reached:.6g} m, "
         f"where the reaction is {best.reaction:.6g} N",
@@ -159,8 +159,8 @@ def solve_imposed_displacement(
     )
 
 
-def _result(problem: DisplacementControl, probed: ProbedState, wanted: float, iterations: int) -> ImposedDisplacement:
-    """Result at one state of robot and probe."""
+def imposed_result(problem: DisplacementControl, probed: ProbedState, wanted: float, iterations: int) -> ImposedDisplacement:
+    """Result at a state of robot and probe, in equilibrium or not."""
     model, probe, contact = problem.model, problem.probe, probed.contact
     pressed = problem.load.plus(probe.frame, probed.reaction * contact.wrench)
     equilibrium = equilibrium_from_state(
@@ -179,36 +179,6 @@ def _result(problem: DisplacementControl, probed: ProbedState, wanted: float, it
         gap=abs(contact.displacement - wanted),
         stable=stable_under_constraint(model, probed.tangent, contact.gradient),
     )
-
-
-def imposed_at(
-    model: SoftModel,
-    q_motors: FloatArray,
-    load: Load,
-    probe: Probe,
-    *,
-    q_springs: FloatArray,
-    reaction: float,
-    displacement: float,
-    iterations: int,
-) -> ImposedDisplacement:
-    """Compute a result from its unknowns, as saved in a file.
-
-    Args:
-        model: The robot.
-        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
-        load: The load without the probe.
-        probe: The probe.
-        q_springs: Spring coordinates, shape (n_springs,) [rad or m].
-        reaction: Force along the probe's line [N].
-        displacement: Displacement of the probe [m].
-        iterations: Evaluations spent.
-
-    Returns:
-        The result, whether or not it is in equilibrium.
-    """
-    problem = DisplacementControl(model, q_motors, load, probe, TOLERANCE)
-    return _result(problem, problem.at(q_springs, reaction), displacement, iterations)
 
 
 def _check_start(problem: DisplacementControl, start: Any) -> None:

@@ -181,10 +181,7 @@ def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
 
 
 def checked_orientation(value: Any) -> FloatArray | None:
-    """Return a target orientation of the tip, a direction with length 1.
-
-    Args:
-        value: A rotation matrix, shape (3, 3), a direction, shape (3,), or None.
+    """Return a target orientation of the tip: a rotation matrix, shape (3, 3), or a unit direction, shape (3,), or None.
 
     Raises:
         ParameterError: If it is something else.
@@ -202,12 +199,7 @@ def checked_orientation(value: Any) -> FloatArray | None:
 
 
 def elbow_side(model: SoftModel, q: FloatArray) -> str:
-    """Whether the last motor joint lies above or below the line from the first motor joint to the tip: "up" or "down".
-
-    Args:
-        model: The robot, with at least one motor.
-        q: Pinocchio's configuration, shape (nq,).
-    """
+    """Whether the last motor joint lies above or below the line from the first motor joint to the tip: "up" or "down"."""
     first, last, tip = (frame_placement(model, q, name).translation for name in (*_ends(model), model.tip))
     along = tip - first
     length = float(along @ along)

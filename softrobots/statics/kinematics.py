@@ -14,15 +14,7 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 def frame_placement(model: SoftModel, q: FloatArray, frame: str) -> Any:
-    """Pose of a frame in the world.
-
-    Args:
-        model: The robot.
-        q: Pinocchio's configuration, shape (nq,).
-        frame: Name of the frame.
-
-    Returns:
-        A new `pinocchio.SE3` [m].
+    """Pose of a frame in the world, a new `pinocchio.SE3` [m], at Pinocchio's configuration, shape (nq,).
 
     Raises:
         NameNotFound: If there is no such frame.
@@ -34,11 +26,6 @@ def frame_placement(model: SoftModel, q: FloatArray, frame: str) -> Any:
 
 def frame_jacobian(model: SoftModel, q: FloatArray, frame: str) -> FloatArray:
     """Geometric Jacobian of a frame in world axes, [Troise 2021] (4), shape (6, nv), linear rows first [m/rad; rad/rad].
-
-    Args:
-        model: The robot.
-        q: Pinocchio's configuration, shape (nq,).
-        frame: Name of the frame.
 
     Raises:
         NameNotFound: If there is no such frame.
@@ -52,20 +39,13 @@ def frame_jacobian(model: SoftModel, q: FloatArray, frame: str) -> FloatArray:
 
 
 def backbone(model: SoftModel, q: FloatArray) -> FloatArray:
-    """Origins of the joints from base to tip at a configuration, shape (n, 3) [m]; repeated points are dropped.
-
-    Args:
-        model: The robot.
-        q: Pinocchio's configuration, shape (nq,).
-    """
+    """Origins of the joints from base to tip at a configuration, shape (n, 3) [m]; repeated points are dropped."""
     pin_model, data = model.workspace(None)
     pin.forwardKinematics(pin_model, data, q)
     frame = model.frame_id(model.tip)
     points = [np.array(pin.updateFramePlacement(pin_model, data, frame).translation)]
-    joint = pin_model.frames[frame].parentJoint
-    while joint > 0:
+    for joint in list(pin_model.supports[pin_model.frames[frame].parentJoint])[:0:-1]:
         point = np.array(data.oMi[joint].translation)
         if float(np.linalg.norm(point - points[-1])) > 1e-12:
             points.append(point)
-        joint = pin_model.parents[joint]
     return np.array(points[::-1])

@@ -89,17 +89,7 @@ class Load:
     def of(
         cls, model: SoftModel, force: Any = None, *, wrench: Any = None, frame: str | None = None, gravity: Any = None
     ) -> Load:
-        """Check a load against a model.
-
-        Args:
-            model: The robot.
-            force: Force at `frame`, shape (3,) [N], world axes.
-            wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several; added to `force`.
-            frame: Name of the frame; the tip by default.
-            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-
-        Returns:
-            The load.
+        """Check a load, given as in `solve_equilibrium`, against a model; `wrench` is added to `force`.
 
         Raises:
             ParameterError: If a shape differs or a number is not finite.
@@ -188,14 +178,7 @@ class AppliedLoad:
             self._scale += term.norms[0] * model.reach + term.norms[1]
 
     def at(self, q: FloatArray) -> JointLoad:
-        """Torque of the load in joint coordinates, with its exact derivative (see `softrobots.model.joint_loads`).
-
-        Args:
-            q: Configuration, shape (nq,), finite.
-
-        Returns:
-            Torque, derivative, potential and size.
-        """
+        """Torque, derivative, potential and size of the load at a finite configuration, shape (nq,)."""
         model, data, nv = self._model, self._data, self._nv
         if nv == 0:  # Pinocchio's frame Jacobian crashes without columns
             return JointLoad(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), None, None, 0.0, 0.0)

@@ -25,13 +25,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.core.checks import FloatArray, positive_number, read_only, unit_vector
+from softrobots.core.checks import FloatArray, positive_number, read_only
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.force_path import ForcePath, PathPoint
-from softrobots.statics.loads import Load
 from softrobots.statics.stability import NEUTRAL, critical_point
 
 FUNDAMENTAL = "fundamental"
@@ -118,19 +117,10 @@ def post_buckling_branches(
     """
     positive_number("largest_step", largest_step, "rad")
     critical = critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force)
-    most = BEYOND * critical.force if max_force is None else float(max_force)
-    constant = Load.of(model, frame=frame, gravity=gravity)
-    path = ForcePath(
-        model,
-        model.checked_motors(q_motors),
-        constant,
-        model.tip if frame is None else frame,
-        unit_vector("direction", direction),
-        critical.q_springs,
-        critical.force,
-    )
+    path = critical.path
+    most = BEYOND * path.force if max_force is None else float(max_force)
     with one_blas_thread(model.n_springs):
-        origin, here = path.point(critical.origin, 0.0), path.point(critical.q_springs, critical.force)
+        origin, here = path.point(critical.origin, 0.0), path.point(path.springs, path.force)
         modes = _modes(path, here) if critical.crosses else np.zeros((0, model.n_springs))
         branches = [_branch(path, FUNDAMENTAL, modes, *path.follow([origin], path.tangent(origin), most, largest_step))]
         for label, there in sorted(_leaving(path, modes), key=lambda one: one[0]):

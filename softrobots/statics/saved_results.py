@@ -21,21 +21,20 @@ from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.displacement_control import Probe
-from softrobots.statics.elastic_state import elastic_state, largest_residual
+from softrobots.statics.displacement_control import DisplacementControl, Probe
+from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
 from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
-from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_at
+from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_result
 from softrobots.statics.inverse_kinematics import IkSolution, checked_orientation
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
 from softrobots.statics.load_estimation import LoadEstimate, estimate_at
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal
 from softrobots.statics.trajectory import Trajectory
-from softrobots.statics.workspace import Workspace, workspace_at
+from softrobots.statics.workspace import FIELDS, Workspace, workspace_at
 from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
 
-_WORKSPACE = ("q_motors", "q_springs", "tip_positions", "manipulability")
 _SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
 
 
@@ -156,16 +155,12 @@ def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
     model, load = _unpack_model(fields)
     point, direction, origin = (read_only(finite_array(name, fields[name], (3,))) for name in ("point", "direction", "origin"))
     normal = read_only(finite_array("normal", fields["normal"], (3,))) if "normal" in fields else None
-    result = imposed_at(
-        model,
-        model.checked_motors(fields["q_motors"][0]),
-        load,
-        Probe(text(fields, "frame"), point, direction, origin, normal),
-        q_springs=finite_array("q_springs", fields["q_springs"][0], (model.n_springs,), "rad"),
-        reaction=finite_number("reaction", fields["reaction"], "N"),
-        displacement=finite_number("displacement", fields["displacement"], "m"),
-        iterations=counts(fields, "iterations")[0],
-    )
+    probe = Probe(text(fields, "frame"), point, direction, origin, normal)
+    problem = DisplacementControl(model, model.checked_motors(fields["q_motors"][0]), load, probe, TOLERANCE)
+    springs = finite_array("q_springs", fields["q_springs"][0], (model.n_springs,), "rad")
+    probed = problem.at(springs, finite_number("reaction", fields["reaction"], "N"))
+    displacement = finite_number("displacement", fields["displacement"], "m")
+    result = imposed_result(problem, probed, displacement, counts(fields, "iterations")[0])
     claimed = 1.001 * float(fields["residual"][0]) + 1e-2 * result.equilibrium.tolerance
     if not (result.residual <= claimed and result.gap <= 1e-11 * model.reach):
         raise FileFormatError(
@@ -213,13 +208,13 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
 
 
 def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
-    arrays = {name: getattr(workspace, name) for name in _WORKSPACE}
+    arrays = {name: getattr(workspace, name) for name in FIELDS}
     return _pack_model(workspace.model, workspace.load) | arrays | {"refused": np.array(workspace.refused)}
 
 
 def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
     model, load = _unpack_model(fields)
-    return workspace_at(model, load, **{name: fields[name] for name in _WORKSPACE}, refused=counts(fields, "refused")[0])
+    return workspace_at(model, load, **{name: fields[name] for name in FIELDS}, refused=counts(fields, "refused")[0])
 
 
 def _pack_map(result: WorkspaceMap) -> dict[str, Any]:

@@ -56,15 +56,9 @@ def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
 
 
 def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Geometric Jacobian of the tip per actuator and per elastic coordinate, the other fixed, linear rows first.
+    """Geometric Jacobian of the tip per actuator and per elastic coordinate, the other fixed, world axes, linear rows first.
 
-    Args:
-        model: The robot.
-        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
-        q_springs: Elastic coordinates, shape (n_springs,) [rad or m].
-
-    Returns:
-        Shapes (6, n_motors) and (6, n_springs), world axes.
+    Shapes (6, n_motors) and (6, n_springs).
     """
     point = model.coordinates.at(q_motors, q_springs)
     return point.columns(frame_jacobian(model, model.embed(point.joints), model.tip))
@@ -96,16 +90,8 @@ def motor_torque_slope(motors: FloatArray, springs: FloatArray, tangent: FloatAr
 
     .. math:: d\tau_m/df = J_m^T + d(J_m^T w - g_m)/dy \, K_t^{-1} J_k^T
 
-    The transpose of the elastostatic Jacobian: the load must have a potential.
-
-    Args:
-        motors: Linear rows of the tip Jacobian, columns per actuator, shape (3, n_motors).
-        springs: The same rows, columns per elastic coordinate, shape (3, n_springs).
-        tangent: Tangent stiffness, shape (n_springs, n_springs).
-        coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
-
-    Returns:
-        Shape (n_motors, 3) [m].
+    The transpose of the elastostatic Jacobian: the load must have a potential. Arguments are those of `tip_motion`, with the
+    linear rows. Shape (n_motors, 3) [m].
 
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.core.checks import FloatArray, positive_number, unit_vector
+from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import NoCriticalLoad, ParameterError
-from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState, scaled
 from softrobots.statics.elastostatics import balanced_state, newton
+from softrobots.statics.force_path import TOLERANCE, ForcePath
 from softrobots.statics.kinematics import frame_jacobian
-from softrobots.statics.loads import Load
 
 _MOST_POINTS = 20_000  # of a path
 _NEWTON_STEPS = 12
-_TOLERANCE = 1e-12
 _SHORTEST_STEP = 1e-10  # of the force, relative to the force reached
 _LARGEST_MOVE = 0.1  # [rad] of a spring between two points of the path
 _NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the one at zero force, may vanish in the next step
@@ -33,10 +33,8 @@ NEUTRAL = 1e-7
 class CriticalPoint(NamedTuple):
     """Point at which an equilibrium path loses its stability."""
 
-    force: float
-    """The force [N]."""
-    q_springs: FloatArray
-    """The springs at the last stable point of the path, shape (n_springs,) [rad or m]."""
+    path: ForcePath
+    """The path; its reference point is the critical one, the last that is stable."""
     crosses: bool
     """Whether an eigenvalue of the tangent stiffness crosses zero and the path continues, unstable.
 
@@ -79,7 +77,7 @@ def critical_load(
         NoCriticalLoad: If the path is stable up to `max_force` (the direction pulls or bends rather than pushes), or as far
             as it could be followed.
     """
-    return critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force).force
+    return critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force).path.force
 
 
 def critical_point(
@@ -91,49 +89,29 @@ def critical_point(
     gravity: Any = None,
     max_force: float | None = None,
 ) -> CriticalPoint:
-    """Find the critical point of the equilibrium path under a growing force; see `critical_load`.
-
-    Args:
-        model: The robot.
-        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
-        direction: Direction of the force, shape (3,), any length but zero, world axes.
-        frame: Frame that is pushed; the tip by default.
-        gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless. It stays constant.
-        max_force: Limit of the force [N]; by default 100 times the largest stiffness over the reach.
-
-    Returns:
-        The point.
-
-    Raises:
-        ParameterError: If an argument is out of range, the model has no springs, or it is unstable under gravity alone.
-        NameNotFound: If the frame does not exist.
-        NoCriticalLoad: If the path is stable up to `max_force`, or as far as it could be followed.
-    """
-    check_model(model)
-    motors = model.checked_motors(q_motors)
-    unit = unit_vector("direction", direction)
+    """Find the critical point of the path under a growing force, with the arguments and errors of `critical_load`."""
+    path = ForcePath.of(model, q_motors, direction, frame=frame, gravity=gravity)
     if model.n_springs == 0:
         raise ParameterError("model", model, "a robot with springs")
-    if max_force is None:
-        largest = 100.0 * model.stiffest / max(model.reach, 1e-9)
-    else:
-        largest = positive_number("max_force", max_force, "N")
-    constant = Load.of(model, frame=frame, gravity=gravity)
-    push = np.concatenate([unit, np.zeros(3)])
-    at = model.tip if frame is None else frame
+    reach = max(model.reach, 1e-9)
+    largest = 100.0 * model.stiffest / reach if max_force is None else positive_number("max_force", max_force, "N")
 
-    def follow(magnitude: float, last: _Point) -> _Point | None:
+    def follow(force: float, last: _Point) -> _Point | None:
         """Point of the path at a force, from a nearby point; None if Newton leaves the path."""
-        guess = last.state.q_springs + (magnitude - last.force) * last.slope
-        state = _correct(model, motors, constant.plus(at, magnitude * push), guess, last.state.q_springs)
-        return None if state is None else _point(model, state, magnitude, push, at)
+        guess = last.state.q_springs + (force - last.force) * last.slope
+        state = _correct(path, force, guess, last.state.q_springs)
+        return None if state is None else _point(path, state, force)
+
+    def critical(last: _Point, force: float, crosses: bool) -> CriticalPoint:
+        return CriticalPoint(replace(path, springs=last.state.q_springs, force=force), crosses, origin)
 
     with one_blas_thread(model.n_springs):
-        first_state = balanced_state(model, motors, constant, model.rest)
-        here = None if first_state is None else _point(model, first_state, 0.0, push, at)
-        if first_state is None or here is None or here.min_eigenvalue <= 0.0:
+        first_state = balanced_state(model, path.motors, path.constant, model.rest)
+        here = None if first_state is None else _point(path, first_state, 0.0)
+        if here is None or here.min_eigenvalue <= 0.0:
             raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
-        first_step = step = float(model.stiffness.min()) / max(model.reach, 1e-9) / 20.0
+        origin = here.state.q_springs
+        first_step = step = float(model.stiffness.min()) / reach / 20.0
         nearly_zero = _NEARLY_ZERO * here.min_eigenvalue
         for _ in range(_MOST_POINTS):
             if here.force >= largest:
@@ -146,16 +124,14 @@ def critical_point(
                 step *= 0.5  # too far to distinguish this path from a neighbour
                 if step < _SHORTEST_STEP * max(here.force, first_step):
                     if here.min_eigenvalue <= 10.0 * nearly_zero or _at_knee(model, here):
-                        # It turns back: a limit point.
-                        return CriticalPoint(here.force, here.state.q_springs, False, first_state.q_springs)
+                        return critical(here, here.force, crosses=False)  # the path turns back: a limit point
                     break
             elif there.min_eigenvalue <= 0.0:
                 force, last = _bisect(follow, here, there.force)
-                return CriticalPoint(force, last.state.q_springs, last.min_eigenvalue <= NEUTRAL, first_state.q_springs)
+                return critical(last, force, crosses=last.min_eigenvalue <= NEUTRAL)
             else:
                 here, step = there, min(1.5 * step, first_step + 0.25 * there.force)
-    reached = f"{here.force:.6g} N along {unit.tolist()}"
-    message = f"the equilibrium stays stable up to {reached}"
+    message = f"the equilibrium stays stable up to {here.force:.6g} N along {path.unit.tolist()}"
     if here.force < largest:
         message += f"; its path could not be followed further (limit: {largest:.6g} N)"
     raise NoCriticalLoad(message, max_force=here.force)
@@ -172,11 +148,12 @@ class _Point(NamedTuple):
     """Derivative of the springs with respect to the force."""
 
 
-def _point(model: SoftModel, state: ElasticState, force: float, push: FloatArray, frame: str) -> _Point:
-    _, springs = state.point.columns(frame_jacobian(model, state.q, frame))
-    softness = 1.0 / np.sqrt(model.stiffness)
-    values, vectors = np.linalg.eigh(scaled(state.tangent, model.stiffness))
-    pull = vectors.T @ (softness * (push @ springs))
+def _point(path: ForcePath, state: ElasticState, force: float) -> _Point:
+    _, springs = state.point.columns(frame_jacobian(path.model, state.q, path.frame))
+    stiffness = path.model.stiffness
+    softness = 1.0 / np.sqrt(stiffness)
+    values, vectors = np.linalg.eigh(scaled(state.tangent, stiffness))
+    pull = vectors.T @ (softness * (np.append(path.unit, np.zeros(3)) @ springs))
     slope = softness * (vectors @ (pull / np.where(np.abs(values) > _STIFF, values, np.inf)))
     return _Point(force, state, float(values[0]), slope)
 
@@ -206,9 +183,10 @@ def _bisect(follow: Callable[[float, _Point], _Point | None], here: _Point, high
             high = middle
 
 
-def _correct(model: SoftModel, motors: FloatArray, load: Load, guess: FloatArray, last: FloatArray) -> ElasticState | None:
+def _correct(path: ForcePath, force: float, guess: FloatArray, last: FloatArray) -> ElasticState | None:
     """Newton from a prediction; None if it does not converge near the prediction and the last point."""
-    state, _ = newton(model, motors, load, guess, tolerance=_TOLERANCE, max_iterations=_NEWTON_STEPS, largest_step=0.5)
+    model, load = path.model, path.load(force)
+    state, _ = newton(model, path.motors, load, guess, tolerance=TOLERANCE, max_iterations=_NEWTON_STEPS, largest_step=0.5)
     if state is None:
         return None
     moved, missed, predicted = (

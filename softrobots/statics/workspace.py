@@ -23,7 +23,9 @@ from softrobots.statics.sensitivity import tip_motion
 from softrobots.version import __version__
 
 _BLOCK = 250  # samples in one block of a checkpoint
-_FIELDS = ("q_motors", "q_springs", "tip_positions", "manipulability")
+
+FIELDS = ("q_motors", "q_springs", "tip_positions", "manipulability")
+"""Names of the arrays of a `Workspace`, one row a sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +100,11 @@ def sample_workspace(
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ParameterError("seed", seed, "a whole number, zero or above")
     kept = None if checkpoint is None else Checkpoint(checkpoint, _identity(model, load, count, int(seed)))
-    answers = _answers(model, load, count, int(seed), kept, progress)
-    stable = np.concatenate([answer["stable"] for answer in answers])
+    samples_drawn = _draw(model, load, count, int(seed), kept, progress)
+    stable = samples_drawn["stable"]
     if not stable.any():
         raise ParameterError("samples", samples, "such that one is a stable equilibrium; none is")
-    motors, springs, tips, measures = (
-        read_only(np.concatenate([answer[name] for answer in answers])[stable]) for name in _FIELDS
-    )
+    motors, springs, tips, measures = (read_only(samples_drawn[name][stable]) for name in FIELDS)
     return Workspace(model, load, motors, springs, tips, measures, count - int(stable.sum()))
 
 
@@ -125,35 +125,36 @@ def _identity(model: SoftModel, load: Load, count: int, seed: int) -> dict[str, 
     }
 
 
-def _answers(
-    model: SoftModel, load: Load, count: int, seed: int, kept: Checkpoint | None, progress: bool | str
-) -> list[dict[str, Any]]:
-    """The samples in blocks, from the checkpoint or new; rows that are not stable are zero."""
-    sizes = [min(_BLOCK, count - first) for first in range(0, count, _BLOCK)]
-    found = [None if kept is None else kept.block(number, _arrays(model, size)) for number, size in enumerate(sizes)]
-    answers = [
-        {name: np.zeros(shape, kind) for name, (kind, shape) in _arrays(model, size).items()} if held is None else held
-        for held, size in zip(found, sizes, strict=True)
-    ]
+def _draw(model: SoftModel, load: Load, count: int, seed: int, kept: Checkpoint | None, progress: bool | str) -> dict[str, Any]:
+    """All samples, from the blocks of the checkpoint or new; rows that are not stable are zero."""
+    samples: dict[str, Any] = {name: np.zeros(shape, kind) for name, (kind, shape) in _arrays(model, count).items()}
+    blocks = [slice(first, min(first + _BLOCK, count)) for first in range(0, count, _BLOCK)]
+    missing = np.ones(count, dtype=bool)
+    for number, rows in enumerate(blocks):
+        block = None if kept is None else kept.block(number, _arrays(model, rows.stop - rows.start))
+        if block is not None:
+            missing[rows] = False
+            for name, array in samples.items():
+                array[rows] = block[name]
 
-    def drawn() -> Iterator[tuple[int, int, FloatArray | None]]:
-        """Block, row and motors of the missing samples; the others are drawn, too, to keep the random sequence."""
+    def drawn() -> Iterator[tuple[int, FloatArray | None]]:
+        """Row and motors of the missing samples; the others are drawn, too, to keep the random sequence."""
         random = np.random.default_rng(seed)
-        for number, size in enumerate(sizes):
-            motors = [model.actuators.draw(random) for _ in range(size)]
-            if found[number] is None:
-                yield from ((number, row, one) for row, one in enumerate(motors))
+        for row in range(count):
+            motors = model.actuators.draw(random)
+            if missing[row]:
+                yield row, motors
 
-    done = sum(size for held, size in zip(found, sizes, strict=True) if held is not None)
-    for number, row, motors in with_progress(drawn(), progress, label="samples", unit="sample", total=count, done=done):
+    done = count - int(missing.sum())
+    for row, motors in with_progress(drawn(), progress, label="samples", unit="sample", total=count, done=done):
         sample = None if motors is None else _sample(model, load, motors)
         if sample is not None:
-            answers[number]["stable"][row] = True
-            for name, value in zip(_FIELDS, sample, strict=True):
-                answers[number][name][row] = value
-        if kept is not None and row == sizes[number] - 1:
-            kept.keep(number, answers[number])
-    return answers
+            for name, value in zip(("stable", *FIELDS), (True, *sample), strict=True):
+                samples[name][row] = value
+        number = row // _BLOCK
+        if kept is not None and row == blocks[number].stop - 1:
+            kept.keep(number, {name: array[blocks[number]] for name, array in samples.items()})
+    return samples
 
 
 def _arrays(model: SoftModel, count: int) -> dict[str, tuple[type, tuple[int, ...]]]:
@@ -186,18 +187,6 @@ def workspace_at(
     model: SoftModel, load: Load, q_motors: Any, q_springs: Any, tip_positions: Any, manipulability: Any, refused: int
 ) -> Workspace:
     """Check the arrays of a workspace, as saved in a file.
-
-    Args:
-        model: The robot.
-        load: The load.
-        q_motors: Actuator coordinates, shape (n, n_motors).
-        q_springs: Elastic coordinates, shape (n, n_springs).
-        tip_positions: Tip positions, shape (n, 3) [m].
-        manipulability: Manipulability, shape (n,).
-        refused: Number of samples left out.
-
-    Returns:
-        The workspace.
 
     Raises:
         ParameterError: If shapes do not fit, or one of a hundred samples, computed again, differs.

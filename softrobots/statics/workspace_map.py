@@ -171,14 +171,9 @@ class WorkspaceMap:
 
 
 def required_pressures(model: SoftModel, q_springs: FloatArray) -> FloatArray:
-    """Gauge pressure at which a link just wrinkles, from the norm of its spring torques: [Troise 2021] (3).
+    """Gauge pressure at which each link just wrinkles, from the norm of its spring torques: [Troise 2021] (3).
 
-    Args:
-        model: The arm, with linear springs.
-        q_springs: Spring coordinates, shape (n, n_springs) [rad].
-
-    Returns:
-        Pressure of each link, shape (n, n_links) [Pa].
+    Linear springs at coordinates of shape (n, n_springs) [rad] give pressures of shape (n, n_links) [Pa].
     """
     torques = model.stiffness * (q_springs - model.rest)
     moments = [np.linalg.norm(torques[:, list(group.springs)], axis=1) for group in model.spring_groups]
@@ -192,15 +187,7 @@ def packed(result: WorkspaceMap) -> dict[str, Any]:
 
 
 def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, fields: Mapping[str, Any]) -> WorkspaceMap:
-    """Check the arrays of a map, as saved in a file.
-
-    Args:
-        model: The arm.
-        gravity: Gravity, world axes [m/s^2]; None: weightless.
-        fields: Arrays by name, as `packed` gives them.
-
-    Returns:
-        The map.
+    """Check the arrays of a map, by name as `packed` gives them, and return the map.
 
     Raises:
         ParameterError: If shapes do not fit, or one of a hundred cases, computed again, differs.
