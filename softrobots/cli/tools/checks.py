@@ -43,27 +43,19 @@ def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[F
     tags, *loaded = findings
     if not loaded[0].ok:
         return (tags, *rules, *loaded)
-    return (tags, *rules, *loaded, _valid_in_yourdfpy(source), kinematics_finding(source, count))
+    return (tags, *rules, *loaded, _valid_in_yourdfpy(source), _kinematics(source, count))
 
 
-def kinematics_finding(source: Robot | Path | str, count: int = 20) -> Finding:
-    """Compare yourdfpy's kinematics of every link with Pinocchio's.
-
-    Args:
-        source: A robot of this package, the path of a URDF file, or URDF text.
-        count: Number of random configurations.
-
-    Returns:
-        What is wrong, or the largest difference.
-    """
+def _kinematics(source: Robot | Path | str, count: int) -> Finding:
+    """Compare yourdfpy's kinematics of every link with Pinocchio's."""
     try:
         (row,) = compare_kinematics(source, ["yourdfpy"], count=count)
     except SoftRobotsError as error:
         return Finding("yourdfpy's kinematics", (str(error),))
-    return Finding("yourdfpy's kinematics", tuple(row_problems(row)), (f"{row_text(row)} at {count} random configurations",))
+    return Finding("yourdfpy's kinematics", tuple(row_problems(row)), (f"{_row_text(row)} at {count} random configurations",))
 
 
-def row_text(row: KinematicsRow) -> str:
+def _row_text(row: KinematicsRow) -> str:
     """Return the errors of a tool on one line."""
     errors = f"within {row.position_error:.1e} m and {row.rotation_error:.1e} rad of Pinocchio"
     return f"{errors}, {row.joints} of {row.joints_in_file} joints, {row.links} of {row.links + len(row.lost_links)} links"
@@ -73,7 +65,7 @@ def row_problems(row: KinematicsRow) -> list[str]:
     """Return what is wrong with a comparison; empty if the tool agrees."""
     if row.problem:
         return [f"{row.tool} refuses the file: {row.problem}"]
-    return [] if row.agrees else [f"{row.tool} is {row_text(row)}; all of them within {row.precision:g} are required"]
+    return [] if row.agrees else [f"{row.tool} is {_row_text(row)}; all of them within {row.precision:g} are required"]
 
 
 def _tags(urdf: str, label: str) -> str:

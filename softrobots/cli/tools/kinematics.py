@@ -118,7 +118,7 @@ def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow
     }
     start = time.perf_counter()
     try:
-        with open_in(tool.name, file) as robot:
+        with open_in(tool, file) as robot:
             loaded = time.perf_counter()
             placed = [robot.poses(values) for values in truth.values]
             finished = time.perf_counter()
@@ -147,17 +147,10 @@ def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow
 
 
 def pose_error(one: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """Distance and angle between two poses.
+    """Return distance [m] and angle [rad] between two poses, each of shape (4, 4) [m].
 
     The angle t of the rotation from one to the other follows from `|R1 - R2| = 2 sqrt(2) sin(t/2)` (Frobenius), which keeps
     its digits at small angles, where the arccosine of the trace loses half of them.
-
-    Args:
-        one: A pose, shape (4, 4) [m].
-        other: Another, likewise.
-
-    Returns:
-        The distance of the origins [m] and the angle between the axes [rad].
     """
     distance = np.linalg.norm(one[:3, 3] - other[:3, 3])
     chord = np.linalg.norm(one[:3, :3] - other[:3, :3]) / np.sqrt(8.0)
@@ -166,15 +159,10 @@ def pose_error(one: FloatArray, other: FloatArray) -> tuple[float, float]:
 
 @contextlib.contextmanager
 def as_file(source: Robot | Path | str) -> Iterator[tuple[Path, str]]:
-    """The URDF file of a robot, and what to call it; all but a URDF file stands in a temporary one.
-
-    Args:
-        source: A robot of this package, the path of a URDF, MJCF or SDF file, or its text (starting with `<`).
+    """Give the URDF file of a source of `read_source`, and its name; all but a URDF file is written to a temporary one.
 
     Raises:
-        ParameterError: If it is something else.
-        DescriptionError: If the file cannot be read or translated.
-        MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
+        SoftRobotsError: What `read_source` raises.
     """
     text, label = read_source(source)
     if label == str(source) and is_urdf_file(Path(label)):

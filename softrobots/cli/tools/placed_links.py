@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.cli.tools.known_tools import find_tool
+from softrobots.cli.tools.known_tools import Tool
 from softrobots.core.checks import FloatArray
 from softrobots.description.rigid_tree_urdf import link_at
 
@@ -27,35 +27,38 @@ class LoadedRobot(NamedTuple):
     """Movable joints that the tool knows and that can be set."""
     poses: Callable[[Mapping[str, float]], Poses]
     """Poses of all links that the tool keeps, for coordinates by joint name [rad or m]; other names are ignored."""
+    close: Callable[[], object] = lambda: None
+    """Gives back what the tool holds."""
 
 
 @contextlib.contextmanager
-def open_in(name: str, file: Path) -> Iterator[LoadedRobot]:
+def open_in(tool: Tool, file: Path) -> Iterator[LoadedRobot]:
     """Load a URDF file in a tool; what the tool holds is given back at the end.
 
-    Args:
-        name: Name of the tool, one of `TOOLS`.
-        file: The file.
-
     Raises:
-        NameNotFound: If there is no such tool.
-        MissingDependency: If it is not installed.
-        Exception: Whatever the tool raises if it refuses the file.
+        MissingDependency: If the tool is not installed.
+        Exception: Whatever it raises if it refuses the file.
     """
-    tool = find_tool(name)
-    with _OPEN[tool.name](tool.load(), file) as robot:
+    robot = _ADAPTERS[tool.name](tool.load(), file)
+    try:
         yield robot
+    finally:
+        robot.close()
 
 
-def joint_of_link(file: Path) -> dict[str, ElementTree.Element]:
+def _carriers(file: Path) -> dict[str, ElementTree.Element]:
     """The joint that carries each link of a URDF file, by the name of the link."""
-    joints = ElementTree.parse(file).getroot().findall("joint")
-    return {link_at(joint, "child"): joint for joint in joints}
+    return {link_at(joint, "child"): joint for joint in ElementTree.parse(file).getroot().findall("joint")}
+
+
+def _mimicking(file: Path) -> tuple[str, ...]:
+    """Joints that mimic others; yourdfpy and urchin move them by themselves."""
+    return tuple(joint.get("name", "") for joint in _carriers(file).values() if joint.find("mimic") is not None)
 
 
 def _along_the_tree(file: Path, steps: Callable[[str, str], FloatArray]) -> dict[str, FloatArray]:
     """Poses of all links out of the pose of each in its parent, `steps(child, parent)`."""
-    carriers = joint_of_link(file)
+    carriers = _carriers(file)
     poses: dict[str, FloatArray] = {}
     for link in carriers:
         path = [link]
@@ -73,8 +76,7 @@ def _homogeneous(rotation: Any, translation: Any) -> FloatArray:
     return pose
 
 
-@contextlib.contextmanager
-def _yourdfpy(yourdfpy: Any, file: Path) -> Iterator[LoadedRobot]:
+def _yourdfpy(yourdfpy: Any, file: Path) -> LoadedRobot:
     robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_collision_scene_graph=False)
     names = tuple(robot.actuated_joint_names)
 
@@ -82,11 +84,10 @@ def _yourdfpy(yourdfpy: Any, file: Path) -> Iterator[LoadedRobot]:
         robot.update_cfg({name: values[name] for name in names if name in values})
         return _along_the_tree(file, robot.get_transform)  # from link to link: from the world it is quadratic in their number
 
-    yield LoadedRobot((*names, *_mimicking(file)), poses)
+    return LoadedRobot((*names, *_mimicking(file)), poses)
 
 
-@contextlib.contextmanager
-def _urchin(urchin: Any, file: Path) -> Iterator[LoadedRobot]:
+def _urchin(urchin: Any, file: Path) -> LoadedRobot:
     robot = urchin.URDF.load(str(file), lazy_load_meshes=True)
     names = tuple(joint.name for joint in robot.actuated_joints)
 
@@ -94,46 +95,35 @@ def _urchin(urchin: Any, file: Path) -> Iterator[LoadedRobot]:
         placed = robot.link_fk(cfg={name: values[name] for name in names if name in values}, use_names=True)
         return {str(name): np.asarray(pose) for name, pose in placed.items()}
 
-    yield LoadedRobot((*names, *_mimicking(file)), poses)
+    return LoadedRobot((*names, *_mimicking(file)), poses)
 
 
-@contextlib.contextmanager
-def _viser(extras: Any, file: Path) -> Iterator[LoadedRobot]:
-    """What `ViserUrdf` tells a server to draw, recorded instead of sent: no port is opened."""
-    recorder = _ViserRecorder()
-    robot = extras.ViserUrdf(recorder, file)
+def _viser(extras: Any, file: Path) -> LoadedRobot:
+    """What `ViserUrdf` tells a server to draw, recorded instead of sent: no port is opened, and shapes are dropped."""
+    import pinocchio as pin
+
+    frames: dict[str, Any] = {}
+
+    def add_frame(name: str, **_: Any) -> Any:
+        frame = frames[name.rpartition("/")[2]] = SimpleNamespace(wxyz=(1.0, 0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0))
+        return frame
+
+    scene = SimpleNamespace(add_frame=add_frame, add_mesh_trimesh=lambda name, mesh: None)
+    robot = extras.ViserUrdf(SimpleNamespace(scene=scene), file)
     names = robot.get_actuated_joint_names()
+
+    def in_parent(child: str, parent: str) -> FloatArray:
+        w, x, y, z = frames[child].wxyz
+        return _homogeneous(pin.Quaternion(w, x, y, z).toRotationMatrix(), frames[child].position)
 
     def poses(values: Mapping[str, float]) -> Poses:
         robot.update_cfg(np.array([values.get(name, 0.0) for name in names]))
-        return _along_the_tree(file, lambda child, parent: recorder.frame(child))
+        return _along_the_tree(file, in_parent)
 
-    yield LoadedRobot((*names, *_mimicking(file)), poses)
-
-
-class _ViserRecorder:
-    """Stands where viser expects its server: keeps the frames of the links, drops the shapes."""
-
-    def __init__(self) -> None:
-        self.scene = SimpleNamespace(add_frame=self._add_frame, add_mesh_trimesh=lambda name, mesh: None)
-        self._frames: dict[str, Any] = {}
-
-    def frame(self, link: str) -> FloatArray:
-        """Pose of a link in its parent, as it would be drawn."""
-        import pinocchio as pin
-
-        frame = self._frames[link]
-        w, x, y, z = frame.wxyz
-        return _homogeneous(pin.Quaternion(w, x, y, z).toRotationMatrix(), frame.position)
-
-    def _add_frame(self, name: str, **_: Any) -> Any:
-        frame = SimpleNamespace(wxyz=(1.0, 0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0))
-        self._frames[name.rpartition("/")[2]] = frame
-        return frame
+    return LoadedRobot((*names, *_mimicking(file)), poses)
 
 
-@contextlib.contextmanager
-def _mujoco(mujoco: Any, file: Path) -> Iterator[LoadedRobot]:
+def _mujoco(mujoco: Any, file: Path) -> LoadedRobot:
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     places = {model.joint(i).name: model.jnt_qposadr[i] for i in range(model.njnt)}
@@ -145,11 +135,10 @@ def _mujoco(mujoco: Any, file: Path) -> Iterator[LoadedRobot]:
         mujoco.mj_kinematics(model, data)
         return {name: _homogeneous(data.xmat[i], data.xpos[i]) for name, i in bodies.items()}
 
-    yield LoadedRobot(tuple(places), poses)
+    return LoadedRobot(tuple(places), poses)
 
 
-@contextlib.contextmanager
-def _drake(_: Any, file: Path) -> Iterator[LoadedRobot]:
+def _drake(_: Any, file: Path) -> LoadedRobot:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import BodyIndex
@@ -169,13 +158,13 @@ def _drake(_: Any, file: Path) -> Iterator[LoadedRobot]:
         plant.SetPositions(context, q)
         return {body.name(): plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4() for body in bodies}
 
-    yield LoadedRobot(tuple(places), poses)
+    return LoadedRobot(tuple(places), poses)
 
 
-@contextlib.contextmanager
-def _pybullet(pybullet: Any, file: Path) -> Iterator[LoadedRobot]:
-    client = pybullet.connect(pybullet.DIRECT)
-    try:
+def _pybullet(pybullet: Any, file: Path) -> LoadedRobot:
+    with contextlib.ExitStack() as stack:
+        client = pybullet.connect(pybullet.DIRECT)
+        stack.callback(pybullet.disconnect, client)
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)  # or a path keeps its first content
         robot = pybullet.loadURDF(str(file), useFixedBase=True, physicsClientId=client)
         count = pybullet.getNumJoints(robot, physicsClientId=client)
@@ -193,15 +182,12 @@ def _pybullet(pybullet: Any, file: Path) -> Iterator[LoadedRobot]:
                 placed[name] = _homogeneous(pybullet.getMatrixFromQuaternion(state[5]), state[4])
             return placed
 
-        yield LoadedRobot(tuple(moving), poses)
-    finally:
-        pybullet.disconnect(client)
+        return LoadedRobot(tuple(moving), poses, stack.pop_all().close)
 
 
-@contextlib.contextmanager
-def _ikpy(chains: Any, file: Path) -> Iterator[LoadedRobot]:
+def _ikpy(chains: Any, file: Path) -> LoadedRobot:
     """The first chain from the root to an end: ikpy follows the first joint of the file at a branch."""
-    carriers = joint_of_link(file)
+    carriers = _carriers(file)
     root = next(link.get("name", "") for link in ElementTree.parse(file).iter("link") if link.get("name") not in carriers)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Link .* is of type 'fixed'")  # a hint for inverse kinematics
@@ -214,16 +200,15 @@ def _ikpy(chains: Any, file: Path) -> Iterator[LoadedRobot]:
         placed = chain.forward_kinematics(coordinates, full_kinematics=True)
         return dict(zip((root, *(link_of[name] for name in names)), placed, strict=True))
 
-    yield LoadedRobot(tuple(link.name for link in chain.links[1:] if link.joint_type != "fixed"), poses)
+    return LoadedRobot(tuple(link.name for link in chain.links[1:] if link.joint_type != "fixed"), poses)
 
 
-@contextlib.contextmanager
-def _roboticstoolbox(roboticstoolbox: Any, file: Path) -> Iterator[LoadedRobot]:
+def _roboticstoolbox(roboticstoolbox: Any, file: Path) -> LoadedRobot:
     from roboticstoolbox.models.URDF.URDFRobot import URDF_read
 
     links, name, _ = URDF_read(file.resolve())
     robot = roboticstoolbox.Robot(links, name=name)
-    carriers = joint_of_link(file)
+    carriers = _carriers(file)
     joints = {carriers[link.name].get("name", ""): link.jindex for link in robot.links if link.isjoint}
 
     def poses(values: Mapping[str, float]) -> Poses:
@@ -233,16 +218,10 @@ def _roboticstoolbox(roboticstoolbox: Any, file: Path) -> Iterator[LoadedRobot]:
         placed = robot.fkine_all(q)
         return {link.name: placed[link.number].A for link in robot.links}
 
-    yield LoadedRobot(tuple(joints), poses)
+    return LoadedRobot(tuple(joints), poses)
 
 
-def _mimicking(file: Path) -> tuple[str, ...]:
-    """Joints that mimic others; yourdfpy and urchin move them by themselves."""
-    joints = ElementTree.parse(file).getroot().findall("joint")
-    return tuple(joint.get("name", "") for joint in joints if joint.find("mimic") is not None)
-
-
-_OPEN: Mapping[str, Callable[[Any, Path], contextlib.AbstractContextManager[LoadedRobot]]] = {
+_ADAPTERS: Mapping[str, Callable[[Any, Path], LoadedRobot]] = {
     "yourdfpy": _yourdfpy,
     "MuJoCo": _mujoco,
     "Drake": _drake,
