@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import math
 import platform
 import time
+import timeit
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -111,21 +113,14 @@ def run(arguments: argparse.Namespace) -> None:
     for row in rows:
         costs = (f"{1e6 * row.compiled_seconds:.3g}", f"{1e6 * row.pinocchio_seconds:.3g}")
         table.append((row.job, *costs, f"{row.ratio:.3g} ({row.low:.3g} to {row.high:.3g})"))
-    files = []
-    if arguments.output is not None:
-        files.append(write_text(arguments.output, json.dumps(answer, indent=1) + "\n", overwrite=arguments.overwrite))
+    text, file = json.dumps(answer, indent=1) + "\n", arguments.output
+    files = [] if file is None else [write_text(file, text, overwrite=arguments.overwrite)]
     head = f"{', '.join(f'{name} {value}' for name, value in machine.items())}; compiled by {compiled.backend}"
     print_answer(arguments, answer, [head, "", *aligned(table), *written_lines(files)])
 
 
 def prepare_jobs(model: SoftModel, compiled: CompiledModel, count: int) -> Mapping[str, Job]:
-    """Return every job by name.
-
-    Args:
-        model: The inflatable arm.
-        compiled: The same arm, compiled.
-        count: Number of cases in a run, or of waypoints.
-    """
+    """Return every job by name, with that many cases, or waypoints, for a model and the same model compiled."""
     random = np.random.default_rng(0)
     motors = random.uniform(-np.pi, np.pi, (count, model.n_motors))
     forces = random.normal(size=(count, 3))
@@ -135,28 +130,22 @@ def prepare_jobs(model: SoftModel, compiled: CompiledModel, count: int) -> Mappi
     targets = np.linspace((0.9, 0.3, 0.2), (0.9, -0.2, 0.1), count)
     start = solve_ik(model, targets[0], force, elbow="up").q_motors
 
+    on_pinocchio, heavy = functools.partial(solve_equilibrium, model), {"gravity": EARTH_GRAVITY}
+
     def each(solve: Callable[..., object], inputs: Any, **options: Any) -> Callable[[], object]:
         """Solve one case after the other."""
         return lambda: [solve(*case, **options) for case in zip(motors, inputs, strict=True)]
 
-    def reference(solve: Callable[..., object], inputs: Any, **options: Any) -> Callable[[], object]:
-        """The same with a function on Pinocchio, which takes the model first."""
-        return each(lambda *case, **options: solve(model, *case, **options), inputs, **options)
-
     return {
-        "equilibrium": Job(count, each(compiled.equilibrium, forces), reference(solve_equilibrium, forces)),
-        "gravity": Job(
-            count,
-            each(compiled.equilibrium, forces, gravity=EARTH_GRAVITY),
-            reference(solve_equilibrium, forces, gravity=EARTH_GRAVITY),
-        ),
-        "estimation": Job(count, each(compiled.estimate_load, torques), reference(estimate_load, torques)),
+        "equilibrium": Job(count, each(compiled.equilibrium, forces), each(on_pinocchio, forces)),
+        "gravity": Job(count, each(compiled.equilibrium, forces, **heavy), each(on_pinocchio, forces, **heavy)),
+        "estimation": Job(count, each(compiled.estimate_load, torques), each(functools.partial(estimate_load, model), torques)),
         "trajectory": Job(
             count,
             lambda: compiled.follow(targets, force, q_motors0=start),
             lambda: follow_trajectory(model, targets, force, q_motors0=start),
         ),
-        "batch": Job(count, lambda: compiled.equilibria(motors, forces, threads=1), reference(solve_equilibrium, forces)),
+        "batch": Job(count, lambda: compiled.equilibria(motors, forces, threads=1), each(on_pinocchio, forces)),
     }
 
 
@@ -177,7 +166,4 @@ def measure(name: str, job: Job, rounds: int) -> Row:
 
 def _cpu_seconds(solve: Callable[[], object], repeats: int) -> float:
     """CPU time of one run, averaged over repeats [s]."""
-    start = time.process_time()
-    for _ in range(repeats):
-        solve()
-    return max(time.process_time() - start, 1e-9) / repeats
+    return max(timeit.timeit(solve, timer=time.process_time, number=repeats), 1e-9) / repeats

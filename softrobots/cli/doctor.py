@@ -80,11 +80,10 @@ def _places(report: _Report) -> Path | None:
     except SoftRobotsError as error:
         report.wrong.append(str(error))
         return None
-    browser: str | None = None
     try:
         browser = browser_text = find_chromium()
     except ViewerError as error:
-        browser_text = f"none, so no pictures of the viewer: {error}"
+        browser, browser_text = None, f"none, so no pictures of the viewer: {error}"
     cache, kept = cache_folder(), cache_is_kept()
     lost = "" if kept else "; for this process alone: the folder for caches cannot be written"
     compiled = f"{cache} (compiled solvers, by {available_backend()}{lost})"

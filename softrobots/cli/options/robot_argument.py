@@ -25,12 +25,7 @@ from softrobots.robots.xacro_robot import argument_text
 
 
 def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Add `ROBOT`, `--set` and `--parameters` to a parser; see `source_of`.
-
-    Args:
-        parser: The parser.
-        optional: Whether `ROBOT` may be left out.
-    """
+    """Add `ROBOT`, which may be `optional`, `--set` and `--parameters` to a parser; see `source_of`."""
     help_text = f"{', '.join(ROBOTS)}; or a URDF, xacro, MJCF or SDF file"
     parser.add_argument("robot", nargs="?" if optional else None, metavar="ROBOT", help=help_text)
     parser.add_argument(
@@ -49,12 +44,7 @@ def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
 
 
 def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Add `ROBOT`, `--set`, `--parameters`, `--spring`, `--tip` and `--muscles` to a parser; see `model_of`.
-
-    Args:
-        parser: The parser.
-        optional: Whether `ROBOT` may be left out.
-    """
+    """Add the options of `add_robot`, and `--spring`, `--tip` and `--muscles`, to a parser; see `model_of`."""
     add_robot(parser, optional=optional)
     help_text = "spring of a joint of a file: stiffness K [N m/rad or N/m], relaxed at REST [rad or m] (0); once for each joint"
     parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=help_text)
@@ -94,9 +84,6 @@ def spring(word: str) -> tuple[str, tuple[float, float]]:
 def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
     """Return what the arguments of `add_robot` name: a robot, the path of a URDF file, or URDF text made from another file.
 
-    Args:
-        arguments: The parsed arguments.
-
     Raises:
         NameNotFound: If there is no such robot, file or parameter.
         ParameterError: If a parameter is refused, or the file of parameters is for another robot.
@@ -118,10 +105,9 @@ def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
         check_names(values, known, file.name)
         texts = {name: argument_text(value) for name, value in values.items()}
         return expand(file, texts | parse_parameters(parameters, known, file.name))
-    if arguments.parameter_file is not None:
-        raise ParameterError("--parameters", str(arguments.parameter_file), f"left out: {file} is no xacro file")
-    if parameters:
-        raise ParameterError("--set", " ".join(parameters), f"left out: {file} is no xacro file")
+    for option, given in (("--parameters", arguments.parameter_file), ("--set", " ".join(parameters))):
+        if given:
+            raise ParameterError(option, str(given), f"left out: {file} is no xacro file")
     return file if is_urdf_file(file) else read_source(file)[0]
 
 
@@ -130,19 +116,19 @@ def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = 
 
     Args:
         arguments: The parsed arguments.
-        source: The result of `source_of`, if that is known.
+        source: The result of `source_of`, if it is known.
 
     Raises:
         SoftRobotsError: Whatever `source_of` and `load_model` raise.
         ParameterError: If a joint is given two springs.
     """
-    names = [joint for joint, _ in arguments.spring]
-    twice = next((joint for place, joint in enumerate(names) if joint in names[:place]), None)
-    if twice is not None:
-        raise ParameterError("--spring", twice, "given once for each joint")
-    if source is None:
-        source = source_of(arguments)
-    return load_model(source, springs=dict(arguments.spring) or None, tip=arguments.tip, muscles=arguments.muscles)
+    springs: dict[str, tuple[float, float]] = {}
+    for joint, stiffness_and_rest in arguments.spring:
+        if joint in springs:
+            raise ParameterError("--spring", joint, "given once for each joint")
+        springs[joint] = stiffness_and_rest
+    source = source_of(arguments) if source is None else source
+    return load_model(source, springs=springs or None, tip=arguments.tip, muscles=arguments.muscles)
 
 
 def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
@@ -160,15 +146,7 @@ def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
 
 
 def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--motors") -> FloatArray:
-    """Return the actuator coordinates given by an option, or the relaxed ones without it.
-
-    Args:
-        model: The robot.
-        words: The numbers of the option, or None.
-        option: The option, for the error.
-
-    Returns:
-        Shape (n_motors,) [rad, m or N].
+    """Return the actuator coordinates given by an option, or the relaxed ones without it, shape (n_motors,) [rad, m or N].
 
     Raises:
         ParameterError: If there are more or fewer numbers than actuators (which are named), or they are out of range.
@@ -180,16 +158,10 @@ def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--
 
 
 def check_one_each(option: str, words: Sequence[float], names: Sequence[str], units: Sequence[str]) -> None:
-    """Refuse more or fewer numbers than there are actuators; the error names those.
-
-    Args:
-        option: The option, for the error.
-        words: The numbers of the option.
-        names: Names of the actuators.
-        units: Unit of each number.
+    """Refuse more or fewer numbers of an option than there are actuators.
 
     Raises:
-        ParameterError: If the counts differ.
+        ParameterError: If the counts differ; lists the actuators with their units.
     """
     if len(words) != len(names):
         named = ", ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))

@@ -43,15 +43,11 @@ def robot_parameters(name: str) -> tuple[RobotParameter, ...]:
         NameNotFound: If there is no such robot.
     """
     kind, preset = robot_class(name)
+    defaults = {field.name: preset.get(field.name, field.default) for field in dataclasses.fields(kind)}
     facts = facts_of(kind)
     return tuple(
-        RobotParameter(
-            field.name,
-            _typed(preset.get(field.name, field.default)),
-            facts[field.name].unit,
-            facts[field.name].description,
-        )
-        for field in dataclasses.fields(kind)
+        RobotParameter(field, _typed(default), facts[field].unit, facts[field].description)
+        for field, default in defaults.items()
     )
 
 
@@ -70,15 +66,12 @@ def xacro_parameters(path: Path) -> tuple[RobotParameter, ...]:
 
 
 def parse_parameters(words: Sequence[str], known: Sequence[RobotParameter], owner: str) -> dict[str, str]:
-    """Split words of the form `name=value`, or `name:=value` as xacro spells it.
+    """Split words of the form `name=value`, or `name:=value` as xacro spells it, into text by name of the parameter.
 
     Args:
         words: The words.
         known: The parameters that exist.
         owner: The robot or file that has them, for errors.
-
-    Returns:
-        Text by name of the parameter.
 
     Raises:
         ParameterError: If a word has another form, or a parameter comes twice.
@@ -98,12 +91,7 @@ def parse_parameters(words: Sequence[str], known: Sequence[RobotParameter], owne
 
 
 def check_names(names: Iterable[str], known: Sequence[RobotParameter], owner: str) -> None:
-    """Refuse names of parameters that do not exist.
-
-    Args:
-        names: The names.
-        known: The parameters that exist.
-        owner: The robot or file that has them, for the error.
+    """Refuse names of parameters that are not among those of an owner, a robot or a file.
 
     Raises:
         NameNotFound: If there is no such parameter; lists those that exist, with default and unit.
