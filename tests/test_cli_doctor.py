@@ -174,7 +174,7 @@ def test_doctor_goes_on_without_browser_and_stops_without_folders(told, monkeypa
     def nowhere() -> Path:
         raise sr.DescriptionError("softrobots was installed without its folder urdf/; install it again")
 
-    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setattr("shutil.which", lambda name, **_: None)  # trimesh asks with a path
     status, out, _ = told("doctor")
     assert status == 0
     assert "browser  none, so no pictures of the viewer: no browser found" in out
