@@ -10,9 +10,8 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
+from softrobots.view.appearance import FORCE_COLOUR, PATH_COLOUR, PULL_COLOUR, PUSH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
 from softrobots.view.figures import canvas, helix_sheet, trajectories, workspaces
-from softrobots.view.meshcat_page.body import PULL_COLOUR, PUSH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
-from softrobots.view.meshcat_page.shapes import FORCE_COLOUR, PATH_COLOUR
 from softrobots.view.scene import WRINKLING_COLOURS
 
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A physiologically-based model for simulation of color vision deficiency,

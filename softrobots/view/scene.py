@@ -76,6 +76,19 @@ class Extent(NamedTuple):
     ground: float
     """Height of the floor: of the lowest point that is fixed to the world, or a little below the origin [m]."""
 
+    def camera(self, tip: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where a camera is that sees a robot with its tip there, and the point that it looks at, shape (3,) [m]."""
+        along, middle = tip - self.base, 0.5 * (self.base + tip)
+        azimuth = np.arctan2(along[1], along[0]) - np.deg2rad(78.0)
+        size = max(self.size, 0.95 * float(np.linalg.norm(along)))  # a robot that is bent at rest may be straight now
+        return middle + 0.94 * size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39]), middle
+
+    def floor(self) -> FloatArray:
+        """Return the two ends of each line of the floor, a sixth of the size apart along x and along y, shape (52, 3) [m]."""
+        offsets = np.linspace(-1.0, 1.0, 13) * self.size
+        along = np.array([(x, y, self.ground) for y in offsets for x in (-self.size, self.size)])
+        return np.concatenate([along, along[:, [1, 0, 2]]])
+
 
 class SceneBuilder:
     """Builds the scenes of one robot; the only part of a viewer that knows the model."""

@@ -14,13 +14,12 @@ from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
 from softrobots.statics.sensitivity import compliance
-from softrobots.view.meshcat_page.robot import RobotDrawing
-from softrobots.view.meshcat_page.stage import Stage
+from softrobots.view.appearance import legend
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import LOOPBACK, ServedPage
+from softrobots.view.viser_page.drawing import ViserDrawing
 from softrobots.view.viser_page.server import end_server, start_server
 from softrobots.view.viser_page.slider_panel import Setting, SliderPanel, round_down
-from softrobots.view.viser_page.tree import ViserTree
 from softrobots.view.warm_start import next_equilibrium
 
 _BENDING = 0.25  # linear deflection of the relaxed tip under the largest force, of the robot's size
@@ -83,15 +82,12 @@ class SliderPage(ServedPage):
         self._server = start_server(model.pinocchio.name, wanted_port)
         try:
             self._port = int(self._server.get_port())
-            self._tree = ViserTree(self._server)
-            root = self._tree["softrobots"]
-            extent, relaxed = self._scenes.extent, self._scenes.relaxed()
-            self._root, self._robot = root, RobotDrawing(root, self._scenes.robot, relaxed, extent.size, 0.5 * self._full)
-            Stage(self._tree, root, extent).look_at(self._equilibrium.tip_position)
+            self._drawing = ViserDrawing(self._server, self._scenes.robot.shapes, self._scenes.extent, 0.5 * self._full)
+            self._drawing.look_at(self._equilibrium.tip_position)
             self._panel = SliderPanel(self._server.gui, model, self._start, self._full, changed=self._wake.set)
+            self._read_scene()
             self._draw()
-            self._show_extras()
-            self._panel.report(self._equilibrium, self._robot.legend())
+            self._report()
         except BaseException:
             end_server(self._server)
             raise
@@ -180,29 +176,30 @@ class SliderPage(ServedPage):
                 self._last, self._problem = setting, None
                 gravity = self._gravity if setting.gravity else None
                 self._equilibrium = next_equilibrium(self._equilibrium, setting.q_motors, setting.force, gravity=gravity)
-                self._draw()
-            self._show_extras()
+                self._read_scene()
+            self._draw()
         except Exception as error:  # any error: the thread must go on with the next change
             self._problem = error
-        self._panel.report(self._equilibrium, self._robot.legend(), "" if self._problem is None else str(self._problem))
+        self._report()
 
     def _solve_from_rest(self, setting: Setting) -> Equilibrium:
         """Solve from relaxed springs."""
         gravity = self._gravity if setting.gravity else None
         return solve_equilibrium(self._model, setting.q_motors, setting.force, gravity=gravity)
 
-    def _draw(self) -> None:
-        """Draw the equilibrium."""
+    def _read_scene(self) -> None:
+        """Take the scene of a new equilibrium."""
         self._trail = [*self._trail[1 - _TRAIL :], self._equilibrium.tip_position]
-        self._robot.show(self._scenes.loaded(self._equilibrium))
+        self._scene = self._scenes.loaded(self._equilibrium)
 
-    def _show_extras(self) -> None:
-        """Draw what check boxes switch on and off."""
-        self._root["rigid"].set_property("visible", self._panel.rigid)
-        if self._panel.path:
-            self._robot.trace(np.array(self._trail))
-        self._root["path"].set_property("visible", self._panel.path)
-        self._tree.commit()
+    def _draw(self) -> None:
+        """Draw the scene, and what check boxes switch on and off."""
+        self._drawing.show(self._scene, rigid=self._panel.rigid, path=np.array(self._trail) if self._panel.path else None)
+
+    def _report(self) -> None:
+        """Write facts and legend into the panel."""
+        rows = legend(self._scenes.robot.shapes, self._scene, path=self._panel.path)
+        self._panel.report(self._equilibrium, rows, "" if self._problem is None else str(self._problem))
 
     def _checked_motors(self, value: Any) -> tuple[float, ...]:
         motors = self._model.checked_motors(value)

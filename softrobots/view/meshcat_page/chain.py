@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from softrobots.core.checks import FloatArray
-from softrobots.view.meshcat_page.shapes import RIGID_COLOUR, material, meshcat_geometry
+from softrobots.view.appearance import RIGID_COLOUR
+from softrobots.view.meshcat_page.shapes import material, meshcat_geometry
 from softrobots.view.robot_shapes import Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Scene
 

@@ -9,10 +9,8 @@ from pathlib import Path
 from string import Template
 
 from softrobots.version import __version__
+from softrobots.view.appearance import Colour, LegendEntry
 from softrobots.view.meshcat_page.page_commands import packed, read_page, tidied
-
-Colour = tuple[float, ...] | int
-"""Red, green, blue and perhaps opacity in [0, 1], or a number as in HTML."""
 
 _HINT = "Drag: turn. Wheel or two fingers: nearer."
 
@@ -42,7 +40,7 @@ class InlinePage:
         return f"InlinePage({len(self.page)} characters, height={self.height})"
 
 
-def page_text(static: str, title: str, legend: Sequence[tuple[Colour, str]]) -> str:
+def page_text(static: str, title: str, legend: Sequence[LegendEntry]) -> str:
     """Return a self-contained page of what a page of meshcat shows.
 
     The same scene gives the same text. The browser unpacks it with its own `DecompressionStream` and requests no other file.
@@ -79,7 +77,7 @@ def live_page(title: str) -> str:
     return _page(title, '<div id="softrobots-rows"></div>', _HINT, _filled("served_scene.html"))
 
 
-def legend_rows(legend: Sequence[tuple[Colour, str]]) -> str:
+def legend_rows(legend: Sequence[LegendEntry]) -> str:
     """Return the HTML of a legend: one line for each colour and meaning, the colour as background of an empty `span`."""
     rows = (f'\n<div><span style="background:{_css(colour)}"></span>{html.escape(text)}</div>' for colour, text in legend)
     return "".join(rows)

@@ -9,23 +9,19 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.view.animation_frames import FRAME_RATE
-from softrobots.view.meshcat_page.arrows import ArrowDrawing
+from softrobots.view.appearance import ARROW_LENGTH, ARROW_WIDTH, FORCE_COLOUR, PATH_COLOUR, LegendEntry, legend
 from softrobots.view.meshcat_page.body import BodyDrawing
 from softrobots.view.meshcat_page.chain import ChainDrawing
-from softrobots.view.meshcat_page.shapes import FORCE_COLOUR, PATH_COLOUR, RIGID_COLOUR, wrinkling_rows
 from softrobots.view.robot_shapes import RobotShapes
-from softrobots.view.scene import Scene
-
-LegendEntry = tuple[tuple[float, ...] | int, str]
-"""Colour and meaning of something that is drawn."""
+from softrobots.view.scene import Arrow, Scene
 
 _CROSS = (0.16, 0.006)  # length and width of the mark of a target, of the size of the robot
 
 
 class RobotDrawing:
-    """One robot under one node of a meshcat page, or of a `ViserTree`, which takes the same calls."""
+    """One robot under one node of a meshcat page."""
 
-    def __init__(self, root: Any, robot: RobotShapes, scene: Scene, size: float, unit_force: float | None = None) -> None:
+    def __init__(self, root: Any, robot: RobotShapes, scene: Scene, size: float) -> None:
         """Draw the robot.
 
         Args:
@@ -33,18 +29,18 @@ class RobotDrawing:
             robot: Its shapes.
             scene: Its first state.
             size: Scale of arrows and marks [m].
-            unit_force: Force whose arrow is `ARROW_LENGTH` long [N]; the largest of each load by default.
         """
         self._root, self._shapes, self._size = root, robot.shapes, size
-        self._arrows = ArrowDrawing(root["load"], size, unit_force)
+        self._arrows = ArrowDrawing(root["load"], size)
         self._chain = ChainDrawing(root, robot.shapes)
         self._body = BodyDrawing(root["body"])
         self._traced = self._marked = False
+        self._animated: tuple[Scene, ...] = ()
         self.show(scene)
 
     def show(self, scene: Scene) -> None:
         """Show another state of the robot."""
-        self._scene = scene
+        self._scene, self._animated = scene, ()
         self._chain.draw(scene)
         self._body.draw(scene)
         self._arrows.draw(scene.arrows)
@@ -93,19 +89,52 @@ class RobotDrawing:
                 self._add_frame(animation, following - 1, scene)
         if any(scene.segments for scene in scenes.values()):
             self._body.animate(animation, scenes)
+            self._animated = tuple(scenes.values())
         return animation
 
     def legend(self) -> list[LegendEntry]:
         """Return colour and meaning of what is drawn."""
-        scene, shapes = self._scene, self._shapes
-        entries: list[LegendEntry] = [(RIGID_COLOUR, scene.reference)] * any(shape.elastic for shape in shapes)
-        if all(shape.inflated_link is None for shape in shapes):
-            entries += [(shape.colour, "equivalent rigid chain") for shape in shapes if shape.of_section][:1]
-        entries += [(colour, meaning) for meaning, colour in self._body.entries.items()]
-        entries += [(PATH_COLOUR, "path of the tip")] * self._traced + [(PATH_COLOUR, "target (cross)")] * self._marked
-        entries += [(FORCE_COLOUR, "force")] * bool(self._arrows.names)
-        return entries + (wrinkling_rows() if scene.wrinkling else [])
+        return legend(self._shapes, self._scene, self._animated, path=self._traced, target=self._marked)
 
     def _add_frame(self, animation: Any, number: int, scene: Scene) -> None:
         self._chain.add_frame(animation, number, scene)
         self._arrows.add_frame(animation, number, scene.arrows)
+
+
+class ArrowDrawing:
+    """One arrow for each force, under one node of a page."""
+
+    def __init__(self, root: Any, size: float) -> None:
+        """Draw under `root` for a robot of a size [m]; the unit force is the largest of each load."""
+        self._root, self._size = root, size
+        self._names: tuple[str, ...] = ()
+
+    def draw(self, arrows: Mapping[str, Arrow]) -> None:
+        """Replace the arrows."""
+        import meshcat.geometry as geometry
+
+        for name in self._names:
+            if name not in arrows:
+                self._root[name].delete()
+        self._names = tuple(arrows)
+        unit = max((arrow.force for arrow in arrows.values()), default=1.0)
+        for name, arrow in arrows.items():
+            length = ARROW_LENGTH * self._size * arrow.force / unit
+            width = ARROW_WIDTH * self._size
+            green = geometry.MeshLambertMaterial(color=FORCE_COLOUR)
+            node = self._root[name]
+            for part, solid, height in (
+                ("shaft", geometry.Cylinder(length, width), 0.5 * length),
+                ("head", geometry.Cylinder(7.0 * width, radiusTop=0.0, radiusBottom=2.5 * width), length + 3.5 * width),
+            ):
+                node[part].set_object(solid, green)
+                raised = np.eye(4)
+                raised[1, 3] = height
+                node[part].set_transform(raised)
+            node.set_transform(arrow.pose)
+
+    def add_frame(self, animation: Any, number: int, arrows: Mapping[str, Arrow]) -> None:
+        """Move the arrows that are drawn to their places at a frame of an animation."""
+        for name in self._names:
+            if name in arrows:
+                animation.at_frame(self._root[name], number).set_transform(arrows[name].pose)

@@ -1,4 +1,4 @@
-"""Geometries and materials of meshcat, and the colours of a page."""
+"""Geometries and materials of meshcat."""
 
 from __future__ import annotations
 
@@ -9,14 +9,6 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ViewerError
 from softrobots.view.mesh_triangles import Triangles
-from softrobots.view.scene import WRINKLING_COLOURS
-
-RIGID_COLOUR = (0.40, 0.50, 0.62, 0.20)
-"""Red, green, blue, opacity of the rigid arm."""
-PATH_COLOUR = 0x1A1A1A
-"""Near black of the path: none of the colours of wrinkling and muscles."""
-FORCE_COLOUR = 0x009E73
-"""Green of the forces."""
 
 
 def meshcat_geometry(shape: Any) -> tuple[Any, FloatArray]:
@@ -49,21 +41,3 @@ def material(rgba: tuple[float, ...]) -> Any:
     return geometry.MeshPhongMaterial(
         color=red << 16 | green << 8 | blue, opacity=rgba[3], transparent=clear, shininess=25, depthWrite=not clear
     )
-
-
-def floor_lines(reach: float, height: float) -> FloatArray:
-    """Return the ends of floor lines along x at a height [m], a sixth of the reach apart, shape (2 n, 3) [m]."""
-    offsets = np.linspace(-1.0, 1.0, 13) * reach
-    ends = [(x, y, height) for y in offsets for x in (-reach, reach)]
-    return np.array(ends)
-
-
-def wrinkling_rows() -> list[tuple[tuple[float, ...] | int, str]]:
-    """Return colour and meaning of each level of wrinkling, for the legend of a page."""
-    rows: list[tuple[tuple[float, ...] | int, str]] = []
-    above = 1.0
-    for least, rgb in WRINKLING_COLOURS:
-        text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"
-        rows.append((rgb, text))
-        above = least
-    return rows

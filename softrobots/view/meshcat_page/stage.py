@@ -8,7 +8,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import ParameterError
-from softrobots.view.meshcat_page.shapes import floor_lines
+from softrobots.view.appearance import FLOOR_COLOUR
 from softrobots.view.scene import Extent
 
 
@@ -33,18 +33,12 @@ class Stage:
         page["/Grid"].set_property("visible", False)
         upright = np.hypot(*(tip - extent.base)[:2]) < 0.1 * size
         self.look_at(tip + [0.3 * size if upright else -0.1 * size, 0.0, 0.0 if upright else 0.2 * size])
-        along = floor_lines(size, extent.ground)
-        ends = np.concatenate([along, along[:, [1, 0, 2]]])
-        lines = geometry.PointsGeometry(ends.T.astype(np.float32))
-        self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=0xB8C0C8)))
+        lines = geometry.PointsGeometry(extent.floor().T.astype(np.float32))
+        self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=FLOOR_COLOUR)))
 
     def look_at(self, tip: FloatArray) -> None:
         """See `softrobots.view.viewer.Viewer.look_at`."""
-        along, middle = tip - self._extent.base, 0.5 * (self._extent.base + tip)
-        azimuth = np.arctan2(along[1], along[0]) - np.deg2rad(78.0)
-        size = max(self._extent.size, 0.95 * float(np.linalg.norm(along)))  # a robot that is bent at rest may be straight now
-        away = 0.94 * size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
-        self.look_from(middle + away, middle)
+        self.look_from(*self._extent.camera(tip))
 
     def look_from(self, eye: Any, centre: Any) -> None:
         """See `softrobots.view.viewer.Viewer.look_from`.

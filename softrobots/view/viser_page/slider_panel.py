@@ -11,7 +11,8 @@ import numpy as np
 
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
-from softrobots.view.meshcat_page.page_text import Colour, legend_rows
+from softrobots.view.appearance import LegendEntry
+from softrobots.view.meshcat_page.page_text import legend_rows
 
 _STEPS = 400  # least number of steps of a slider
 _LISTED = 6  # most inflated links that are listed one by one
@@ -93,7 +94,7 @@ class SliderPanel:
             slider.value = value
         self._gravity.value = setting.gravity
 
-    def report(self, equilibrium: Equilibrium, legend: Sequence[tuple[Colour, str]], problem: str = "") -> None:
+    def report(self, equilibrium: Equilibrium, legend: Sequence[LegendEntry], problem: str = "") -> None:
         """Show facts of an equilibrium, and the legend.
 
         Args:

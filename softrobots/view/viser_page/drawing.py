@@ -1,0 +1,167 @@
+"""A robot on a page of viser: its links, body, forces and path, drawn from scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ViewerError
+from softrobots.view.appearance import (
+    ARROW_LENGTH,
+    ARROW_WIDTH,
+    FLOOR_COLOUR,
+    FORCE_COLOUR,
+    PATH_COLOUR,
+    RIGID_COLOUR,
+    Colour,
+    body_parts,
+)
+from softrobots.view.body import tube
+from softrobots.view.mesh_triangles import Triangles
+from softrobots.view.robot_shapes import Shape
+from softrobots.view.scene import WRINKLING_COLOURS, Extent, Scene
+
+_SIDES = 32  # corners of the cross-section of what is round
+_DOT = 0.012  # size of the dots of a path [m]
+_AMBIENT, _SUN = 2.2, 2.0  # strength of the light from everywhere and from above
+
+
+class Mesh(NamedTuple):
+    """Triangles of one colour. Of meshes of one name only corners, pose, red, green and blue change."""
+
+    corners: FloatArray
+    """Points, shape (n, 3) [m]."""
+    faces: Any
+    """Corners of each triangle, shape (m, 3), integers."""
+    pose: FloatArray
+    """Pose of their axes, shape (4, 4) [m]."""
+    colour: Colour
+    """Colour of the triangles."""
+    flat: bool = False
+    """Whether triangles are flat; others look round."""
+
+
+class ViserDrawing:
+    """One robot on a page; for one thread at a time."""
+
+    def __init__(self, server: Any, shapes: Sequence[Shape], extent: Extent, unit_force: float) -> None:
+        """Draw the floor, and prepare the shapes of the robot.
+
+        Args:
+            server: The `viser.ViserServer`.
+            shapes: The shapes of the robot.
+            extent: Size and place of the robot at rest.
+            unit_force: Force whose arrow is `ARROW_LENGTH` long [N].
+
+        Raises:
+            ViewerError: If a shape cannot be drawn.
+        """
+        self._server, self._extent, self._unit_force = server, extent, unit_force
+        self._shapes = [(shape, *triangles(shape.geometry)) for shape in shapes]
+        self.handles: dict[str, Any] = {}
+        """Viser's handle of each mesh that is shown, and of the path, by name."""
+        # Viser's default light is a photograph; under even light colours look like those of the legend.
+        scene = server.scene
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(False)
+        scene.add_light_ambient("/light/ambient", intensity=_AMBIENT)
+        scene.add_light_directional("/light/sun", intensity=_SUN, position=(-0.3, -0.6, 1.0))
+        floor = extent.floor().reshape(-1, 2, 3)
+        scene.add_line_segments("/floor", floor, _rgb(FLOOR_COLOUR), thickness=1.0, thickness_units="screen")
+
+    def look_at(self, tip: FloatArray) -> None:
+        """Place the camera of browsers that connect later so that it sees a robot with its tip there, shape (3,) [m]."""
+        self._server.initial_camera.position, self._server.initial_camera.look_at = self._extent.camera(tip)
+
+    def show(self, scene: Scene, *, rigid: bool, path: FloatArray | None) -> None:
+        """Show a state, in one message.
+
+        Args:
+            scene: The state.
+            rigid: Whether the rigid robot is shown.
+            path: Positions of the dots of a path, shape (n, 3) [m]; None: no path.
+        """
+        meshes = dict(self._meshes(scene, rigid))
+        with self._server.atomic():
+            for name in [name for name in self.handles if name not in meshes and (name != "path" or path is None)]:
+                self.handles.pop(name).remove()
+            for name, mesh in meshes.items():
+                self._show_mesh(name, mesh)
+            if path is not None and "path" in self.handles:
+                self.handles["path"].points = path
+            elif path is not None:
+                self.handles["path"] = self._server.scene.add_point_cloud(
+                    "/path", path, _rgb(PATH_COLOUR), point_size=_DOT, point_shape="circle", precision="float32"
+                )
+
+    def _meshes(self, scene: Scene, rigid: bool) -> Iterator[tuple[str, Mesh]]:
+        """Name and triangles of everything that is shown."""
+        for (shape, corners, faces, flat), pose, relaxed in zip(self._shapes, scene.deformed, scene.rigid, strict=True):
+            colour: Colour = shape.colour
+            if shape.inflated_link is not None:
+                level = scene.wrinkling[shape.inflated_link] if scene.wrinkling else 0
+                colour = (*WRINKLING_COLOURS[level][1], shape.colour[3])
+            yield f"deformed/{shape.name}", Mesh(corners, faces, pose, colour, flat)
+            if rigid and shape.elastic:
+                yield f"rigid/{shape.name}", Mesh(corners, faces, relaxed, RIGID_COLOUR, flat)
+        for part in body_parts(scene):
+            yield f"body/{part.path}", Mesh(*part.surface(), np.eye(4), part.colour)
+        width = ARROW_WIDTH * self._extent.size
+        for name, arrow in scene.arrows.items():
+            end = ARROW_LENGTH * self._extent.size * arrow.force / self._unit_force
+            heights = [0.0, 0.0, end, end, end, end, end + 7.0 * width, end + 7.0 * width]
+            along_z = arrow.pose[:, [2, 0, 1, 3]]
+            yield f"load/{name}", Mesh(*_turned(heights, width * np.array([1, 1, 1, 1, 2.5, 2.5, 0, 0])), along_z, FORCE_COLOUR)
+
+    def _show_mesh(self, name: str, mesh: Mesh) -> None:
+        x, y, z, w = pin.Quaternion(mesh.pose[:3, :3]).coeffs().tolist()
+        place, colour = {"wxyz": np.array([w, x, y, z]), "position": mesh.pose[:3, 3]}, _rgb(mesh.colour)
+        if name in self.handles:  # viser sends what differs
+            for key, value in {**place, "vertices": mesh.corners, "color": colour}.items():
+                setattr(self.handles[name], key, value)
+            return
+        opacity = None if isinstance(mesh.colour, int) or mesh.colour[3] >= 1.0 else mesh.colour[3]
+        look = {"opacity": opacity, "flat_shading": mesh.flat, "side": "double", "cast_shadow": False, "receive_shadow": False}
+        self.handles[name] = self._server.scene.add_mesh_simple(
+            f"/{name}", mesh.corners, mesh.faces, color=colour, **look, **place
+        )
+
+
+def triangles(geometry: Any) -> tuple[FloatArray, Any, bool]:
+    """Return corners and triangles of a shape, and whether the triangles are flat.
+
+    Raises:
+        ViewerError: If the shape is no box, cylinder, sphere or mesh.
+    """
+    if isinstance(geometry, Triangles):
+        return geometry.corners, geometry.faces, False
+    if isinstance(geometry, coal.Cylinder):
+        half = geometry.halfLength
+        return *_turned([-half, -half, half, half], np.full(4, geometry.radius)), False
+    if isinstance(geometry, coal.Sphere):
+        angles = np.linspace(0.0, np.pi, _SIDES // 2 + 1)
+        return *_turned(-geometry.radius * np.cos(angles), geometry.radius * np.sin(angles)), False
+    if isinstance(geometry, coal.Box):
+        from trimesh.creation import box
+
+        solid = box(2.0 * np.array(geometry.halfSide).ravel())
+        return np.array(solid.vertices), np.array(solid.faces), True
+    raise ViewerError(f"a {type(geometry).__name__} cannot be drawn; boxes, cylinders, spheres and meshes can")
+
+
+def _turned(heights: Any, radii: Any) -> tuple[FloatArray, Any]:
+    """Corners and triangles of a body of revolution about z. A rim that is given twice is a sharp edge."""
+    centres = np.zeros((len(heights), 3))
+    centres[:, 2] = heights
+    return tube(np.tile(np.eye(3), (len(heights), 1, 1)), centres, radii, _SIDES)
+
+
+def _rgb(colour: Colour) -> tuple[int, ...]:
+    if isinstance(colour, int):
+        return colour >> 16 & 255, colour >> 8 & 255, colour & 255
+    return tuple(round(255 * share) for share in colour[:3])
