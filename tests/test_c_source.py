@@ -22,13 +22,14 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots.compiled.c.source import to_c
 from softrobots.compiled.drivers import intrinsics, trigonometry
+from softrobots.compiled.program.generated_module import functions_of
 from tests.conftest import missing
 from tests.support.c_libraries import build_library
 from tests.support.tables import each_row
 
 pytestmark = pytest.mark.system
 
-TRIGONOMETRY = "\n\n".join(map(inspect.getsource, trigonometry.FUNCTIONS))
+TRIGONOMETRY = "\n\n".join(map(inspect.getsource, functions_of(trigonometry)))
 EVERYTHING = f'''"""All that the language has.
 
 It's the arm's /* module */ really??/

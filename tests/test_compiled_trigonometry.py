@@ -15,8 +15,9 @@ import pytest
 
 from softrobots.compiled.drivers import intrinsics, trigonometry
 from softrobots.compiled.drivers.trigonometry import cosine, sine
+from softrobots.compiled.program.generated_module import functions_of
 
-TEXT = "from __future__ import annotations\n" + "\n".join(map(inspect.getsource, trigonometry.FUNCTIONS))
+TEXT = "from __future__ import annotations\n" + "\n".join(map(inspect.getsource, functions_of(trigonometry)))
 
 
 def angles(rng: np.random.Generator) -> np.ndarray:
@@ -81,7 +82,7 @@ def test_numba_makes_lanes_of_them(tool: Callable[[str], ModuleType]) -> None:
 
     names: dict[str, Any] = {"floor": np.floor, "where": compiled(lambda condition, a, b: a if condition else b)}
     exec(TEXT, names)
-    for function in trigonometry.FUNCTIONS:
+    for function in functions_of(trigonometry):
         names[function.__name__] = compiled(names[function.__name__])
     exec("def lanes(w):\n    for lane in range(256):\n        w[256 + lane] = sine(w[lane])\n", names)
     lanes = compiled(names["lanes"], "void(float64[::1])")

@@ -6,8 +6,6 @@ Functions in the kernel language. Their text goes into every generated module be
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array, fabs, sqrt
 from softrobots.compiled.settings import *
@@ -218,21 +216,3 @@ def settle(w: Array) -> int:
         return CERTIFIED
     go_to_start(w)
     return descend(w)
-
-
-FUNCTIONS: tuple[Callable[..., object], ...] = (
-    is_usable,
-    is_settled,
-    is_stable,
-    move,
-    keep,
-    leave_saddle,
-    outcome,
-    search_line,
-    cross_valley,
-    descend,
-    go_to_start,
-    settle_from,
-    settle,
-)
-"""All functions, each behind those that it uses."""

@@ -146,16 +146,5 @@ def reach_batch(
                 store_case(case, outputs, result_places, begin + lane)
 
 
-FUNCTIONS: tuple[Callable[..., object], ...] = (
-    running,
-    load_block,
-    load_case,
-    store_block,
-    store_case,
-    is_solved,
-    settle_batch,
-)
-"""Equilibria, each behind those that it uses."""
-
 MOTOR_FUNCTIONS: tuple[Callable[..., object], ...] = (estimate_batch, reach_batch)
 """Load estimation and inverse kinematics."""

@@ -6,8 +6,6 @@ and the force or the motors take damped steps (Levenberg-Marquardt) that are kep
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from softrobots.compiled.drivers.equilibrium_drivers import descend, go_to_start, is_usable
 from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array
@@ -76,6 +74,15 @@ def go_back(w: Array, varied: int, count: int) -> None:
         w[UNKNOWN + i] = w[PREVIOUS + N_VARIED + i]
 
 
+def within_limits(w: Array, varied: int) -> int:
+    """Return the status of motors that were searched for."""
+    if varied == 0:
+        for i in range(N_MOTORS):
+            if w[i] < LOWER[i] - 1e-9 or w[i] > UPPER[i] + 1e-9:
+                return BEYOND_LIMITS
+    return CERTIFIED
+
+
 def estimated(w: Array) -> int:
     """Return the status of a force that explains the motor torques."""
     if w[OBSERVED] < OBSERVABLE * OBSERVABLE * REACH * REACH:
@@ -129,15 +136,6 @@ def search(w: Array, varied: int, count: int) -> int:
     return within_limits(w, varied)
 
 
-def within_limits(w: Array, varied: int) -> int:
-    """Return the status of motors that were searched for."""
-    if varied == 0:
-        for i in range(N_MOTORS):
-            if w[i] < LOWER[i] - 1e-9 or w[i] > UPPER[i] + 1e-9:
-                return BEYOND_LIMITS
-    return CERTIFIED
-
-
 def estimate(w: Array) -> int:
     """Find the force that explains the motor torques in the workspace; return the status."""
     for i in range(3):
@@ -179,20 +177,3 @@ def reach(w: Array) -> int:
         return CERTIFIED
     go_back(w, 0, N_MOTORS)
     return search(w, 0, N_MOTORS)
-
-
-FUNCTIONS: tuple[Callable[..., object], ...] = (
-    look,
-    squared_tolerance,
-    step_within_limits,
-    keep_point,
-    take_step,
-    go_back,
-    within_limits,
-    estimated,
-    search,
-    estimate,
-    step_to_target,
-    reach,
-)
-"""All functions, each behind those that it uses."""

@@ -5,8 +5,6 @@ The Python solvers use matrices instead, in `softrobots.compiled.run.actuation`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array
 
@@ -18,7 +16,3 @@ def put_muscles(w: Array, muscles: Array) -> None:
         for j in range(N_MUSCLES):
             total += MUSCLE_SLOPE[N_MUSCLES * i + j] * (muscles[j] - MUSCLE_REST[j])
         w[MUSCLE_PLACE + i] = total
-
-
-FUNCTIONS: tuple[Callable[..., object], ...] = (put_muscles,)
-"""All functions."""

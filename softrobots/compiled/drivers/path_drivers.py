@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array, fabs, where
 from softrobots.compiled.drivers.motor_drivers import go_back, keep_point, reach, step_to_target
@@ -116,7 +114,3 @@ def follow(
             keep_point(w)
             predict(w)
     return reached
-
-
-FUNCTIONS: tuple[Callable[..., object], ...] = (is_near, predict, correct, step_in_parts, follow)
-"""All functions, each behind those that it uses."""

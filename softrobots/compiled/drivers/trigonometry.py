@@ -13,8 +13,6 @@ once for the sine and cosine of one number.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from softrobots.compiled.drivers.intrinsics import floor, where
 
 
@@ -66,15 +64,3 @@ def cosine(x: float) -> float:
     r = beyond_quarters(x, q)
     size = where(is_odd(q), sine_near_zero(r), cosine_near_zero(r))
     return where(is_odd(floor((q + 1.0) * 0.5)), -size, size)
-
-
-FUNCTIONS: tuple[Callable[..., float], ...] = (
-    quarter_turns,
-    beyond_quarters,
-    is_odd,
-    sine_near_zero,
-    cosine_near_zero,
-    sine,
-    cosine,
-)
-"""All functions, each behind those that it uses."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import inspect
-import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -52,13 +53,13 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         The program.
     """
     layout = Layout(unknowns.chain.n_motors, len(unknowns.strains))
-    functions, lane_functions = [*drivers.FUNCTIONS], [*lane_drivers.FUNCTIONS]
+    functions, lane_functions = functions_of(drivers), functions_of(lane_drivers)
     tables: dict[str, object] = {}
     loops, lane_loops, entries, names = [], [], ["settle", "settle_from"], ["WORKSPACE_SIZE", "N", "N_MOTORS"]
     tip = None
     if len(unknowns.chain.muscle_rest):
         tables |= _muscle_tables(unknowns, layout)
-        functions += muscle_drivers.FUNCTIONS
+        functions += functions_of(muscle_drivers)
         entries, names = [*entries, "put_muscles"], [*names, "N_MUSCLES"]
     if unknowns.is_unrolled:
         blocks, size = equilibrium_blocks(unknowns, layout, weight=weight)
@@ -75,8 +76,9 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         lane_size, entries = size, [*entries, "estimate", "reach", "follow"]
         blocks = blocks + by_force + by_target
         lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
-        functions += motor_drivers.FUNCTIONS + path_drivers.FUNCTIONS
-        lane_functions += lane_drivers.MOTOR_FUNCTIONS
+        functions += functions_of(motor_drivers) + functions_of(path_drivers)
+    else:
+        lane_functions = [one for one in lane_functions if one not in lane_drivers.MOTOR_FUNCTIONS]
     docstring, places = manual(unknowns, layout, tip, weight=weight)
     names += [*places, *Status.__members__]
     # A name could end the text.
@@ -85,14 +87,14 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
     text = "\n\n\n".join(
         [
             title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
-            *_texts(trigonometry.FUNCTIONS),
+            *map(_text, functions_of(trigonometry)),
             *(block.text() for block in blocks),
             *loops,
-            *_texts(functions),
+            *map(_text, functions),
         ]
     )
     lane_texts = [lane_block(block).text(lanes=True) for block in lanes]
-    lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *_texts(lane_functions)])
+    lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *map(_text, lane_functions)])
     return Program(text + "\n", lane_text + "\n", layout, size, tip, (*entries, *names))
 
 
@@ -150,5 +152,10 @@ def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
     }
 
 
-def _texts(functions: Iterable[Callable[..., object]]) -> Sequence[str]:
-    return [textwrap.dedent(inspect.getsource(function)).rstrip() for function in functions]
+def functions_of(module: ModuleType) -> list[Callable[..., Any]]:
+    """Return the functions that a module of drivers defines, in the order of its text: each behind those that it uses."""
+    return [one for one in vars(module).values() if inspect.isfunction(one) and one.__module__ == module.__name__]
+
+
+def _text(function: Callable[..., Any]) -> str:
+    return inspect.getsource(function).rstrip()
