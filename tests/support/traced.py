@@ -10,7 +10,7 @@ import mpmath as mp
 
 from softrobots.compiled.drivers import intrinsics
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Scalar, in_order
 
 NAMES = ("Array", "fabs", "floor", "sqrt", "where", "zeros")
 MANY_DIGITS = {"sine": mp.sin, "cosine": mp.cos, "sqrt": mp.sqrt, "fabs": mp.fabs}
@@ -32,3 +32,8 @@ def values(block: Block, outputs: Sequence[Scalar], inputs: Sequence[Any], **oth
     w = [*inputs, *outputs]
     functions(made.text(), **others)["compute"](w)
     return w[len(inputs) :]
+
+
+def operations(block: Block) -> int:
+    """Number of arithmetic operations."""
+    return sum(one.operation != "load" for one in in_order([value for _, _, value in block.stores]))

@@ -91,7 +91,7 @@ def element_kinds(plan: LoopedPlan) -> list[Kind]:
 
 def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     """Return the properties that elements with the same code share."""
-    one = unknowns.traced(row, lambda _: 0.0, lambda _: 0.0, lambda _: 0.0)
+    one = unknowns.traced(row)
     zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
     constraint = unknowns.multipliers_at(row)
     return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0))
@@ -210,7 +210,7 @@ def _store_tip_step(
 def _common(rows: list[int], plan: LoopedPlan, block: Block, columns: TableColumns) -> TracedElement:
     """Return an element of a kind, with table entries for the numbers in which its elements differ."""
     unknowns, layout = plan.unknowns, plan.layout
-    ones = [unknowns.traced(row, lambda _: 0.0, lambda _: 0.0, lambda _: 0.0) for row in rows]
+    ones = [unknowns.traced(row) for row in rows]
     first = ones[0]
     unknown = iter(block.loads(0, max(len(first.moving), 1), "q"))
     coordinates = [

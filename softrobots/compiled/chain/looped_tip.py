@@ -19,7 +19,6 @@ from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.looped_plan import LoopedPlan
 from softrobots.compiled.chain.recursion import Balance, inward
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
-from softrobots.compiled.chain.tip_motion import motor_of
 from softrobots.compiled.chain.unrolled_chain import seen_backwards
 from softrobots.compiled.trace.blocks import Block
 
@@ -54,11 +53,8 @@ def _finish(plan: LoopedPlan, tip: TipLayout) -> Block:
     block = Block("finish_tip", "Compute the response to motors and constrained sums from the sums of the passes.")
     axes = vector(block.loads(recursion.base, 9)).reshape(3, 3)
     total = vector(block.loads(tip.bends, 9)).reshape(3, 3)
-    leading = [
-        unknowns.traced(row, lambda motor: block.load(motor), lambda _: 0.0, lambda _: 0.0)
-        for row in range(unknowns.leading_motors)
-    ]
-    motors = [motor for row in range(len(leading)) if (motor := motor_of(unknowns, row)) is not None]
+    leading = unknowns.leading(block)
+    motors = [motor for row in range(len(leading)) if (motor := unknowns.motor(row)) is not None]
     loads = []
     for place in (0, 3) if plan.weight else (0,):
         force, lever = block.loads(recursion.force + place, 3), block.loads(recursion.lever + place, 3)

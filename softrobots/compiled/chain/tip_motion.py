@@ -20,7 +20,6 @@ from softrobots.compiled.chain.elements import Vector, constants
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.chain.unrolled_chain import Evaluation, solve_again
 from softrobots.compiled.trace.expressions import Scalar
-from softrobots.model.serial_chain import ChainJoint
 
 
 @dataclass
@@ -52,7 +51,7 @@ def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
     torques, changes, tip = constants(np.zeros(count)), constants(np.zeros(count)), constants(np.zeros(3))
     beyond = [constants(np.zeros(3)) for _ in range(4)]  # sums of c x over the strains beyond, per right-hand side
     for row in reversed(range(len(point.inward_passes))):
-        one, motor = point.inward_passes[row], motor_of(unknowns, row)
+        one, motor = point.inward_passes[row], unknowns.motor(row)
         if motor is None:
             beyond = [total + one.motion.bends @ step for total, step in zip(beyond, point.steps[row], strict=True)]
             tip = tip + one.motion.moves @ point.steps[row][0]
@@ -78,13 +77,13 @@ def step_with_motors(unknowns: Unknowns, point: Evaluation, motors: Vector) -> l
     """
     bends = constants(np.zeros(3))  # of the motors beyond
     for row in range(len(point.inward_passes)):
-        motor = motor_of(unknowns, row)
+        motor = unknowns.motor(row)
         if motor is not None:
             bends = bends + point.inward_passes[row].motion.bends[:, 0] * motors[motor]
     turn = constants(np.zeros(3))  # of the motors nearer to the base
     sides: list[list[Scalar]] = []
     for row, one in enumerate(point.inward_passes):
-        motor = motor_of(unknowns, row)
+        motor = unknowns.motor(row)
         if motor is not None:
             turn = turn + one.motion.twists[:, 0] * motors[motor]
             bends = bends - one.motion.bends[:, 0] * motors[motor]
@@ -93,9 +92,3 @@ def step_with_motors(unknowns: Unknowns, point: Evaluation, motors: Vector) -> l
             coupling = one.motion.bends.T @ turn + one.motion.twists.T @ bends
             sides.append([value - by for value, by in zip(one.gradient, coupling, strict=True)])
     return solve_again(unknowns, point, sides)
-
-
-def motor_of(unknowns: Unknowns, row: int) -> int | None:
-    """Return the number of the motor of an element; None for other elements."""
-    element = unknowns.chain.elements[row]
-    return element.motor if isinstance(element, ChainJoint) else None

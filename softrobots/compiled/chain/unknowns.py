@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.settings import LARGEST_POSITION, MAX_UNROLLED_JOINTS
+from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain
+
+
+class Segment(NamedTuple):
+    """Part of a chain with constrained sums of its strains: groups with overlapping elements share one."""
+
+    first: int
+    """Its first element."""
+    last: int
+    """Its last element."""
+    groups: tuple[int, ...]
+    """Its groups of `SerialChain.held`, one multiplier each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,35 +71,25 @@ class Unknowns:
         return {strain: place for place, strain in enumerate(self.strains)}
 
     @cached_property
-    def multiplier(self) -> dict[int, tuple[int, int]]:
-        """By constrained strain: the segment, and the number of its multiplier there."""
-        multipliers: dict[int, tuple[int, int]] = {}
-        for row, group in enumerate(self.chain.held):
-            segment = self.segment_of_group[row]
-            number = sum(other == segment for other in self.segment_of_group[:row])
-            multipliers |= {strain: (segment, number) for strain in group}
-        return multipliers
-
-    @cached_property
-    def segment_of_group(self) -> tuple[int, ...]:
-        """Segment of each constrained group, from 0: groups with overlapping elements share one."""
-        spans = [self._span(group) for group in self.chain.held]
-        segments: list[int] = []
-        for row, span in enumerate(spans):
-            same = [segments[other] for other in range(row) if spans[other][0] <= span[1] and span[0] <= spans[other][1]]
-            segments.append(same[0] if same else max(segments, default=-1) + 1)
+    def segments(self) -> tuple[Segment, ...]:
+        """The constrained segments."""
+        segments: list[Segment] = []
+        for group, constrained in enumerate(self.chain.held):
+            rows = [row for row, element in enumerate(self.chain.elements) if set(strains_of(element)) & set(constrained)]
+            new = Segment(min(rows), max(rows), (group,))
+            for place, one in enumerate(segments):
+                if one.first <= new.last and new.first <= one.last:
+                    segments[place] = Segment(min(one.first, new.first), max(one.last, new.last), (*one.groups, group))
+                    break
+            else:
+                segments.append(new)
         return tuple(segments)
 
     @cached_property
-    def segment_spans(self) -> tuple[tuple[int, int], ...]:
-        """First and last element of each constrained segment."""
-        ends = []
-        for segment in range(len(set(self.segment_of_group))):
-            spans = [
-                self._span(group) for group, one in zip(self.chain.held, self.segment_of_group, strict=True) if one == segment
-            ]
-            ends.append((min(first for first, _ in spans), max(last for _, last in spans)))
-        return tuple(ends)
+    def multiplier(self) -> dict[int, int]:
+        """By constrained strain: the number of its multiplier in its segment."""
+        numbered = [(number, group) for segment in self.segments for number, group in enumerate(segment.groups)]
+        return {strain: number for number, group in numbered for strain in self.chain.held[group]}
 
     @cached_property
     def masses_beyond(self) -> tuple[float, ...]:
@@ -93,24 +97,30 @@ class Unknowns:
         own = [sum(body.mass for body in bodies_of(element)) for element in self.chain.elements]
         return tuple(float(sum(own[row + 1 :])) for row in range(len(own)))
 
+    def motor(self, row: int) -> int | None:
+        """Return the number of the motor that an element is; None for other elements."""
+        element = self.chain.elements[row]
+        return element.motor if isinstance(element, ChainJoint) else None
+
     @cached_property
     def leading_motors(self) -> int:
         """Number of elements, all motors, before the first unknown."""
-        for row, element in enumerate(self.chain.elements):
-            if isinstance(element, ChainSection) or element.motor is None:
-                return row
-        return len(self.chain.elements)
+        rows = range(len(self.chain.elements))
+        return next((row for row in rows if self.motor(row) is None), len(rows))
+
+    def leading(self, block: Block) -> list[TracedElement]:
+        """Return the leading motors, with their positions in the workspace."""
+        return [self.traced(row, block.load) for row in range(self.leading_motors)]
 
     def traced(
-        self, row: int, motor: Callable[[int], Scalar], unknown: Callable[[int], Scalar], pull: Callable[[int], Scalar]
+        self, row: int, motor: Callable[[int], Scalar] = lambda _: 0.0, unknown: Callable[[int], Scalar] = lambda _: 0.0
     ) -> TracedElement:
-        """Return an element with its constants.
+        """Return an element with its constants, without muscle tensions.
 
         Args:
             row: Index of the element.
             motor: Position of a motor by its number.
             unknown: An unknown by its place.
-            pull: Constant load on an unknown by its place.
         """
         element, chain = self.chain.elements[row], self.chain
         strains = strains_of(element)
@@ -124,7 +134,6 @@ class Unknowns:
             coordinates = [
                 unknown(self.place[strain]) if strain in self.place else float(chain.rest[strain]) for strain in strains
             ]
-        constraints = tuple(self.multiplier[strains[one]][1] if strains[one] in self.multiplier else None for one in moving)
         return TracedElement(
             kind=kind,
             rotation=constants(element.rotation),
@@ -135,8 +144,8 @@ class Unknowns:
             moving=moving,
             stiffness=[float(chain.stiffness[strains[one]]) for one in moving],
             rest=[float(chain.rest[strains[one]]) for one in moving],
-            pull=[pull(place) for place in places],
-            constraints=constraints,
+            pull=[0.0] * len(moving),
+            constraints=tuple(self.multiplier.get(strains[one]) for one in moving),
             length=element.length if isinstance(element, ChainSection) else 0.0,
         )
 
@@ -164,14 +173,17 @@ class Unknowns:
 
     def multipliers_at(self, row: int) -> int:
         """Return the number of multipliers of the segment of an element; 0 outside of constrained segments."""
-        for segment, (first, last) in enumerate(self.segment_spans):
-            if first <= row <= last:
-                return sum(one == segment for one in self.segment_of_group)
-        return 0
+        return next((len(one.groups) for one in self.segments if one.first <= row <= one.last), 0)
 
     def moving(self, row: int) -> tuple[int, ...]:
         """Return the unknown strains of an element."""
         return tuple(strain for strain in strains_of(self.chain.elements[row]) if strain in self.place)
+
+    def in_order(self, by_element: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+        """Return numbers of the unknowns of each element in the order of the unknowns."""
+        pairs = (zip(self.moving(row), values, strict=True) for row, values in enumerate(by_element))
+        by_strain = dict(itertools.chain.from_iterable(pairs))
+        return [by_strain[strain] for strain in self.strains]
 
     @property
     def _first_section(self) -> int:
@@ -185,10 +197,6 @@ class Unknowns:
             element.strain + row for element in self.chain.elements if isinstance(element, ChainSection) for row in rows
         )
 
-    def _span(self, group: Sequence[int]) -> tuple[int, int]:
-        rows = [row for row, element in enumerate(self.chain.elements) if set(strains_of(element)) & set(group)]
-        return min(rows), max(rows)
-
 
 def strains_of(element: Element) -> tuple[int, ...]:
     """Return the indices of the strains of an element; none for a motor."""
@@ -200,9 +208,3 @@ def strains_of(element: Element) -> tuple[int, ...]:
 def bodies_of(element: Element) -> tuple[ChainBody, ...]:
     """Return the bodies of an element."""
     return element.bodies if isinstance(element, ChainSection) else (element.body,)
-
-
-def compliances_of(unknowns: Unknowns, segment: int) -> list[float]:
-    """Return the compliance of the sum of each multiplier of a segment [rad/(N m) or m/N]."""
-    groups = [group for group, one in zip(unknowns.chain.held, unknowns.segment_of_group, strict=True) if one == segment]
-    return [float(np.sum(1.0 / unknowns.chain.stiffness[list(group)])) for group in groups]

@@ -47,8 +47,6 @@ class Evaluation:
     """Axes of the frame behind the leading motors in the world, shape (3, 3)."""
     base: Vector
     """Its origin in the world [m]."""
-    force: Vector
-    """The force on the tip [N]."""
 
 
 def evaluate(
@@ -80,12 +78,7 @@ def evaluate(
     chain = unknowns.chain
     rest = [float(chain.rest[strain]) for strain in unknowns.strains]
     elements = [
-        unknowns.traced(
-            row,
-            lambda motor: block.load(motor),
-            lambda place: rest[place] if at_rest else block.load(layout.unknown + place),
-            lambda _: 0.0,
-        )
+        unknowns.traced(row, block.load, lambda place: rest[place] if at_rest else block.load(layout.unknown + place))
         for row in range(len(chain.elements))
     ]
     leading = unknowns.leading_motors
@@ -102,42 +95,34 @@ def evaluate(
     pivot_shift = block.load(layout.single("pivot_shift")) if shift_pivots else 0.0
 
     outward_passes = seen_backwards(elements[:leading]) + outward_passes
-    beyond, balance = Outboard.tip(4 if tip_columns else 1), Balance()
-    inward_passes: list[InwardPass | None] = [None] * len(elements)
+    sides = 4 if tip_columns else 1
+    beyond, balance = Outboard.tip(sides), Balance()
+    backwards: list[InwardPass] = []
     energy: Scalar = 0.0
     tip = loads[0].lever
     for row in reversed(range(len(elements))):
         one = inward(
             elements[row], outward_passes[row], loads, beyond, balance, tip_columns=tip_columns, pivot_shift=pivot_shift
         )
-        inward_passes[row], loads, beyond = one, one.loads, one.beyond
+        loads, beyond = one.loads, one.beyond
+        backwards.append(one)
         if row == leading:
             tip = loads[0].lever
             energy = balance.energy - sum(load.force @ load.lever for load in loads)
-    return _solved(
-        unknowns,
-        [one for one in inward_passes if one is not None],
-        4 if tip_columns else 1,
-        Evaluation([], [], [], [], [], balance, beyond, energy, tip, base_axes, base, force),
-    )
+    inward_passes = backwards[::-1]
 
-
-def _solved(unknowns: Unknowns, inward_passes: list[InwardPass], sides: int, made: Evaluation) -> Evaluation:
-    """Trace the step pass."""
-    turns = [constants(np.zeros(3)) for _ in range(sides)]
-    by_strain: dict[int, tuple[Scalar, Scalar]] = {}
-    for row, one in enumerate(inward_passes):
-        made.turns.append(list(turns))
-        steps: list[Vector] = [constants(np.zeros(0))] * sides
+    turn: list[Vector] = [constants(np.zeros(3)) for _ in range(sides)]
+    turns, steps = [], []
+    for one in inward_passes:
+        turns.append(turn)
+        own: list[Vector] = [constants(np.zeros(0))] * sides
         if one.eliminated is not None:
-            steps = [one.eliminated.steps(side, turn) for side, turn in enumerate(turns)]
-            for place, strain in enumerate(unknowns.moving(row)):
-                by_strain[strain] = (one.gradient[place], steps[0][place])
-            turns = [turn + one.twists @ step for turn, step in zip(turns, steps, strict=True)]
-        made.steps.append(steps)
-    made.inward_passes = inward_passes
-    made.gradient, made.step = ([by_strain[strain][kind] for strain in unknowns.strains] for kind in range(2))
-    return made
+            own = [one.eliminated.steps(side, nearer) for side, nearer in enumerate(turn)]
+            turn = [nearer + one.twists @ step for nearer, step in zip(turn, own, strict=True)]
+        steps.append(own)
+    gradient = unknowns.in_order([one.gradient for one in inward_passes])
+    step = unknowns.in_order([own[0] for own in steps])
+    return Evaluation(inward_passes, turns, steps, gradient, step, balance, beyond, energy, tip, base_axes, base)
 
 
 def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[Scalar]]) -> list[Scalar]:
@@ -161,12 +146,11 @@ def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[
                 total = total + coupling * (pivot * value)
             columns[row] = replace(eliminated, columns=[column])
     turn: Vector = constants(np.zeros(3))
-    steps: dict[int, Scalar] = {}
+    steps: list[Sequence[Scalar]] = [[] for _ in sides]
     for row, eliminated in sorted(columns.items()):
-        moved = eliminated.steps(0, turn)
-        turn = turn + point.inward_passes[row].twists @ moved
-        steps |= dict(zip(unknowns.moving(row), moved, strict=True))
-    return [steps[strain] for strain in unknowns.strains]
+        steps[row] = eliminated.steps(0, turn)
+        turn = turn + point.inward_passes[row].twists @ steps[row]
+    return unknowns.in_order(steps)
 
 
 def place_base(leading: list[TracedElement]) -> tuple[Any, Vector]:
@@ -183,10 +167,10 @@ def place_base(leading: list[TracedElement]) -> tuple[Any, Vector]:
 
 def seen_backwards(leading: list[TracedElement]) -> list[OutwardPass]:
     """Return the outward passes of the leading motors in the axes behind the last of them."""
-    axes, made = constants(np.eye(3)), []
+    axes, backwards = constants(np.eye(3)), []
     for element in reversed(leading):
         start = turned(axes, -element.coordinates[0]) if element.kind == "turn" else axes
         before = start @ element.rotation.T
-        made.append(OutwardPass(start, before @ element.translation, axes, None))
+        backwards.append(OutwardPass(start, before @ element.translation, axes, None))
         axes = before
-    return made[::-1]
+    return backwards[::-1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -21,7 +21,6 @@ from softrobots.compiled.program.manual import manual
 from softrobots.compiled.program.motor_program import force_blocks, target_blocks
 from softrobots.compiled.program.unrolled_program import equilibrium_blocks
 from softrobots.compiled.statuses import Status
-from softrobots.compiled.trace.blocks import Block
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
             *map(_text, functions),
         ]
     )
-    lane_texts = [lane_block(block).text(lanes=True) for block in lanes]
+    lane_texts = [replace(block, name=f"{block.name}_lanes").text(lanes=True) for block in lanes]
     lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *map(_text, lane_functions)])
     return Program(text + "\n", lane_text + "\n", layout, size, tip, (*entries, *names))
 
@@ -104,11 +103,6 @@ def _lanes(size: int) -> int:
     while count > settings.MIN_LANES and count * size * 8 > settings.LANE_MEMORY:
         count //= 2
     return count
-
-
-def lane_block(block: Block) -> Block:
-    """Return the block under the name of its form for lanes."""
-    return Block(f"{block.name}_lanes", block.purpose, block.parameters, block.trace, block.stores)
 
 
 def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, tables: dict[str, object]) -> str:

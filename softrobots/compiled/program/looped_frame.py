@@ -7,12 +7,12 @@ import numpy as np
 from softrobots.compiled.chain.elements import Load, constants, vector
 from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.looped_plan import LoopedPlan
+from softrobots.compiled.chain.recursion import Balance
 from softrobots.compiled.chain.recursion_layout import RecursionLayout
 from softrobots.compiled.chain.unrolled_chain import place_base
-from softrobots.compiled.program.passes import decide, dot, go_on, point_numbers
-from softrobots.compiled.settings import LEAST_SIZE
+from softrobots.compiled.program.passes import decide, go_on, point_numbers
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar, larger
+from softrobots.compiled.trace.expressions import Scalar
 
 
 def looped_frame(plan: LoopedPlan, count: int) -> list[Block]:
@@ -32,11 +32,7 @@ def looped_frame(plan: LoopedPlan, count: int) -> list[Block]:
 def _prepare(plan: LoopedPlan, count: int) -> Block:
     block = Block("prepare", "Compute what depends on motors and load only.")
     unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
-    leading = [
-        unknowns.traced(row, lambda motor: block.load(motor), lambda _: 0.0, lambda _: 0.0)
-        for row in range(unknowns.leading_motors)
-    ]
-    axes, origin = place_base(leading)
+    axes, origin = place_base(unknowns.leading(block))
     for place, load in ((0, layout.force), (3, layout.gravity)):
         block.store_all(recursion.force + place, (axes.T @ vector(block.loads(load, 3))).tolist())
     block.store_all(recursion.base, [*axes.ravel().tolist(), *origin.tolist()])
@@ -71,22 +67,7 @@ def _finish(plan: LoopedPlan) -> Block:
     levers, forces = block.loads(recursion.lever, 6), block.loads(recursion.force, 6)
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0), Load(vector(forces[3:]), vector(levers[3:]), 0.0)]
     energy: Scalar = sums[0] - sum((one.force @ one.lever for one in loads[: 2 if plan.weight else 1]), 0.0)
-    force = block.loads(layout.force, 3)
-    load = dot(force, force) * unknowns.chain.reach**2 + sums[1]
-    if unknowns.pulled:
-        pull = block.loads(layout.pull, layout.unknowns)
-        load = load + dot(pull, pull)
-    numbers = point_numbers(
-        slope=steps[0],
-        error=steps[1],
-        length=steps[2],
-        energy=energy,
-        elastic=sums[0],
-        load=larger(load, LEAST_SIZE**2),
-        range_margin=sums[2],
-        min_pivot=sums[3],
-        n_negative_pivots=sums[4],
-    )
+    numbers = point_numbers(block, layout, unknowns, Balance(*sums[:3]), energy, steps, sums[3:])
     for name, value in numbers.items():
         block.store(layout.single(name), value)
     base = block.loads(recursion.base, 12)
@@ -99,15 +80,7 @@ def _decide(plan: LoopedPlan) -> Block:
     unknowns, layout = plan.unknowns, plan.layout
     names = ("energy", "slope", "error", "length", "size", "rounding", "min_pivot", "n_negative_pivots", "range_margin")
     point: dict[str, Scalar] = {name: block.load(layout.single(name)) for name in names}
-    _, share = decide(
-        block,
-        layout,
-        point,
-        n_constraints=len(unknowns.chain.held),
-        spring_rounding=unknowns.spring_rounding,
-        mode=block.load(layout.single("mode")),
-        bound=block.load(layout.single("bound")),
-    )
+    _, share = decide(block, layout, unknowns, point)
     block.store(plan.recursion.end, share)
     return block
 

@@ -14,7 +14,6 @@ from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayou
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import looped_frame
 from softrobots.compiled.trace.blocks import Block
-from softrobots.model.serial_chain import ChainJoint
 
 
 @dataclass(frozen=True)
@@ -158,26 +157,24 @@ def _sequence(
             pass_calls.append((kind.number, f"{name}_{infix}{kind.number}(w, {at}, ROW[i], PLACE[i])"))
     blocks = [block for kind in kinds for block in kind.blocks]
     sequence = [steps[row] for row in sorted(steps)]
-    ends = list(zip(range(len(unknowns.segment_spans)), unknowns.segment_spans, strict=True))
-    for segment, (first, last) in reversed(ends):
-        ends_of_segment, size = segment_blocks(plan, segment)
+    leading = unknowns.leading_motors
+    for number, segment in reversed(list(enumerate(unknowns.segments))):
+        ends_of_segment, size = segment_blocks(plan, number, segment)
         blocks += ends_of_segment
-        base, end = len(kinds) + 2 * segment, len(kinds) + 2 * segment + 1
-        leading = unknowns.leading_motors
-        sequence.insert(last + 1 - leading, (end, 0, 0, 0))
-        sequence.insert(first - leading, (base, record, 0, 0))
+        base = len(kinds) + 2 * number
+        end = base + 1
+        sequence.insert(segment.last + 1 - leading, (end, 0, 0, 0))
+        sequence.insert(segment.first - leading, (base, record, 0, 0))
         record += size
         inward_calls += [
-            (end, f"add_multipliers_{infix}{segment}(w)"),
-            (base, f"eliminate_multipliers_{infix}{segment}(w, {at})"),
+            (end, f"add_multipliers_{infix}{number}(w)"),
+            (base, f"eliminate_multipliers_{infix}{number}(w, {at})"),
         ]
-        step_calls.append((base, f"solve_multipliers_{infix}{segment}(w, {at})"))
+        step_calls.append((base, f"solve_multipliers_{infix}{number}(w, {at})"))
     return blocks, sequence, record
 
 
 def _coordinate(unknowns: Unknowns, layout: Layout, row: int) -> int:
     """Return the place of the first coordinate of an element in the workspace."""
-    element = unknowns.chain.elements[row]
-    if isinstance(element, ChainJoint) and element.motor is not None:
-        return element.motor
-    return layout.unknown + unknowns.place[unknowns.moving(row)[0]]
+    motor = unknowns.motor(row)
+    return layout.unknown + unknowns.place[unknowns.moving(row)[0]] if motor is None else motor

@@ -189,11 +189,11 @@ def _damped(matrix: object, damping: Scalar, right: Vector) -> Vector:
 
 def _with_columns(unknowns: Unknowns, point: Evaluation, force: Vector) -> list[Scalar]:
     """Return the Newton step of the unknowns when the force changes as well."""
-    by_strain: dict[int, Scalar] = {}
-    for row, steps in enumerate(point.steps):
-        for place, strain in enumerate(unknowns.moving(row)):
-            by_strain[strain] = steps[0][place] + sum((steps[1 + axis][place] * force[axis] for axis in range(3)), 0.0)
-    return [by_strain[strain] for strain in unknowns.strains]
+    by_element = [
+        [own[0][place] + sum((own[1 + axis][place] * force[axis] for axis in range(3)), 0.0) for place in range(len(own[0]))]
+        for own in point.steps
+    ]
+    return unknowns.in_order(by_element)
 
 
 def _balanced(values: dict[str, Scalar], unknowns: Unknowns) -> Scalar:

@@ -5,58 +5,61 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.settings import ARMIJO, ENERGY_ROUNDING, LARGEST_STEP, NEWTON_TOLERANCE, POSITIVE_PIVOT
+from softrobots.compiled.chain.recursion import Balance
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.settings import (
+    ARMIJO,
+    ENERGY_ROUNDING,
+    LARGEST_STEP,
+    LEAST_SIZE,
+    NEWTON_TOLERANCE,
+    POSITIVE_PIVOT,
+)
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
 
 
 def point_numbers(
-    *,
-    slope: Scalar,
-    error: Scalar,
-    length: Scalar,
+    block: Block,
+    layout: Layout,
+    unknowns: Unknowns,
+    balance: Balance,
     energy: Scalar,
-    elastic: Scalar,
-    load: Scalar,
-    range_margin: Scalar,
-    min_pivot: Scalar,
-    n_negative_pivots: Scalar,
+    products: Sequence[Scalar],
+    pivots: Sequence[Scalar],
 ) -> dict[str, Scalar]:
     """Return the single numbers of a point from sums over the chain.
 
     Args:
-        slope: Derivative of the energy along the Newton step.
-        error: Squared out-of-balance torque.
-        length: Squared Newton step.
+        block: The block of the point.
+        layout: The places in the workspace.
+        unknowns: The chain.
+        balance: Elastic energy, weight and range margin.
         energy: Elastic energy plus potential [J].
-        elastic: Elastic energy [J].
-        load: Squared size of the load [N^2 m^2].
-        range_margin: Negative if a section is beyond its range.
-        min_pivot: Smallest pivot.
-        n_negative_pivots: Number of pivots that are not positive.
+        products: Derivative of the energy along the Newton step, squared out-of-balance torque, squared Newton step.
+        pivots: Smallest pivot, and number of pivots that are not positive.
     """
+    force = block.loads(layout.force, 3)
+    load = dot(force, force) * unknowns.chain.reach**2 + balance.weight
+    if unknowns.pulled:
+        pull = block.loads(layout.pull, layout.unknowns)
+        load = load + dot(pull, pull)
+    size = larger(load, LEAST_SIZE**2)
     return {
-        "energy": if_less(range_margin, 0.0, 1e300, energy),
-        "slope": slope,
-        "error": error,
-        "length": length,
-        "size": load,
-        "rounding": (square_root(load) + absolute(elastic) * 2.0 + absolute(energy)) * ENERGY_ROUNDING,
-        "min_pivot": min_pivot,
-        "n_negative_pivots": n_negative_pivots,
-        "range_margin": range_margin,
+        "energy": if_less(balance.range_margin, 0.0, 1e300, energy),
+        "slope": products[0],
+        "error": products[1],
+        "length": products[2],
+        "size": size,
+        "rounding": (square_root(size) + absolute(balance.energy) * 2.0 + absolute(energy)) * ENERGY_ROUNDING,
+        "min_pivot": pivots[0],
+        "n_negative_pivots": pivots[1],
+        "range_margin": balance.range_margin,
     }
 
 
 def decide(
-    block: Block,
-    layout: Layout,
-    point: dict[str, Scalar],
-    *,
-    n_constraints: int,
-    spring_rounding: float,
-    mode: Scalar,
-    bound: Scalar,
+    block: Block, layout: Layout, unknowns: Unknowns, point: dict[str, Scalar], *, starts: bool = False
 ) -> tuple[Scalar, Scalar]:
     """Trace the new mode of a case.
 
@@ -66,18 +69,18 @@ def decide(
     Args:
         block: The block of the pass.
         layout: The places in the workspace.
+        unknowns: The chain.
         point: The numbers of the point, see `point_numbers`.
-        n_constraints: Number of multipliers.
-        spring_rounding: Rounding of the spring torques [N m].
-        mode: Mode before.
-        bound: Largest energy that the point may have [J].
+        starts: Whether this is the first pass, without a mode before and a bound of the energy.
 
     Returns:
         The mode, and the share of the step that mode 0 takes.
     """
+    mode: Scalar = 0.0 if starts else block.load(layout.single("mode"))
+    bound: Scalar = 1e300 if starts else block.load(layout.single("bound"))
     error, length, energy = point["error"], point["length"], point["energy"]
-    settled_to = larger(point["size"] * NEWTON_TOLERANCE**2, spring_rounding**2)
-    all_signs = if_less(absolute(point["n_negative_pivots"] - float(n_constraints)), 0.5, 1.0, 0.0)
+    settled_to = larger(point["size"] * NEWTON_TOLERANCE**2, unknowns.spring_rounding**2)
+    all_signs = if_less(absolute(point["n_negative_pivots"] - float(len(unknowns.chain.held))), 0.5, 1.0, 0.0)
     sound = if_less(point["size"], 1e300, if_less(point["range_margin"], 0.0, 0.0, all_signs), 0.0)
     stable = if_less(POSITIVE_PIVOT, point["min_pivot"], sound, 0.0)
     going = if_less(energy, bound, 2.0 - 2.0 * stable, 2.0)

@@ -8,9 +8,8 @@ from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.chain.unrolled_chain import Evaluation, evaluate
 from softrobots.compiled.program.passes import decide, dot, go_on, point_numbers
-from softrobots.compiled.settings import LEAST_SIZE
 from softrobots.compiled.trace.blocks import Block, hoist
-from softrobots.compiled.trace.expressions import Scalar, larger
+from softrobots.compiled.trace.expressions import Scalar
 
 
 def equilibrium_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> tuple[list[Block], int]:
@@ -47,19 +46,9 @@ def equilibrium_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> t
 
 def numbers(unknowns: Unknowns, layout: Layout, block: Block, point: Evaluation) -> dict[str, Scalar]:
     """Return the single numbers of an evaluation."""
-    force = block.loads(layout.force, 3)
-    load = sum((one * one for one in force), 0.0) * unknowns.chain.reach**2 + point.balance.weight
-    return point_numbers(
-        slope=dot(point.gradient, point.step),
-        error=dot(point.gradient, point.gradient),
-        length=dot(point.step, point.step),
-        energy=point.energy,
-        elastic=point.balance.energy,
-        load=larger(load, LEAST_SIZE**2),
-        range_margin=point.balance.range_margin,
-        min_pivot=point.beyond.min_pivot,
-        n_negative_pivots=point.beyond.n_negative_pivots,
-    )
+    products = dot(point.gradient, point.step), dot(point.gradient, point.gradient), dot(point.step, point.step)
+    pivots = point.beyond.min_pivot, point.beyond.n_negative_pivots
+    return point_numbers(block, layout, unknowns, point.balance, point.energy, products, pivots)
 
 
 def store_tip(block: Block, layout: Layout, point: Evaluation) -> None:
@@ -70,15 +59,7 @@ def store_tip(block: Block, layout: Layout, point: Evaluation) -> None:
 def _advance(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation, *, starts: bool) -> None:
     """Write the next point of the case."""
     rest = [float(unknowns.chain.rest[strain]) for strain in unknowns.strains]
-    mode, share = decide(
-        block,
-        layout,
-        numbers(unknowns, layout, block, point),
-        n_constraints=0,
-        spring_rounding=unknowns.spring_rounding,
-        mode=0.0 if starts else block.load(layout.single("mode")),
-        bound=1e300 if starts else block.load(layout.single("bound")),
-    )
+    mode, share = decide(block, layout, unknowns, numbers(unknowns, layout, block, point), starts=starts)
     here: Sequence[Scalar] = rest if starts else block.loads(layout.unknown, layout.unknowns)
     for place, (one, step) in enumerate(zip(here, point.step, strict=True)):
         block.store(layout.unknown + place, go_on(mode, one, share, step))

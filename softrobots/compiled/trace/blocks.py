@@ -71,10 +71,6 @@ class Block:
         body = [f"{indent}{line}" for line in _statements(self.stores, lanes)]
         return "\n".join([*lines, *(body or [f"{indent}pass"])])
 
-    def operations(self) -> int:
-        """Return the number of arithmetic operations."""
-        return sum(one.operation != "load" for one in in_order([value for _, _, value in self.stores]))
-
 
 def hoist(
     blocks: Sequence[Block],
