@@ -22,7 +22,7 @@ import pytest
 import softrobots as sr
 from softrobots.core import blas_threads
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.robots import xacro_robot
+from softrobots.robots import fields
 from tests.conftest import missing
 from tests.support import solver_mix
 from tests.support.foreign import INERTIAL, joint
@@ -133,7 +133,7 @@ def test_two_processes_give_the_same_bytes(mix: tuple[Any, ...], alone: list[byt
 @pytest.mark.usefixtures("racing")
 def test_robots_are_described_and_loaded_at_the_same_time(mix: tuple[Any, ...]) -> None:
     """Xacro keeps its state in module globals; nothing of one robot may get into another."""
-    xacro_robot._expanded.cache_clear()
+    fields._expanded.cache_clear()
     made = [
         sr.InflatableArm(link_lengths=(0.3,)),
         sr.InflatableArm(link_lengths=(0.4,)),
@@ -141,7 +141,7 @@ def test_robots_are_described_and_loaded_at_the_same_time(mix: tuple[Any, ...]) 
     ]
     with ThreadPoolExecutor(THREADS) as pool:
         models = list(pool.map(sr.load_model, made * 2))
-    xacro_robot._expanded.cache_clear()
+    fields._expanded.cache_clear()
     assert models == [sr.load_model(robot) for robot in made] * 2
 
 

@@ -23,8 +23,7 @@ from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube, PccArm
-from softrobots.robots.fields import facts_of
-from softrobots.robots.xacro_robot import default_text
+from softrobots.robots.fields import default_text, facts_of
 from tests.conftest import CHECKOUT
 from tests.support.laws import law
 from tests.support.oracles import tube_points

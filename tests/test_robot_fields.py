@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.robots.fields import Facts, PerPart, check_parameters, facts_of, parameter, per_part
-from softrobots.robots.xacro_robot import XacroRobot
+from softrobots.robots.fields import Facts, PerPart, XacroRobot, check_parameters, facts_of, parameter, per_part
 from tests.support.laws import law
 
 numbers = st.floats(-1e6, 1e6)
@@ -37,7 +36,7 @@ def rod(**bounds: float) -> Any:
 
 @law(
     *(f"robots.fields.{name}" for name in ("parameter", "per_part", "check_parameters", "Facts")),
-    "robots.xacro_robot.XacroRobot",
+    "robots.fields.XacroRobot",
 )
 @given(limits=st.tuples(numbers, numbers).map(sorted), strict=st.tuples(st.booleans(), st.booleans()), value=numbers)
 def test_values_within_the_bounds_are_accepted(limits: list[float], strict: tuple[bool, bool], value: float) -> None:

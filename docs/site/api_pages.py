@@ -45,7 +45,7 @@ PAGES = {
         "Robots and models",
         "Parameters of a robot, what is loaded of it, and one robot on another.",
         (
-            *_top("InflatableArm", "PccArm", "HelixTube", "ROBOTS", "robots.Robot", "robots.xacro_robot.XacroRobot"),
+            *_top("InflatableArm", "PccArm", "HelixTube", "ROBOTS", "robots.Robot", "robots.fields.XacroRobot"),
             *(f"softrobots.robots.fields.{name}" for name in ("parameter", "per_part", "check_parameters", "Facts")),
             *_top("load_model", "SoftModel", "SpringGroup", "grown_coordinates"),
             *(f"softrobots.robots.parameter_file.{name}" for name in ("read_robot", "read_parameters", "write_parameters")),

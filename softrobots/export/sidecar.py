@@ -18,7 +18,7 @@ from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag, Sprin
 from softrobots.export.number_sources import Rules, check_robot, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.robots.xacro_robot import XacroRobot, default_text
+from softrobots.robots.fields import XacroRobot, default_text
 from softrobots.version import __version__
 
 FORMAT = "softrobots sidecar"

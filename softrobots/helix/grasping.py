@@ -62,14 +62,9 @@ class GraspTest(NamedTuple):
         Raises:
             ParameterError: If a number is out of range.
         """
-        return grasp_force(
-            pressure,
-            object_radius=self.object_radius,
-            deflection=self.deflections if deflection is None else deflection,
-            turn_height=self.turn_height,
-            turns=self.turns,
-            diameter=self.diameter,
-        )
+        dimensions = self._asdict()
+        tested = dimensions.pop("deflections")
+        return grasp_force(pressure, deflection=tested if deflection is None else deflection, **dimensions)
 
 
 PAPER_CYLINDER = GraspTest(object_radius=0.020, turn_height=0.080, turns=1.5, deflections=(0.0, 0.002, 0.004), diameter=0.0331)
@@ -107,7 +102,6 @@ class GraspForce:
     """Grasp force, the smaller bound [N]: force of one half on the other."""
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
         for name in self.__dataclass_fields__:
             object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
 

@@ -61,7 +61,6 @@ class BentTube:
     """Winding of the actuator: "right" or "left"."""
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
         for name in ("rest_positions", "poses", "arc_length", "contraction", "angle", "curvature", "torsion"):
             object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
 

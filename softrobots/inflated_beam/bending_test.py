@@ -43,7 +43,6 @@ class BendingTest:
     below `h - l1`."""
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
         object.__setattr__(self, "probe_distance", positive_number("probe_distance", self.probe_distance, "m"))
         for name in ("hinge_offset", "offset"):
             object.__setattr__(self, name, non_negative_number(name, getattr(self, name), "m"))

@@ -6,10 +6,10 @@ from typing import Any
 
 from softrobots.core.errors import NameNotFound
 from softrobots.description.sources import Robot
+from softrobots.robots.fields import XacroRobot
 from softrobots.robots.helix_tube import HelixTube
 from softrobots.robots.inflatable_arm import InflatableArm
 from softrobots.robots.pcc_arm import PccArm
-from softrobots.robots.xacro_robot import XacroRobot
 
 ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
     "inflatable_arm": InflatableArm,
@@ -22,11 +22,7 @@ ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
 
 
 def robot_class(name: str) -> tuple[Any, Mapping[str, Any]]:
-    """Return the class of a robot of `ROBOTS`, and the fields that its entry presets.
-
-    Raises:
-        NameNotFound: If there is no such robot.
-    """
+    """Return the class of a robot of `ROBOTS`, and the fields that its entry presets, or raise NameNotFound."""
     if name not in ROBOTS:
         raise NameNotFound("robot", name, ROBOTS)
     constructor = ROBOTS[name]

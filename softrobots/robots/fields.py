@@ -1,4 +1,4 @@
-"""Parameters of a robot as dataclass fields that carry their meaning, unit, bounds and source.
+"""A robot as a dataclass: fields that carry meaning, unit, bounds and source, and are the arguments of a xacro file.
 
 The facts are stated only there. The checks of a robot, the command line, the API reference and the JSON beside a URDF read
 them, and a test compares the xacro files with them.
@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from dataclasses import Field, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
 from softrobots.core.checks import choice, finite_array, finite_number, positive_integer
 from softrobots.core.errors import ParameterError
+from softrobots.description.expansion import expand
+from softrobots.description.paths import xacro_folder
 
 MOST_PARTS = 1000
 """Largest number of links or segments; xacro takes minutes for that many."""
@@ -120,11 +124,7 @@ def check_parameters(robot: Any, parts: str = "parts", lengths: str | None = Non
 
 
 def numbers(name: str, value: Any, count: int | None, unit: str, parts: str = "parts") -> tuple[float, ...]:
-    """Return `value` as a tuple of `count` floats, a single number repeated; of any length if `count` is None.
-
-    Raises:
-        ParameterError: If it is no number or list of numbers, or a list of another length.
-    """
+    """Return numbers as a tuple of `count`, a single one repeated, of any length without `count`; or raise ParameterError."""
     if isinstance(value, str | bytes):
         raise ParameterError(name, value, f"a number or a list of numbers [{unit}]")
     if count is not None and not isinstance(value, Sequence) and getattr(value, "ndim", 0) == 0:
@@ -135,7 +135,7 @@ def numbers(name: str, value: Any, count: int | None, unit: str, parts: str = "p
     return values
 
 
-def _checked(field: dataclasses.Field[Any], facts: Facts, value: Any, count: int, parts: str) -> Any:
+def _checked(field: Field[Any], facts: Facts, value: Any, count: int, parts: str) -> Any:
     name = field.name
     if facts.options:
         return choice(name, value, facts.options)
@@ -164,3 +164,62 @@ def _colours(name: str, value: Any, count: int, parts: str) -> tuple[tuple[float
     if checked.min() < 0.0 or checked.max() > 1.0:
         raise ParameterError(name, value, requirement)
     return tuple(tuple(colour) for colour in checked.tolist())
+
+
+@dataclass(frozen=True, kw_only=True)
+class XacroRobot:
+    """Base of a frozen dataclass whose fields (`parameter`) are the arguments of a xacro file."""
+
+    XACRO: ClassVar[str | Path]
+    """The file that describes the robot: a name in xacro/, or a path."""
+
+    @property
+    def n_joints(self) -> int:
+        """Number of movable joints of the chain; above 300 Pinocchio's workspace is refused."""
+        raise NotImplementedError
+
+    def xacro_arguments(self) -> dict[str, str]:
+        """Return the parameters as arguments of the xacro file: text by name, full precision."""
+        arguments = {}
+        for name, facts in facts_of(self).items():
+            value = getattr(self, name)
+            if facts.form == "colour":
+                arguments[name] = ",".join(" ".join(map(repr, colour)) for colour in value)
+            elif facts.in_xacro:
+                arguments[name] = argument_text(value)
+        return arguments
+
+    def urdf(self) -> str:
+        """Return the robot as URDF text, with its springs, sections and muscles inside.
+
+        Raises:
+            DescriptionError: If xacro refuses the parameters, e.g. parts too light to cut tiny links from them.
+        """
+        return _expanded(self.XACRO, tuple(self.xacro_arguments().items()))
+
+    def _each(self, name: str) -> tuple[Any, ...]:
+        """Values of a field, one a part."""
+        values: tuple[Any, ...] = getattr(self, name)
+        return values
+
+
+@lru_cache(maxsize=64)
+def _expanded(xacro_file: str | Path, arguments: tuple[tuple[str, str], ...]) -> str:
+    return expand(xacro_folder() / xacro_file, dict(arguments))
+
+
+def default_text(field: Field[Any]) -> str:
+    """Return the default of a field as the text of a xacro argument."""
+    default: Any = field.default
+    return " ".join(map(repr, default)) if field.metadata["facts"].form == "colour" else argument_text(default)
+
+
+def argument_text(value: Any) -> str:
+    """Return a value as the text of a xacro argument, full precision; None is empty."""
+    if isinstance(value, str):
+        return value
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "[" + ",".join(map(repr, value)) + "]" if isinstance(value, tuple) else repr(value)

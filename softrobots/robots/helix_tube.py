@@ -14,9 +14,8 @@ from softrobots import helix
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING, in_range
 from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import ParameterError, StraightTube
-from softrobots.robots.fields import check_parameters, parameter
+from softrobots.robots.fields import XacroRobot, check_parameters, parameter
 from softrobots.robots.pcc_arm import CHAINS, HINGE_RULES, MOST_SECTIONS
-from softrobots.robots.xacro_robot import XacroRobot
 
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""
@@ -135,7 +134,6 @@ class HelixTube(XacroRobot):
     XACRO = "helix_tube.urdf.xacro"
 
     def __post_init__(self) -> None:
-        """Check every field."""
         check_parameters(self)
         if self.wall_thickness > 0.05 * self.diameter:
             raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius, {self.radius} m")

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from softrobots import inflated_beam
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, check_parameters, parameter, per_part
-from softrobots.robots.xacro_robot import XacroRobot
+from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, parameter, per_part
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,8 +12,7 @@ import numpy as np
 from softrobots.constant_curvature import AZIMUTHS, muscle_residual
 from softrobots.core.checks import finite_array, finite_number, positive_array
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, check_parameters, numbers, parameter, per_part
-from softrobots.robots.xacro_robot import XacroRobot
+from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, numbers, parameter, per_part
 
 CHAINS = ("sections", "lumped")
 """Forms of the equivalent rigid chain."""

@@ -20,8 +20,8 @@ from softrobots.model.loader import load_model
 from softrobots.model.muscles import MUSCLE_INPUTS
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import ROBOTS, Robot, XacroRobot
+from softrobots.robots.fields import argument_text
 from softrobots.robots.parameter_file import read_parameters
-from softrobots.robots.xacro_robot import argument_text
 
 
 def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
