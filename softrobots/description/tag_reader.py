@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError
@@ -104,26 +105,19 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
 
 
 def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]) -> SectionTag:
-    name, where = _named(element, "section", source)
+    where = _where(element, "section", source)
     joints = tuple(element.get("joints", "").split())
     if len(joints) != 6 or any(roles.get(joint) != "section" for joint in joints):
         raise DescriptionError(
             f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
         )
-    length, ei, gj, ea, radius = (_positive(element, key, where) for key in ("length", "EI", "GJ", "EA", "radius"))
-    return SectionTag(name, _segment(element, where), joints, length, ei, gj, ea, _rest(element, where), radius)
-
-
-def _rest(element: ElementTree.Element, where: str) -> tuple[float, ...]:
-    rest = element.get("rest", "").split()
-    numbers = tuple(number_in(text) for text in rest)
-    if len(numbers) != 4 or any(map(math.isnan, numbers)) or numbers[3] <= 0.0:
-        raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
-    return numbers
+    ei, gj, ea = (_positive(element, key, where) for key in ("EI", "GJ", "EA"))
+    facts = _facts_of_section(element, where)
+    return SectionTag(joints=joints, bending_stiffness=ei, torsional_stiffness=gj, axial_stiffness=ea, **facts)
 
 
 def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> LumpedSectionTag:
-    name, where = _named(element, "lumped section", source)
+    where = _where(element, "lumped section", source)
     joints = {key: element.get(key, "") for key in COORDINATES if element.get(key)}
     complete = {"bend_x", "bend_y"} <= joints.keys() and springs.keys() >= set(joints.values())
     if not complete or len(set(joints.values())) != len(joints):
@@ -131,26 +125,38 @@ def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[
             f"{where} names the joints {joints}; different spring joints bend_x and bend_y are required; "
             "twist and stretch are optional"
         )
-    length, hinge, radius = (_positive(element, key, where) for key in ("length", "hinge", "radius"))
-    return LumpedSectionTag(name, _segment(element, where), joints, length, hinge, _rest(element, where), radius)
+    return LumpedSectionTag(joints=joints, hinge=_positive(element, "hinge", where), **_facts_of_section(element, where))
+
+
+def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any]:
+    """The fields of `AnySectionTag`."""
+    rest = element.get("rest", "").split()
+    strains = tuple(number_in(text) for text in rest)
+    if len(strains) != 4 or any(map(math.isnan, strains)) or strains[3] <= 0.0:
+        raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
+    sizes = {key: _positive(element, key, where) for key in ("length", "radius")}
+    return {"name": element.get("name", ""), "segment": _segment(element, where), "rest": strains, **sizes}
 
 
 def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
-    name, where = _named(element, "muscle", source)
-    positive = {key: _positive(element, key, where) for key in ("distance", "rest_length", "shortest", "longest", "strongest")}
-    if not positive["shortest"] < positive["longest"]:
-        raise DescriptionError(f"{where} is shortest at {positive['shortest']} and longest at {positive['longest']} m")
-    return MuscleTag(name, _segment(element, where), _number(element, "azimuth", where), **positive)
+    where = _where(element, "muscle", source)
+    limits: dict[str, Any] = {
+        key: _positive(element, key, where) for key in ("rest_length", "shortest", "longest", "strongest")
+    }
+    if not limits["shortest"] < limits["longest"]:
+        raise DescriptionError(f"{where} is shortest at {limits['shortest']} and longest at {limits['longest']} m")
+    return MuscleTag(**vars(_line(element, source, "muscle")), **limits)
 
 
-def _line(element: ElementTree.Element, source: str) -> LineTag:
-    name, where = _named(element, "line", source)
-    return LineTag(name, _segment(element, where), _number(element, "azimuth", where), _positive(element, "distance", where))
+def _line(element: ElementTree.Element, source: str, kind: str = "line") -> LineTag:
+    where = _where(element, kind, source)
+    azimuth, distance = _number(element, "azimuth", where), _positive(element, "distance", where)
+    return LineTag(name=element.get("name", ""), segment=_segment(element, where), azimuth=azimuth, distance=distance)
 
 
-def _named(element: ElementTree.Element, kind: str, source: str) -> tuple[str, str]:
-    """Name of a part, and the part for errors."""
-    return element.get("name", ""), f"the {kind} {element.get('name', '')!r} of {source}"
+def _where(element: ElementTree.Element, kind: str, source: str) -> str:
+    """A part, for errors."""
+    return f"the {kind} {element.get('name', '')!r} of {source}"
 
 
 def _tip(root: ElementTree.Element, source: str) -> str | None:
@@ -167,20 +173,21 @@ def _check_together(tags: RobotTags, source: str) -> None:
     """Check that names are unique, no joint is in two sections, and muscles run along segments that exist."""
     if tags.sections and tags.lumped_sections:
         raise DescriptionError(f"{source} has sections and lumped sections; one kind is required")
-    _unique("section", [*(tag.name for tag in tags.sections), *(tag.name for tag in tags.lumped_sections)], source)
-    _unique("muscle", [*(tag.name for tag in tags.muscles), *(tag.name for tag in tags.lines)], source)
+    sections, lines = (*tags.sections, *tags.lumped_sections), (*tags.muscles, *tags.lines)
+    _unique("section", [tag.name for tag in sections], source)
+    _unique("muscle", [tag.name for tag in lines], source)
     used = [joint for tag in tags.sections for joint in tag.joints]
     used += [joint for lumped in tags.lumped_sections for joint in lumped.joints.values()]
     _unique("joint of a section", used, source)
     orphans = [name for name, role in tags.roles.items() if role == "section" and name not in used]
     if orphans:
         raise DescriptionError(f"{source} has joints with the role 'section' that no section names: {', '.join(orphans)}")
-    segments = {tag.segment for tag in tags.sections} | {tag.segment for tag in tags.lumped_sections}
-    named = [("muscle", tag.name, tag.segment) for tag in tags.muscles]
-    for what, name, segment in [*named, *(("line", tag.name, tag.segment) for tag in tags.lines)]:
-        if segment not in segments:
+    segments = {tag.segment for tag in sections}
+    for tag in lines:
+        if tag.segment not in segments:
+            what = "muscle" if isinstance(tag, MuscleTag) else "line"
             raise DescriptionError(
-                f"the {what} {name!r} of {source} runs along segment {segment}; "
+                f"the {what} {tag.name!r} of {source} runs along segment {tag.segment}; "
                 f"available: {', '.join(map(str, sorted(segments))) or 'none'}"
             )
 

@@ -39,75 +39,49 @@ class InflatedLinkTag:
     """Largest moment of the link, beyond wrinkling [N m]; None for linear springs."""
 
 
-@dataclass(frozen=True)
-class SectionTag:
-    """A section of constant strain: six joints that follow four section coordinates."""
+@dataclass(frozen=True, kw_only=True)
+class AnySectionTag:
+    """What both kinds of sections have."""
 
     name: str
-    """Name of the section, and of the link at its end."""
+    """Name of the section; of constant strain, also of the link at its end."""
     segment: int
     """Number of the segment that it is part of, from 1."""
-    joints: tuple[str, ...]
-    """Its six joints, base to tip; `softrobots.constant_curvature.strain_chain.JOINTS` in that order."""
     length: float
     """Rest length [m]."""
+    rest: tuple[float, ...]
+    """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
+    radius: float
+    """Radius of the body, for pictures [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionTag(AnySectionTag):
+    """A section of constant strain: six joints that follow four section coordinates."""
+
+    joints: tuple[str, ...]
+    """Its six joints, base to tip; `softrobots.constant_curvature.strain_chain.JOINTS` in that order."""
     bending_stiffness: float
     """EI [N m^2]."""
     torsional_stiffness: float
     """GJ [N m^2]."""
     axial_stiffness: float
     """EA [N]."""
-    rest: tuple[float, ...]
-    """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
-    radius: float
-    """Radius of the body, for pictures [m]."""
 
 
-@dataclass(frozen=True)
-class LumpedSectionTag:
+@dataclass(frozen=True, kw_only=True)
+class LumpedSectionTag(AnySectionTag):
     """A section lumped into spring joints at its middle."""
 
-    name: str
-    """Name of the section."""
-    segment: int
-    """Number of the segment that it is part of, from 1."""
     joints: Mapping[str, str]
     """Spring joint by section coordinate, `STRAINS`; `twist` and `stretch` may be missing."""
-    length: float
-    """Rest length [m]."""
     hinge: float
     """Length of rod from the start of the section to the joints [m]."""
-    rest: tuple[float, ...]
-    """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
-    radius: float
-    """Radius of the body, for pictures [m]."""
 
 
-@dataclass(frozen=True)
-class MuscleTag:
-    """A muscle along a segment, parallel to its backbone."""
-
-    name: str
-    """Name of the muscle."""
-    segment: int
-    """Number of the segment, from 1."""
-    azimuth: float
-    """Azimuth, from the x axis of the segment towards y [rad]."""
-    distance: float
-    """Distance from the backbone [m]."""
-    rest_length: float
-    """Length with the segment straight at its rest length [m]."""
-    shortest: float
-    """Lower limit of its length [m]."""
-    longest: float
-    """Upper limit of its length [m]."""
-    strongest: float
-    """Largest tension and push [N]."""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LineTag:
-    """A drawn line along a segment, parallel to its backbone, without effect: the actuator of a helix."""
+    """A line along a segment, parallel to its backbone; one without effect, as the actuator of a helix, is drawn only."""
 
     name: str
     """Name of the line."""
@@ -117,6 +91,20 @@ class LineTag:
     """Azimuth, from the x axis of the segment towards y [rad]."""
     distance: float
     """Distance from the backbone [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MuscleTag(LineTag):
+    """A muscle along such a line."""
+
+    rest_length: float
+    """Length with the segment straight at its rest length [m]."""
+    shortest: float
+    """Lower limit of its length [m]."""
+    longest: float
+    """Upper limit of its length [m]."""
+    strongest: float
+    """Largest tension and push [N]."""
 
 
 @dataclass(frozen=True)

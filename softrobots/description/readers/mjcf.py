@@ -6,6 +6,7 @@ Coordinates are MuJoCo's `qpos`, also where `ref` is not zero: the placement of 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,10 @@ from softrobots.core.checks import LARGEST, read_only
 from softrobots.core.errors import DescriptionError, MissingDependency
 from softrobots.core.xml_input import parse_xml
 from softrobots.description.readers.mjcf_limits import check_mjcf
-from softrobots.description.readers.mjcf_refusals import driven_joint, joint_name, not_carried
+from softrobots.description.readers.mjcf_refusals import driven_joint, name_in, not_carried
 from softrobots.description.readers.mjcf_shapes import visible_shapes
-from softrobots.description.readers.tree_builder import Motion, TreeBuilder
-from softrobots.description.rigid_tree import Body, Placement, RigidTree
+from softrobots.description.readers.tree_builder import TreeBuilder
+from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree
 from softrobots.description.urdf_tags import SpringTag
 
 
@@ -59,9 +60,9 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     if reasons:
         raise DescriptionError(f"{source} has features that a robot of springs and motors lacks: {'; '.join(reasons)}")
     shapes = visible_shapes(mujoco, model, text, path)
-    bodies = [_body_name(model, number) for number in range(model.nbody)]
-    joints = [joint_name(model, number) for number in range(model.njnt)]
-    builder = TreeBuilder(_model_name(model), source, bodies, joints)
+    bodies = [name_in(model, "body", number) for number in range(model.nbody)]
+    joints = [name_in(model, "joint", number) for number in range(model.njnt)]
+    builder = TreeBuilder(_model_name(model), source, bodies, joints, _springs(model, joints))
     for number, name in enumerate(bodies):
         body = Body(
             name,
@@ -73,8 +74,8 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
         if number == 0:
             builder.draw_on_world(body)
             continue
-        motions, end = _motions(mujoco, model, number, source)
-        builder.add(body, bodies[model.body_parentid[number]], motions, end)
+        parent = bodies[model.body_parentid[number]]
+        builder.add(body, parent, *_joints(mujoco, model, number, source, parent))
     for number in range(model.nsite):
         site = model.site(number)
         if site.name:
@@ -82,41 +83,41 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     return builder.tree()
 
 
-def _motions(mujoco: Any, model: Any, body: int, source: str) -> tuple[list[Motion], Placement]:
+def _joints(mujoco: Any, model: Any, body: int, source: str, parent: str) -> tuple[list[Joint], Placement]:
     """Degrees of freedom of a body, each about its anchor, and the pose of the body in the frame of the last one."""
     place = Placement.turned(model.body_pos[body], model.body_quat[body])
-    motions: list[Motion] = []
+    joints: list[Joint] = []
     first = int(model.body_jntadr[body])
     for joint in range(first, first + int(model.body_jntnum[body])):
         slides = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
         kind = "prismatic" if slides else "revolute"
+        name, child = name_in(model, "joint", joint), name_in(model, "body", body)
         axis, anchor = np.array(model.jnt_axis[joint]), np.zeros(3) if slides else np.array(model.jnt_pos[joint])
         reference = float(model.qpos0[model.jnt_qposadr[joint]])
         if not abs(reference) <= LARGEST:
-            raise DescriptionError(
-                f"{source}: the joint {joint_name(model, joint)} has ref = {reference}; up to {LARGEST:g} is read"
-            )
+            raise DescriptionError(f"{source}: the joint {name} has ref = {reference}; up to {LARGEST:g} is read")
         dof = int(model.jnt_dofadr[joint])
-        motions.append(
-            Motion(
-                joint_name(model, joint),
+        joints.append(
+            Joint(
+                name,
                 kind,
+                parent,
+                child,
                 place @ Placement(anchor) @ Placement.moved(kind, axis, -reference),
                 axis,
                 tuple(model.jnt_range[joint].tolist()) if model.jnt_limited[joint] else (-np.inf, np.inf),
                 _effort(mujoco, model, joint),
                 np.inf,
                 float(model.dof_damping[dof]),
-                _spring(model, joint),
             )
         )
         place = Placement(-anchor)
-    return motions, place
+    return joints, place
 
 
-def _spring(model: Any, joint: int) -> SpringTag | None:
-    stiffness = float(model.jnt_stiffness[joint])
-    return SpringTag(stiffness, float(model.qpos_spring[model.jnt_qposadr[joint]])) if stiffness != 0.0 else None
+def _springs(model: Any, names: Sequence[str]) -> dict[str, SpringTag]:
+    stiffness, rest = model.jnt_stiffness.tolist(), model.qpos_spring[model.jnt_qposadr].tolist()
+    return {name: SpringTag(*pair) for name, *pair in zip(names, stiffness, rest, strict=True) if pair[0] != 0.0}
 
 
 def _effort(mujoco: Any, model: Any, joint: int) -> float:
@@ -129,10 +130,6 @@ def _effort(mujoco: Any, model: Any, joint: int) -> float:
         if driven_joint(mujoco, model, number) == joint
     ]
     return max(limits, default=np.inf)
-
-
-def _body_name(model: Any, number: int) -> str:
-    return str(model.body(number).name) or f"body_{number}"
 
 
 def _model_name(model: Any) -> str:

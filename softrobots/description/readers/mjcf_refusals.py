@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 
-def joint_name(model: Any, number: int) -> str:
-    """Return the name of a joint of a MuJoCo model; `joint_<number>` if it has none."""
-    return str(model.joint(number).name) or f"joint_{number}"
+def name_in(model: Any, kind: str, number: int) -> str:
+    """Return the name of a "body" or "joint" of a MuJoCo model; `<kind>_<number>` if it has none."""
+    return str(getattr(model, kind)(number).name) or f"{kind}_{number}"
 
 
 def driven_joint(mujoco: Any, model: Any, actuator: int) -> int | None:
@@ -43,7 +43,10 @@ def _joints(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
         ("plastic joint springs", plastic, "their rest position depends on the history"),
         ("joints with spring and dry friction", springs & rubbing, "their equilibrium is not unique"),
     ):
-        names = [f"{joint_name(model, number)} of body {_body(model, number)}" for number in np.flatnonzero(chosen).tolist()]
+        names = [
+            f"{name_in(model, 'joint', number)} of body {name_in(model, 'body', int(model.jnt_bodyid[number]))}"
+            for number in np.flatnonzero(chosen).tolist()
+        ]
         if names:
             yield f"{what} {_few(names)}", why
 
@@ -91,22 +94,18 @@ def _elsewhere(mujoco: Any, model: Any) -> Iterable[tuple[str, str]]:
     if active:
         yield f"equality constraints {_few(active)}", "loops and couplings are not supported"
     if model.nflex:
-        yield (
-            f"{model.nflex} flexes",
-            "deformable bodies; a chain of hinges with stiffness is supported",
-        )
-    bodies = [str(model.body(number).name) or f"body_{number}" for number in np.flatnonzero(model.body_plugin >= 0)]
+        yield f"{model.nflex} flexes", "deformable bodies; a chain of hinges with stiffness is supported"
+    bodies = [name_in(model, "body", number) for number in np.flatnonzero(model.body_plugin >= 0).tolist()]
     if bodies:
         yield f"plugins with forces on bodies {_few(bodies)}", "as of the cable; a chain of hinges with stiffness is supported"
-    floating = [str(model.body(number).name) or f"body_{number}" for number in np.flatnonzero(model.body_gravcomp)]
+    floating = [name_in(model, "body", number) for number in np.flatnonzero(model.body_gravcomp).tolist()]
     if floating:
         yield f"gravity compensation of bodies {_few(floating)}", "every body has its full weight"
     if np.any(model.opt.wind) and (model.opt.density > 0.0 or model.opt.viscosity > 0.0):
         yield "wind", "loads are given to the solvers"
     flags = mujoco.mjtDisableBit
-    off = (
-        flags.mjDSBL_SPRING if hasattr(flags, "mjDSBL_SPRING") else flags.mjDSBL_PASSIVE
-    )  # older versions have one flag for all passive forces
+    # Older versions have one flag for all passive forces.
+    off = flags.mjDSBL_SPRING if hasattr(flags, "mjDSBL_SPRING") else flags.mjDSBL_PASSIVE
     if model.opt.disableflags & int(off) and np.any(model.jnt_stiffness):
         yield "springs that are disabled", "remove their stiffness instead"
 
@@ -115,11 +114,6 @@ def _rows(model: Any, field: str, count: int) -> Any:
     """Which rows of a field, absent before MuJoCo 4, are not all zero."""
     values = getattr(model, field, None)
     return np.zeros(count, dtype=bool) if values is None else np.any(np.asarray(values) != 0.0, axis=1)
-
-
-def _body(model: Any, joint: int) -> str:
-    number = int(model.jnt_bodyid[joint])
-    return str(model.body(number).name) or f"body_{number}"
 
 
 def _few(names: list[str], most: int = 5) -> str:

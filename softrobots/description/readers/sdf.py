@@ -19,8 +19,8 @@ from softrobots.core.xml_input import parse_xml
 from softrobots.description.readers.sdf_refusals import not_carried
 from softrobots.description.readers.sdf_shapes import placement_of, visible_shapes
 from softrobots.description.readers.sdf_text import warnings_of_drake, without_drawings
-from softrobots.description.readers.tree_builder import Motion, TreeBuilder
-from softrobots.description.rigid_tree import Body, Placement, RigidTree
+from softrobots.description.readers.tree_builder import TreeBuilder
+from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree
 from softrobots.description.urdf_structure import MOST_LINKS
 from softrobots.description.urdf_tags import SpringTag
 
@@ -87,14 +87,14 @@ def _tree(plant: Any, source: str, frames: set[str], shapes: dict[str, list[Any]
     model = _moving_model(plant, edges, source)
     names = {edge.child.index(): _name(plant, edge.child, model) for edge in edges}
     names[plant.world_body().index()] = "world"
-    springs, efforts = _springs(plant), _efforts(plant)
-    builder = TreeBuilder(
-        model, source, names.values(), [_name(plant, edge.joint, model) for edge in edges if edge.joint.num_velocities()]
-    )
+    joints = {edge.joint.index(): _name(plant, edge.joint, model) for edge in edges if edge.joint.num_velocities()}
+    by_joint, efforts = _springs(plant), _efforts(plant)
+    springs = {name: by_joint[index] for index, name in joints.items() if index in by_joint}
+    builder = TreeBuilder(model, source, names.values(), joints.values(), springs)
     for edge in edges:
-        motions, end = _motions(edge, _name(plant, edge.joint, model), springs, efforts)
-        body = _body(edge.child, names[edge.child.index()], shapes)
-        builder.add(body, names[edge.parent.index()], motions, end)
+        ends = names[edge.parent.index()], names[edge.child.index()]
+        moving, end = _joints(edge, joints.get(edge.joint.index(), ""), ends, efforts)
+        builder.add(_body(edge.child, ends[1], shapes), ends[0], moving, end)
     for frame in _items(plant.get_frame, "FrameIndex", plant.num_frames()):
         if frame.name() in frames and not frame.is_body_frame():
             place = placement_of(frame.GetFixedPoseInBodyFrame())
@@ -155,32 +155,29 @@ def _not_supported(plant: Any) -> Iterator[str]:
         yield f"{plant.num_constraints()} constraints (loops and couplings are not supported)"
 
 
-def _motions(
-    edge: _Edge, name: str, springs: dict[Any, SpringTag], efforts: dict[Any, float]
-) -> tuple[list[Motion], Placement]:
+def _joints(edge: _Edge, name: str, ends: tuple[str, str], efforts: dict[Any, float]) -> tuple[list[Joint], Placement]:
+    """The joint of an edge, if it moves, and the pose of its child in the joint, or in the parent."""
     joint = edge.joint
-    start, end = (
-        placement_of(joint.frame_on_parent().GetFixedPoseInBodyFrame()),
-        placement_of(joint.frame_on_child().GetFixedPoseInBodyFrame()),
-    )
+    start = placement_of(joint.frame_on_parent().GetFixedPoseInBodyFrame())
+    end = placement_of(joint.frame_on_child().GetFixedPoseInBodyFrame())
     if joint.num_velocities() == 0:
         joined = start @ placement_of(joint.X_FM()) @ end.inverse
         return [], joined.inverse if edge.reversed else joined
     axis = np.array(joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis())
     if edge.reversed:  # the same motion with parent and child exchanged
         start, end, axis = end, start, -axis
-    motion = Motion(
+    moving = Joint(
         name,
         _KINDS[joint.type_name()],
+        *ends,
         start,
         axis,
         (float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])),
         efforts.get(joint.index(), np.inf),
         float(joint.velocity_upper_limits()[0]),
         float(joint.default_damping_vector()[0]),
-        springs.get(joint.index()),
     )
-    return [motion], end.inverse
+    return [moving], end.inverse
 
 
 def _springs(plant: Any) -> dict[Any, SpringTag]:

@@ -10,8 +10,8 @@ last hinge with `C` off its axis gets one too, to which the body is fixed; other
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,34 +26,12 @@ _UNIT = 1e-6  # tolerance of the length of an axis
 _X_AXIS = read_only(np.array([1.0, 0.0, 0.0]))
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """One degree of freedom between a body and its parent."""
-
-    name: str
-    """Name of the joint."""
-    kind: str
-    """"revolute" or "prismatic"."""
-    start: Placement
-    """Pose of its frame in that of the previous joint, or of the parent body, at zero."""
-    axis: FloatArray
-    """Unit axis in its frame, shape (3,)."""
-    limits: tuple[float, float]
-    """Lowest and highest coordinate [rad or m]; infinite where there is none."""
-    effort: float
-    """Largest torque or force [N m or N]."""
-    velocity: float
-    """Largest speed [rad/s or m/s]."""
-    damping: float
-    """Viscous damping [N m s/rad or N s/m]."""
-    spring: SpringTag | None
-    """Its spring, if any."""
-
-
 class TreeBuilder:
     """Collects bodies and joints, parents first."""
 
-    def __init__(self, name: str, source: str, bodies: Iterable[str], joints: Iterable[str]) -> None:
+    def __init__(
+        self, name: str, source: str, bodies: Iterable[str], joints: Iterable[str], springs: Mapping[str, SpringTag]
+    ) -> None:
         """Start with an empty world.
 
         Args:
@@ -61,6 +39,7 @@ class TreeBuilder:
             source: Its origin, for errors.
             bodies: Names of all bodies; extra links get other names.
             joints: Names of all joints.
+            springs: Springs by name of the joint.
 
         Raises:
             DescriptionError: If a name in the file is also generated for an unnamed or nested part.
@@ -77,7 +56,7 @@ class TreeBuilder:
         self._links, self._names = {"world", *bodies}, set(joints)
         self._bodies: list[Body] = [Body("world", 0.0, Placement(), read_only(np.zeros((3, 3))))]
         self._joints: list[Joint] = []
-        self._springs: dict[str, SpringTag] = {}
+        self._springs = springs
         self._moving: set[str] = set()
         self._carriers: set[str] = set()
 
@@ -85,13 +64,13 @@ class TreeBuilder:
         """Copy the visual shapes of a body to the world."""
         self._bodies[0] = replace(self._bodies[0], visuals=world.visuals)
 
-    def add(self, body: Body, parent: str, motions: Sequence[Motion], end: Placement) -> None:
+    def add(self, body: Body, parent: str, joints: Sequence[Joint], end: Placement) -> None:
         """Add a body.
 
         Args:
             body: The body.
             parent: Its parent body.
-            motions: Degrees of freedom from the parent to it; none if it is fixed.
+            joints: Degrees of freedom from the parent to it, each placed in the frame of the previous one; none if it is fixed.
             end: Pose of the body in the frame of the last of them, or in its parent.
 
         Raises:
@@ -99,31 +78,32 @@ class TreeBuilder:
         """
         self._check(f"the body {body.name}", body.mass, body.centre.position, body.centre.rotation, body.inertia)
         self._check(f"the body {body.name}", end.position, end.rotation)
-        for motion in motions:
-            bounds = np.array([bound for bound in motion.limits if not np.isinf(bound)])
-            self._check(f"the joint {motion.name}", motion.start.position, motion.start.rotation, motion.axis, bounds)
-            self._check(f"the joint {motion.name}", motion.damping)
-            if not abs(np.linalg.norm(motion.axis) - 1.0) <= _UNIT:
+        for joint in joints:
+            bounds = np.array([bound for bound in joint.limits if not np.isinf(bound)])
+            self._check(f"the joint {joint.name}", joint.placement.position, joint.placement.rotation, joint.axis, bounds)
+            self._check(f"the joint {joint.name}", joint.damping)
+            if not abs(np.linalg.norm(joint.axis) - 1.0) <= _UNIT:
                 raise DescriptionError(
-                    f"{self._source}: the joint {motion.name} has the axis {motion.axis.tolist()}; a direction is required"
+                    f"{self._source}: the joint {joint.name} has the axis {joint.axis.tolist()}; a direction is required"
                 )
         self._carriers.add(parent)
-        if motions or parent in self._moving:
+        if joints or parent in self._moving:
             self._moving.add(body.name)
-        if not motions:
+        if not joints:
             self._fix(body, parent, end)
             return
-        last = motions[-1]
+        last = joints[-1]
         beside = last.kind == "revolute" and float(np.linalg.norm(np.cross(last.axis, end.position))) > _ROUNDING
         if not beside:
             turned = end.rotation.T @ last.axis
-            last, end = replace(last, start=last.start @ end, axis=read_only(turned / np.linalg.norm(turned))), Placement()
-        motions = [*motions[:-1], last]
-        body, shares = self._shared(body, motions, end)
-        for motion, mass, following in zip(motions[:-1], shares, motions[1:], strict=True):
-            name = self._free_name(self._links, f"{body.name}_{motion.name}")
-            self._bodies.append(small_ball(name, mass, following.start.position, gyration(body)))
-            self._move(motion, parent, name)
+            axis = read_only(turned / np.linalg.norm(turned))
+            last, end = replace(last, placement=last.placement @ end, axis=axis), Placement()
+        joints = [*joints[:-1], last]
+        body, shares = self._shared(body, joints, end)
+        for joint, mass, following in zip(joints[:-1], shares, joints[1:], strict=True):
+            name = self._free_name(self._links, f"{body.name}_{joint.name}")
+            self._bodies.append(small_ball(name, mass, following.placement.position, gyration(body)))
+            self._move(joint, parent, name)
             parent = name
         if beside:
             name = self._free_name(self._links, f"{body.name}_{last.name}")
@@ -153,26 +133,22 @@ class TreeBuilder:
         tip = "tip" if "tip" in self._links else next(iter(ends)) if len(ends) == 1 else None
         return RigidTree(self._name, tuple(self._bodies), tuple(self._joints), dict(self._springs), tip)
 
-    def _shared(self, body: Body, motions: Sequence[Motion], end: Placement) -> tuple[Body, list[float]]:
+    def _shared(self, body: Body, joints: Sequence[Joint], end: Placement) -> tuple[Body, list[float]]:
         """Move mass from the body to each link before the last hinges whose axes meet at one point."""
         takers = 0
-        for motion in reversed(motions[1:]):
-            if motion.kind != "revolute":
+        for joint in reversed(joints[1:]):
+            if joint.kind != "revolute":
                 break
             takers += 1
-            if np.any(motion.start.position):
+            if np.any(joint.placement.position):
                 break
         point = -end.rotation.T @ end.position
         lighter, each = give_mass(body, point, takers)
-        return lighter, [0.0] * (len(motions) - 1 - takers) + [each] * takers
+        return lighter, [0.0] * (len(joints) - 1 - takers) + [each] * takers
 
-    def _move(self, motion: Motion, parent: str, child: str) -> None:
-        spring = motion.spring
-        effort, velocity = (value if value > 0.0 else LARGEST for value in (motion.effort, motion.velocity))
-        details = (motion.start, motion.axis, motion.limits, effort, velocity, motion.damping)
-        self._joints.append(Joint(motion.name, motion.kind, parent, child, *details))
-        if spring is not None:
-            self._springs[motion.name] = spring
+    def _move(self, joint: Joint, parent: str, child: str) -> None:
+        effort, velocity = (value if value > 0.0 else LARGEST for value in (joint.effort, joint.velocity))
+        self._joints.append(replace(joint, parent=parent, child=child, effort=effort, velocity=velocity))
 
     def _fix(self, body: Body, parent: str, placement: Placement) -> None:
         self._bodies.append(body)
