@@ -261,11 +261,8 @@ def program_at(
     unknowns = Unknowns(model.chain(), locked)
     program = make_program(unknowns, weight=gravity is not None)
     actuation = Actuation(model, unknowns)
-    w = [0.0] * program.size
-    w[program.layout.force : program.layout.force + 3] = force.tolist()
-    if gravity is not None:
-        w[program.layout.gravity : program.layout.gravity + 3] = gravity.tolist()
-    actuation.put(Run(program, None), w, motors)
+    weight = {} if gravity is None else {"gravity": gravity}
+    w = actuation.workspace(Run(program, None), motors, force=force, **weight).tolist()
     return program, functions(program.text), actuation, w
 
 

@@ -299,3 +299,14 @@ def test_a_path_starts_where_solve_ik_says() -> None:
     first = sr.solve_ik(model, path[0], (0.0, 1.0, 0.0))
     assert found.certified.all()
     assert np.abs((found.q_motors[0] - first.q_motors) / model.motor_scale).max() < 3e-6
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_batch_without_cases(name: str) -> None:
+    """Muscles of given length are checked row by row: no rows, no check."""
+    model, c = robot(name), solver(name)
+    nothing, force = np.zeros((0, model.n_motors)), np.zeros((0, 3))
+    assert c.equilibria(nothing, force).q_springs.shape == (0, model.n_springs)
+    assert c.inverse_kinematics(force, q_motors0=nothing).q_motors.shape == nothing.shape
+    if name in FEELING:
+        assert c.estimate_loads(nothing, nothing).forces.shape == (0, 3)

@@ -27,14 +27,17 @@ class Actuation:
         self._lengths = len(chain.muscle_rest) > 0 and not self._tensions
         self._relaxed = chain.free @ model.rest  # strains at rest of elastic coordinates and muscles
 
-    def put(self, run: Any, w: Any, motors: FloatArray) -> None:
-        """Write the actuators of one case into a workspace, with its start."""
-        layout = run.layout
+    def workspace(self, run: Any, motors: FloatArray, **numbers: FloatArray) -> Any:
+        """Return a workspace of one case: actuators, start, and other numbers by the name of their place in the layout."""
+        layout, w = run.layout, run.workspace()
         run.put(w, 0, motors[: self._count])
         if self._tensions:
             run.put(w, layout.pull, self._pulls(motors[None]))
         if self._lengths:
             run.put(w, layout.start, self._starts(motors[None]))
+        for name, values in numbers.items():
+            run.put(w, getattr(layout, name), values)
+        return w
 
     def jacobian(self, run: Any, w: Any) -> FloatArray:
         """Return the elastostatic Jacobian of all actuators after `look_at_tip`, shape (3, n_motors)."""
@@ -78,7 +81,8 @@ class Actuation:
         if joints.size and not (joints.min() >= -LARGEST_POSITION and joints.max() <= LARGEST_POSITION):
             bad |= ~np.all(np.abs(joints) <= LARGEST_POSITION, axis=1)
         if self._lengths:
-            bad |= [not (np.all(np.isfinite(row)) and self._model.actuators.admit(row)) for row in motors]
+            admitted = (np.all(np.isfinite(row)) and self._model.actuators.admit(row) for row in motors)
+            bad |= ~np.fromiter(admitted, dtype=bool, count=len(motors))
         return bad
 
     def checked(self, q_motors: Any, field: str = "q_motors") -> FloatArray:

@@ -97,12 +97,6 @@ def fail(statuses: Any, bad: Any, errors: Sequence[FloatArray], others: Sequence
         other[failed] = np.nan_to_num(other[failed], posinf=0.0, neginf=0.0)
 
 
-def statuses_of(values: Any) -> Any:
-    """Mark statuses as read-only."""
-    values.setflags(write=False)
-    return values
-
-
 def in_parts(work: Callable[[int, int], None], count: int, threads: int) -> None:
     """Work on cases in chunks that threads take as they become free.
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.backends import BACKENDS, available_backend
-from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, statuses_of, unusable, without
+from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, unusable, without
 from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE, CompiledStatics
 from softrobots.compiled.run.looped_search import LoopedSearch
 from softrobots.compiled.run.results import CompiledLoadEstimate, LoadBatch, MotorBatch
 from softrobots.compiled.run.unrolled_search import UnrolledSearch
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
-from softrobots.core.checks import choice, finite_array, positive_number, read_only
+from softrobots.core.checks import choice, finite_array, positive_number
 from softrobots.core.errors import LoadNotFound, ParameterError, TargetUnreachable
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
@@ -140,14 +140,7 @@ class CompiledModel(CompiledStatics):
         search = self._search(run)
         statuses, unknowns, forces, residuals, unexplained, observed = search.estimate_batch(motors, torques, down, threads)
         fail(statuses, bad, [residuals, unexplained], [unknowns, forces, observed])
-        return LoadBatch(
-            read_only(self._actuation.elastic(unknowns)),
-            statuses_of(statuses),
-            read_only(residuals),
-            read_only(forces),
-            read_only(unexplained),
-            read_only(observed),
-        )
+        return LoadBatch(self._actuation.elastic(unknowns), statuses, residuals, forces, unexplained, observed)
 
     def inverse_kinematics(
         self,
@@ -198,13 +191,7 @@ class CompiledModel(CompiledStatics):
             points, loads, down, motors, unknowns, tolerance, threads
         )
         fail(statuses, bad, [residuals, errors], [unknowns, motors])
-        return MotorBatch(
-            read_only(self._actuation.elastic(unknowns)),
-            statuses_of(statuses),
-            read_only(residuals),
-            read_only(motors),
-            read_only(errors),
-        )
+        return MotorBatch(self._actuation.elastic(unknowns), statuses, residuals, motors, errors)
 
     def follow(
         self,

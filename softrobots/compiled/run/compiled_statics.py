@@ -11,7 +11,7 @@ from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import make_program
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.backends import make_run
-from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, statuses_of, unusable, without
+from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import finite_array, read_only
@@ -133,10 +133,8 @@ class CompiledStatics:
     def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:
         run = self._run(gravity is not None)
         motors = self._actuation.checked(q_motors)
-        w = run.workspace()
-        run.put(w, run.layout.force, finite_array("force", force, (3,), "N"))
-        run.put(w, run.layout.gravity, gravity_vector(gravity))
-        self._actuation.put(run, w, motors)
+        load = finite_array("force", force, (3,), "N")
+        w = self._actuation.workspace(run, motors, force=load, gravity=gravity_vector(gravity))
         if q_springs0 is None:
             status = run.settle(w)
         else:
@@ -180,9 +178,7 @@ class CompiledStatics:
         (unknowns, tips, squares), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
         residuals = root(squares)
         fail(statuses, bad, [residuals], [unknowns, tips])
-        return EquilibriumBatch(
-            read_only(self._actuation.elastic(unknowns)), statuses_of(statuses), read_only(residuals), read_only(tips)
-        )
+        return EquilibriumBatch(self._actuation.elastic(unknowns), statuses, residuals, tips)
 
     def _run(self, weight: bool) -> Any:
         """Return the code with or without gravity, generated on first use."""

@@ -13,11 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.batches import statuses_of
 from softrobots.compiled.run.results import MotorBatch
 from softrobots.compiled.settings import HIDDEN, LEAST_SIZE, SEARCH_STEPS
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray, positive_integer, read_only
+from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.force_search import Directions, search_force, torque_tolerance
 from softrobots.statics.tip_search import LocalSolution, advance, search
@@ -45,13 +44,9 @@ class LoopedSearch:
         self, q_motors: FloatArray, force: FloatArray, gravity: FloatArray, start: FloatArray
     ) -> tuple[Status, ChainState]:
         """Find the equilibrium from given elastic coordinates."""
-        run, layout = self.run, self.run.layout
-        w = run.workspace()
-        self.actuation.put(run, w, q_motors)
-        run.put(w, layout.force, force)
-        run.put(w, layout.gravity, gravity)
-        run.put(w, layout.unknown, self.actuation.unknowns(q_motors, start))
-        status = Status(run.settle_from(w))
+        unknowns = self.actuation.unknowns(q_motors, start)
+        w = self.actuation.workspace(self.run, q_motors, force=force, gravity=gravity, unknown=unknowns)
+        status = Status(self.run.settle_from(w))
         return status, ChainState(w, self.actuation.elastic(self.unknowns(w)))
 
     def unknowns(self, w: Any) -> FloatArray:
@@ -72,16 +67,7 @@ class LoopedSearch:
         return self.actuation.jacobian(self.run, w)
 
     def estimate(self, q_motors: FloatArray, torques: FloatArray, gravity: FloatArray) -> tuple[Status, Any]:
-        """Find the force that explains motor torques.
-
-        Args:
-            q_motors: Actuators, shape (n_motors,).
-            torques: Their loads, shape (n_motors,) [N m or N].
-            gravity: Gravity, shape (3,) [m/s^2].
-
-        Returns:
-            The status, and a workspace with the results as of `motor_drivers.estimate`.
-        """
+        """Find the force that explains motor torques; return the status, and a workspace as of `motor_drivers.estimate`."""
         problem = _MeasuredTorques(self, q_motors, torques, gravity)
         status, state = self.settle(q_motors, np.zeros(3), gravity, self.model.rest)
         single = self.run.layout.single
@@ -109,19 +95,7 @@ class LoopedSearch:
         start: FloatArray,
         tolerance: float,
     ) -> tuple[Status, LocalSolution[ChainState]]:
-        """Find actuators that put the tip at a target, from given ones.
-
-        Args:
-            target: The target, shape (3,) [m].
-            force: Force on the tip, shape (3,) [N].
-            gravity: Gravity, shape (3,) [m/s^2].
-            q_motors: Actuators to start from, shape (n_motors,).
-            start: Elastic coordinates to start from, shape (n_springs,).
-            tolerance: Largest distance from the target [m].
-
-        Returns:
-            The status, and the end of the search.
-        """
+        """Find actuators that put the tip within the tolerance [m] of a target, from given ones and elastic coordinates."""
         tip = _SoughtTip(self.model, self, force, gravity, target)
         first = self.model.actuators.go(q_motors, np.zeros(len(q_motors)))  # within the limits
         status, state = self.settle(first, force, gravity, start)
@@ -153,11 +127,11 @@ class LoopedSearch:
                 poses.append(here)
                 statuses.append(self._arrived(here, tolerance))
         batch = MotorBatch(
-            read_only(np.array([one.state.q_springs for one in poses])),
-            statuses_of(np.array(statuses, dtype=np.uint8)),
-            read_only(np.array([self.residual(one.state.w) for one in poses])),
-            read_only(np.array([one.q_motors for one in poses])),
-            read_only(np.array([one.error for one in poses])),
+            np.array([one.state.q_springs for one in poses]),
+            np.array(statuses, dtype=np.uint8),
+            np.array([self.residual(one.state.w) for one in poses]),
+            np.array([one.q_motors for one in poses]),
+            np.array([one.error for one in poses]),
         )
         return batch, first.iterations
 
@@ -165,12 +139,6 @@ class LoopedSearch:
         self, motors: FloatArray, torques: FloatArray, gravity: FloatArray, threads: int
     ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Find the forces of many cases, one after the other whatever the number of threads.
-
-        Args:
-            motors: Actuators, shape (n, n_motors).
-            torques: Their loads, shape (n, n_motors) [N m or N].
-            gravity: Gravity, shape (3,) [m/s^2].
-            threads: Number of threads.
 
         Returns:
             Status, unknowns, force, residual, unexplained torque and observability of each case.

@@ -98,6 +98,11 @@ class Batch:
     residual: FloatArray
     """Norm of the out-of-balance torque, shape (n,) [N m]; infinite for input that is not finite."""
 
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in vars(self).values():
+            array.setflags(write=False)
+
     @property
     def certified(self) -> Any:
         """Mask of the valid rows, shape (n,)."""

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.batches import root, solve_batch, statuses_of
+from softrobots.compiled.run.batches import root, solve_batch
 from softrobots.compiled.run.results import MotorBatch
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
 
 
@@ -23,12 +23,8 @@ class UnrolledSearch:
 
     def estimate(self, q_motors: FloatArray, torques: FloatArray, gravity: FloatArray) -> tuple[Status, Any]:
         """Find the force that explains motor torques; see `LoopedSearch.estimate`."""
-        run = self._run
-        w = run.workspace()
-        self._actuation.put(run, w, q_motors)
-        run.put(w, run.layout.torques, torques)
-        run.put(w, run.layout.gravity, gravity)
-        return Status(run.estimate(w)), w
+        w = self._actuation.workspace(self._run, q_motors, torques=torques, gravity=gravity)
+        return Status(self._run.estimate(w)), w
 
     def estimate_batch(
         self, motors: FloatArray, torques: FloatArray, gravity: FloatArray, threads: int
@@ -73,20 +69,17 @@ class UnrolledSearch:
     ) -> tuple[MotorBatch, int]:
         """Move the tip through targets, shape (n, 3) [m], each step from the last; see `LoopedSearch.follow`."""
         run, layout, count = self._run, self._run.layout, len(targets)
-        w = run.workspace()
-        self._actuation.put(run, w, q_motors)
-        run.put(w, layout.force, force)
-        run.put(w, layout.gravity, gravity)
-        run.put(w, layout.unknown, self._actuation.unknowns(q_motors, self._model.rest))
+        start = self._actuation.unknowns(q_motors, self._model.rest)
+        w = self._actuation.workspace(run, q_motors, force=force, gravity=gravity, unknown=start)
         w[layout.single("tolerated")] = float(tolerance)
         motors, unknowns = run.array(count * len(q_motors)), run.array(count * layout.unknowns)
         residuals, errors, statuses = run.array(count), run.array(count), run.array(count)
         run.follow(w, run.flat(targets), count, motors, unknowns, residuals, errors, statuses)
         batch = MotorBatch(
-            read_only(self._actuation.elastic(np.reshape(unknowns, (count, layout.unknowns)))),
-            statuses_of(np.asarray(statuses, dtype=np.uint8)),
-            read_only(np.sqrt(residuals)),
-            read_only(np.reshape(motors, (count, len(q_motors)))),
-            read_only(np.sqrt(errors)),
+            self._actuation.elastic(np.reshape(unknowns, (count, layout.unknowns))),
+            np.asarray(statuses, dtype=np.uint8),
+            np.sqrt(residuals),
+            np.reshape(motors, (count, len(q_motors))),
+            np.sqrt(errors),
         )
         return batch, int(w[layout.single("iterations")])

@@ -4,6 +4,10 @@ The numbers of a block depend on its case and targets only, not on the worker or
 
 For each target and branch of postures (a *lane*) the load grows level by level; each search starts from the pose of the level
 before. A lane that fails at a load after it was solved is not searched at larger loads.
+
+A lane carries a load if its tip is at the target and no link lacks pressure. Between the last level that is carried and the
+next one its payload is found by regula falsi (Illinois) on the missing pressure, or by bisection where the arm does not reach
+the target at the larger load.
 """
 
 from __future__ import annotations
@@ -12,12 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.sweeps.arm_solver import solver
-from softrobots.compiled.sweeps.load_case import SweepCase
-from softrobots.compiled.sweeps.payload import payloads
+from softrobots.compiled.sweeps.arm_solver import ArmSolver, SweepCase, solver
 from softrobots.compiled.sweeps.postures import starts
 from softrobots.core.checks import FloatArray
-from softrobots.statics.workspace_map import BoolArray
+from softrobots.statics.workspace_map import CLOSE, BoolArray
+
+ROUNDS = 10
+"""Searches between two levels; bisection alone narrows a step down to a thousandth."""
 
 
 class BlockResult(NamedTuple):
@@ -80,7 +85,7 @@ def solve_block(case: SweepCase, targets: FloatArray) -> BlockResult:
         reached[lanes, level], required[lanes, level] = found.reached, found.required_pressure
         excess[lanes, level] = found.excess
         poses[lanes, level] = np.where(found.reached[:, None], found.pose, 0.0)
-    carried = payloads(arm.search, goals, levels, excess, poses)
+    carried = _payloads(arm, goals, levels, excess, poses)
     best = required.reshape(n_branches, len(near), count).argmin(axis=0)
     chosen = best * len(near) + np.arange(len(near))[:, None], np.arange(count)  # lane and level
     result = BlockResult(
@@ -91,3 +96,44 @@ def solve_block(case: SweepCase, targets: FloatArray) -> BlockResult:
     result.payload[near] = carried.reshape(n_branches, len(near)).max(axis=0)
     result.q_motors[near], result.q_springs[near] = poses[chosen][..., :n_motors], poses[chosen][..., n_motors:]
     return result
+
+
+def _payloads(arm: ArmSolver, targets: FloatArray, levels: FloatArray, excess: FloatArray, poses: FloatArray) -> FloatArray:
+    """Find the payload of each lane.
+
+    Args:
+        arm: Searches for poses.
+        targets: Targets, shape (n, 3) [m].
+        levels: Loads of the sweep, shape (n_loads,), increasing [N].
+        excess: Missing pressure at each level, shape (n, n_loads) [Pa]; infinite where the target is not reached.
+        poses: Motor angles and springs at each level, shape (n, n_loads, n_motors + n_springs) [rad].
+
+    Returns:
+        Payloads, shape (n,) [N]: 0 where the first level is not carried, the last level where all are.
+    """
+    carried = np.cumprod(excess <= CLOSE, axis=1).sum(axis=1)  # number of levels, from the first on
+    answer = np.where(carried > 0, levels[np.maximum(carried - 1, 0)], 0.0)
+    lanes = np.flatnonzero((carried > 0) & (carried < len(levels)))
+    last = carried[lanes] - 1
+    low, high, starts = levels[last], levels[last + 1], poses[lanes, last]
+    missing = excess[lanes, last]  # at the lower end
+    pull = np.stack([missing, excess[lanes, last + 1]])  # at both ends; halved where the other end has moved twice in a row
+    moved = np.full(len(lanes), -1)  # which end moved last
+    for _ in range(ROUNDS):
+        rows = np.flatnonzero(missing < -CLOSE)
+        if len(rows) == 0:
+            break
+        known = np.isfinite(pull[1, rows])
+        share = np.where(known, pull[0, rows] / (pull[0, rows] - np.where(known, pull[1, rows], 0.0)), 0.5)
+        middle = low[rows] + share * (high[rows] - low[rows])
+        found = arm.search(targets[lanes[rows]], middle, starts[rows])
+        carries = found.excess <= CLOSE
+        up, down = rows[carries], rows[~carries]
+        low[up], missing[up], starts[up] = middle[carries], found.excess[carries], found.pose[carries]
+        high[down] = middle[~carries]
+        pull[0, up], pull[1, down] = found.excess[carries], found.excess[~carries]
+        pull[1, up[moved[up] == 0]] *= 0.5
+        pull[0, down[moved[down] == 1]] *= 0.5
+        moved[up], moved[down] = 0, 1
+    answer[lanes] = low
+    return answer

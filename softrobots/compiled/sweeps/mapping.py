@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.compiled_model import compile_model
+from softrobots.compiled.sweeps.arm_solver import SweepCase
 from softrobots.compiled.sweeps.block import BlockResult, solve_block
-from softrobots.compiled.sweeps.load_case import SweepCase
 from softrobots.compiled.sweeps.postures import check_arm
 from softrobots.compiled.sweeps.scheduling import run_blocks
 from softrobots.core.checkpoint import Checkpoint
