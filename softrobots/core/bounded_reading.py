@@ -18,14 +18,7 @@ _PART = 1 << 20  # bytes read at a time
 
 
 def read_bytes(path: Path, largest: int) -> bytes:
-    """Return the content of a file.
-
-    Args:
-        path: The file. A pipe is read until it is closed; without a writer it is empty.
-        largest: Maximum size in bytes.
-
-    Returns:
-        The bytes.
+    """Return the content of a file of at most `largest` bytes; a pipe without a writer is empty, another is read to its end.
 
     Raises:
         FileFormatError: If the file cannot be read, or is larger.
@@ -41,14 +34,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
 
 
 def read_text(path: Path, largest: int) -> str:
-    """Return the text of a UTF-8 file, with or without a byte order mark.
-
-    Args:
-        path: The file.
-        largest: Maximum size in bytes.
-
-    Returns:
-        The text.
+    """Return the text of a UTF-8 file of at most `largest` bytes, with or without a byte order mark.
 
     Raises:
         FileFormatError: If the file cannot be read, is larger, or is not UTF-8.
@@ -61,13 +47,7 @@ def read_text(path: Path, largest: int) -> str:
 
 @contextmanager
 def opened(path: Path) -> Iterator[IO[bytes]]:
-    """Open a file for reading, as a context manager that turns errors of the system into `FileFormatError`.
-
-    Args:
-        path: The file.
-
-    Yields:
-        The binary file.
+    """Open a binary file for reading, as a context manager that turns errors of the system into `FileFormatError`.
 
     Raises:
         FileFormatError: If it cannot be opened or read, e.g. because it is a folder.

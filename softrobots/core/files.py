@@ -21,15 +21,7 @@ _NAME = 60  # characters of a file name that its draft keeps; all of them and th
 
 
 def as_path(name: str, value: Any) -> Path:
-    """Return `value` as a path.
-
-    Args:
-        name: Name of the parameter, for the error.
-        value: Text or a path.
-
-    Raises:
-        ParameterError: If it is neither.
-    """
+    """Return `value`, text or a path, as a path, or raise ParameterError for the parameter of that name."""
     if not isinstance(value, str | os.PathLike) or not str(value):
         raise ParameterError(name, value, "a path")
     return Path(value)
@@ -121,26 +113,14 @@ def write_atomically(target: Path, write: Callable[[IO[bytes]], object], *, over
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes, *, overwrite: bool) -> Path:
-    """Write a file of bytes and return its path.
-
-    Raises:
-        ParameterError: If `path` is not a path.
-        OutputExists: If the file exists and `overwrite` is false, or is a folder, a device or a pipe.
-        OutputError: If the file cannot be written.
-    """
+    """Write a file of bytes and return its path; errors are those of `new_file` and `write_atomically`."""
     target = new_file(path, overwrite=overwrite)
     write_atomically(target, lambda file: file.write(content), overwrite=overwrite)
     return target
 
 
 def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> Path:
-    """Write a text file in UTF-8 and return its path.
-
-    Raises:
-        ParameterError: If `path` is not a path.
-        OutputExists: If the file exists and `overwrite` is false, or is a folder, a device or a pipe.
-        OutputError: If the file cannot be written, or the text cannot be encoded in UTF-8.
-    """
+    """Write a text file as `write_bytes` in UTF-8; raise OutputError if the text cannot be encoded in it, too."""
     try:
         content = text.encode("utf-8")
     except UnicodeEncodeError as error:  # a lone surrogate, as in file names that are not text

@@ -16,15 +16,9 @@ DEEPEST = 40
 
 
 def parse_json(text: str) -> Any:
-    """Parse a JSON text.
+    """Parse a JSON text into dictionaries, lists, strings, finite numbers, booleans and None, nested at most `DEEPEST` deep.
 
     Python's own parser also accepts NaN and Infinity, reads 1e999 as infinite, and of duplicate names keeps the last.
-
-    Args:
-        text: The text.
-
-    Returns:
-        Dictionaries, lists, strings, finite numbers, booleans and None, nested at most `DEEPEST` deep.
 
     Raises:
         FileFormatError: If the text is not such JSON.
@@ -40,14 +34,7 @@ def parse_json(text: str) -> Any:
 
 
 def read_json(path: Path, largest: int) -> Any:
-    """Read a JSON file.
-
-    Args:
-        path: The file, in UTF-8.
-        largest: Maximum size in bytes.
-
-    Returns:
-        As `parse_json`.
+    """Read a JSON file in UTF-8 of at most `largest` bytes; see `parse_json`.
 
     Raises:
         FileFormatError: If the file cannot be read, is larger, or is not such JSON.

@@ -70,16 +70,7 @@ def read_arrays(path: Path, *, only: Sequence[str] | None = None, largest: int |
 
 
 def check_size(name: str, arrays: Mapping[str, Any], largest: int) -> None:
-    """Check that arrays are small enough to be read again after they are written.
-
-    Args:
-        name: Name of the parameter, for the error.
-        arrays: The arrays by name.
-        largest: Limit of the reader [bytes].
-
-    Raises:
-        ParameterError: If they are larger together.
-    """
+    """Raise ParameterError for a parameter whose arrays together are larger than a reader takes [bytes]."""
     size = sum(np.asarray(value).nbytes + _LARGEST_HEADER for value in arrays.values())
     if size > largest:
         raise ParameterError(name, f"{size} bytes of arrays", f"of at most {largest} bytes, the most that is read again")

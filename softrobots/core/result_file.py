@@ -109,22 +109,14 @@ def load_result(path: str | Path) -> Any:
 
 
 def text(arrays: Mapping[str, Any], name: str) -> str:
-    """Return an array that holds a single text.
-
-    Raises:
-        FileFormatError: If it holds something else.
-    """
+    """Return an array that holds a single text, or raise FileFormatError."""
     if arrays[name].shape != () or arrays[name].dtype.kind != "U":
         raise FileFormatError(f"its {name} is not a text")
     return str(arrays[name])
 
 
 def label(arrays: Mapping[str, Any], name: str) -> str:
-    """Return a printable one-line label.
-
-    Raises:
-        FileFormatError: If the array holds something else.
-    """
+    """Return an array that holds a printable label of one line, or raise FileFormatError."""
     word = text(arrays, name)
     if not 0 < len(word) <= _LONGEST_LABEL or not word.isprintable():
         raise FileFormatError(f"its {name} must be 1 to {_LONGEST_LABEL} printable characters")
@@ -132,11 +124,7 @@ def label(arrays: Mapping[str, Any], name: str) -> str:
 
 
 def counts(arrays: Mapping[str, Any], name: str) -> list[int]:
-    """Return an array of integers, zero or above, as a list; a single number gives a list of one.
-
-    Raises:
-        FileFormatError: If it holds something else.
-    """
+    """Return an array of non-negative integers as a list, of one for a single number, or raise FileFormatError."""
     array = np.atleast_1d(arrays[name])
     if array.dtype.kind not in "iu" or array.ndim != 1 or array.min(initial=0) < 0:
         raise FileFormatError(f"its {name} must be an array of non-negative integers")

@@ -41,11 +41,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 def read_xml(path: Path) -> str:
     """Read the text of an XML file in the encoding of its byte order mark or declaration; UTF-8 by default.
 
-    Args:
-        path: The file.
-
-    Returns:
-        The text; a declared encoding is changed to UTF-8.
+    A declared encoding is changed to UTF-8.
 
     Raises:
         DescriptionError: If the file cannot be read, is too large, declares another than the usual encodings, or is not in the
@@ -79,17 +75,10 @@ def as_unicode(text: str) -> str:
 
 
 def parse_xml(text: str, source: str) -> ElementTree.Element:
-    """Parse XML text and return its root element.
+    """Parse XML text and return its root element; `source` names it in errors.
 
     Document types and entities are refused: no robot description needs them, and expanding them can exhaust memory or read
     other files.
-
-    Args:
-        text: The document.
-        source: Name of its source, for the error.
-
-    Returns:
-        The root element.
 
     Raises:
         DescriptionError: If the text is not well-formed XML, declares a document type, or is larger or nested deeper than any
@@ -122,14 +111,9 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
 
 
 def number_in(text: str | None, most: float = LARGEST) -> float:
-    """Parse a number in XML, NaN if it is not one.
+    """Parse a decimal number in XML, NaN if it is not one or larger in size than `most`.
 
-    Args:
-        text: Decimal number; not `1_000`, `0x10`, `inf` or digits of other scripts, which only some parsers accept.
-        most: Largest magnitude.
-
-    Returns:
-        The number; NaN also if it is larger.
+    `1_000`, `0x10`, `inf` and digits of other scripts, which only some parsers accept, are not.
     """
     stripped = (text or "").strip()
     if len(stripped) > 400 or not _NUMBER.fullmatch(stripped):
