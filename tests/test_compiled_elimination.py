@@ -17,6 +17,7 @@ import softrobots as sr
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate, eliminate_multipliers
 from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.small_systems import inverse_small, smallest_square, solve_small
 from softrobots.compiled.chain.tip_motion import step_with_motors, tip_motion
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -455,8 +456,7 @@ def test_a_matrix_without_full_rank_has_no_smallest_singular_value(shape: tuple[
 def traced_at(model: SoftModel, gravity: bool) -> tuple[Unknowns, Block, Evaluation]:
     unknowns = Unknowns(model.chain())
     block = Block("compute", "Compute.")
-    layout = Layout(model.n_motors, len(unknowns.strains))
-    return unknowns, block, evaluate(unknowns, block, layout, weight=gravity, tip_columns=True)
+    return unknowns, block, evaluate(Plan(unknowns, gravity), block, tip_columns=True)
 
 
 def workspace(model: SoftModel, motors: np.ndarray, springs: np.ndarray, force: np.ndarray, gravity: Any) -> list[float]:

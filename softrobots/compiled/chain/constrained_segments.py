@@ -6,14 +6,14 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import vector
 from softrobots.compiled.chain.elimination import eliminate_multipliers
-from softrobots.compiled.chain.looped_plan import LoopedPlan
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion_layout import load_outboard, sides, store_outboard
 from softrobots.compiled.chain.unknowns import Segment
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar
 
 
-def segment_blocks(plan: LoopedPlan, number: int, segment: Segment) -> tuple[list[Block], int]:
+def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block], int]:
     """Trace the functions at the ends of the constrained segment of this number.
 
     Returns:

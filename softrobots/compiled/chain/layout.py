@@ -88,12 +88,17 @@ class Layout:
     def __post_init__(self) -> None:
         """Compute the places."""
         motors, n = self.motors, self.unknowns
-        point = max(motors, 3) + n
+        point = self.varied + n
         before_tip = dict(pull=n, start=n, unknown=n, step=n, line_origin=n, line_direction=n)
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
         searches = dict(tip=3, torques=motors, target=3, next_target=3)
         rest = dict(singles=len(SINGLES), prepared=0)
         assign_places(self, motors, force=3, gravity=3, **before_tip, **searches, **points, **rest)
+
+    @property
+    def varied(self) -> int:
+        """Number of motors, or of components of the force if there are fewer motors, before the unknowns of a point."""
+        return max(self.motors, 3)
 
     def single(self, name: str) -> int:
         """Return the place of one of `SINGLES`."""

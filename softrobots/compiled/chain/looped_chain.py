@@ -18,7 +18,7 @@ import numpy as np
 from softrobots.compiled.chain.elements import Load, constants, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.looped_plan import LoopedPlan
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout, load_outboard, sides, store_outboard
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -80,7 +80,7 @@ class TableColumns:
         return [column[row] for row in range(self._count) for column in self._columns]
 
 
-def element_kinds(plan: LoopedPlan) -> list[Kind]:
+def element_kinds(plan: Plan) -> list[Kind]:
     """Trace the code of every kind of element behind the leading motors."""
     unknowns = plan.unknowns
     groups: dict[Any, list[int]] = {}
@@ -97,7 +97,7 @@ def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0))
 
 
-def _trace_kind(number: int, rows: list[int], plan: LoopedPlan) -> Kind:
+def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
     layout, recursion, tip, infix = plan.layout, plan.recursion, plan.tip, plan.infix
     names = ("at", "row", "q")
     out = Block(f"outward_{infix}{number}", "Outward pass of an element.", names)
@@ -161,9 +161,7 @@ def _store_constraints(
     return [*gaps, *torques]
 
 
-def _store_step(
-    step_pass: Block, element: TracedElement, result: InwardPass, plan: LoopedPlan, multipliers: int
-) -> list[Expression]:
+def _store_step(step_pass: Block, element: TracedElement, result: InwardPass, plan: Plan, multipliers: int) -> list[Expression]:
     """Trace the Newton step of an element; return the sums of the elements before it."""
     layout, recursion = plan.layout, plan.recursion
     turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + multipliers), step_pass.loads(recursion.steps, 3)
@@ -184,7 +182,7 @@ def _store_step(
 
 
 def _store_tip_step(
-    step_pass: Block, back: Block, result: InwardPass, plan: LoopedPlan, tip: TipLayout, multipliers: int
+    step_pass: Block, back: Block, result: InwardPass, plan: Plan, tip: TipLayout, multipliers: int
 ) -> list[Expression]:
     """Trace the response of an element to a force on the tip; for a motor, its column of the Jacobian so far."""
     layout, recursion = plan.layout, plan.recursion
@@ -207,7 +205,7 @@ def _store_tip_step(
     return [one for part in (*turn_loads, *bend_loads) for one in part]
 
 
-def _common(rows: list[int], plan: LoopedPlan, block: Block, columns: TableColumns) -> TracedElement:
+def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) -> TracedElement:
     """Return an element of a kind, with table entries for the numbers in which its elements differ."""
     unknowns, layout = plan.unknowns, plan.layout
     ones = [unknowns.traced(row) for row in rows]
@@ -252,7 +250,7 @@ def _relaxed(ones: Sequence[TracedElement], block: Block, layout: Layout, column
 
 
 def _arriving(
-    block: Block, element: TracedElement, plan: LoopedPlan, multipliers: int
+    block: Block, element: TracedElement, plan: Plan, multipliers: int
 ) -> tuple[list[Expression], list[Load], Outboard, Balance]:
     """Return the sums before the inward pass of an element: workspace elements, loads, outboard sums, balance."""
     recursion, count = plan.recursion, 6 if plan.weight else 3

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from softrobots.compiled.chain.elements import Load, vector
 from softrobots.compiled.chain.elimination import Outboard
-from softrobots.compiled.chain.looped_plan import LoopedPlan
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, inward
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
 from softrobots.compiled.chain.unrolled_chain import seen_backwards
@@ -36,7 +36,7 @@ CONTROL = '''def look_at_tip(w: Array) -> None:
 """Function that makes all passes."""
 
 
-def tip_frame(plan: LoopedPlan, tip: TipLayout) -> list[Block]:
+def tip_frame(plan: Plan, tip: TipLayout) -> list[Block]:
     """Trace the straight-line functions around the loops."""
     return [_start_inward_tip(tip), _finish(plan, tip), _finish_column(plan.recursion, tip)]
 
@@ -47,7 +47,7 @@ def _start_inward_tip(tip: TipLayout) -> Block:
     return block
 
 
-def _finish(plan: LoopedPlan, tip: TipLayout) -> Block:
+def _finish(plan: Plan, tip: TipLayout) -> Block:
     """Add the sums beyond each motor, pass the leading motors, and turn all into world axes."""
     unknowns, recursion = plan.unknowns, plan.recursion
     block = Block("finish_tip", "Compute the response to motors and constrained sums from the sums of the passes.")

@@ -66,6 +66,11 @@ class Unknowns:
         return tuple(row for row in range(len(self.chain.stiffness)) if row not in self._locked_strains)
 
     @cached_property
+    def rest(self) -> tuple[float, ...]:
+        """Rest value of each unknown strain [rad or m]."""
+        return tuple(float(self.chain.rest[strain]) for strain in self.strains)
+
+    @cached_property
     def place(self) -> dict[int, int]:
         """Place of each unknown strain among the unknowns."""
         return {strain: place for place, strain in enumerate(self.strains)}

@@ -14,7 +14,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Vector, constants, turned, vector
 from softrobots.compiled.chain.elimination import Outboard
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, OutwardPass, TracedElement, inward, outward
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
@@ -25,6 +25,8 @@ from softrobots.compiled.trace.expressions import Scalar
 class Evaluation:
     """A chain at given coordinates, traced; vectors in the axes behind the leading motors."""
 
+    unknown: Sequence[Scalar]
+    """The unknowns."""
     inward_passes: list[InwardPass]
     """Result of each element, the leading motors included."""
     turns: list[list[Vector]]
@@ -50,11 +52,9 @@ class Evaluation:
 
 
 def evaluate(
-    unknowns: Unknowns,
+    plan: Plan,
     block: Block,
-    layout: Layout,
     *,
-    weight: bool,
     at_rest: bool = False,
     forceless: bool = False,
     tip_columns: bool = False,
@@ -63,28 +63,21 @@ def evaluate(
     """Trace a chain at the coordinates in the workspace.
 
     Args:
-        unknowns: The chain.
+        plan: The chain and its places.
         block: Block of the expressions.
-        layout: The places in the workspace.
-        weight: Whether there is gravity.
         at_rest: Whether the unknowns are at rest, instead of in the workspace.
         forceless: Whether there is no force on the tip.
         tip_columns: Whether to solve for the motion of the tip as well.
         shift_pivots: Whether pivots are shifted by the `pivot_shift` in the workspace.
-
-    Returns:
-        The evaluation.
     """
+    unknowns, layout = plan.unknowns, plan.layout
     chain = unknowns.chain
-    rest = [float(chain.rest[strain]) for strain in unknowns.strains]
-    elements = [
-        unknowns.traced(row, block.load, lambda place: rest[place] if at_rest else block.load(layout.unknown + place))
-        for row in range(len(chain.elements))
-    ]
+    unknown: Sequence[Scalar] = unknowns.rest if at_rest else block.loads(layout.unknown, layout.unknowns)
+    elements = [unknowns.traced(row, block.load, lambda place: unknown[place]) for row in range(len(chain.elements))]
     leading = unknowns.leading_motors
     base_axes, base = place_base(elements[:leading])
     force = constants(np.zeros(3)) if forceless else base_axes.T @ vector(block.loads(layout.force, 3))
-    forces = [force, base_axes.T @ vector(block.loads(layout.gravity, 3))] if weight else [force]
+    forces = [force, base_axes.T @ vector(block.loads(layout.gravity, 3))] if plan.weight else [force]
 
     axes, outward_passes = constants(np.eye(3)), []
     for element in elements[leading:]:
@@ -122,7 +115,7 @@ def evaluate(
         steps.append(own)
     gradient = unknowns.in_order([one.gradient for one in inward_passes])
     step = unknowns.in_order([own[0] for own in steps])
-    return Evaluation(inward_passes, turns, steps, gradient, step, balance, beyond, energy, tip, base_axes, base)
+    return Evaluation(unknown, inward_passes, turns, steps, gradient, step, balance, beyond, energy, tip, base_axes, base)
 
 
 def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[Scalar]]) -> list[Scalar]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from softrobots.compiled import settings
 from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
@@ -42,16 +43,9 @@ class Program:
 
 
 def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
-    """Generate the code of a robot.
-
-    Args:
-        unknowns: The chain.
-        weight: Whether there is gravity.
-
-    Returns:
-        The program.
-    """
-    layout = Layout(unknowns.chain.n_motors, len(unknowns.strains))
+    """Generate the code of a robot; `weight`: whether there is gravity."""
+    plan = Plan(unknowns, weight)
+    layout = plan.layout
     functions, lane_functions = functions_of(drivers), functions_of(lane_drivers)
     tables: dict[str, object] = {}
     loops, lane_loops, entries, names = [], [], ["settle", "settle_from"], ["WORKSPACE_SIZE", "N", "N_MOTORS"]
@@ -61,24 +55,24 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
         functions += functions_of(muscle_drivers)
         entries, names = [*entries, "put_muscles"], [*names, "N_MUSCLES"]
     if unknowns.is_unrolled:
-        blocks, size = equilibrium_blocks(unknowns, layout, weight=weight)
+        blocks, size = equilibrium_blocks(plan)
         lanes, lane_size = blocks[1:3], size
     else:
-        parts = looped_program(unknowns, layout, weight=weight)
+        parts = looped_program(plan)
         blocks, size, lanes, lane_size = parts.blocks + parts.tip_blocks, parts.size, parts.blocks, parts.lane_size
         tables |= {**parts.places, **parts.tables}
         tip, entries = parts.tip, [*entries, "look_at_tip"]
         loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
     if unknowns.moved_by_motors:
-        by_force, size = force_blocks(unknowns, layout, size, weight=weight)
-        by_target = target_blocks(unknowns, layout, weight=weight)
+        by_force, size = force_blocks(plan, size)
+        by_target = target_blocks(plan)
         lane_size, entries = size, [*entries, "estimate", "reach", "follow"]
         blocks = blocks + by_force + by_target
         lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
         functions += functions_of(motor_drivers) + functions_of(path_drivers)
     else:
         lane_functions = [one for one in lane_functions if one not in lane_drivers.MOTOR_FUNCTIONS]
-    docstring, places = manual(unknowns, layout, tip, weight=weight)
+    docstring, places = manual(plan, tip)
     names += [*places, *Status.__members__]
     # A name could end the text.
     docstring = docstring.replace("\\", "\\\\").replace('"""', r"\"\"\"")
@@ -118,11 +112,11 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "N_CONSTRAINTS": len(chain.held),
         **{status.name: status.value for status in Status},
         "REACH": float(chain.reach),
-        "N_VARIED": max(layout.motors, 3),
+        "N_VARIED": layout.varied,
         "LOWER": tuple(np.maximum(chain.limits[: layout.motors, 0], -1e300).tolist()),
         "UPPER": tuple(np.minimum(chain.limits[: layout.motors, 1], 1e300).tolist()),
         "SPRING_ROUNDING": unknowns.spring_rounding,
-        "REST": tuple(float(chain.rest[strain]) for strain in strains),
+        "REST": unknowns.rest,
         "SOFTNESS": tuple((min_pivot / float(chain.stiffness[strain])) ** 0.5 for strain in strains),
         "GROUP": tuple(group.get(strain, -1) for strain in strains),
     }

@@ -6,7 +6,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Load, constants, vector
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.looped_plan import LoopedPlan
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance
 from softrobots.compiled.chain.recursion_layout import RecursionLayout
 from softrobots.compiled.chain.unrolled_chain import place_base
@@ -15,7 +15,7 @@ from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
 
 
-def looped_frame(plan: LoopedPlan, count: int) -> list[Block]:
+def looped_frame(plan: Plan, count: int) -> list[Block]:
     """Trace the straight-line functions around loops of `count` steps."""
     return [
         _prepare(plan, count),
@@ -29,7 +29,7 @@ def looped_frame(plan: LoopedPlan, count: int) -> list[Block]:
     ]
 
 
-def _prepare(plan: LoopedPlan, count: int) -> Block:
+def _prepare(plan: Plan, count: int) -> Block:
     block = Block("prepare", "Compute what depends on motors and load only.")
     unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
     axes, origin = place_base(unknowns.leading(block))
@@ -46,7 +46,7 @@ def _start_outward(recursion: RecursionLayout) -> Block:
     return block
 
 
-def _start_inward(plan: LoopedPlan) -> Block:
+def _start_inward(plan: Plan) -> Block:
     block = Block("start_inward", "Start the inward pass at the tip, and clear all sums.")
     recursion = plan.recursion
     axes = vector(block.loads(recursion.axes, 9)).reshape(3, 3)
@@ -60,14 +60,14 @@ def _start_inward(plan: LoopedPlan) -> Block:
     return block
 
 
-def _finish(plan: LoopedPlan) -> Block:
+def _finish(plan: Plan) -> Block:
     block = Block("finish", "Compute energy, residual, step and tip from the sums of the passes.")
-    unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
+    layout, recursion = plan.layout, plan.recursion
     sums, steps = block.loads(recursion.sums, 5), block.loads(recursion.steps, 3)
     levers, forces = block.loads(recursion.lever, 6), block.loads(recursion.force, 6)
     loads = [Load(vector(forces[:3]), vector(levers[:3]), 1.0), Load(vector(forces[3:]), vector(levers[3:]), 0.0)]
     energy: Scalar = sums[0] - sum((one.force @ one.lever for one in loads[: 2 if plan.weight else 1]), 0.0)
-    numbers = point_numbers(block, layout, unknowns, Balance(*sums[:3]), energy, steps, sums[3:])
+    numbers = point_numbers(plan, block, Balance(*sums[:3]), energy, steps, sums[3:])
     for name, value in numbers.items():
         block.store(layout.single(name), value)
     base = block.loads(recursion.base, 12)
@@ -75,22 +75,22 @@ def _finish(plan: LoopedPlan) -> Block:
     return block
 
 
-def _decide(plan: LoopedPlan) -> Block:
+def _decide(plan: Plan) -> Block:
     block = Block("decide", "Decide whether the case goes on.")
-    unknowns, layout = plan.unknowns, plan.layout
+    layout = plan.layout
     names = ("energy", "slope", "error", "length", "size", "rounding", "min_pivot", "n_negative_pivots", "range_margin")
     point: dict[str, Scalar] = {name: block.load(layout.single(name)) for name in names}
-    _, share = decide(block, layout, unknowns, point)
+    _, share = decide(plan, block, point)
     block.store(plan.recursion.end, share)
     return block
 
 
-def _advance(plan: LoopedPlan) -> Block:
+def _advance(plan: Plan) -> Block:
     block = Block("advance", "Take the step of one unknown, if the case goes on.", ("i",))
     layout = plan.layout
     unknown, step = block.load(layout.unknown, "i"), block.load(layout.step, "i")
     share, mode = block.load(plan.recursion.end), block.load(layout.single("mode"))
-    block.store(layout.unknown, go_on(mode, unknown, share, step), "i")
+    go_on(block, layout.unknown, [unknown], [step], mode, share, "i")
     return block
 
 
@@ -101,9 +101,8 @@ def _start(layout: Layout) -> Block:
     return block
 
 
-def _relax(plan: LoopedPlan) -> Block:
+def _relax(plan: Plan) -> Block:
     block = Block("relax", "Put an unknown where its spring is relaxed.", ("i",))
-    unknowns = plan.unknowns
-    rest = {float(unknowns.chain.rest[strain]) for strain in unknowns.strains}
+    rest = set(plan.unknowns.rest)
     block.store(plan.layout.unknown, rest.pop() if len(rest) == 1 else block.table("REST", 0, "i"), "i")
     return block

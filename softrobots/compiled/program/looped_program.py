@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from softrobots.compiled.chain.constrained_segments import segment_blocks
 from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.looped_chain import Kind, element_kinds
-from softrobots.compiled.chain.looped_plan import LoopedPlan
 from softrobots.compiled.chain.looped_tip import CONTROL as TIP_CONTROL
 from softrobots.compiled.chain.looped_tip import tip_frame
-from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
+from softrobots.compiled.chain.plan import Plan
+from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import looped_frame
 from softrobots.compiled.trace.blocks import Block
@@ -99,19 +99,9 @@ def first_pass_SUFFIX(w: Array) -> None:
     newton_pass_SUFFIX(w)'''
 
 
-def looped_program(unknowns: Unknowns, layout: Layout, *, weight: bool) -> LoopedProgram:
-    """Trace the functions that find equilibria of a looped chain.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        weight: Whether there is gravity.
-
-    Returns:
-        The program.
-    """
-    recursion = RecursionLayout(layout.prepared)
-    plan = LoopedPlan(unknowns, layout, recursion, weight)
+def looped_program(plan: Plan) -> LoopedProgram:
+    """Trace the functions that find equilibria of a looped chain, and those of the response of its tip."""
+    unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
     calls: dict[str, list[tuple[int, str]]] = {}
     kinds = element_kinds(plan)
     # Before the records stand the share of the step, and the bounds of the loops.
@@ -131,7 +121,7 @@ def looped_program(unknowns: Unknowns, layout: Layout, *, weight: bool) -> Loope
 
 
 def _sequence(
-    plan: LoopedPlan, kinds: list[Kind], record: int, calls: dict[str, list[tuple[int, str]]]
+    plan: Plan, kinds: list[Kind], record: int, calls: dict[str, list[tuple[int, str]]]
 ) -> tuple[list[Block], list[tuple[int, int, int, int]], int]:
     """Put the elements in order, with the ends of constrained segments between them.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import NamedTuple
 
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns, strains_of
 from softrobots.compiled.statuses import Status
@@ -26,19 +26,13 @@ class Place(NamedTuple):
     """Meaning and unit."""
 
 
-def manual(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight: bool) -> tuple[str, list[str]]:
-    """Return the docstring, and the names of all places in it.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        tip: Places of the response of the tip; None without it.
-        weight: Whether there is gravity.
-    """
+def manual(plan: Plan, tip: TipLayout | None) -> tuple[str, list[str]]:
+    """Return the docstring, and the names of all places in it; `tip`: those of the response of the tip."""
+    unknowns, layout = plan.unknowns, plan.layout
     places = layout.constants() | ({} if tip is None else tip.constants())
-    given, found = _inputs(unknowns, layout, weight=weight), _results(unknowns, layout, tip)
+    given, found = _inputs(plan), _results(plan, tip)
     lines = [
-        f"Statics of {_on_a_line(unknowns.chain.name)}{', with gravity' if weight else ', weightless'}: generated code.",
+        f"Statics of {_on_a_line(unknowns.chain.name)}{', with gravity' if plan.weight else ', weightless'}: generated code.",
         "",
         "Functions work on an array of WORKSPACE_SIZE numbers, initially zero, which may be used for several cases.",
         "settle, settle_from, estimate and reach return a status; the results are valid only if it is 0:",
@@ -53,12 +47,13 @@ def manual(unknowns: Unknowns, layout: Layout, tip: TipLayout | None, *, weight:
     return "\n".join(lines), list(dict.fromkeys(row.name for row in (*given, *found)))
 
 
-def _inputs(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
+def _inputs(plan: Plan) -> list[Place]:
     """Return the inputs."""
+    unknowns, layout = plan.unknowns, plan.layout
     n, searches = layout.unknowns, unknowns.moved_by_motors
     places = [Place("MOTORS", layout.motors, f"motor joints [rad or m]: {_motors(unknowns)}")] if layout.motors else []
     places.append(Place("FORCE", 3, "force on the tip [N], world axes"))
-    if weight:
+    if plan.weight:
         places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
     if unknowns.pulled:
         places.append(Place("PULL", n, "load of the muscle tensions on each unknown [N m or N]; put_muscles writes it"))
@@ -74,9 +69,9 @@ def _inputs(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Place]:
     return places
 
 
-def _results(unknowns: Unknowns, layout: Layout, tip: TipLayout | None) -> list[Place]:
+def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
     """Return the results."""
-    n, m = layout.unknowns, layout.motors
+    unknowns, n, m = plan.unknowns, plan.layout.unknowns, plan.layout.motors
     places = [
         Place("UNKNOWN", n, f"the unknowns [rad or m]: {_strains(unknowns)}"),
         Place("TIP", 3, "the loaded tip [m], world axes"),

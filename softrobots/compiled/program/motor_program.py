@@ -15,6 +15,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.small_systems import smallest_square, solve_small
 from softrobots.compiled.chain.tip_motion import TipMotion, step_with_motors, tip_motion
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -33,56 +34,37 @@ from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
 
 
-def force_blocks(unknowns: Unknowns, layout: Layout, first: int, *, weight: bool) -> tuple[list[Block], int]:
-    """Trace the functions of load estimation.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        first: First free place in the workspace.
-        weight: Whether there is gravity.
-
-    Returns:
-        The functions, and the next free place.
-    """
+def force_blocks(plan: Plan, first: int) -> tuple[list[Block], int]:
+    """Trace the functions of load estimation; return them and the next free place in the workspace, from `first` on."""
+    layout = plan.layout
     prepare = Block("prepare_force", "Compute what depends on motors and torques only.")
     trace = prepare.trace
     force_pass = Block("force_pass", "Evaluate the point, and take a Newton step with another force.", trace=trace)
-    point = evaluate(unknowns, force_pass, layout, weight=weight, tip_columns=True)
-    _force_step(force_pass, layout, unknowns, point, starts=False)
+    _force_step(plan, force_pass, evaluate(plan, force_pass, tip_columns=True))
     look = Block("look_for_force", "Evaluate an equilibrium, and the end of a damped step of the force.", trace=trace)
-    _look_for_force(look, layout, unknowns, evaluate(unknowns, look, layout, weight=weight, tip_columns=True))
+    _look_for_force(plan, look, evaluate(plan, look, tip_columns=True))
     singles = [look.load(layout.single(one)) for one in ("mode", "damping")]
     varying = [*look.loads(layout.unknown, layout.unknowns), *look.loads(layout.force, 3), *singles]
     count = hoist([force_pass, look], prepare, varying, first)
     start = Block("first_force_pass", "Prepare, evaluate the relaxed robot without force, and take a Newton step.", trace=trace)
     start.stores = list(prepare.stores)
-    relaxed = evaluate(unknowns, start, layout, weight=weight, at_rest=True, forceless=True, tip_columns=True)
-    _force_step(start, layout, unknowns, relaxed, starts=True)
+    _force_step(plan, start, evaluate(plan, start, at_rest=True, forceless=True, tip_columns=True), starts=True)
     return [prepare, start, force_pass, look], first + count
 
 
-def target_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> list[Block]:
-    """Trace the functions of inverse kinematics.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        weight: Whether there is gravity.
-
-    Returns:
-        The functions.
-    """
+def target_blocks(plan: Plan) -> list[Block]:
+    """Trace the functions of inverse kinematics."""
     step = Block("target_step", "Evaluate the point, and the end of a step to the target, or from the target to the next one.")
-    point = evaluate(unknowns, step, layout, weight=weight, tip_columns=True)
+    point = evaluate(plan, step, tip_columns=True)
     lane = Block("target_pass", "Evaluate the point, and take a Newton step to the target.", trace=step.trace)
-    _target_step(step, lane, layout, unknowns, point)
+    _target_step(plan, step, lane, point)
     look = Block("look_for_target", "Evaluate an equilibrium, and the end of a damped step to the target.", trace=step.trace)
-    _look_for_target(look, layout, unknowns, point)
+    _look_for_target(plan, look, point)
     return [step, lane, look]
 
 
-def _force_step(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation, *, starts: bool) -> None:
+def _force_step(plan: Plan, block: Block, point: Evaluation, *, starts: bool = False) -> None:
+    unknowns, layout = plan.unknowns, plan.layout
     motion = tip_motion(unknowns, point)
     measured = vector(block.loads(layout.torques, layout.motors))
     felt = motion.jacobian.T
@@ -90,32 +72,28 @@ def _force_step(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluat
     change = solve_small(felt, left - motion.torque_change)
     missing = _explainable(felt, left - motion.torque_change, unknowns)
     step = _with_columns(unknowns, point, change)
-    values = numbers(unknowns, layout, block, point)
+    values = numbers(plan, block, point)
     size = measured @ measured
     settled_to = if_less(size, LARGEST_SIZE**2, larger(size, LEAST_SIZE**2) * NEWTON_TOLERANCE**2, -1.0)
     settled = if_less(missing @ missing, settled_to, _balanced(values, unknowns), 0.0)
-    mode, share = _mode(block, layout, values, settled, step, starts=starts)
-    rest = [float(unknowns.chain.rest[strain]) for strain in unknowns.strains]
-    here = rest if starts else block.loads(layout.unknown, layout.unknowns)
+    mode, share = _mode(plan, block, values, settled, step, starts=starts)
     force = constants(np.zeros(3)) if starts else vector(block.loads(layout.force, 3))
-    _go(block, layout.unknown, here, step, mode, share)
-    _go(block, layout.force, force, point.base_axes @ change, mode, share)
-    _store_torques(block, layout, motion, left, missing)
-    store_tip(block, layout, point)
+    go_on(block, layout.unknown, point.unknown, step, mode, share)
+    go_on(block, layout.force, force, point.base_axes @ change, mode, share)
+    _store_torques(layout, block, motion, left, missing)
+    store_tip(plan, block, point)
 
 
-def _look_for_force(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
+def _look_for_force(plan: Plan, block: Block, point: Evaluation) -> None:
+    unknowns, layout = plan.unknowns, plan.layout
     motion = tip_motion(unknowns, point)
     left = vector(block.loads(layout.torques, layout.motors)) - motion.motor_torques
     felt = motion.jacobian.T
     damped = _damped(felt, block.load(layout.single("damping")), left)
-    block.store_all(layout.next_point, (vector(block.loads(layout.force, 3)) + point.base_axes @ damped).tolist())
-    ahead = [
-        one + by
-        for one, by in zip(block.loads(layout.unknown, layout.unknowns), _with_columns(unknowns, point, damped), strict=True)
-    ]
-    block.store_all(layout.next_point + max(layout.motors, 3), ahead)
-    _store_torques(block, layout, motion, left, _explainable(felt, left, unknowns))
+    force, unknown = vector(block.loads(layout.force, 3)), vector(point.unknown)
+    strains = vector(_with_columns(unknowns, point, damped))
+    _store_next(layout, block, force + point.base_axes @ damped, unknown + strains)
+    _store_torques(layout, block, motion, left, _explainable(felt, left, unknowns))
 
 
 def _explainable(felt: Any, torques: Vector, unknowns: Unknowns) -> Vector:
@@ -125,17 +103,24 @@ def _explainable(felt: Any, torques: Vector, unknowns: Unknowns) -> Vector:
     return felt @ _damped(felt, RANK_TOLERANCE * float(unknowns.chain.reach), torques)
 
 
-def _store_torques(block: Block, layout: Layout, motion: TipMotion, left: Vector, missing: Vector) -> None:
+def _store_next(layout: Layout, block: Block, varied: Vector, unknown: Vector) -> None:
+    """Write the end of a step: motors or force, and unknowns."""
+    block.store_all(layout.next_point, varied.tolist())
+    block.store_all(layout.next_point + layout.varied, unknown.tolist())
+
+
+def _store_torques(layout: Layout, block: Block, motion: TipMotion, left: Vector, missing: Vector) -> None:
     """Write the unexplained torques and the observability of the force; it is never observable with fewer than three motors."""
     block.store(layout.single("missing"), missing @ missing)
     block.store(layout.single("unexplained"), left @ left)
     block.store(layout.single("observed"), smallest_square(motion.jacobian) if layout.motors >= 3 else 0.0)
 
 
-def _target_step(step: Block, lane: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
+def _target_step(plan: Plan, step: Block, lane: Block, point: Evaluation) -> None:
+    unknowns, layout = plan.unknowns, plan.layout
     motion = tip_motion(unknowns, point)
     missing, next_missing = (_missing(step, place, point) for place in (layout.target, layout.next_target))
-    values = numbers(unknowns, layout, step, point)
+    values = numbers(plan, step, point)
     distance = missing @ missing
     tolerated = step.load(layout.single("tolerated"))
     settled = if_less(tolerated * tolerated, distance, 0.0, _balanced(values, unknowns))
@@ -148,26 +133,24 @@ def _target_step(step: Block, lane: Block, layout: Layout, unknowns: Unknowns, p
         )
         motors = solve_small(motion.jacobian, wanted - motion.tip_change)
         strains = step_with_motors(unknowns, point, motors)
-        mode, share = _mode(block, layout, values, settled, [*strains, *motors], starts=False)
-        here = [vector(block.loads(*one)) for one in ((0, layout.motors), (layout.unknown, layout.unknowns))]
+        mode, share = _mode(plan, block, values, settled, [*strains, *motors])
+        joints, unknown = vector(block.loads(0, layout.motors)), vector(point.unknown)
         if block is lane:
-            _go(block, 0, here[0], motors, mode, share)
-            _go(block, layout.unknown, here[1], strains, mode, share)
+            go_on(block, 0, joints, motors, mode, share)
+            go_on(block, layout.unknown, unknown, strains, mode, share)
         else:
-            block.store_all(layout.next_point, (here[0] + motors * share).tolist())
-            block.store_all(layout.next_point + max(layout.motors, 3), (here[1] + vector(strains) * share).tolist())
+            _store_next(layout, block, joints + motors * share, unknown + vector(strains) * share)
         block.store(layout.single("missing"), distance)
-        store_tip(block, layout, point)
+        store_tip(plan, block, point)
 
 
-def _look_for_target(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation) -> None:
+def _look_for_target(plan: Plan, block: Block, point: Evaluation) -> None:
+    unknowns, layout = plan.unknowns, plan.layout
     motion = tip_motion(unknowns, point)
     missing = _missing(block, layout.target, point)
     motors = _damped(motion.jacobian, block.load(layout.single("damping")), missing)
-    strains = step_with_motors(unknowns, point, motors)
-    block.store_all(layout.next_point, (vector(block.loads(0, layout.motors)) + motors).tolist())
-    ahead = vector(block.loads(layout.unknown, layout.unknowns)) + vector(strains)
-    block.store_all(layout.next_point + max(layout.motors, 3), ahead.tolist())
+    strains = vector(step_with_motors(unknowns, point, motors))
+    _store_next(layout, block, vector(block.loads(0, layout.motors)) + motors, vector(point.unknown) + strains)
     block.store(layout.single("missing"), missing @ missing)
     block.store(layout.single("observed"), smallest_square(motion.jacobian))
 
@@ -202,9 +185,10 @@ def _balanced(values: dict[str, Scalar], unknowns: Unknowns) -> Scalar:
 
 
 def _mode(
-    block: Block, layout: Layout, values: dict[str, Scalar], settled: Scalar, step: Sequence[Scalar], *, starts: bool
+    plan: Plan, block: Block, values: dict[str, Scalar], settled: Scalar, step: Sequence[Scalar], *, starts: bool = False
 ) -> tuple[Scalar, Scalar]:
     """Write the new mode of a case; return it and the share of the step; see `softrobots.compiled.program.passes`."""
+    layout = plan.layout
     signs = if_less(absolute(values["n_negative_pivots"]), 0.5, 1.0, 0.0)
     stable = if_less(POSITIVE_PIVOT, values["min_pivot"], signs, 0.0)
     length = sum((one * one for one in step), 0.0)
@@ -215,11 +199,3 @@ def _mode(
     block.store(layout.single("mode"), mode)
     block.store(layout.single("error"), values["error"])
     return mode, LARGEST_STEP / square_root(larger(length, LARGEST_STEP**2))
-
-
-def _go(
-    block: Block, place: int, here: Sequence[Scalar] | Vector, step: Sequence[Scalar] | Vector, mode: Scalar, share: Scalar
-) -> None:
-    """Write the next point of a case, if it goes on."""
-    for number, (one, by) in enumerate(zip(here, step, strict=True)):
-        block.store(place + number, go_on(mode, one, share, by))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance
-from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.settings import (
     ARMIJO,
     ENERGY_ROUNDING,
@@ -20,9 +19,8 @@ from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, lar
 
 
 def point_numbers(
+    plan: Plan,
     block: Block,
-    layout: Layout,
-    unknowns: Unknowns,
     balance: Balance,
     energy: Scalar,
     products: Sequence[Scalar],
@@ -31,14 +29,14 @@ def point_numbers(
     """Return the single numbers of a point from sums over the chain.
 
     Args:
+        plan: The chain and its places.
         block: The block of the point.
-        layout: The places in the workspace.
-        unknowns: The chain.
         balance: Elastic energy, weight and range margin.
         energy: Elastic energy plus potential [J].
         products: Derivative of the energy along the Newton step, squared out-of-balance torque, squared Newton step.
         pivots: Smallest pivot, and number of pivots that are not positive.
     """
+    unknowns, layout = plan.unknowns, plan.layout
     force = block.loads(layout.force, 3)
     load = dot(force, force) * unknowns.chain.reach**2 + balance.weight
     if unknowns.pulled:
@@ -58,24 +56,22 @@ def point_numbers(
     }
 
 
-def decide(
-    block: Block, layout: Layout, unknowns: Unknowns, point: dict[str, Scalar], *, starts: bool = False
-) -> tuple[Scalar, Scalar]:
+def decide(plan: Plan, block: Block, point: dict[str, Scalar], *, starts: bool = False) -> tuple[Scalar, Scalar]:
     """Trace the new mode of a case.
 
     Mode 0 goes on, 1 is in stable balance, 2 is left to the descent: where pivots are not positive, a section is beyond its
     range, the energy does not decrease enough, or a number is NaN.
 
     Args:
+        plan: The chain and its places.
         block: The block of the pass.
-        layout: The places in the workspace.
-        unknowns: The chain.
         point: The numbers of the point, see `point_numbers`.
         starts: Whether this is the first pass, without a mode before and a bound of the energy.
 
     Returns:
         The mode, and the share of the step that mode 0 takes.
     """
+    unknowns, layout = plan.unknowns, plan.layout
     mode: Scalar = 0.0 if starts else block.load(layout.single("mode"))
     bound: Scalar = 1e300 if starts else block.load(layout.single("bound"))
     error, length, energy = point["error"], point["length"], point["energy"]
@@ -92,9 +88,12 @@ def decide(
     return new_mode, share
 
 
-def go_on(mode: Scalar, here: Scalar, share: Scalar, step: Scalar) -> Scalar:
-    """Return a number after a share of its step, if the case goes on."""
-    return if_less(mode, 0.5, here + share * step, here)
+def go_on(
+    block: Block, first: int, here: Sequence[Scalar], step: Sequence[Scalar], mode: Scalar, share: Scalar, base: str = ""
+) -> None:
+    """Write numbers after a share of their step, if the case goes on."""
+    for place, (one, by) in enumerate(zip(here, step, strict=True)):
+        block.store(first + place, if_less(mode, 0.5, one + share * by, one), base)
 
 
 def dot(one: Sequence[Scalar], other: Sequence[Scalar]) -> Scalar:

@@ -2,65 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unrolled_chain import Evaluation, evaluate
 from softrobots.compiled.program.passes import decide, dot, go_on, point_numbers
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar
 
 
-def equilibrium_blocks(unknowns: Unknowns, layout: Layout, *, weight: bool) -> tuple[list[Block], int]:
-    """Trace the functions that find equilibria.
-
-    Args:
-        unknowns: The chain.
-        layout: The places in the workspace.
-        weight: Whether there is gravity.
-
-    Returns:
-        The functions, and the size of the workspace.
-    """
+def equilibrium_blocks(plan: Plan) -> tuple[list[Block], int]:
+    """Trace the functions that find equilibria; return them and the size of the workspace."""
+    layout = plan.layout
     prepare = Block("prepare", "Compute what depends on motors and load only.")
     trace = prepare.trace
     newton_pass = Block("newton_pass", "Evaluate the point, and take a Newton step.", trace=trace)
-    at_point = evaluate(unknowns, newton_pass, layout, weight=weight)
-    _advance(newton_pass, layout, unknowns, at_point, starts=False)
+    _advance(plan, newton_pass, evaluate(plan, newton_pass))
     evaluation = Block("evaluate", "Evaluate the point: Newton step, energy, residual, pivots.", trace=trace)
-    shifted = evaluate(unknowns, evaluation, layout, weight=weight, shift_pivots=True)
-    for name, value in numbers(unknowns, layout, evaluation, shifted).items():
+    shifted = evaluate(plan, evaluation, shift_pivots=True)
+    for name, value in numbers(plan, evaluation, shifted).items():
         evaluation.store(layout.single(name), value)
     evaluation.store_all(layout.step, shifted.step)
-    store_tip(evaluation, layout, shifted)
+    store_tip(plan, evaluation, shifted)
     singles = [evaluation.load(layout.single(one)) for one in ("mode", "bound", "pivot_shift")]
     varying = [*evaluation.loads(layout.unknown, layout.unknowns), *singles]
     count = hoist([newton_pass, evaluation], prepare, varying, layout.prepared)
     first_pass = Block("first_pass", "Prepare, evaluate the robot at its start, and take a Newton step.", trace=trace)
     first_pass.stores = list(prepare.stores)
-    relaxed = evaluate(unknowns, first_pass, layout, weight=weight, at_rest=True)
-    _advance(first_pass, layout, unknowns, relaxed, starts=True)
+    _advance(plan, first_pass, evaluate(plan, first_pass, at_rest=True), starts=True)
     return [prepare, first_pass, newton_pass, evaluation], layout.prepared + count
 
 
-def numbers(unknowns: Unknowns, layout: Layout, block: Block, point: Evaluation) -> dict[str, Scalar]:
+def numbers(plan: Plan, block: Block, point: Evaluation) -> dict[str, Scalar]:
     """Return the single numbers of an evaluation."""
     products = dot(point.gradient, point.step), dot(point.gradient, point.gradient), dot(point.step, point.step)
     pivots = point.beyond.min_pivot, point.beyond.n_negative_pivots
-    return point_numbers(block, layout, unknowns, point.balance, point.energy, products, pivots)
+    return point_numbers(plan, block, point.balance, point.energy, products, pivots)
 
 
-def store_tip(block: Block, layout: Layout, point: Evaluation) -> None:
+def store_tip(plan: Plan, block: Block, point: Evaluation) -> None:
     """Write the tip in world axes."""
-    block.store_all(layout.tip, (point.base + point.base_axes @ point.tip).tolist())
+    block.store_all(plan.layout.tip, (point.base + point.base_axes @ point.tip).tolist())
 
 
-def _advance(block: Block, layout: Layout, unknowns: Unknowns, point: Evaluation, *, starts: bool) -> None:
+def _advance(plan: Plan, block: Block, point: Evaluation, *, starts: bool = False) -> None:
     """Write the next point of the case."""
-    rest = [float(unknowns.chain.rest[strain]) for strain in unknowns.strains]
-    mode, share = decide(block, layout, unknowns, numbers(unknowns, layout, block, point), starts=starts)
-    here: Sequence[Scalar] = rest if starts else block.loads(layout.unknown, layout.unknowns)
-    for place, (one, step) in enumerate(zip(here, point.step, strict=True)):
-        block.store(layout.unknown + place, go_on(mode, one, share, step))
-    store_tip(block, layout, point)
+    mode, share = decide(plan, block, numbers(plan, block, point), starts=starts)
+    go_on(block, plan.layout.unknown, point.unknown, point.step, mode, share)
+    store_tip(plan, block, point)

@@ -1,8 +1,9 @@
-"""Inputs of the functions that trace a looped chain."""
+"""Inputs of the functions that trace a chain."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
@@ -10,19 +11,25 @@ from softrobots.compiled.chain.unknowns import Unknowns
 
 
 @dataclass(frozen=True)
-class LoopedPlan:
-    """A looped chain and its places in the workspace."""
+class Plan:
+    """A chain and its places in the workspace."""
 
     unknowns: Unknowns
     """The chain."""
-    layout: Layout
-    """Places of the numbers of a case."""
-    recursion: RecursionLayout
-    """Places of the sums that elements hand on."""
     weight: bool
     """Whether there is gravity."""
     tip: TipLayout | None = None
-    """Places of the response of the tip, in code that traces it."""
+    """Places of the response of the tip, in code of looped chains that traces it."""
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Places of the numbers of a case."""
+        return Layout(self.unknowns.chain.n_motors, len(self.unknowns.strains))
+
+    @cached_property
+    def recursion(self) -> RecursionLayout:
+        """Places of the sums that elements of a looped chain hand on."""
+        return RecursionLayout(self.layout.prepared)
 
     @property
     def infix(self) -> str:
