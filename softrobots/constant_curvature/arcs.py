@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, common_shape, finite_array, read_only
+from softrobots.core.checks import FloatArray, common_shape, finite_array, instance_of, read_only
 from softrobots.core.errors import ParameterError
 
 
@@ -113,9 +113,7 @@ def checked_strains(strains: Any) -> FloatArray:
 
 def checked_arc(arc: Arc) -> Arc:
     """Return `arc` if it is an `Arc`, or raise ParameterError."""
-    if not isinstance(arc, Arc):
-        raise ParameterError("arc", arc, "an Arc")
-    return arc
+    return instance_of("arc", arc, Arc, "an Arc")
 
 
 def stack_arcs(arcs: Arc | Sequence[Arc]) -> Arc:

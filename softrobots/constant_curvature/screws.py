@@ -1,4 +1,4 @@
-r"""Screw motion along a section of constant strain, with first and second derivatives.
+r"""Screw motion (exponential map of SE(3)) along a section of constant strain, with first and second derivatives.
 
 A section has the *section coordinates* `z = h (kx, ky, tau, stretch - 1)`: the rotation over its length about x, y (bending)
 and z (twist) [rad], and its elongation [m], at rest length `h`. The pose of its end in the frame of its start is

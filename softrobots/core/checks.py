@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from softrobots.core.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
+Kind = TypeVar("Kind")
 
 LARGEST = 1e30
 """Largest magnitude accepted, and inverse of the smallest positive number: squares and cubes of others would overflow."""
@@ -141,6 +142,13 @@ def listed(name: str, value: Any, count: int, requirement: str) -> list[Any]:
     if not isinstance(value, tuple | list | np.ndarray) or not np.iterable(value) or len(value) != count:
         raise ParameterError(name, value, requirement)
     return list(value)
+
+
+def instance_of(name: str, value: Any, kind: type[Kind], requirement: str) -> Kind:
+    """Return `value` if it is a `kind`, or raise ParameterError."""
+    if not isinstance(value, kind):
+        raise ParameterError(name, value, requirement)
+    return value
 
 
 def read_only(array: FloatArray) -> FloatArray:

@@ -76,7 +76,6 @@ class SelfIntersection(SoftRobotsError, ValueError):
     """
 
     def __init__(self, message: str, *, contact: Any) -> None:
-        """Create the error with the contact."""
         super().__init__(message)
         self.contact = contact
 
@@ -91,7 +90,6 @@ class NotConverged(SoftRobotsError, RuntimeError):
     """
 
     def __init__(self, message: str, *, best: Any, residual: float, iterations: int) -> None:
-        """Create the error with the best iterate."""
         super().__init__(message)
         self.best = best
         self.residual = residual
@@ -128,7 +126,6 @@ class NoCriticalLoad(SoftRobotsError, RuntimeError):
     """
 
     def __init__(self, message: str, *, max_force: float) -> None:
-        """Create the error with the largest load."""
         super().__init__(message)
         self.max_force = max_force
 
@@ -137,7 +134,6 @@ class OutputError(SoftRobotsError, OSError):
     """A result cannot be written."""
 
     def __str__(self) -> str:
-        """Return the message itself."""
         return str(self.args[0])
 
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
-from softrobots.core.errors import ParameterError
+from softrobots.core.checks import instance_of
 from softrobots.robots import HelixTube, InflatableArm, PccArm, XacroRobot
 
 Rules = dict[tuple[str, str], str]
@@ -23,14 +23,8 @@ _BEND = ("-pi / 2", "pi / 2")
 
 
 def check_robot(robot: Any) -> XacroRobot:
-    """Return `robot` if it is one of this package.
-
-    Raises:
-        ParameterError: If it is something else.
-    """
-    if not isinstance(robot, XacroRobot):
-        raise ParameterError("robot", robot, "an InflatableArm, a PccArm or a HelixTube, or left out")
-    return robot
+    """Return `robot` if it is one of this package, or raise ParameterError."""
+    return instance_of("robot", robot, XacroRobot, "an InflatableArm, a PccArm or a HelixTube, or left out")
 
 
 def number_rules(robot: XacroRobot) -> Rules:

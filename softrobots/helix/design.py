@@ -1,4 +1,4 @@
-"""A helix design: actuator and tube, the resulting helix, the requirement that it was made for, and its JSON file."""
+"""A helix design: actuator and tube, the resulting helix, its deviation from the requirement, and its JSON file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_number, listed, non_negative_number, positive_number
+from softrobots.core.checks import FloatArray, choice, finite_number, instance_of, listed, non_negative_number, positive_number
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path, write_text
 from softrobots.core.json_text import read_json
@@ -275,8 +275,7 @@ def _checked_wish(wish: Any) -> Wish | None:
     """A requirement with checked numbers, or None if that is given."""
     if wish is None:
         return None
-    if not isinstance(wish, Wish):
-        raise ParameterError("wish", wish, "a Wish, or None")
+    instance_of("wish", wish, Wish, "a Wish, or None")
     purpose = choice("wish.purpose", wish.purpose, ("grasp", "antenna"))
     path = choice("wish.path", wish.path, ("inner" if purpose == "grasp" else "centre",))
     radius, rise = positive_number("wish.radius", wish.radius, "m"), positive_number("wish.turn_height", wish.turn_height, "m")

@@ -189,11 +189,7 @@ class _NearestHelix(NamedTuple):
         return _helix(np.asarray(radius), np.asarray(self.required.turn_height / (2.0 * math.pi)), self.diameter)
 
     def nearest(self) -> HelixShape:
-        """Return the nearest helix that is free of contact (turns may just touch) and within the limits; see the module.
-
-        Raises:
-            ParameterError: If nothing within the limits is realisable.
-        """
+        """Return the nearest helix that is free of contact (turns may just touch) and within the limits, if there is one."""
         best = (math.inf, 0.0, 0.0)
         for curve in self._border():
 

@@ -1,4 +1,4 @@
-r"""Deviation of a tube that is pinched at discrete places from the smooth helix.
+r"""Shape error of a tube that is pinched at discrete places: a chain of screw motions against the smooth helix.
 
 Between the pinches the tube is straight, contraction 1; at a pinch the contraction is 0, in the limit. The line opposite the
 actuator is not wrinkled: it keeps its length and has no kink. So the pieces are joined by the frames of this *outer* path, x

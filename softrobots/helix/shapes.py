@@ -1,4 +1,4 @@
-r"""Helical actuation in closed form: from the actuator on the tube to the helix, and back.
+r"""Helical actuation in closed form: from contraction and angle of the actuator to radii and pitch of the helix, and back.
 
 An inflated tube of diameter `D` wrinkles along an actuator that runs around it at the angle `theta` to its axis and contracts
 to the share `lambda` of its length; the line opposite keeps its length. Tube, actuator (inner path) and opposite line (outer

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.actuators import Actuators
@@ -289,11 +289,5 @@ class SoftModel:
 
 
 def check_model(model: Any) -> SoftModel:
-    """Return `model` if it is a `SoftModel`.
-
-    Raises:
-        ParameterError: If it is something else, e.g. a robot that has not been loaded.
-    """
-    if not isinstance(model, SoftModel):
-        raise ParameterError("model", model, "a SoftModel (made by softrobots.load_model)")
-    return model
+    """Return `model` if it is a `SoftModel`, or raise ParameterError, e.g. for a robot that has not been loaded."""
+    return instance_of("model", model, SoftModel, "a SoftModel (made by softrobots.load_model)")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from softrobots import helix
-from softrobots.core.checks import FloatArray, non_negative_number, positive_number
+from softrobots.core.checks import FloatArray, instance_of, non_negative_number, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.robots import HelixTube
 
@@ -33,8 +33,7 @@ def grown_coordinates(tube: HelixTube, length: float, front: float = 0.0) -> Flo
     Raises:
         ParameterError: If the tube is no `HelixTube` or is lumped, or a length is out of range.
     """
-    if not isinstance(tube, HelixTube):
-        raise ParameterError("tube", tube, "a HelixTube")
+    instance_of("tube", tube, HelixTube, "a HelixTube")
     if tube.chain != "sections":
         raise ParameterError("tube", tube.chain, 'a HelixTube with chain="sections"; lumped chains cannot grow')
     grown = positive_number("length", length, "m")

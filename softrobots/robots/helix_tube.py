@@ -12,7 +12,7 @@ import numpy as np
 
 from softrobots import helix
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING, in_range
-from softrobots.core.checks import FloatArray, positive_number
+from softrobots.core.checks import FloatArray, instance_of, positive_number
 from softrobots.core.errors import ParameterError, StraightTube
 from softrobots.robots.fields import XacroRobot, check_parameters, parameter
 from softrobots.robots.pcc_arm import CHAINS, HINGE_RULES, MOST_SECTIONS
@@ -155,8 +155,7 @@ class HelixTube(XacroRobot):
             ParameterError: If `design` is no `HelixDesign`, `fields` has a field that it fixes, or a value is out of range.
             SelfIntersection: If the tube would run into itself and `allow_self_contact` is not given.
         """
-        if not isinstance(design, helix.HelixDesign):
-            raise ParameterError("design", design, "a HelixDesign")
+        instance_of("design", design, helix.HelixDesign, "a HelixDesign")
         designed: dict[str, Any] = {name: getattr(design, name) for name in ("contraction", "angle", "diameter", "handedness")}
         designed["length"] = design.tube_length
         twice = sorted(designed.keys() & fields.keys())

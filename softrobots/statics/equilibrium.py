@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
+from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, is_stable, largest_residual
@@ -274,8 +274,7 @@ def check_same_model(model: SoftModel, equilibrium: Any) -> None:
         ParameterError: If it is something else.
     """
     check_model(model)
-    if not isinstance(equilibrium, Equilibrium):
-        raise ParameterError("equilibrium", equilibrium, "an Equilibrium of the model")
+    instance_of("equilibrium", equilibrium, Equilibrium, "an Equilibrium of the model")
     if equilibrium.model != model:
         raise ParameterError("equilibrium", equilibrium.model, f"an equilibrium of the model given, {model!r}")
 

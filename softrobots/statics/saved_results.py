@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import choice, finite_array, finite_number, increasing, read_only
+from softrobots.core.checks import choice, finite_array, finite_number, increasing, instance_of, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import csv_text, write_text
 from softrobots.core.json_text import parse_json
@@ -257,8 +257,7 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
-    if not isinstance(trajectory, Trajectory):
-        raise ParameterError("trajectory", trajectory, "a Trajectory")
+    instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
     model, moments = trajectory.model, trajectory.link_moments
     names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error"]
     names += [f"joint_{name}" if name in names else name for name in (*model.motor_joints, *model.spring_joints)]

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.constant_curvature.screws import Screw
-from softrobots.core.checks import FloatArray, positive_integer
-from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.core.checks import FloatArray, instance_of, positive_integer
+from softrobots.core.errors import NameNotFound
 from softrobots.description.urdf_tags import LineTag, MuscleTag
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
@@ -137,8 +137,7 @@ def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:
     Raises:
         ParameterError: If `equilibrium` is no Equilibrium, or `points` is not positive.
     """
-    if not isinstance(equilibrium, Equilibrium):
-        raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
+    instance_of("equilibrium", equilibrium, Equilibrium, "an Equilibrium")
     return body_at(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, points)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, positive_integer, positive_number
+from softrobots.core.checks import FloatArray, finite_array, instance_of, positive_integer, positive_number
 from softrobots.core.errors import ParameterError, ViewerError
 from softrobots.core.files import new_file, write_text
 from softrobots.model.soft_model import SoftModel, check_model
@@ -134,8 +134,7 @@ class Viewer(ServedPage):
         Raises:
             ParameterError: If it belongs to another robot, or the duration is not positive.
         """
-        if not isinstance(trajectory, Trajectory):
-            raise ParameterError("trajectory", trajectory, "a Trajectory")
+        instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
         self._check(trajectory.equilibria[0])
         span = float(trajectory.times[-1] - trajectory.times[0])
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")

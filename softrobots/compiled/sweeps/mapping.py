@@ -21,12 +21,12 @@ from softrobots.core.checks import (
     FloatArray,
     finite_array,
     increasing,
+    instance_of,
     non_negative_array,
     positive_integer,
     positive_number,
     unit_vector,
 )
-from softrobots.core.errors import ParameterError
 from softrobots.core.npz_file import LARGEST
 from softrobots.core.progress import with_progress
 from softrobots.model.soft_model import SoftModel, check_model
@@ -85,8 +85,7 @@ def map_workspace(
         ClusterError: If the cluster fails.
     """
     check_arm(check_model(model))
-    if not isinstance(grid, TargetGrid):
-        raise ParameterError("grid", grid, "a TargetGrid")
+    instance_of("grid", grid, TargetGrid, "a TargetGrid")
     sizes = increasing("loads", non_negative_array("loads", finite_array("loads", loads, (None,), "N"), "N"), "N")
     positive_integer("number of loads", len(sizes), 100_000)
     most = LARGEST // (10 + 8 * (model.n_motors + model.n_springs))  # that can be saved

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softrobots import helix
-from softrobots.core.checks import FloatArray, finite_array, positive_number
+from softrobots.core.checks import FloatArray, finite_array, instance_of, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure
 from softrobots.view.figures.helix_sheet import draw, sheet
@@ -114,8 +114,7 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
         ParameterError: If an argument is out of range.
         MissingDependency: If matplotlib is not installed.
     """
-    if not isinstance(test, helix.GraspTest):
-        raise ParameterError("test", test, "a GraspTest")
+    instance_of("test", test, helix.GraspTest, "a GraspTest")
     most = positive_number("pressure", pressure, "Pa")
     depths = _row("deflections", test.deflections, "m")
     if len(depths) > len(COLOURS):

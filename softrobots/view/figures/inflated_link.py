@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots import inflated_beam
-from softrobots.core.checks import finite_number, positive_number
+from softrobots.core.checks import finite_number, instance_of, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam import CharacterisationRow
 from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, grid_and_legend, line_style, new_figure, new_plot
@@ -173,7 +173,6 @@ def _check_rows(rows: Any) -> None:
     if isinstance(rows, str) or not isinstance(rows, Sequence) or not rows:
         raise ParameterError("rows", rows, "at least one CharacterisationRow")
     for row in rows:
-        if not isinstance(row, CharacterisationRow):
-            raise ParameterError("rows", row, "a sequence of CharacterisationRow")
+        instance_of("rows", row, CharacterisationRow, "a sequence of CharacterisationRow")
         positive_number("rows: pressure", row.pressure, "Pa")
         positive_number("rows: stiffness", row.stiffness, "N m/rad")

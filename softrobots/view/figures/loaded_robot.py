@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, instance_of
 from softrobots.core.errors import ParameterError
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone
@@ -31,8 +31,7 @@ def loaded_shape(equilibrium: Equilibrium) -> Any:
         ParameterError: If it is no equilibrium.
         MissingDependency: If matplotlib is not installed.
     """
-    if not isinstance(equilibrium, Equilibrium):
-        raise ParameterError("equilibrium", equilibrium, "an Equilibrium")
+    instance_of("equilibrium", equilibrium, Equilibrium, "an Equilibrium")
     model = equilibrium.model
     if model.structure.section_table:
         return shape(equilibrium)

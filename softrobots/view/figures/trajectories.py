@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, positive_integer
+from softrobots.core.checks import FloatArray, finite_array, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.statics.kinematics import backbone
 from softrobots.statics.trajectory import Trajectory
@@ -41,7 +41,7 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
         MissingDependency: If matplotlib is not installed.
     """
     positive_integer("shown", shown)
-    _check(trajectory)
+    instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
     figure, axes = new_space((8.0, 6.4), "Loaded arm along the path")
     model = trajectory.model
     chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, shown).round().astype(int))
@@ -77,8 +77,8 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
         ParameterError: If one of them is no trajectory, or they differ in length.
         MissingDependency: If matplotlib is not installed.
     """
-    _check(trajectory)
-    _check(rigid)
+    instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
+    instance_of("trajectory", rigid, Trajectory, "a Trajectory")
     if len(rigid.times) != len(trajectory.times):
         raise ParameterError("rigid", len(rigid.times), f"a trajectory with {len(trajectory.times)} waypoints")
     figure, axes = new_plot(
@@ -131,7 +131,7 @@ def link_moments(trajectory: Trajectory) -> Any:
         ParameterError: If it is no trajectory or its robot names no inflated links.
         MissingDependency: If matplotlib is not installed.
     """
-    _check(trajectory)
+    instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
     moments = trajectory.link_moments
     if moments is None:
         raise ParameterError("trajectory", trajectory.model, "of a robot with inflated links")
@@ -148,8 +148,3 @@ def link_moments(trajectory: Trajectory) -> Any:
     axes.set_ylim(0.0, 1.12 * max(float(moments.max()), *(limit for limit, _ in limits)))
     axes.legend(fontsize=9)
     return figure
-
-
-def _check(trajectory: Trajectory) -> None:
-    if not isinstance(trajectory, Trajectory):
-        raise ParameterError("trajectory", trajectory, "a Trajectory")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_number
+from softrobots.core.checks import FloatArray, finite_number, instance_of
 from softrobots.core.errors import ParameterError
 from softrobots.statics.workspace import Workspace
 from softrobots.statics.workspace_map import WorkspaceMap
@@ -33,8 +33,7 @@ def workspace(samples: Workspace) -> Any:
         ParameterError: If it is no workspace.
         MissingDependency: If matplotlib is not installed.
     """
-    if not isinstance(samples, Workspace):
-        raise ParameterError("samples", samples, "a Workspace")
+    instance_of("samples", samples, Workspace, "a Workspace")
     figure = new_figure((13.0, 4.4))
     tips, order = samples.tip_positions, np.argsort(samples.manipulability)
     scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 7, "rasterized": True}
@@ -71,8 +70,7 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
         ParameterError: If it is no map, it has one radius or one height only, or the load is not finite.
         MissingDependency: If matplotlib is not installed.
     """
-    if not isinstance(result, WorkspaceMap):
-        raise ParameterError("result", result, "a WorkspaceMap")
+    instance_of("result", result, WorkspaceMap, "a WorkspaceMap")
     if len(result.grid.x) < 2 or len(result.grid.z) < 2:
         raise ParameterError("result", result.grid.shape, "a map with at least two coordinates x and z (this is its shape)")
     wanted = result.loads[-1] / 2.0 if load is None else finite_number("load", load, "N")
