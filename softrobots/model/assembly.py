@@ -1,4 +1,4 @@
-"""From rigid bodies and the tags of a description to a `SoftModel`: springs, coordinates and actuators, in one pass."""
+"""Assembly of a `SoftModel` from rigid bodies and the tags of a description: springs, coordinates and actuators."""
 
 from __future__ import annotations
 

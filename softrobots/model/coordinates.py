@@ -1,4 +1,4 @@
-r"""Actuator and elastic coordinates of a robot, and the joint positions that follow from them.
+r"""Generalised coordinates of a robot: actuators and elastic coordinates, and the joint positions that follow from them.
 
 Statics works on elastic coordinates `y` (free) at given actuator coordinates `u`. Joint positions are a map `q(u, y)`:
 
@@ -89,11 +89,8 @@ class DirectPoint(NamedTuple):
     """Joint positions."""
     coordinates: DirectCoordinates
     """Which joint is an actuator and which is elastic."""
-
-    @property
-    def valid(self) -> bool:
-        """True: direct coordinates have no range limit."""
-        return True
+    valid: bool = True
+    """True: direct coordinates have no range limit."""
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
         """Select the rows and columns of the load that belong to the coordinates."""
@@ -158,21 +155,14 @@ class SectionPoint:
         """Evaluate the map of the sections, unless they are out of range."""
         self._c = coordinates
         n = len(coordinates.spring_indices)
-        self._joints: FloatArray = np.zeros(coordinates.count)
-        self._joints[coordinates.motor_indices] = motors
-        self._joints[coordinates.spring_indices] = elastic[:n]
         self._chain = SectionChain(elastic[n:].reshape(-1, 4), coordinates.lengths)
-        self._joints[coordinates.section_indices] = self._chain.positions - coordinates.rest_joints
-
-    @property
-    def joints(self) -> FloatArray:
-        """Joint positions."""
-        return self._joints
-
-    @property
-    def valid(self) -> bool:
+        self.valid = self._chain.valid
         """Whether every section is in range."""
-        return self._chain.valid
+        self.joints: FloatArray = np.zeros(coordinates.count)
+        """Joint positions."""
+        self.joints[coordinates.motor_indices] = motors
+        self.joints[coordinates.spring_indices] = elastic[:n]
+        self.joints[coordinates.section_indices] = self._chain.positions - coordinates.rest_joints
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
         """Transform a joint load by the chain rule.

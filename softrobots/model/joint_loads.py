@@ -1,4 +1,4 @@
-r"""A load in joint coordinates, with its derivative kept as factors.
+r"""Generalised forces of a load in joint coordinates, with their derivative kept as factors.
 
 For a world-fixed force `f` at a point of a chain, with linear and angular Jacobian columns `v_i`, `w_i`, the derivative of
 :math:`J_v^T f` is :math:`(f \times w_i) \cdot v_j` for `i <= j`, and symmetric. For a world-fixed moment `mu` that of

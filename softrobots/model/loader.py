@@ -186,9 +186,14 @@ def _tip(model: Any, tip: str | None, label: str) -> str:
     return str(leaves[0])
 
 
+def load_arguments(model: SoftModel) -> dict[str, Any]:
+    """Return the arguments with which `load_model` builds a model again from its URDF text."""
+    motors = model.structure.motor_joints
+    return {"springs": model.spring_table, "motors": motors, "tip": model.tip, "muscles": model.muscle_input}
+
+
 def _reduce(model: SoftModel) -> tuple[Any, ...]:
-    springs, motors = model.spring_table, model.structure.motor_joints
-    return partial(load_model, springs=springs, motors=motors, tip=model.tip, muscles=model.muscle_input), (model.urdf,)
+    return partial(load_model, **load_arguments(model)), (model.urdf,)
 
 
 copyreg.pickle(SoftModel, _reduce)  # as URDF text and arguments; Pinocchio's workspaces are not pickled

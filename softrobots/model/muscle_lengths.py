@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from softrobots.constant_curvature.strain_chain import LARGEST_BENDING
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.urdf_tags import MuscleTag
-from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
+from softrobots.model.coordinates import Coordinates, ReducedLoad
 from softrobots.model.joint_loads import JointLoad
-from softrobots.model.muscles import MUSCLE_STRAINS, Segments, muscle_arms
+from softrobots.model.muscles import MUSCLE_STRAINS, MusclePoint, Segments, muscle_arms
 from softrobots.model.springs import Springs
 
 CONSISTENT = 1e-6
@@ -211,11 +212,10 @@ class MuscleLengths:
         return bendings
 
 
-class MuscleLengthPoint(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class MuscleLengthPoint(MusclePoint):
     """A robot at given muscle lengths."""
 
-    inner: Point
-    """The robot without muscles."""
     spread: FloatArray
     """Derivative of its elastic coordinates with respect to the lengths."""
     free: FloatArray
@@ -224,16 +224,6 @@ class MuscleLengthPoint(NamedTuple):
     """Its springs."""
     strains: FloatArray
     """Its elastic coordinates."""
-
-    @property
-    def joints(self) -> FloatArray:
-        """Joint positions."""
-        return self.inner.joints
-
-    @property
-    def valid(self) -> bool:
-        """Whether every section is within its range."""
-        return self.inner.valid
 
     def reduce(self, joints: JointLoad) -> ReducedLoad:
         """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included."""

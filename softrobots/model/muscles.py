@@ -17,7 +17,7 @@ neglected: 1 mm in 0.524 m for 0.8 rad at 0.04 m.)
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -65,17 +65,12 @@ class MuscleForces:
         return MuscleForcePoint(self._inner.at(motors[:count], elastic), self._matrix, motors[count:], elastic)
 
 
-class MuscleForcePoint(NamedTuple):
-    """A robot under given muscle tensions."""
+@dataclass(frozen=True, eq=False)
+class MusclePoint:
+    """A robot with muscles, whose joints are those of the robot without them."""
 
     inner: Point
     """The robot without muscles."""
-    matrix: FloatArray
-    """Length derivative of the muscles."""
-    tensions: FloatArray
-    """Tension of each muscle [N]."""
-    elastic: FloatArray
-    """Elastic coordinates."""
 
     @property
     def joints(self) -> FloatArray:
@@ -86,6 +81,18 @@ class MuscleForcePoint(NamedTuple):
     def valid(self) -> bool:
         """Whether every section is within its range."""
         return self.inner.valid
+
+
+@dataclass(frozen=True, eq=False)
+class MuscleForcePoint(MusclePoint):
+    """A robot under given muscle tensions."""
+
+    matrix: FloatArray
+    """Length derivative of the muscles."""
+    tensions: FloatArray
+    """Tension of each muscle [N]."""
+    elastic: FloatArray
+    """Elastic coordinates."""
 
     def reduce(self, joints: JointLoad) -> ReducedLoad:
         """Add the tensions to the load; the load on a muscle is its tension."""

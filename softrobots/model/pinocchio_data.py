@@ -29,10 +29,9 @@ class PinocchioData(threading.local):
 
     def at(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         """Return model and data of the calling thread; see `SoftModel.workspace`."""
-        pair = self._pairs.get(gravity)
-        if pair is None:
-            pair = self._pairs[gravity] = self._pair(gravity)
-        return pair
+        if gravity not in self._pairs:
+            self._pairs[gravity] = self._pair(gravity)
+        return self._pairs[gravity]
 
     def _pair(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         if gravity is None:

@@ -1,4 +1,4 @@
-"""Solvers for the elastic coordinates of a robot under a load (the equations are in `softrobots.statics.elastic_state`).
+"""Newton and fixed-point solvers for the static equilibrium of a robot (equations: `softrobots.statics.elastic_state`).
 
 - "newton": Newton on the potential energy with the exact tangent, made positive definite where it is not, and halving of
   steps that do not lower the energy. It ends in a stable equilibrium. A world-fixed moment in the load has no energy: then

@@ -1,4 +1,4 @@
-"""Damped Newton search for the tip force; independent of the solver."""
+"""Levenberg-Marquardt search for the tip force in its observable directions; independent of the solver."""
 
 from __future__ import annotations
 
@@ -44,14 +44,6 @@ class Directions(NamedTuple):
 class Measurement(Protocol[State]):
     """Measured motor torques, and a robot on which forces are tried."""
 
-    @property
-    def reach(self) -> float:
-        """Scale of lengths [m]."""
-
-    @property
-    def tolerance(self) -> float:
-        """Largest part of the torques that may stay unexplained [N m]."""
-
     def equilibrium(self, force: FloatArray, near: State) -> State | None:
         """Solve for the equilibrium under a force, from a nearby state; None if it does not converge."""
 
@@ -67,24 +59,27 @@ def torque_tolerance(torques: FloatArray) -> float:
     return TOLERANCE * max(float(np.linalg.norm(torques)), MOMENT_FLOOR)
 
 
-def search_force(problem: Measurement[State], state: State, most: int) -> tuple[FloatArray, State, int]:
+def search_force(
+    problem: Measurement[State], state: State, most: int, *, reach: float, tolerance: float
+) -> tuple[FloatArray, State, int]:
     """Levenberg-Marquardt on the torque equation, in the observable directions of each step.
 
     Args:
         problem: The measurement.
         state: The robot without the force.
         most: Most steps.
+        reach: Scale of lengths [m].
+        tolerance: Largest part of the torques that may stay unexplained [N m].
 
     Returns:
         The force, shape (3,) [N], the robot under it, and the number of steps.
     """
-    force, reach = np.zeros(3), problem.reach
-    damping, spent = _FIRST_DAMPING * reach, 0
+    force, damping, spent = np.zeros(3), _FIRST_DAMPING * reach, 0
     while spent < most:
         left, values, right, keep = problem.directions(state)
         missing = left[:, : len(values)].T @ problem.unexplained(state)
         size = float(np.linalg.norm(missing[keep]))
-        if size <= problem.tolerance:
+        if size <= tolerance:
             break
         step = right[: len(values)][keep].T @ (missing[keep] * values[keep] / (values[keep] ** 2 + damping**2))
         trial = problem.equilibrium(force + step, state)

@@ -161,10 +161,6 @@ class _Problem:
     base: Load
     frame: str
 
-    @property
-    def reach(self) -> float:
-        return self.model.reach
-
     @cached_property
     def tolerance(self) -> float:
         return torque_tolerance(self.torques)
@@ -206,7 +202,8 @@ def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int
     """Damped Newton, see `softrobots.statics.force_search`."""
     no_force = np.zeros(3)
     relaxed = elastic_state(problem.model, problem.motors, problem.model.rest, problem.load(no_force))
-    return search_force(problem, problem.equilibrium(no_force, relaxed) or relaxed, most)
+    start = problem.equilibrium(no_force, relaxed) or relaxed
+    return search_force(problem, start, most, reach=problem.model.reach, tolerance=problem.tolerance)
 
 
 def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:

@@ -1,4 +1,4 @@
-r"""Post-buckling: every branch of equilibria that leaves the path at the critical load, followed and labelled.
+r"""Post-buckling: branch switching at the critical load, and numerical continuation of every branch of equilibria.
 
 At the critical force `F_c` of a push along `d` the tangent stiffness `K_t` of the path from zero force (the *fundamental*
 path) is singular: `K_t v = 0`. Other equilibria leave it along the buckling modes `v`. They are found at a small distance

@@ -1,4 +1,4 @@
-"""Results of statics as named arrays, and back, for result files; trajectories as CSV tables.
+"""Serialisation of the results of statics: named arrays for result files, and trajectories as CSV tables.
 
 A file holds the robot (URDF and springs), the load and the coordinates. Everything else is computed again on loading, and a
 file whose residual is larger than it claims is refused.
@@ -19,7 +19,7 @@ from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import csv_text, write_text
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
-from softrobots.model.loader import load_model
+from softrobots.model.loader import load_arguments, load_model
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.displacement_control import DisplacementControl, Probe
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
@@ -35,22 +35,14 @@ from softrobots.statics.trajectory import Trajectory
 from softrobots.statics.workspace import FIELDS, Workspace, workspace_at
 from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
 
+_COLUMNS = ("q_motors", "q_springs", "residual", "tolerance", "iterations")
 _SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
 
 
 def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
     wrenches = {name: wrench.tolist() for name, wrench in load.wrenches.items()}
-    arguments = {
-        "springs": model.spring_table,
-        "motors": model.structure.motor_joints,
-        "tip": model.tip,
-        "muscles": model.muscle_input,
-    }
-    return {
-        "urdf": np.array(model.urdf),
-        "model": np.array(json.dumps(arguments)),
-        "load": np.array(json.dumps({"wrenches": wrenches, "gravity": load.gravity})),
-    }
+    load_text = json.dumps({"wrenches": wrenches, "gravity": load.gravity})
+    return {"urdf": model.urdf, "model": json.dumps(load_arguments(model)), "load": load_text}
 
 
 def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
@@ -68,20 +60,14 @@ def _pack_rows(equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
     first = equilibria[0]
     if any(not e.load.same_as(first.load) for e in equilibria):
         raise ParameterError("result", first.model, "equilibria under one load; these have several")
-    return _pack_model(first.model, first.load) | {
-        "q_motors": np.array([e.q_motors for e in equilibria]),
-        "q_springs": np.array([e.q_springs for e in equilibria]),
-        "residual": np.array([e.residual for e in equilibria]),
-        "tolerance": np.array([e.tolerance for e in equilibria]),
-        "iterations": np.array([e.iterations for e in equilibria]),
-        "solver": np.array([e.method for e in equilibria]),
-    }
+    columns = {name: [getattr(equilibrium, name) for equilibrium in equilibria] for name in _COLUMNS}
+    return _pack_model(first.model, first.load) | columns | {"solver": [equilibrium.method for equilibrium in equilibria]}
 
 
 def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
     model, load = _unpack_model(fields)
     count = len(fields["q_motors"])
-    if count == 0 or any(len(fields[name]) != count for name in ("q_springs", "residual", "tolerance", "iterations", "solver")):
+    if count == 0 or any(len(fields[name]) != count for name in (*_COLUMNS, "solver")):
         raise FileFormatError("its arrays must have one row for each of at least one configuration")
     motors = finite_array("q_motors", fields["q_motors"], (count, model.n_motors))
     springs = finite_array("q_springs", fields["q_springs"], (count, model.n_springs), "rad")
@@ -107,8 +93,8 @@ def _pack_solution(solution: IkSolution) -> dict[str, Any]:
     return _pack_rows((solution.equilibrium,)) | {
         "target": solution.target,
         "orientation": solution.orientation,
-        "error": np.array(solution.error),
-        "steps": np.array(solution.iterations),
+        "error": solution.error,
+        "steps": solution.iterations,
         "alternatives": np.array(solution.alternatives).reshape(-1, len(solution.q_motors)),
     }
 
@@ -135,20 +121,8 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
 
 
 def _pack_imposed(result: ImposedDisplacement) -> dict[str, Any]:
-    probe = result.probe
-    return (
-        _pack_rows((result.equilibrium,))
-        | _pack_model(result.model, result.load)
-        | {
-            "frame": np.array(probe.frame),
-            "point": probe.point,
-            "direction": probe.direction,
-            "origin": probe.origin,
-            "normal": probe.normal,
-            "displacement": np.array(result.displacement),
-            "reaction": np.array(result.reaction),
-        }
-    )
+    rows, load = _pack_rows((result.equilibrium,)), _pack_model(result.model, result.load)
+    return rows | load | vars(result.probe) | {"displacement": result.displacement, "reaction": result.reaction}
 
 
 def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
@@ -170,13 +144,8 @@ def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
 
 
 def _pack_estimate(estimate: LoadEstimate) -> dict[str, Any]:
-    return _pack_rows((estimate.equilibrium,)) | {
-        "force": estimate.force,
-        "frame": np.array(estimate.frame),
-        "measured_torques": estimate.measured_torques,
-        "estimation": np.array(estimate.method),
-        "torque_std": estimate.torque_std,
-    }
+    fields = {name: getattr(estimate, name) for name in ("force", "frame", "measured_torques", "torque_std")}
+    return _pack_rows((estimate.equilibrium,)) | fields | {"estimation": estimate.method}
 
 
 def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
@@ -194,7 +163,7 @@ def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
 
 def _pack_trajectory(trajectory: Trajectory) -> dict[str, Any]:
     rows = _pack_rows(trajectory.equilibria)
-    return rows | {"times": trajectory.times, "targets": trajectory.targets, "following": np.array(trajectory.method)}
+    return rows | {"times": trajectory.times, "targets": trajectory.targets, "following": trajectory.method}
 
 
 def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
@@ -209,7 +178,7 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
 
 def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
     arrays = {name: getattr(workspace, name) for name in FIELDS}
-    return _pack_model(workspace.model, workspace.load) | arrays | {"refused": np.array(workspace.refused)}
+    return _pack_model(workspace.model, workspace.load) | arrays | {"refused": workspace.refused}
 
 
 def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:

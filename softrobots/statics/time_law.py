@@ -1,4 +1,4 @@
-"""Paths in time: point-to-point motion on a straight line, and waypoints from a file."""
+"""Trajectory generation: straight lines with a quintic time law, and waypoints from a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Goal of the tip, and a robot on Pinocchio under a load, for the search in `softrobots.statics.tip_search`."""
+"""Task of the tip (position, direction, orientation): error and Jacobian on a loaded robot in Pinocchio, for `tip_search`."""
 
 from __future__ import annotations
 

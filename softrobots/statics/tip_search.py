@@ -1,4 +1,4 @@
-r"""Local search for actuator coordinates that bring the loaded tip to a goal.
+r"""Local inverse kinematics of the loaded tip: Levenberg-Marquardt within the actuator limits, and steps between waypoints.
 
 At every step the elastic coordinates are in equilibrium; the step uses the exact derivative of the loaded tip,
 :math:`dx/dq_m = J_m + J_k K_t^{-1} d(J_k^T w - g_k)/dq_m`. With no load this is ordinary rigid inverse kinematics.

@@ -1,4 +1,4 @@
-"""Following a path of targets with the loaded tip, waypoint by waypoint."""
+"""Trajectory following: inverse kinematics of the loaded tip along a path of targets, waypoint by waypoint."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def follow_trajectory(
         steps = (
             _paper_steps(model, points, moments, load, first, gain)
             if method == "paper"
-            else _exact_steps(model, points, load, first, inner, tolerance, allow_jumps)
+            else _exact_steps(LoadedTip(model, Goal(points[0]), load, inner), points, first, tolerance, allow_jumps)
         )
         bar = with_progress(steps, progress, label=f"waypoints ({method})", unit="wp", total=len(points) - 1)
         equilibria = (first, *bar)
@@ -204,16 +204,15 @@ def _named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachab
 
 
 def _exact_steps(
-    model: SoftModel, points: FloatArray, load: Load, first: Equilibrium, method: str, tolerance: float, allow_jumps: bool
+    tip: LoadedTip, points: FloatArray, first: Equilibrium, tolerance: float, allow_jumps: bool
 ) -> Iterable[Equilibrium]:
-    state = elastic_state(model, first.q_motors, first.q_springs, load)
-    here = LocalSolution(first.q_motors, state, 0.0)
-    tip = LoadedTip(model, Goal(points[0]), load, method)
+    model, load, method = tip.model, tip.load, tip.method
+    here = LocalSolution(first.q_motors, elastic_state(model, first.q_motors, first.q_springs, load), 0.0)
     for number, (last, target) in enumerate(pairwise(points), start=2):
         reached = advance(tip, last, target, here, tolerance)
         if reached is None:
             try:
-                reached = _jump(tip, target, here, tolerance)
+                reached = _jump(tip, target, here.q_motors, tolerance)
             except TargetUnreachable as error:
                 raise _named(error, number, len(points)) from error
             if not allow_jumps:
@@ -230,17 +229,13 @@ def _exact_steps(
         yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
 
 
-def _jump(
-    tip: LoadedTip, target: FloatArray, here: LocalSolution[ElasticState], tolerance: float
-) -> LocalSolution[ElasticState]:
+def _jump(tip: LoadedTip, target: FloatArray, start: FloatArray, tolerance: float) -> LocalSolution[ElasticState]:
     """Solution for a waypoint from any start, where the path from the previous one is blocked."""
     model, load = tip.model, tip.load
-    wrench = dict(load.wrenches)
-    ik = solve_ik(
-        model, target, wrench=wrench, gravity=load.gravity, q_motors0=here.q_motors, method=tip.method, tolerance=tolerance
-    )
-    state = elastic_state(model, ik.equilibrium.q_motors, ik.equilibrium.q_springs, load)
-    return LocalSolution(ik.equilibrium.q_motors, state, ik.error, iterations=ik.iterations)
+    wrench, gravity = dict(load.wrenches), load.gravity
+    ik = solve_ik(model, target, wrench=wrench, gravity=gravity, q_motors0=start, method=tip.method, tolerance=tolerance)
+    state = elastic_state(model, ik.q_motors, ik.equilibrium.q_springs, load)
+    return LocalSolution(ik.q_motors, state, ik.error, iterations=ik.iterations)
 
 
 def _paper_steps(

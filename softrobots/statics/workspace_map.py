@@ -183,7 +183,7 @@ def required_pressures(model: SoftModel, q_springs: FloatArray) -> FloatArray:
 def packed(result: WorkspaceMap) -> dict[str, Any]:
     """Return the arrays of a map by name, without its robot, for `unpacked`."""
     grid = {f"grid_{axis}": getattr(result.grid, axis) for axis in "xyz"}
-    return grid | {name: getattr(result, name) for name in _ARRAYS} | {"tolerance": np.array(result.tolerance)}
+    return grid | {name: getattr(result, name) for name in _ARRAYS} | {"tolerance": result.tolerance}
 
 
 def unpacked(model: SoftModel, gravity: tuple[float, float, float] | None, fields: Mapping[str, Any]) -> WorkspaceMap:

@@ -73,7 +73,10 @@ class LoopedSearch:
         single = self.run.layout.single
         if status != Status.CERTIFIED:
             return status, state.w
-        _, state, iterations = search_force(problem, problem.looked_at(state), SEARCH_STEPS)
+        tolerance = torque_tolerance(torques)
+        _, state, iterations = search_force(
+            problem, problem.looked_at(state), SEARCH_STEPS, reach=self.model.reach, tolerance=tolerance
+        )
         left, values, _, observable = problem.directions(state)
         unexplained = problem.unexplained(state)
         missing = float(np.linalg.norm(left[:, : len(values)].T @ unexplained))
@@ -84,7 +87,7 @@ class LoopedSearch:
         state.w[single("iterations")] = float(iterations)
         if not (whole and observable.all()) and missing <= HIDDEN * size:
             return Status.UNOBSERVABLE, state.w
-        return Status.CERTIFIED if missing <= problem.tolerance else Status.NOT_REACHED, state.w
+        return Status.CERTIFIED if missing <= tolerance else Status.NOT_REACHED, state.w
 
     def reach(
         self,
@@ -201,14 +204,6 @@ class _MeasuredTorques:
     torques: FloatArray
     gravity: FloatArray
 
-    @property
-    def reach(self) -> float:
-        return self.chain.model.reach
-
-    @property
-    def tolerance(self) -> float:
-        return torque_tolerance(self.torques)
-
     def looked_at(self, state: ChainState) -> ChainState:
         self.chain.run.look_at_tip(state.w)
         return state
@@ -221,7 +216,7 @@ class _MeasuredTorques:
         return np.asarray(self.torques - self.chain.actuation.loads(self.chain.run, state.w))
 
     def directions(self, state: ChainState) -> Directions:
-        return Directions.of(self.chain.actuation.jacobian(self.chain.run, state.w).T, self.reach)
+        return Directions.of(self.chain.actuation.jacobian(self.chain.run, state.w).T, self.chain.model.reach)
 
 
 @dataclass(frozen=True, eq=False)
