@@ -178,10 +178,9 @@ def _kinematics(folder: Path, tools: Sequence[str], report: _Report) -> None:
         }
         for row in rows
     ]
-    cells = [(row.file, row.tool, row.version, *_measured(row), *row_problems(row)) for row in rows]
+    cells = []
+    for row in rows:
+        measured = (f"{row.position_error:.1e} m", f"{row.rotation_error:.1e} rad", f"{row.links} links, {row.joints} joints")
+        cells.append((row.file, row.tool, row.version, *measured, *row_problems(row)))
     report.add("Largest difference from Pinocchio's kinematics at 20 random configurations", cells)
     report.wrong.extend(f"{row.file}: {text}" for row in rows for text in row_problems(row))
-
-
-def _measured(row: KinematicsRow) -> tuple[str, str, str]:
-    return f"{row.position_error:.1e} m", f"{row.rotation_error:.1e} rad", f"{row.links} links, {row.joints} joints"

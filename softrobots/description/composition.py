@@ -171,10 +171,10 @@ class _Part(NamedTuple):
     @property
     def tip(self) -> str | None:
         """Name of the tip link; None if there are several ends."""
-        names = [body.name for body in self.tree.bodies]
-        ends = [name for name in names if not self.tree.joints_of(name)]
         if self.tags.tip is not None:
             return self.tags.tip
+        names = [body.name for body in self.tree.bodies]
+        ends = [name for name in names if not self.tree.joints_of(name)]
         return "tip" if "tip" in names else ends[0] if len(ends) == 1 else None
 
 
@@ -183,8 +183,8 @@ def _read(source: Any, field: str) -> _Part:
     tags = read_tags(text, label)  # raises for anything but URDF
     document = minidom.parseString(text.encode("utf-8"))
     (dom,) = children(document)
-    both = {e.getAttribute("name") for e in children(dom) if e.tagName == "link"}
-    both &= {e.getAttribute("name") for e in children(dom) if e.tagName == "joint"}
+    links, joints = ({e.getAttribute("name") for e in children(dom) if e.tagName == tag} for tag in ("link", "joint"))
+    both = links & joints
     if both:
         raise DescriptionError(f"{label} has links and joints that have the same name: {', '.join(sorted(both))}")
     return _Part(label, document, dom, read_rigid_tree(text, label), tags)
@@ -201,21 +201,17 @@ def _joint_on_world(part: _Part) -> Joint | None:
 
 def _prepare_child(child: _Part, base: Joint | None, carrier: _Part, prefix: str) -> None:
     """Remove what the whole has only once (tip, world, `<mujoco>`); names have their prefix already."""
-    removed = package_tags(child.dom, "tip")
-    for element in children(child.dom):
-        if base is not None and (element.tagName, element.getAttribute("name")) in (
-            ("link", prefix + _WORLD),
-            ("joint", prefix + base.name),
-        ):
-            removed.append(element)
-        if base is not None and element.tagName == "gazebo" and element.getAttribute("reference") == prefix + _WORLD:
-            removed.append(element)
-        if element.tagName == "mujoco" and any(other.tagName == "mujoco" for other in children(carrier.dom)):
-            removed.append(element)
+    removed, elements = package_tags(child.dom, "tip"), children(child.dom)
+    if base is not None:
+        world = (("link", "name", _WORLD), ("joint", "name", base.name), ("gazebo", "reference", _WORLD))
+        for tag, attribute, name in world:
+            removed += [e for e in elements if e.tagName == tag and e.getAttribute(attribute) == prefix + name]
+    if any(element.tagName == "mujoco" for element in children(carrier.dom)):
+        removed += [element for element in elements if element.tagName == "mujoco"]
     for element in removed:
         child.dom.removeChild(element)
-    numbers = [tag.segment for tag in carrier.tags.sections] + [tag.segment for tag in carrier.tags.lumped_sections]
-    shift_segments(child.dom, max(numbers, default=0))
+    sections = (*carrier.tags.sections, *carrier.tags.lumped_sections)
+    shift_segments(child.dom, max((tag.segment for tag in sections), default=0))
 
 
 def _check_kinds(carrier: _Part, child: _Part) -> None:

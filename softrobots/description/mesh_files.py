@@ -46,12 +46,7 @@ class MissingMeshWarning(UserWarning):
 
 
 def with_absolute_paths(urdf: str, folder: Path) -> str:
-    """Return URDF text with relative paths of meshes made absolute; nothing else changes.
-
-    Args:
-        urdf: Text of a URDF file.
-        folder: Folder of that file.
-    """
+    """Return the text of a URDF file in a folder, with relative paths of meshes made absolute; nothing else changes."""
 
     def absolute(match: re.Match[str]) -> str:
         name = html.unescape(match[2] if match[2] is not None else match[3])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 import pinocchio as pin
@@ -15,14 +16,11 @@ from softrobots.description.rigid_tree import SOLIDS, Body, Joint, Placement, Ri
 from softrobots.description.urdf_tags import NAMESPACE, SpringTag
 
 _SHAPES = (*SOLIDS, "mesh")
+_ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")  # of the inertia, row by row
 
 
 def read_rigid_tree(urdf: str, source: str = "the URDF") -> RigidTree:
     """Read bodies and joints from URDF text that Pinocchio accepts; springs are in `SoftModel.spring_table`.
-
-    Args:
-        urdf: The whole document.
-        source: Its origin, for errors.
 
     Raises:
         DescriptionError: If the text is no URDF, has no single root, or has a malformed number.
@@ -55,37 +53,33 @@ def write_rigid_tree(tree: RigidTree) -> str:
     becomes continuous.
     """
     ElementTree.register_namespace("softrobots", NAMESPACE)
-    robot = ElementTree.Element("robot", {"name": tree.name or "robot"})
-    ElementTree.SubElement(
-        ElementTree.SubElement(robot, "mujoco"), "compiler", {"discardvisual": "false", "fusestatic": "false"}
-    )
+    robot = Element("robot", {"name": tree.name or "robot"})
+    SubElement(SubElement(robot, "mujoco"), "compiler", {"discardvisual": "false", "fusestatic": "false"})
     for body in tree.bodies:
-        link = ElementTree.SubElement(robot, "link", {"name": body.name})
+        link = SubElement(robot, "link", {"name": body.name})
         if body.mass > 0.0:
-            inertial = ElementTree.SubElement(link, "inertial")
+            inertial = SubElement(link, "inertial")
             _write_placement(inertial, body.centre)
-            ElementTree.SubElement(inertial, "mass", {"value": repr(float(body.mass))})
-            entries = {
-                f"i{a}{b}": body.inertia["xyz".index(a), "xyz".index(b)] for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
-            }
-            ElementTree.SubElement(inertial, "inertia", {name: repr(float(value)) for name, value in entries.items()})
+            SubElement(inertial, "mass", {"value": repr(float(body.mass))})
+            entries = zip(_ENTRIES, body.inertia[np.triu_indices(3)].tolist(), strict=True)
+            SubElement(inertial, "inertia", {name: repr(value) for name, value in entries})
         for kind, shapes in (("visual", body.visuals), ("collision", body.collisions)):
             for shape in shapes:
-                _write_shape(ElementTree.SubElement(link, kind), shape)
+                _write_shape(SubElement(link, kind), shape)
     for joint in tree.joints:
-        _write_joint(ElementTree.SubElement(robot, "joint", {"name": joint.name}), joint, tree.springs.get(joint.name))
+        _write_joint(SubElement(robot, "joint", {"name": joint.name}), joint, tree.springs.get(joint.name))
     for name, spring in tree.springs.items():
         _write_hints(robot, name, springStiffness=repr(float(spring.stiffness)), springReference=repr(float(spring.rest)))
     for joint in tree.joints:
         if joint.child == (tree.tip or "tip") and joint.kind == "fixed":
             _write_hints(robot, joint.name, preserveFixedJoint="true")
     if tree.tip is not None:
-        ElementTree.SubElement(robot, f"{{{NAMESPACE}}}tip", {"link": tree.tip})
+        SubElement(robot, f"{{{NAMESPACE}}}tip", {"link": tree.tip})
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode") + "\n"
 
 
-def _numbers(element: ElementTree.Element | None, attribute: str, default: str) -> FloatArray:
+def _numbers(element: Element | None, attribute: str, default: str) -> FloatArray:
     """Numbers of an attribute, as many as the default has."""
     text = default if element is None else element.get(attribute, default)
     numbers = [float(part) for part in text.split()]
@@ -94,29 +88,27 @@ def _numbers(element: ElementTree.Element | None, attribute: str, default: str) 
     return np.array(numbers)
 
 
-def _placement(element: ElementTree.Element) -> Placement:
+def _placement(element: Element) -> Placement:
     origin = element.find("origin")
     rpy = _numbers(origin, "rpy", "0 0 0")
     return Placement(read_only(_numbers(origin, "xyz", "0 0 0")), read_only(np.asarray(pin.rpy.rpyToMatrix(*rpy))))
 
 
-_Colours = Mapping[str, ElementTree.Element | None]  # by name of the material
+_Colours = Mapping[str, Element | None]  # by name of the material
 
 
-def _body(link: ElementTree.Element, colours: _Colours) -> Body:
-    inertial = link.find("inertial")
-    shapes = {kind: tuple(_shape(element, colours) for element in link.findall(kind)) for kind in ("visual", "collision")}
-    name = link.get("name", "")
+def _body(link: Element, colours: _Colours) -> Body:
+    name, inertial = link.get("name", ""), link.find("inertial")
+    shapes = [tuple(_shape(element, colours) for element in link.findall(kind)) for kind in ("visual", "collision")]
     if inertial is None:
-        return Body(name, 0.0, Placement(), np.zeros((3, 3)), shapes["visual"], shapes["collision"])
-    moments = inertial.find("inertia")
-    xx, xy, xz, yy, yz, zz = (_numbers(moments, f"i{axes}", "0")[0] for axes in ("xx", "xy", "xz", "yy", "yz", "zz"))
+        return Body(name, 0.0, Placement(), np.zeros((3, 3)), *shapes)
+    xx, xy, xz, yy, yz, zz = (_numbers(inertial.find("inertia"), entry, "0")[0] for entry in _ENTRIES)
     inertia = read_only(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     mass = float(_numbers(inertial.find("mass"), "value", "0")[0])
-    return Body(name, mass, _placement(inertial), inertia, shapes["visual"], shapes["collision"])
+    return Body(name, mass, _placement(inertial), inertia, *shapes)
 
 
-def _shape(element: ElementTree.Element, colours: _Colours) -> Shape:
+def _shape(element: Element, colours: _Colours) -> Shape:
     geometry = element.find("geometry")
     solid = next(iter(geometry)) if geometry is not None and len(geometry) else None
     if solid is None or solid.tag not in _SHAPES:
@@ -132,7 +124,7 @@ def _shape(element: ElementTree.Element, colours: _Colours) -> Shape:
     return Shape(solid.tag, tuple(size.tolist()), _placement(element), rgba, solid.get("filename", ""))
 
 
-def _joint(element: ElementTree.Element) -> Joint:
+def _joint(element: Element) -> Joint:
     axis = _numbers(element.find("axis"), "xyz", "1 0 0")
     length = float(np.linalg.norm(axis))
     kind, limit, dynamics = element.get("type", ""), element.find("limit"), element.find("dynamics")
@@ -155,19 +147,19 @@ def _joint(element: ElementTree.Element) -> Joint:
     )
 
 
-def link_at(joint: ElementTree.Element, end: str) -> str:
+def link_at(joint: Element, end: str) -> str:
     """Return the name of the "parent" or "child" link of a URDF joint; empty if it has none."""
     element = joint.find(end)
     return "" if element is None else element.get("link", "")
 
 
-def _write_placement(element: ElementTree.Element, placement: Placement) -> None:
-    ElementTree.SubElement(element, "origin", {"xyz": number_text(placement.position), "rpy": number_text(placement.rpy)})
+def _write_placement(element: Element, placement: Placement) -> None:
+    SubElement(element, "origin", {"xyz": number_text(placement.position), "rpy": number_text(placement.rpy)})
 
 
-def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
+def _write_shape(element: Element, shape: Shape) -> None:
     _write_placement(element, shape.placement)
-    solid = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
+    solid = SubElement(SubElement(element, "geometry"), shape.kind)
     if shape.kind == "mesh":
         solid.set("filename", shape.filename)
         solid.set("scale", number_text(shape.size))
@@ -178,33 +170,33 @@ def _write_shape(element: ElementTree.Element, shape: Shape) -> None:
             solid.set(name, repr(float(value)))
     if shape.rgba is not None:
         name = "colour_" + "_".join(f"{value:.6g}" for value in shape.rgba)
-        material = ElementTree.SubElement(element, "material", {"name": name})
-        ElementTree.SubElement(material, "color", {"rgba": number_text(shape.rgba)})
+        material = SubElement(element, "material", {"name": name})
+        SubElement(material, "color", {"rgba": number_text(shape.rgba)})
 
 
-def _write_hints(robot: ElementTree.Element, joint: str, **hints: str) -> None:
+def _write_hints(robot: Element, joint: str, **hints: str) -> None:
     """Write a `<gazebo>` tag of a joint for Gazebo's parser."""
-    element = ElementTree.SubElement(robot, "gazebo", {"reference": joint})
+    element = SubElement(robot, "gazebo", {"reference": joint})
     for name, value in hints.items():
-        ElementTree.SubElement(element, name).text = value
+        SubElement(element, name).text = value
 
 
-def _write_joint(element: ElementTree.Element, joint: Joint, spring: SpringTag | None) -> None:
+def _write_joint(element: Element, joint: Joint, spring: SpringTag | None) -> None:
     bounded = bool(np.any(np.isfinite(joint.limits)))  # a bound on one side only: the other is `LARGEST`
     element.set("type", "continuous" if joint.kind == "revolute" and not bounded else joint.kind)
     _write_placement(element, joint.placement)
-    ElementTree.SubElement(element, "parent", {"link": joint.parent})
-    ElementTree.SubElement(element, "child", {"link": joint.child})
+    SubElement(element, "parent", {"link": joint.parent})
+    SubElement(element, "child", {"link": joint.child})
     if not joint.movable:
         return
-    ElementTree.SubElement(element, "axis", {"xyz": number_text(joint.axis)})
+    SubElement(element, "axis", {"xyz": number_text(joint.axis)})
     limit = {"effort": repr(min(joint.effort, LARGEST)), "velocity": repr(min(joint.velocity, LARGEST))}
     if bounded or joint.kind == "prismatic":  # URDF has no prismatic joint without limits
         low, high = np.clip(joint.limits, -LARGEST, LARGEST)
         limit |= {"lower": repr(float(low)), "upper": repr(float(high))}
-    ElementTree.SubElement(element, "limit", limit)
-    ElementTree.SubElement(element, "dynamics", {"damping": repr(float(joint.damping)), "friction": "0.0"})
-    ElementTree.SubElement(element, f"{{{NAMESPACE}}}role", {"value": "spring" if spring else "motor"})
+    SubElement(element, "limit", limit)
+    SubElement(element, "dynamics", {"damping": repr(float(joint.damping)), "friction": "0.0"})
+    SubElement(element, f"{{{NAMESPACE}}}role", {"value": "spring" if spring else "motor"})
     if spring:
         numbers = {"stiffness": repr(float(spring.stiffness)), "rest": repr(float(spring.rest))}
-        ElementTree.SubElement(element, f"{{{NAMESPACE}}}spring", numbers)
+        SubElement(element, f"{{{NAMESPACE}}}spring", numbers)

@@ -9,9 +9,9 @@ from typing import Any
 
 from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError
-from softrobots.core.xml_input import number_in, parse_xml
+from softrobots.core.xml_input import number_in
 from softrobots.description.expansion import XACRO_NAMESPACE
-from softrobots.description.urdf_structure import check_structure
+from softrobots.description.urdf_structure import check_structure, urdf_root
 from softrobots.description.urdf_tags import (
     COORDINATES,
     NAMESPACE,
@@ -29,17 +29,11 @@ from softrobots.description.urdf_tags import (
 def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
     """Read the tags of this package from URDF text; all are empty for a file that has none.
 
-    Args:
-        urdf_text: The whole document.
-        source: Its origin, for errors.
-
     Raises:
         DescriptionError: If the text is no URDF (see `softrobots.description.urdf_structure.check_structure`), or a tag is
             malformed.
     """
-    root = parse_xml(urdf_text, source)
-    if root.tag != "robot":
-        raise DescriptionError(f"{source} has the root tag <{root.tag}>; <robot> is required")
+    root = urdf_root(urdf_text, source)
     if any(str(element.tag).startswith(f"{{{XACRO_NAMESPACE}}}") for element in root.iter()):
         raise DescriptionError(
             f"{source} is an unexpanded xacro file; expand it first (softrobots.description.expansion.expand)"
@@ -140,9 +134,8 @@ def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any
 
 def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
     where = _where(element, "muscle", source)
-    limits: dict[str, Any] = {
-        key: _positive(element, key, where) for key in ("rest_length", "shortest", "longest", "strongest")
-    }
+    keys = ("rest_length", "shortest", "longest", "strongest")
+    limits: dict[str, Any] = {key: _positive(element, key, where) for key in keys}
     if not limits["shortest"] < limits["longest"]:
         raise DescriptionError(f"{where} is shortest at {limits['shortest']} and longest at {limits['longest']} m")
     return MuscleTag(**vars(_line(element, source, "muscle")), **limits)

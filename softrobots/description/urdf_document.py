@@ -7,9 +7,8 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
 
-from softrobots.core.errors import DescriptionError
-from softrobots.core.xml_input import parse_xml
 from softrobots.description.rigid_tree_urdf import link_at
+from softrobots.description.urdf_structure import urdf_root
 from softrobots.description.urdf_tags import NAMESPACE
 
 Problems = Iterator[tuple[str, str]]
@@ -19,10 +18,6 @@ Problems = Iterator[tuple[str, str]]
 class UrdfDocument:
     """A parsed URDF file.
 
-    Args:
-        urdf: The whole document.
-        source: Its origin, for errors.
-
     Raises:
         DescriptionError: If the text is not XML, or its root tag is not `<robot>`.
     """
@@ -30,10 +25,8 @@ class UrdfDocument:
     def __init__(self, urdf: str, source: str = "the URDF") -> None:
         self.text = urdf
         """The whole document."""
-        self.root = parse_xml(urdf, source)
+        self.root = urdf_root(urdf, source)
         """Its root element."""
-        if self.root.tag != "robot":
-            raise DescriptionError(f"{source} has the root tag <{self.root.tag}>; <robot> is required")
         self.links = {name_of(link): link for link in self.root.findall("link")}
         """Links by name."""
         self.joints = {name_of(joint): joint for joint in self.root.findall("joint")}

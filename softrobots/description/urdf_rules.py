@@ -49,10 +49,6 @@ def check_rules(urdf: str, source: str = "the URDF") -> tuple[Finding, ...]:
 
     Where a robot of this package is mounted on another one, violations by the other robot are remarks.
 
-    Args:
-        urdf: The whole document.
-        source: Its origin, for errors.
-
     Raises:
         DescriptionError: If the text is not XML, or its root tag is not `<robot>`.
     """
@@ -62,9 +58,8 @@ def check_rules(urdf: str, source: str = "the URDF") -> tuple[Finding, ...]:
     for what, rule in RULES.items():
         broken = list(rule(document))
         problems = tuple(text for subject, text in broken if subject not in foreign)
-        findings.append(
-            Finding(what, problems, tuple(f"{text} (third-party)" for subject, text in broken if subject in foreign))
-        )
+        remarks = tuple(f"{text} (third-party)" for subject, text in broken if subject in foreign)
+        findings.append(Finding(what, problems, remarks))
     return tuple(findings)
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 
 from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError
-from softrobots.core.xml_input import number_in
+from softrobots.core.xml_input import number_in, parse_xml
 
 MOST_LINKS = 2000
 """Most links of a robot; Pinocchio's parser recurses and has about 2 kB of stack for each of so many in one chain."""
@@ -43,12 +43,20 @@ _OF_SHAPES: Mapping[str, Mapping[str, int]] = {
 _RESERVED = "universe"  # Pinocchio's name of the world
 
 
+def urdf_root(urdf: str, source: str) -> ElementTree.Element:
+    """Parse URDF text.
+
+    Raises:
+        DescriptionError: If the text is not XML, or its root tag is not `<robot>`.
+    """
+    root = parse_xml(urdf, source)
+    if root.tag != "robot":
+        raise DescriptionError(f"{source} has the root tag <{root.tag}>; <robot> is required")
+    return root
+
+
 def check_structure(root: ElementTree.Element, source: str) -> None:
     """Refuse a URDF that is no tree, or has names or numbers that parsers misread.
-
-    Args:
-        root: The root element.
-        source: Its origin, for errors.
 
     Raises:
         DescriptionError: If it has no links or more than `MOST_LINKS`; if a link or joint has no name or that of another, or a

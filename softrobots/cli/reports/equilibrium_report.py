@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from softrobots.statics.loads import Load
 def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     """Everything about an equilibrium by the names of its attributes, with `units`."""
     model = equilibrium.model
-    load = equilibrium.load
     facts = [
         Fact("q_motors", equilibrium.q_motors, joined_units(model.actuators.units)),
         Fact("motor_torques", equilibrium.motor_torques, joined_units(load_units(model.actuators.units))),
@@ -40,13 +40,14 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
         Fact("iterations", equilibrium.iterations, "-"),
         Fact("method", equilibrium.method),
     ]
+    return model_answer(model, equilibrium.load, facts)
+
+
+def model_answer(model: SoftModel, load: Load, facts: Sequence[Fact]) -> dict[str, Any]:
+    """Facts of a loaded robot after its names, its wrenches by frame [N, N m], force first, and gravity [m/s^2], if any."""
     names = {"motor_joints": model.motor_joints, "spring_joints": model.spring_joints, "tip": model.tip}
-    return {"robot": model.pinocchio.name, **names, "load": load_answer(load), **answer_of(facts)}
-
-
-def load_answer(load: Load) -> dict[str, Any]:
-    """Wrenches by frame [N, N m], force first, and gravity [m/s^2], None if weightless."""
-    return {"wrenches": dict(load.wrenches), "gravity": load.gravity}
+    loaded = {"wrenches": dict(load.wrenches), "gravity": load.gravity}
+    return {"robot": model.pinocchio.name, **names, "load": loaded, **answer_of(facts)}
 
 
 def equilibrium_lines(equilibrium: Equilibrium) -> list[str]:
@@ -65,17 +66,15 @@ def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
 
 def summary_lines(equilibrium: Equilibrium) -> list[str]:
     """Return lines with the pose of the tip and the certificates."""
-    pose, margins = equilibrium.transform_tip_to_world, wrinkling_margins(equilibrium)
+    margins = wrinkling_margins(equilibrium)
     known = [margin for margin in margins if margin is not None]
     least = f", at least {100.0 * min(known):.1f} % of the wrinkling moment is left" if known else ""
     links = [("wrinkled", "YES: linear springs no longer hold" if equilibrium.wrinkled else f"no{least}")] if margins else []
     steps = f"{equilibrium.iterations} iteration{'s' * (equilibrium.iterations != 1)} by {equilibrium.method}"
+    rpy = pin.rpy.matrixToRpy(equilibrium.transform_tip_to_world.rotation)
     rows = [
         ("tip position", f"{formatted(equilibrium.tip_position)} m"),
-        (
-            "tip roll, pitch, yaw",
-            f"{formatted(np.where(abs(rpy := pin.rpy.matrixToRpy(pose.rotation)) < 1e-15, 0.0, rpy))} rad",
-        ),
+        ("tip roll, pitch, yaw", f"{formatted(np.where(abs(rpy) < 1e-15, 0.0, rpy))} rad"),
         ("stable", "yes, certified" if equilibrium.stable else "NO: not certified"),
         ("within limits", "yes" if equilibrium.within_limits else "NO: a motor, a muscle or a spring is beyond its limits"),
         *links,

@@ -12,7 +12,7 @@ from softrobots.cli.reports.equilibrium_report import (
     coordinate_lines,
     equilibrium_answer,
     head_lines,
-    load_answer,
+    model_answer,
     summary_lines,
     wrinkling_margins,
     wrinkling_moments,
@@ -68,8 +68,7 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         Fact("residual", [equilibrium.residual for equilibrium in equilibria], "N m"),
         Fact("method", trajectory.method),
     ]
-    names = {"motor_joints": model.motor_joints, "spring_joints": model.spring_joints, "tip": model.tip}
-    return {"robot": model.pinocchio.name, **names, "load": load_answer(equilibria[0].load), **answer_of(facts)}
+    return model_answer(model, equilibria[0].load, facts)
 
 
 def trajectory_lines(trajectory: Trajectory) -> list[str]:

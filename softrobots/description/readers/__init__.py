@@ -28,7 +28,7 @@ def to_urdf(text: str, source: str, path: Path | None = None) -> str:
     Args:
         text: The description.
         source: Its origin, for errors.
-        path: Its file, if any, to which included files are relative.
+        path: Its file, if any, to which included files and meshes are relative.
 
     Raises:
         MissingDependency: If MuJoCo (for MJCF) or Drake (for SDF) is not installed (extra `interop`).

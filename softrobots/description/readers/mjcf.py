@@ -36,10 +36,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     Features without effect on a loaded robot at rest are ignored: contacts, damping polynomials, armature, sensors, actuators
     with zero control, and position actuators of joints without stiffness, which are motors.
 
-    Args:
-        text: The document.
-        source: Its origin, for errors.
-        path: Its file, if any, to which included files are relative.
+    The arguments are those of `softrobots.description.readers.to_urdf`.
 
     Raises:
         MissingDependency: If MuJoCo is not installed (extra `interop`).

@@ -53,12 +53,7 @@ _RESOLUTION = 100.0  # of a generated mesh; the first numbers of its `params`
 
 
 def check_mjcf(root: ElementTree.Element, source: str, path: Path | None) -> None:
-    """Refuse an MJCF description that exceeds a limit or includes files from elsewhere.
-
-    Args:
-        root: The root element.
-        source: Its origin, for errors.
-        path: Its file, if any.
+    """Refuse an MJCF description, read from a file or not, that exceeds a limit or includes files from elsewhere.
 
     Raises:
         DescriptionError: If it expands to more than `MOST_ELEMENTS` elements; if an included file is not below its folder,

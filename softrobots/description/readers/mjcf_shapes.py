@@ -17,13 +17,8 @@ _DEFAULT_COLOUR = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)  # of a geom 
 def visible_shapes(mujoco: Any, model: Any, text: str, path: Path | None) -> list[tuple[Shape, ...]]:
     """Return the visible shapes of every body of a compiled model, by number of the body.
 
-    Planes, ellipsoids, height fields, and meshes without a file or with a reference pose are omitted.
-
-    Args:
-        mujoco: The package.
-        model: The compiled model.
-        text: Its MJCF document.
-        path: The file of the document, if any.
+    Planes, ellipsoids, height fields, and meshes without a file or with a reference pose are omitted. Names of mesh files are
+    in the MJCF document alone, and relative to its file, if it has one.
     """
     files = _mesh_files(mujoco, model, text, path) if model.nmesh else {}
     shapes: list[list[Shape]] = [[] for _ in range(model.nbody)]

@@ -46,10 +46,7 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
     frame called `tip`, or the only moving link at an end of the tree. Visible boxes, cylinders, spheres and existing mesh files
     are read, and capsules as cylinders. Contacts, plugins and controllers are ignored.
 
-    Args:
-        text: The document.
-        source: Its origin, for errors.
-        path: Its file, if any, to which mesh files are relative.
+    The arguments are those of `softrobots.description.readers.to_urdf`.
 
     Raises:
         MissingDependency: If Drake is not installed (extra `interop`).

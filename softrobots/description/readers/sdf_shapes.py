@@ -16,11 +16,8 @@ from softrobots.description.rigid_tree import Placement, Shape
 def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
     """Return the visual shapes of every link, by its scoped name `model::link`.
 
-    Meshes whose files are missing are omitted; the result is empty if Drake cannot read one of the others.
-
-    Args:
-        text: An SDF document that Drake accepts.
-        path: Its file, if any, to which mesh files are relative.
+    Meshes whose files are missing are omitted; the result is empty if Drake cannot read one of the others. Mesh files are
+    relative to the file of the document, if it has one.
     """
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph

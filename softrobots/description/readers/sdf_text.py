@@ -34,11 +34,7 @@ def without_drawings(text: str) -> str:
 def with_found_meshes(text: str, folder: Path | None) -> str:
     """Return an SDF document with visible boxes, cylinders, spheres, capsules and existing meshes as its only shapes.
 
-    Mesh files are named by URIs, and of materials only the colours are kept.
-
-    Args:
-        text: An SDF document.
-        folder: Folder of its file, if any, to which mesh files are relative.
+    Mesh files, relative to a folder if there is one, are named by URIs, and of materials only the colours are kept.
     """
     document = minidom.parseString(text.encode("utf-8"))
     _remove(document, lambda e: not _drawn(e, folder) if e.tagName == "visual" else e.tagName in _LEFT_OUT)
