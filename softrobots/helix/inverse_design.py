@@ -147,7 +147,8 @@ def _design(
     for name, length in (("radius", required.radius), ("turn_height", required.turn_height)):
         if not tube / _EXTREME <= length <= tube * _EXTREME:
             raise ParameterError(name, length, f"within a factor of {_EXTREME:g} of the diameter {tube} m")
-    search = _NearestHelix(required, tube, count, contraction_range, angle_range)
+    outwards = tube if required.path == "inner" else 0.5 * tube  # from the required path to the outer one
+    required_shape = _helix(required.radius + outwards - 0.5 * tube, required.turn_height / (2.0 * math.pi), tube)
 
     def design_of(shape: HelixShape, *, clipped: bool) -> HelixDesign:
         contraction, angle, _ = (float(value) for value in inverse(shape))
@@ -156,19 +157,20 @@ def _design(
             angle = float(np.clip(angle, *(angle_range or (angle, angle))))
         return HelixDesign(contraction, angle, tube, count, handedness, required, contraction_range, angle_range)
 
-    design = design_of(search.required_shape, clipped=False)
+    design = design_of(required_shape, clipped=False)
     if design.realisable:
         return design
     if on_unrealisable == "nearest":
+        search = _NearestHelix(required, tube, count, contraction_range, angle_range)
         return design_of(search.nearest(), clipped=True)
+    faults, advice = "; ".join(design.faults), "on_unrealisable='nearest' gives the nearest helix that can be made"
     if on_unrealisable == "warn":
-        warnings.warn(DesignWarning("; ".join(design.faults), design=design), stacklevel=3)
+        warnings.warn(DesignWarning(faults, design=design), stacklevel=3)
         return design
-    advice = "on_unrealisable='nearest' gives the nearest helix that can be made"
     if bool(design.contact.touches):
-        raise SelfIntersection(f"{'; '.join(design.faults)}; {advice}", contact=design.contact)
+        raise SelfIntersection(f"{faults}; {advice}", contact=design.contact)
     reached = within(np.asarray(design.contraction), contraction_range, LIMIT_ROUNDING)
-    name, faults = "angle_limits" if reached else "contraction_limits", "; ".join(design.faults)
+    name = "angle_limits" if reached else "contraction_limits"
     raise ParameterError(name, getattr(design, name), f"wide enough for the required helix ({faults}); {advice}")
 
 
@@ -180,13 +182,6 @@ class _NearestHelix(NamedTuple):
     turns: float
     contraction_limits: Limits | None
     angle_limits: Limits | None
-
-    @property
-    def required_shape(self) -> HelixShape:
-        """The required helix itself."""
-        outwards = self.diameter if self.required.path == "inner" else 0.5 * self.diameter
-        radius = self.required.radius + outwards - 0.5 * self.diameter
-        return _helix(np.asarray(radius), np.asarray(self.required.turn_height / (2.0 * math.pi)), self.diameter)
 
     def nearest(self) -> HelixShape:
         """Return the nearest helix that is free of contact (turns may just touch) and within the limits, if there is one."""
@@ -210,7 +205,7 @@ class _NearestHelix(NamedTuple):
             limits = f"{self.contraction_limits}" + (f" and angles in {self.angle_limits}" if self.angle_limits else "")
             room = " and has room for the object inside" if self.required.path == "inner" else ""
             raise ParameterError(name, limits, "such that some helix within the limits is free of contact" + room)
-        return _helix(np.asarray(best[1]), np.asarray(best[2]), self.diameter)
+        return _helix(best[1], best[2], self.diameter)
 
     def _path_radius(self, centre_radius: FloatArray) -> FloatArray:
         """Radius of the required path [m]."""
@@ -265,9 +260,9 @@ class _NearestHelix(NamedTuple):
         return curves
 
 
-def _helix(radius: FloatArray, pitch: FloatArray, diameter: float) -> HelixShape:
+def _helix(radius: FloatArray | float, pitch: FloatArray | float, diameter: float) -> HelixShape:
     """Helix from the radius of its centre line."""
-    return HelixShape(np.asarray(radius + 0.5 * diameter), np.asarray(radius - 0.5 * diameter), pitch)
+    return HelixShape(np.asarray(radius + 0.5 * diameter), np.asarray(radius - 0.5 * diameter), np.asarray(pitch))
 
 
 def _graded(parameter: FloatArray) -> FloatArray:

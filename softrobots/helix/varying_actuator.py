@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -167,9 +166,6 @@ def bent_tube(
     )
 
 
-_Change = Callable[[float, FloatArray], list[float]]
-
-
 class _Piece:
     """The tube between two neighbouring breakpoints."""
 
@@ -184,33 +180,29 @@ class _Piece:
 
     def rates(self, position: float) -> tuple[float, float, float]:
         """Per length of the uninflated tube: length of the centre line [-], rotation about y and about z [rad/m]."""
-        contraction, angle = self._contraction(position), self._angle(position)
+        contraction, angle = self.actuator(position)
         cosine = math.cos(angle)
         ratio = math.hypot(1.0 - contraction, 2.0 * math.sqrt(contraction) * cosine)  # |1 + zeta|
         scale = self._diameter * ratio
         bending = (1.0 - contraction) * (1.0 + contraction) / (scale * cosine)
         return ratio / (2.0 * cosine), bending, self._sign * 4.0 * contraction * math.sin(angle) / scale
 
-    def change(self, scale: float) -> _Change:
+    def change(self, position: float, state: FloatArray, scale: float) -> list[float]:
         """Derivative of the state: quaternion (w, x, y, z), position and centre length by `scale`."""
-
-        def derivative(position: float, state: FloatArray) -> list[float]:
-            w, x, y, z = state[:4].tolist()
-            along, bending, twist = self.rates(min(max(float(position), self.start), self.end))
-            share = along / scale
-            step = share / (w * w + x * x + y * y + z * z)
-            return [
-                -0.5 * (y * bending + z * twist),
-                0.5 * (y * twist - z * bending),
-                0.5 * (w * bending - x * twist),
-                0.5 * (w * twist + x * bending),
-                2.0 * step * (x * z + w * y),
-                2.0 * step * (y * z - w * x),
-                step * (w * w - x * x - y * y + z * z),
-                share,
-            ]
-
-        return derivative
+        w, x, y, z = state[:4].tolist()
+        along, bending, twist = self.rates(min(max(float(position), self.start), self.end))
+        share = along / scale
+        step = share / (w * w + x * x + y * y + z * z)
+        return [
+            -0.5 * (y * bending + z * twist),
+            0.5 * (y * twist - z * bending),
+            0.5 * (w * bending - x * twist),
+            0.5 * (w * twist + x * bending),
+            2.0 * step * (x * z + w * y),
+            2.0 * step * (y * z - w * x),
+            step * (w * w - x * x - y * y + z * z),
+            share,
+        ]
 
 
 def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter: float) -> tuple[float, float]:
@@ -250,14 +242,13 @@ def _integrate(
     state = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     states = [np.zeros((0, 8))]
     for piece, here in parts:
-        change = piece.change(scale)
 
-        def counted(position: float, now: FloatArray, change: _Change = change) -> list[float]:
+        def counted(position: float, now: FloatArray, piece: _Piece = piece) -> list[float]:
             nonlocal spent
             spent += 1
             if spent > budget:
                 raise stuck(float(position), f"more than {budget} evaluations")
-            return change(position, now)
+            return piece.change(position, now, scale)
 
         times = here if len(here) and here[-1] == piece.end else np.append(here, piece.end)
         span = (piece.start, piece.end)
