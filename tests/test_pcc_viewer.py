@@ -65,5 +65,3 @@ def test_what_is_drawn_is_the_body(pcc: sr.SoftModel) -> None:
         assert triangles.max() == len(corners) - 1
         for points in segment.muscles.values():
             assert np.allclose(np.linalg.norm(points - segment.backbone, axis=1), 0.04, atol=1e-12)
-        with pytest.raises(sr.NameNotFound, match="muscle_9"):
-            segment.muscle_surface("muscle_9", 0.01)

@@ -64,15 +64,8 @@ def even_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
 def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) -> list[Frame]:
     """Return frames of a tube that grows at constant speed and is then held; see `robots.growth.grown_coordinates`.
 
-    Args:
-        tube: The tube.
-        seconds: Duration of the animation [s].
-        front: Length behind the tip over which the helix forms [m]. While the tube is held the rest of the helix forms, at the
-            speed of growth, or faster so that it ends in the last frame.
-        hold: Share of the duration, at the end, for which the whole tube is held, in [0, 1).
-
-    Returns:
-        The frames.
+    While the tube is held the rest of the helix forms, at the speed of growth, or faster so that it ends in the last frame. The
+    arguments are those of `Viewer.animate_growth`.
 
     Raises:
         ParameterError: If an argument is out of range.

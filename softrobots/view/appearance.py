@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.view.body import SegmentBody
+from softrobots.view.body import SegmentBody, tube
 from softrobots.view.robot_shapes import Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Scene
 
@@ -42,6 +42,14 @@ LegendEntry = tuple[Colour, str]
 """Colour and meaning of something that is drawn."""
 
 
+def rgb(colour: Colour) -> tuple[int, int, int]:
+    """Return red, green and blue of a colour, each from 0 to 255."""
+    if isinstance(colour, int):
+        return colour >> 16 & 255, colour >> 8 & 255, colour & 255
+    red, green, blue = (round(255 * share) for share in colour[:3])
+    return red, green, blue
+
+
 class BodyPart(NamedTuple):
     """A tube, a muscle or a line of a continuous body."""
 
@@ -60,10 +68,12 @@ class BodyPart(NamedTuple):
         return f"segment_{self.segment.number}/" + ("tube" if self.line is None else f"lines/{self.line}")
 
     def surface(self, sides: int = 24) -> tuple[FloatArray, FloatArray]:
-        """Return corners and triangles, as `SegmentBody.surface`, of a tube with a number of sides."""
+        """Return corners and triangles, as `SegmentBody.surface`; lines have six sides."""
+        segment = self.segment
         if self.line is None:
-            return self.segment.surface(sides)
-        return self.segment.muscle_surface(self.line, _MUSCLE_RADIUS * self.segment.radius, 6)
+            return segment.surface(sides)
+        points = (segment.muscles | segment.lines)[self.line]
+        return tube(segment.poses[:, :3, :3], points, _MUSCLE_RADIUS * segment.radius, 6)
 
 
 def body_parts(scene: Scene, segments: Sequence[SegmentBody] | None = None) -> Iterator[BodyPart]:

@@ -9,7 +9,6 @@ import pinocchio as pin
 
 from softrobots.constant_curvature.screws import Screw
 from softrobots.core.checks import FloatArray, instance_of, positive_integer
-from softrobots.core.errors import NameNotFound
 from softrobots.description.urdf_tags import LineTag, MuscleTag
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
@@ -61,39 +60,12 @@ class SegmentBody:
         chosen = {name: points[kept] for name, points in self.muscles.items()}
         return SegmentBody(self.number, self.poses[kept], self.radius, chosen, {n: p[kept] for n, p in self.lines.items()})
 
-    def dome(self, sides: int = 24, rings: int = 6) -> tuple[FloatArray, FloatArray]:
-        """Return the triangles of a hemisphere on the end of the tube, for the tip of an everting tube.
-
-        Args:
-            sides: Corners of its cross-section.
-            rings: Cross-sections.
-
-        Returns:
-            Corners, shape ((rings + 1) sides + 2, 3) [m], and the corners of each triangle, as in `surface`.
-        """
-        angle = 0.5 * np.pi * np.arange(rings + 1) / (rings + 0.5)  # not to the pole, where a ring would be a point
-        poses = np.tile(self.poses[-1], (rings + 1, 1, 1))
+    def dome(self) -> tuple[FloatArray, FloatArray]:
+        """Return the triangles of a hemisphere on the end of the tube, for the tip of an everting tube, as in `surface`."""
+        angle = 0.5 * np.pi * np.arange(7) / 6.5  # not to the pole, where a ring would be a point
+        poses = np.tile(self.poses[-1], (7, 1, 1))
         poses[:, :3, 3] += self.radius * np.sin(angle)[:, None] * poses[:, :3, 2]
-        return tube(poses[:, :3, :3], poses[:, :3, 3], self.radius * np.cos(angle), sides)
-
-    def muscle_surface(self, name: str, radius: float, sides: int = 8) -> tuple[FloatArray, FloatArray]:
-        """Return the triangles of a tube around a muscle or a line, as in `surface`.
-
-        Args:
-            name: The muscle, or the line.
-            radius: Radius of the tube [m].
-            sides: Corners of its cross-section.
-
-        Returns:
-            Corners and triangles.
-
-        Raises:
-            NameNotFound: If the segment has no muscle or line of that name.
-        """
-        lines = self.muscles | self.lines
-        if name not in lines:
-            raise NameNotFound("muscle", name, lines)
-        return tube(self.poses[:, :3, :3], lines[name], radius, sides)
+        return tube(poses[:, :3, :3], poses[:, :3, 3], self.radius * np.cos(angle), 24)
 
 
 def tube(rotations: FloatArray, centres: FloatArray, radius: FloatArray | float, sides: int) -> tuple[FloatArray, FloatArray]:

@@ -83,21 +83,10 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
 
 @contextlib.contextmanager
 def open_page(html: str | Path, picture: str | Path, width: int, height: int) -> Iterator[tuple[Any, Path]]:
-    """Open a page in a window of a size [px] with its controls hidden.
-
-    Args:
-        html: The page.
-        picture: The file that will be written.
-        width: Width [px].
-        height: Height [px].
+    """Open a page in a window of a size [px] with its controls hidden; arguments and errors are those of `take_picture`.
 
     Yields:
         The Playwright `Page`, and the path of the picture.
-
-    Raises:
-        ViewerError: If the page is no file or no Chromium is installed.
-        OutputError: If the picture cannot be written.
-        MissingDependency: If Playwright is not installed.
     """
     page_file = as_path("html", html)
     if not page_file.is_file():

@@ -78,26 +78,22 @@ def has_finite_corners(geometry: Any) -> bool:
 
 
 def _parts(file: Path, scale: FloatArray) -> tuple[ColouredPart, ...]:
+    """Parts of a mesh as trimesh reads them; none if it cannot."""
     try:
         import trimesh
 
         with warnings.catch_warnings(), np.errstate(all="ignore"):  # colours that are NaN
             warnings.simplefilter("ignore", DeprecationWarning)  # pycollada sets shapes as NumPy 2.5 no longer wants
-            return _parts_of(trimesh, trimesh.Scene(trimesh.load(str(file))), scale)
+            scene, parts = trimesh.Scene(trimesh.load(str(file))), []
+            for node in scene.graph.nodes_geometry:
+                transform, name = scene.graph[node]
+                part = scene.geometry[name]
+                if isinstance(part, trimesh.Trimesh) and len(part.faces):
+                    corners = (np.asarray(part.vertices) @ transform[:3, :3].T + transform[:3, 3]) * scale
+                    parts.append(ColouredPart(Triangles(corners, np.asarray(part.faces)), _colour(part.visual)))
+            return tuple(parts)
     except Exception:  # each format has a reader of its own
         return ()
-
-
-def _parts_of(trimesh: Any, scene: Any, scale: FloatArray) -> tuple[ColouredPart, ...]:
-    parts = []
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
-        part = scene.geometry[name]
-        if not isinstance(part, trimesh.Trimesh) or not len(part.faces):
-            continue
-        corners = (np.asarray(part.vertices) @ transform[:3, :3].T + transform[:3, 3]) * scale
-        parts.append(ColouredPart(Triangles(corners, np.asarray(part.faces)), _colour(part.visual)))
-    return tuple(parts)
 
 
 def _colour(visual: Any) -> tuple[float, float, float, float] | None:

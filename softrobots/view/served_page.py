@@ -29,10 +29,12 @@ class ServedPage(abc.ABC):
         """End the server."""
         self.close()
 
+    _url: str
+
     @property
-    @abc.abstractmethod
     def url(self) -> str:
         """Address of the page; reachable from this machine only."""
+        return self._url
 
     @property
     @abc.abstractmethod

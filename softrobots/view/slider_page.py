@@ -18,7 +18,7 @@ from softrobots.view.appearance import legend
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import LOOPBACK, ServedPage
 from softrobots.view.viser_page.drawing import ViserDrawing
-from softrobots.view.viser_page.server import end_server, start_server
+from softrobots.view.viser_page.server import start_server
 from softrobots.view.viser_page.slider_panel import Setting, SliderPanel, round_down
 from softrobots.view.warm_start import next_equilibrium
 
@@ -81,7 +81,7 @@ class SliderPage(ServedPage):
         self._worker = threading.Thread(target=self._follow, name="softrobots sliders", daemon=True)
         self._server = start_server(model.pinocchio.name, wanted_port)
         try:
-            self._port = int(self._server.get_port())
+            self._url = f"http://{LOOPBACK}:{self._server.get_port()}/"
             self._drawing = ViserDrawing(self._server, self._scenes.robot.shapes, self._scenes.extent, 0.5 * self._full)
             self._drawing.look_at(self._equilibrium.tip_position)
             self._panel = SliderPanel(self._server.gui, model, self._start, self._full, changed=self._wake.set)
@@ -89,15 +89,10 @@ class SliderPage(ServedPage):
             self._draw()
             self._report()
         except BaseException:
-            end_server(self._server)
+            self._server.stop()
             raise
         self._worker.start()
         atexit.register(self.close)
-
-    @property
-    def url(self) -> str:
-        """Address of the page; reachable from this machine only."""
-        return f"http://{LOOPBACK}:{self._port}/"
 
     @property
     def serving(self) -> bool:
@@ -132,12 +127,8 @@ class SliderPage(ServedPage):
         with self._lock:
             if self._closed.is_set():
                 raise ViewerError("the page is closed; open a new one")
-            now = self._panel.setting
-            setting = Setting(
-                now.q_motors if motors is None else motors,
-                now.force if push is None else push,
-                now.gravity if gravity is None else gravity,
-            )
+            given: dict[str, Any] = {"q_motors": motors, "force": push, "gravity": gravity}
+            setting = self._panel.setting._replace(**{name: value for name, value in given.items() if value is not None})
             self._panel.move_to(setting)
             self._solve(setting)
             if self._problem is not None:
@@ -153,7 +144,7 @@ class SliderPage(ServedPage):
         self._wake.set()
         atexit.unregister(self.close)
         self._worker.join()
-        end_server(self._server)
+        self._server.stop()
 
     def _follow(self) -> None:
         """Follow the sliders until the page is closed; of several changes the newest counts."""

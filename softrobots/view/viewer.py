@@ -60,11 +60,6 @@ class Viewer(ServedPage):
             raise
 
     @property
-    def url(self) -> str:
-        """Address of the page; reachable from this machine only."""
-        return self._url
-
-    @property
     def serving(self) -> bool:
         """Whether the server runs."""
         return self._server.poll() is None
@@ -139,7 +134,7 @@ class Viewer(ServedPage):
         span = float(trajectory.times[-1] - trajectory.times[0])
         seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
         positive_integer("repetitions", repetitions)
-        self._stage.look_at(trajectory.tip_positions.mean(axis=0))
+        self.look_at(trajectory.tip_positions.mean(axis=0))
         self._robot.show(self._scenes.loaded(trajectory.equilibria[0]))
         self._robot.trace(trajectory.tip_positions)
         animation = self._robot.animate(self._scenes.trajectory(trajectory, seconds))
@@ -169,7 +164,7 @@ class Viewer(ServedPage):
         self._robot.show(dataclasses.replace(scenes[0], deformed=whole.deformed, segments=()))
         self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=1000)
         backbone = np.concatenate([segment.backbone for segment in whole.segments])
-        self._stage.look_at(backbone.max(axis=0) + backbone.min(axis=0))
+        self.look_at(backbone.max(axis=0) + backbone.min(axis=0))
         self._show_legend()
 
     def look_at(self, tip: FloatArray) -> None:
@@ -180,7 +175,7 @@ class Viewer(ServedPage):
         Args:
             tip: Position of the tip, or its average, shape (3,) [m].
         """
-        self._stage.look_at(tip)
+        self._stage.look_from(*self._scenes.extent.camera(tip))
 
     def look_from(self, eye: Any, centre: Any) -> None:
         """Place the camera.

@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
 from softrobots.core.errors import EquilibriumNotFound, TargetUnreachable
-from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 
@@ -59,14 +57,9 @@ def next_solution(last: Equilibrium, target: Any, force: Any = None, *, gravity:
         TargetUnreachable: If no search reaches the target.
         EquilibriumNotFound: If there is no equilibrium at any of the starts.
     """
-    start = _within_limits(last.model, last.q_motors)
+    low, high = last.model.motor_limits.T
+    start = last.q_motors if np.all((last.q_motors >= low) & (last.q_motors <= high)) else None
     try:
         return solve_ik(last.model, target, force, gravity=gravity, q_motors0=start, starts=1)
     except (TargetUnreachable, EquilibriumNotFound):
         return solve_ik(last.model, target, force, gravity=gravity, q_motors0=start, starts=_STARTS)
-
-
-def _within_limits(model: SoftModel, motors: FloatArray) -> FloatArray | None:
-    """The coordinates as a start of a search, or None if they are beyond the limits."""
-    low, high = model.motor_limits.T
-    return motors if np.all((motors >= low) & (motors <= high)) else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
@@ -19,6 +18,14 @@ reset               as at the start
 quit                end
 or a JSON object, e.g. {"motors": [0.3, 0.6, -0.8], "force": [0, 10, -15], "gravity": true}, with target instead of motors"""
 """Help on the lines."""
+
+_ARRAYS: dict[str, tuple[tuple[int | None], str]] = {
+    "target": ((3,), "m"),
+    "motors": ((None,), "rad, m or N"),
+    "force": ((3,), "N"),
+    "gravity": ((3,), "m/s^2"),
+}
+"""What can be set: shape and unit."""
 
 
 class Wanted(NamedTuple):
@@ -56,31 +63,25 @@ def changed(line: str, now: Wanted, start: Wanted) -> Wanted:
     if not text or text.startswith("#"):
         return now
     if text.startswith("{"):
-        return _changed_by(_json_object(text), now)
+        return _changed_by_object(text, now)
     name, *words = text.split()
     if name in ("reset", "quit"):
         if words:
             raise ParameterError(name, " ".join(words), "given without anything else")
         return start if name == "reset" else now._replace(done=True)
-    setter = _setter(name, (*_SETTERS, "reset", "quit"))
-    return setter(now, words[0] if name == "gravity" and len(words) == 1 else _numbers(name, words))
+    if name not in _ARRAYS:
+        raise NameNotFound("command", name, (*_ARRAYS, "reset", "quit"))
+    if name == "gravity" and len(words) == 1:
+        return _set(now, name, words[0])
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError as error:
+        raise ParameterError(name, " ".join(words), "given in numbers") from error
+    return _set(now, name, numbers)
 
 
 def read_commands(text: str, start: Wanted) -> Wanted:
-    """Return the state after all commands of a text: lines, or one JSON object, applied to the start.
-
-    Args:
-        text: The whole text.
-        start: The state that the commands change.
-
-    Returns:
-        The state.
-
-    Raises:
-        NameNotFound: If there is no such command.
-        ParameterError: If its numbers are wrong in kind or number.
-        FileFormatError: If it starts with `{` and is no JSON object.
-    """
+    """Return the state after all commands of a text: lines, or one JSON object, applied to the start; see `changed`."""
     if text.lstrip().startswith("{"):
         return changed(text, start, start)
     wanted = start
@@ -89,59 +90,30 @@ def read_commands(text: str, start: Wanted) -> Wanted:
     return wanted
 
 
-def _json_object(text: str) -> Mapping[str, Any]:
+def _changed_by_object(text: str, now: Wanted) -> Wanted:
+    """The state after a JSON object."""
     try:
-        return dict(parse_json(text))
+        values = parse_json(text)
     except FileFormatError as error:
         raise FileFormatError(f"this is no JSON object: {error}") from error
-
-
-def _changed_by(values: Mapping[str, Any], now: Wanted) -> Wanted:
     if "motors" in values and "target" in values:
         raise ParameterError("motors", values["motors"], "left out where a target is given: they follow from it")
-    wanted = now
     for name, value in values.items():
-        wanted = _setter(name, tuple(_SETTERS))(wanted, value)
-    return wanted
+        if name not in _ARRAYS:
+            raise NameNotFound("command", name, tuple(_ARRAYS))
+        now = _set(now, name, value)
+    return now
 
 
-def _setter(name: str, available: tuple[str, ...]) -> Callable[[Wanted, Any], Wanted]:
-    if name not in _SETTERS:
-        raise NameNotFound("command", name, available)
-    return _SETTERS[name]
-
-
-def _numbers(name: str, words: list[str]) -> list[float]:
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise ParameterError(name, " ".join(words), "given in numbers") from error
-
-
-def _set_motors(now: Wanted, value: Any) -> Wanted:
-    return now._replace(motors=read_only(finite_array("motors", value, (None,), "rad, m or N")), target=None)
-
-
-def _set_target(now: Wanted, value: Any) -> Wanted:
-    return now._replace(target=read_only(finite_array("target", value, (3,), "m")))
-
-
-def _set_force(now: Wanted, value: Any) -> Wanted:
-    return now._replace(force=read_only(finite_array("force", value, (3,), "N")))
-
-
-def _set_gravity(now: Wanted, value: Any) -> Wanted:
-    if value is None or value is False or value == "off":
-        return now._replace(gravity=None)
-    if isinstance(value, str) and value != "on":
-        raise ParameterError("gravity", value, "on, off or three numbers [m/s^2]")
-    given = EARTH_GRAVITY if value is True or value == "on" else value
-    return now._replace(gravity=read_only(finite_array("gravity", given, (3,), "m/s^2")))
-
-
-_SETTERS: dict[str, Callable[[Wanted, Any], Wanted]] = {
-    "target": _set_target,
-    "motors": _set_motors,
-    "force": _set_force,
-    "gravity": _set_gravity,
-}
+def _set(now: Wanted, name: str, value: Any) -> Wanted:
+    """The state with another target, other motors, force or gravity."""
+    if name == "gravity":
+        if value is None or value is False or value == "off":
+            return now._replace(gravity=None)
+        if isinstance(value, str) and value != "on":
+            raise ParameterError("gravity", value, "on, off or three numbers [m/s^2]")
+        value = EARTH_GRAVITY if value is True or value == "on" else value
+    elif name == "motors":
+        now = now._replace(target=None)
+    changes: dict[str, Any] = {name: read_only(finite_array(name, value, *_ARRAYS[name]))}
+    return now._replace(**changes)

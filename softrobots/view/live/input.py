@@ -28,8 +28,7 @@ _ESCAPE_WAIT = 0.1  # [s], for the rest of an escape sequence
 
 _KEY = re.compile(r"\x1b[\[O](\d*)[\d;]*([A-Za-z~])|.", re.DOTALL)
 _PART_OF_KEY = re.compile(r"\x1b([\[O][\d;]*)?$")
-_NAMED = {"A": "up", "B": "down", "C": "right", "D": "left"}
-_NUMBERED = {"5": "page up", "6": "page down"}
+_NAMED = {"A": "up", "B": "down", "C": "right", "D": "left", "5~": "page up", "6~": "page down"}
 _ENDING = ("SIGTERM", "SIGHUP", "SIGQUIT")
 
 Tell = Callable[[str], object]
@@ -97,7 +96,10 @@ class WatchedFile:
             mark = (status.st_mtime_ns, status.st_size, status.st_ino)
             if mark == self._mark and time.time() - status.st_mtime > _RECENT:
                 return None
-            text = self._content() if stat.S_ISREG(status.st_mode) else None
+            text = None
+            if stat.S_ISREG(status.st_mode):
+                with self._path.open("rb") as file:
+                    text = file.read(_LARGEST + 1)  # the size in `stat` may be wrong
             if mark != self._mark and (text is None or len(text) > _LARGEST):
                 self._mark = mark
                 raise FileFormatError(f"{self._path} must be a file of at most {_LARGEST} bytes")
@@ -111,11 +113,6 @@ class WatchedFile:
             return None
         self._text = text
         return text
-
-    def _content(self) -> bytes:
-        """The content up to one byte beyond the limit; the size in `stat` may be wrong."""
-        with self._path.open("rb") as file:
-            return file.read(_LARGEST + 1)
 
 
 class Keys:
@@ -173,7 +170,7 @@ class Keys:
         return line, rest
 
 
-class Terminal:
+class Terminal(contextlib.ExitStack):
     """A terminal in single-key mode without echo; a context manager that restores it.
 
     It is restored at SIGTERM, SIGHUP and SIGQUIT too, which raise SystemExit, and set again when the program continues after
@@ -182,8 +179,8 @@ class Terminal:
 
     def __init__(self, descriptor: int) -> None:
         """Use a terminal that is open for reading."""
+        super().__init__()
         self._descriptor = descriptor
-        self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Terminal:
         """Switch to single keys."""
@@ -200,13 +197,9 @@ class Terminal:
             for name in _ENDING:
                 self._handle(getattr(signal, name), _end)
             self._handle(signal.SIGCONT, lambda *_: self._single())
-        self._stack.callback(restore)
+        self.callback(restore)
         self._single()
         return self
-
-    def __exit__(self, *_: object) -> None:
-        """Restore the terminal."""
-        self._stack.close()
 
     @contextlib.contextmanager
     def lines(self) -> Iterator[None]:
@@ -225,7 +218,7 @@ class Terminal:
             tty.setcbreak(self._descriptor, termios.TCSADRAIN)
 
     def _handle(self, number: int, handler: Callable[..., object]) -> None:
-        self._stack.callback(signal.signal, number, signal.signal(number, handler))
+        self.callback(signal.signal, number, signal.signal(number, handler))
 
 
 @contextlib.contextmanager
@@ -269,8 +262,7 @@ def _named(pressed: re.Match[str] | None) -> str:
     """Name of the key of an escape sequence."""
     if pressed is None or not pressed[2]:
         return pressed[0] if pressed else ""
-    named = _NUMBERED.get(pressed[1]) if pressed[2] == "~" else _NAMED.get(pressed[2])
-    return named or repr(pressed[0])
+    return _NAMED.get(f"{pressed[1]}~" if pressed[2] == "~" else pressed[2], repr(pressed[0]))
 
 
 def _end(number: int, _: object) -> NoReturn:

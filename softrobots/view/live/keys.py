@@ -30,11 +30,7 @@ _MOVES = {
     "right": (0, 1.0), "left": (0, -1.0), "page up": (1, 1.0), "page down": (1, -1.0), "up": (2, 1.0), "down": (2, -1.0),
     "x": (0, 1.0), "X": (0, -1.0), "y": (1, 1.0), "Y": (1, -1.0), "z": (2, 1.0), "Z": (2, -1.0),
 }  # fmt: skip
-_TARGET_SHARE, _FORCE_SHARE, _MOTOR_SHARE = (
-    0.02,
-    0.01,
-    0.05,
-)  # of reach, of force for reach, of motor_scale
+_TARGET_SHARE, _FORCE_SHARE, _MOTOR_SHARE = 0.02, 0.01, 0.05  # of reach, of force for reach, of motor_scale
 _FURTHEST = 2.0**20  # largest factor of a step: a key that is held down gives no infinite step
 
 
@@ -49,7 +45,7 @@ class KeyMoves:
         """
         model = equilibrium.model
         self._motor, self._force = 0, not model.n_motors
-        self._scaled = 1.0
+        self._factor = 1.0  # of all steps
         self._target_step = _round_step(_TARGET_SHARE * model.reach)
         self._motor_steps = [_round_step(_MOTOR_SHARE * scale) for scale in model.motor_scale.tolist()]
         self._force_step, softness = 1.0, 0.0
@@ -61,8 +57,10 @@ class KeyMoves:
     @property
     def hint(self) -> str:
         """One line about what the keys move."""
-        motors = f"; + and - actuator {self._motor + 1} by {self._motor_steps[self._motor]:g}" if self._motor_steps else ""
-        what = f"force by {self._force_step:g} N" if self._force else f"target by {self._target_step:g} m"
+        steps = [self._factor * step for step in self._motor_steps]
+        motors = f"; + and - actuator {self._motor + 1} by {steps[self._motor]:g}" if steps else ""
+        step = self._factor * (self._force_step if self._force else self._target_step)
+        what = f"force by {step:g} N" if self._force else f"target by {step:g} m"
         return f"arrows move the {what}{motors}; ? lists the keys"
 
     def press(self, key: str, now: Wanted, start: Wanted, equilibrium: Equilibrium) -> Wanted:
@@ -95,7 +93,7 @@ class KeyMoves:
                 raise ParameterError("t", "the target", "left: this robot has no actuators to reach a target with")
             self._force = key == "f"
         elif key in ("<", ">"):
-            self._scale(0.5 if key == "<" else 2.0)
+            self._factor = min(max(self._factor * (0.5 if key == "<" else 2.0), 1.0 / _FURTHEST), _FURTHEST)
         elif key in "123456789":
             self._choose(int(key) - 1)
         else:
@@ -104,7 +102,7 @@ class KeyMoves:
 
     def _moved(self, axis: int, sign: float, now: Wanted, equilibrium: Equilibrium) -> Wanted:
         """The force or the target moved by a step along an axis."""
-        step = sign * (self._force_step if self._force else self._target_step) * np.eye(3)[axis]
+        step = sign * self._factor * (self._force_step if self._force else self._target_step) * np.eye(3)[axis]
         if self._force:
             return now._replace(force=read_only(now.force + step))
         return now._replace(target=read_only((equilibrium.tip_position if now.target is None else now.target) + step))
@@ -113,21 +111,13 @@ class KeyMoves:
         """The chosen actuator moved by a step."""
         self._choose(self._motor)
         motors: FloatArray = np.array(now.motors)
-        motors[self._motor] += sign * self._motor_steps[self._motor]
+        motors[self._motor] += sign * self._factor * self._motor_steps[self._motor]
         return now._replace(motors=read_only(motors), target=None)
 
     def _choose(self, motor: int) -> None:
         if motor >= len(self._motor_steps):
             raise ParameterError("actuator", motor + 1, f"one of the {len(self._motor_steps)} of this robot")
         self._motor = motor
-
-    def _scale(self, factor: float) -> None:
-        if not 1.0 / _FURTHEST <= self._scaled * factor <= _FURTHEST:
-            return
-        self._scaled *= factor
-        self._target_step *= factor
-        self._force_step *= factor
-        self._motor_steps = [factor * step for step in self._motor_steps]
 
 
 def _round_step(step: float) -> float:

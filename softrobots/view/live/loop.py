@@ -33,13 +33,7 @@ class Commands(Protocol):
     """A source of commands; see `softrobots.view.live.input`."""
 
     def read(self, live: LiveView) -> Wanted | None:
-        """Wait a fraction of a second for commands.
-
-        Args:
-            live: The view as it is.
-
-        Returns:
-            The commanded state; None if no command came.
+        """Wait a fraction of a second, and return the commanded state; None if no command came.
 
         Raises:
             SoftRobotsError: If a command is wrong. More can be read after it.

@@ -28,13 +28,7 @@ _REPEATED = 256  # bytes of an array from which it is looked for among the other
 
 
 def read_page(static: str) -> tuple[str, list[bytes]]:
-    """Return script and commands of a page of meshcat's `static_html`.
-
-    Args:
-        static: The page.
-
-    Returns:
-        Its script, and its commands, each in msgpack.
+    """Return the script and the commands, each in msgpack, of a page of meshcat's `static_html`.
 
     Raises:
         ViewerError: If there is no script or no command, as from another version of meshcat.

@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Template
 
 from softrobots.version import __version__
-from softrobots.view.appearance import Colour, LegendEntry
+from softrobots.view.appearance import Colour, LegendEntry, rgb
 from softrobots.view.meshcat_page.page_commands import packed, read_page, tidied
 
 _HINT = "Drag: turn. Wheel or two fingers: nearer."
@@ -66,14 +66,7 @@ def page_text(static: str, title: str, legend: Sequence[LegendEntry]) -> str:
 
 
 def live_page(title: str) -> str:
-    """Return the page that the meshcat server serves: it follows the commands of the server and shows its legend.
-
-    Args:
-        title: Title of the page.
-
-    Returns:
-        The page.
-    """
+    """Return the page that the meshcat server serves: it follows the commands of the server and shows its legend."""
     return _page(title, '<div id="softrobots-rows"></div>', _HINT, _filled("served_scene.html"))
 
 
@@ -99,6 +92,6 @@ def _css(colour: Colour) -> str:
     """A colour of the legend in CSS, with twice the opacity of transparent ones."""
     if isinstance(colour, int):
         return f"#{colour:06x}"
-    red, green, blue = (round(255 * value) for value in colour[:3])
+    red, green, blue = rgb(colour)
     opacity = min(1.0, 2.0 * colour[3]) if len(colour) == 4 and colour[3] < 1.0 else 1.0
     return f"rgba({red},{green},{blue},{opacity:g})"

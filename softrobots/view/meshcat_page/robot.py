@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.view import appearance
 from softrobots.view.animation_frames import FRAME_RATE
-from softrobots.view.appearance import ARROW_LENGTH, ARROW_WIDTH, FORCE_COLOUR, PATH_COLOUR, LegendEntry, legend
 from softrobots.view.meshcat_page.body import BodyDrawing
-from softrobots.view.meshcat_page.chain import ChainDrawing
-from softrobots.view.robot_shapes import RobotShapes
-from softrobots.view.scene import Arrow, Scene
+from softrobots.view.meshcat_page.shapes import material, meshcat_geometry
+from softrobots.view.robot_shapes import RobotShapes, Shape
+from softrobots.view.scene import WRINKLING_COLOURS, Arrow, Scene
 
 _CROSS = (0.16, 0.006)  # length and width of the mark of a target, of the size of the robot
 
@@ -49,8 +49,7 @@ class RobotDrawing:
         """Draw a path, shape (n, 3) [m], as dots."""
         import meshcat.geometry as geometry
 
-        rgb = np.array([PATH_COLOUR >> 16 & 255, PATH_COLOUR >> 8 & 255, PATH_COLOUR & 255]) / 255.0
-        colours = np.tile(rgb[:, None], (1, len(positions)))
+        colours = np.tile(np.array(appearance.rgb(appearance.PATH_COLOUR))[:, None] / 255.0, (1, len(positions)))
         cloud = geometry.PointCloud(positions.T.astype(np.float32), colours.astype(np.float32), size=0.012)
         self._root["path"].set_object(cloud)
         self._traced = True
@@ -66,7 +65,7 @@ class RobotDrawing:
             return
         if not self._marked:
             length, width = (share * self._size for share in _CROSS)
-            dark = geometry.MeshBasicMaterial(color=PATH_COLOUR)
+            dark = geometry.MeshBasicMaterial(color=appearance.PATH_COLOUR)
             for axis in range(3):
                 sides = [width] * 3
                 sides[axis] = length
@@ -92,13 +91,78 @@ class RobotDrawing:
             self._animated = tuple(scenes.values())
         return animation
 
-    def legend(self) -> list[LegendEntry]:
+    def legend(self) -> list[appearance.LegendEntry]:
         """Return colour and meaning of what is drawn."""
-        return legend(self._shapes, self._scene, self._animated, path=self._traced, target=self._marked)
+        return appearance.legend(self._shapes, self._scene, self._animated, path=self._traced, target=self._marked)
 
     def _add_frame(self, animation: Any, number: int, scene: Scene) -> None:
         self._chain.add_frame(animation, number, scene)
         self._arrows.add_frame(animation, number, scene.arrows)
+
+
+class ChainDrawing:
+    """The links under one node of a page: all of them as `deformed`, those that springs move a second time as `rigid`."""
+
+    def __init__(self, root: Any, shapes: Sequence[Shape]) -> None:
+        """Draw every shape under `root`, inflated links once in each colour of wrinkling."""
+        self._root, self._shapes = root, shapes
+        self._levels: dict[int, int] = {}
+        self._sections_shown = True
+        for shape in shapes:
+            solid, turn = meshcat_geometry(shape.geometry)
+            if shape.elastic:
+                root[f"rigid/{shape.name}/body"].set_object(solid, material(appearance.RIGID_COLOUR))
+                root[f"rigid/{shape.name}/body"].set_transform(turn)
+            node = root[f"deformed/{shape.name}"]
+            if shape.inflated_link is None:
+                node["body"].set_object(solid, material(shape.colour))
+                node["body"].set_transform(turn)
+                continue
+            # One copy for each colour, of which one is visible: an animation can switch visibility, but no colour.
+            for level, (_, rgb) in enumerate(WRINKLING_COLOURS):
+                node[f"level_{level}"].set_object(solid, material((*rgb, shape.colour[3])))
+                node[f"level_{level}"].set_transform(turn)
+                node[f"level_{level}"].set_property("visible", level == 0)
+            self._levels[shape.inflated_link] = 0
+
+    def draw(self, scene: Scene) -> None:
+        """Move both chains, and colour the inflated links."""
+        sections_shown = scene.grown is None  # sections that have not everted yet would stick out of the tip
+        if sections_shown != self._sections_shown:
+            self._sections_shown = sections_shown
+            for shape in self._shapes:
+                if shape.of_section:
+                    self._root[f"deformed/{shape.name}"].set_property("visible", sections_shown)
+        for name, pose in self._poses(scene):
+            self._root[name].set_transform(pose)
+        levels = {link: scene.wrinkling[link] if scene.wrinkling else 0 for link in self._levels}
+        for shape in self._shapes:
+            link = shape.inflated_link
+            if link is not None and levels[link] != self._levels[link]:
+                node = self._root[f"deformed/{shape.name}"]
+                node[f"level_{self._levels[link]}"].set_property("visible", False)
+                node[f"level_{levels[link]}"].set_property("visible", True)
+        self._levels = levels
+
+    def add_frame(self, animation: Any, number: int, scene: Scene) -> None:
+        """Move both chains at a frame of an animation, and colour the inflated links of a loaded robot."""
+        for name, pose in self._poses(scene):
+            animation.at_frame(self._root[name], number).set_transform(pose)
+        for shape in self._shapes:
+            if shape.inflated_link is None or scene.wrinkling is None:
+                continue
+            for level in range(len(WRINKLING_COLOURS)):
+                node = self._root[f"deformed/{shape.name}/level_{level}"]
+                visible = level == scene.wrinkling[shape.inflated_link]
+                animation.at_frame(node, number).set_property("visible", "boolean", visible)
+
+    def _poses(self, scene: Scene) -> Iterator[tuple[str, FloatArray]]:
+        """Node and pose of every shape of both chains."""
+        for shape, pose in zip(self._shapes, scene.deformed, strict=True):
+            yield f"deformed/{shape.name}", pose
+        for shape, pose in zip(self._shapes, scene.rigid, strict=True):
+            if shape.elastic:
+                yield f"rigid/{shape.name}", pose
 
 
 class ArrowDrawing:
@@ -119,9 +183,9 @@ class ArrowDrawing:
         self._names = tuple(arrows)
         unit = max((arrow.force for arrow in arrows.values()), default=1.0)
         for name, arrow in arrows.items():
-            length = ARROW_LENGTH * self._size * arrow.force / unit
-            width = ARROW_WIDTH * self._size
-            green = geometry.MeshLambertMaterial(color=FORCE_COLOUR)
+            length = appearance.ARROW_LENGTH * self._size * arrow.force / unit
+            width = appearance.ARROW_WIDTH * self._size
+            green = geometry.MeshLambertMaterial(color=appearance.FORCE_COLOUR)
             node = self._root[name]
             for part, solid, height in (
                 ("shaft", geometry.Cylinder(length, width), 0.5 * length),

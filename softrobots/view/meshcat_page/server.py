@@ -38,19 +38,14 @@ def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str,
     )
     watchdog = threading.Timer(_REPLY_TIME / 1000.0, server.kill)  # a silent server is killed, which ends the wait
     watchdog.start()
-    addresses: dict[str, str] = {}
-    while server.stdout is not None and len(addresses) < 2:
-        line = server.stdout.readline().decode("utf-8", "replace")
-        if not line:
-            watchdog.cancel()
-            message = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
-            end_server(server)
-            raise ViewerError(f"the meshcat server ended before it served: {message}")
-        name, _, value = line.strip().partition("=")
-        if name in ("zmq_url", "web_url"):
-            addresses[name] = value
+    line = next((line for line in server.stdout or () if line.startswith(b"serves ")), b"")
     watchdog.cancel()
-    return server, addresses["zmq_url"], addresses["web_url"]
+    if not line:
+        message = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
+        end_server(server)
+        raise ViewerError(f"the meshcat server ended before it served: {message}")
+    _, zmq_url, web_url = line.decode().split()
+    return server, zmq_url, web_url
 
 
 def end_server(server: subprocess.Popen[bytes]) -> None:
@@ -92,12 +87,7 @@ def connect(zmq_url: str, web_url: str) -> Any:
 
 
 def send_html(page: Any, what: str, text: str) -> None:
-    """Send a server what meshcat has no command for.
-
-    Args:
-        page: The `meshcat.Visualizer`.
-        what: "page", the HTML that it serves, or "legend", the rows of the legend on it.
-        text: HTML.
+    """Send the server of a `meshcat.Visualizer` what meshcat has no command for: the "page" that it serves, or its "legend".
 
     Raises:
         ViewerError: If the server does not answer.

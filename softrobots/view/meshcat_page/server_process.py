@@ -17,7 +17,7 @@ from typing import Any
 
 
 def main() -> None:
-    """Print `zmq_url=` and `web_url=`, and serve until standard input closes; arguments: the address, and perhaps the port."""
+    """Print "serves" and its two addresses, and serve until standard input closes; arguments: the address, perhaps the port."""
     import umsgpack
     from meshcat.servers.zmqserver import VIEWER_ROOT, ZMQWebSocketBridge, find_node
     from tornado.web import Application, RequestHandler
@@ -102,7 +102,7 @@ def main() -> None:
     except OSError as error:
         sys.exit(f"port {port}: {error.strerror}")
     bridge.app.add_handlers(".*", [(r"/favicon\.ico", NoIcon), (r"/static/(?:index\.html)?", Page)])
-    print(f"zmq_url={bridge.zmq_url}\nweb_url={bridge.web_url}", flush=True)  # noqa: T201
+    print(f"serves {bridge.zmq_url} {bridge.web_url}", flush=True)  # noqa: T201
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, sys.stdout.fileno())  # the parent reads no further, and a full pipe would block the server
     os.dup2(quiet, sys.stderr.fileno())

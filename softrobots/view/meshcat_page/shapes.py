@@ -8,6 +8,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ViewerError
+from softrobots.view.appearance import rgb
 from softrobots.view.mesh_triangles import Triangles
 
 
@@ -36,7 +37,7 @@ def material(rgba: tuple[float, ...]) -> Any:
     """Return meshcat's material of a colour: red, green, blue, opacity."""
     import meshcat.geometry as geometry
 
-    red, green, blue = (round(255 * value) for value in rgba[:3])
+    red, green, blue = rgb(rgba)
     clear = rgba[3] < 1.0
     return geometry.MeshPhongMaterial(
         color=red << 16 | green << 8 | blue, opacity=rgba[3], transparent=clear, shininess=25, depthWrite=not clear

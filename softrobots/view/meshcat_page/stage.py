@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array
+from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.view.appearance import FLOOR_COLOUR
 from softrobots.view.scene import Extent
@@ -25,20 +25,16 @@ class Stage:
         """
         import meshcat.geometry as geometry
 
-        self._page, self._root, self._extent = page, root, extent
+        self._page, self._root = page, root
         size, tip = extent.size, extent.tip
         page["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
         page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
         page["/Axes"].set_property("visible", False)
         page["/Grid"].set_property("visible", False)
         upright = np.hypot(*(tip - extent.base)[:2]) < 0.1 * size
-        self.look_at(tip + [0.3 * size if upright else -0.1 * size, 0.0, 0.0 if upright else 0.2 * size])
+        self.look_from(*extent.camera(tip + [0.3 * size if upright else -0.1 * size, 0.0, 0.0 if upright else 0.2 * size]))
         lines = geometry.PointsGeometry(extent.floor().T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=FLOOR_COLOUR)))
-
-    def look_at(self, tip: FloatArray) -> None:
-        """See `softrobots.view.viewer.Viewer.look_at`."""
-        self.look_from(*self._extent.camera(tip))
 
     def look_from(self, eye: Any, centre: Any) -> None:
         """See `softrobots.view.viewer.Viewer.look_from`.

@@ -11,16 +11,8 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ViewerError
-from softrobots.view.appearance import (
-    ARROW_LENGTH,
-    ARROW_WIDTH,
-    FLOOR_COLOUR,
-    FORCE_COLOUR,
-    PATH_COLOUR,
-    RIGID_COLOUR,
-    Colour,
-    body_parts,
-)
+from softrobots.view import appearance
+from softrobots.view.appearance import Colour, body_parts, rgb
 from softrobots.view.body import tube
 from softrobots.view.mesh_triangles import Triangles
 from softrobots.view.robot_shapes import Shape
@@ -72,7 +64,7 @@ class ViserDrawing:
         scene.add_light_ambient("/light/ambient", intensity=_AMBIENT)
         scene.add_light_directional("/light/sun", intensity=_SUN, position=(-0.3, -0.6, 1.0))
         floor = extent.floor().reshape(-1, 2, 3)
-        scene.add_line_segments("/floor", floor, _rgb(FLOOR_COLOUR), thickness=1.0, thickness_units="screen")
+        scene.add_line_segments("/floor", floor, rgb(appearance.FLOOR_COLOUR), thickness=1.0, thickness_units="screen")
 
     def look_at(self, tip: FloatArray) -> None:
         """Place the camera of browsers that connect later so that it sees a robot with its tip there, shape (3,) [m]."""
@@ -96,7 +88,7 @@ class ViserDrawing:
                 self.handles["path"].points = path
             elif path is not None:
                 self.handles["path"] = self._server.scene.add_point_cloud(
-                    "/path", path, _rgb(PATH_COLOUR), point_size=_DOT, point_shape="circle", precision="float32"
+                    "/path", path, rgb(appearance.PATH_COLOUR), point_size=_DOT, point_shape="circle", precision="float32"
                 )
 
     def _meshes(self, scene: Scene, rigid: bool) -> Iterator[tuple[str, Mesh]]:
@@ -108,19 +100,20 @@ class ViserDrawing:
                 colour = (*WRINKLING_COLOURS[level][1], shape.colour[3])
             yield f"deformed/{shape.name}", Mesh(corners, faces, pose, colour, flat)
             if rigid and shape.elastic:
-                yield f"rigid/{shape.name}", Mesh(corners, faces, relaxed, RIGID_COLOUR, flat)
+                yield f"rigid/{shape.name}", Mesh(corners, faces, relaxed, appearance.RIGID_COLOUR, flat)
         for part in body_parts(scene):
             yield f"body/{part.path}", Mesh(*part.surface(), np.eye(4), part.colour)
-        width = ARROW_WIDTH * self._extent.size
+        width = appearance.ARROW_WIDTH * self._extent.size
+        radii = width * np.array([1.0, 1.0, 1.0, 1.0, 2.5, 2.5, 0.0, 0.0])
         for name, arrow in scene.arrows.items():
-            end = ARROW_LENGTH * self._extent.size * arrow.force / self._unit_force
+            end = appearance.ARROW_LENGTH * self._extent.size * arrow.force / self._unit_force
             heights = [0.0, 0.0, end, end, end, end, end + 7.0 * width, end + 7.0 * width]
             along_z = arrow.pose[:, [2, 0, 1, 3]]
-            yield f"load/{name}", Mesh(*_turned(heights, width * np.array([1, 1, 1, 1, 2.5, 2.5, 0, 0])), along_z, FORCE_COLOUR)
+            yield f"load/{name}", Mesh(*_turned(heights, radii), along_z, appearance.FORCE_COLOUR)
 
     def _show_mesh(self, name: str, mesh: Mesh) -> None:
         x, y, z, w = pin.Quaternion(mesh.pose[:3, :3]).coeffs().tolist()
-        place, colour = {"wxyz": np.array([w, x, y, z]), "position": mesh.pose[:3, 3]}, _rgb(mesh.colour)
+        place, colour = {"wxyz": np.array([w, x, y, z]), "position": mesh.pose[:3, 3]}, rgb(mesh.colour)
         if name in self.handles:  # viser sends what differs
             for key, value in {**place, "vertices": mesh.corners, "color": colour}.items():
                 setattr(self.handles[name], key, value)
@@ -159,9 +152,3 @@ def _turned(heights: Any, radii: Any) -> tuple[FloatArray, Any]:
     centres = np.zeros((len(heights), 3))
     centres[:, 2] = heights
     return tube(np.tile(np.eye(3), (len(heights), 1, 1)), centres, radii, _SIDES)
-
-
-def _rgb(colour: Colour) -> tuple[int, ...]:
-    if isinstance(colour, int):
-        return colour >> 16 & 255, colour >> 8 & 255, colour & 255
-    return tuple(round(255 * share) for share in colour[:3])

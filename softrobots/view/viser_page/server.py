@@ -18,7 +18,7 @@ _STARTING = threading.Lock()
 
 
 def start_server(label: str, port: int | None = None) -> Any:
-    """Start a server in threads of this process; end it with `end_server`.
+    """Start a server in threads of this process; its `stop` ends it.
 
     Args:
         label: Title of the panel with the sliders.
@@ -49,7 +49,7 @@ def start_server(label: str, port: int | None = None) -> Any:
         server = Server(host=LOOPBACK, port=FIRST_PORT if port is None else port, label=label, verbose=False)
     server.get_event_loop().call_soon_threadsafe(console.begin_capture)
     if port is not None and server.get_port() != port:  # viser took the next free one
-        end_server(server)
+        server.stop()
         raise ViewerError(f"port {port} of {LOOPBACK} cannot be had: it is taken, or reserved for the system")
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()  # beside the robot, not before it
@@ -78,8 +78,3 @@ def _for_this_machine() -> Iterator[None]:
             yield
         finally:
             websockets_server.serve = serve
-
-
-def end_server(server: Any) -> None:
-    """End a server and its threads."""
-    server.stop()

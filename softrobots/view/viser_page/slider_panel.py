@@ -95,13 +95,7 @@ class SliderPanel:
         self._gravity.value = setting.gravity
 
     def report(self, equilibrium: Equilibrium, legend: Sequence[LegendEntry], problem: str = "") -> None:
-        """Show facts of an equilibrium, and the legend.
-
-        Args:
-            equilibrium: The equilibrium that is shown.
-            legend: Colour and meaning of each thing.
-            problem: Why there is no equilibrium for the values of the sliders; empty if there is.
-        """
+        """Show facts of an equilibrium, the legend, and why there is no equilibrium for the values of the sliders, if so."""
         rows = "".join(f"<tr><td>{name}</td><td>{html.escape(text)}</td></tr>" for name, text in _facts(equilibrium))
         note = f'<div id="softrobots-note">NO EQUILIBRIUM; the picture shows the last one. {html.escape(problem)}</div>'
         self._text.content = (
@@ -111,9 +105,8 @@ class SliderPanel:
 
     def _slider(self, name: str, unit: str, low: float, high: float, value: float) -> Any:
         first, last, step = slider_grid(low, high)
-        handle = self._gui.add_slider(
-            f"{name} [{unit}]", first, last, step, first
-        )  # viser shows as many digits as the initial value has
+        # Viser shows as many digits as the initial value has.
+        handle = self._gui.add_slider(f"{name} [{unit}]", first, last, step, first)
         handle.value = value
         handle.on_update(self._moved)
         return handle
@@ -169,12 +162,8 @@ def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:
     """Name and value of each fact of an equilibrium."""
     x, y, z = equilibrium.tip_position.tolist()
     facts = [("tip [m]", f"{x:.4f}  {y:.4f}  {z:.4f}")]
-    truths = (
-        ("stable", equilibrium.stable),
-        ("conservative", equilibrium.conservative),
-        ("within limits", equilibrium.within_limits),
-    )
-    facts += [(name, "yes" if true else "no") for name, true in truths]
+    for name in ("stable", "conservative", "within_limits"):
+        facts.append((name.replace("_", " "), "yes" if getattr(equilibrium, name) else "no"))
     groups = equilibrium.model.spring_groups
     left = [1.0 - moment / group.wrinkling_moment for moment, group in zip(equilibrium.link_moments, groups, strict=True)]
     links = [
