@@ -17,6 +17,7 @@ from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
 from softrobots.helix.template import write_template
 from softrobots.robots import HelixTube
+from softrobots.view.figures import helices
 
 _EXAMPLES = """examples:
   softrobots helix forward --contraction 0.66 --angle 0.0873       actuator -> helix
@@ -205,13 +206,7 @@ def _limit(arguments: argparse.Namespace) -> None:
         Fact("contraction_limit", exact, "-", "smallest contraction, exact"),
         Fact("simple_contraction_limit", simple, "-", "by the simple rule"),
     ]
-
-    def draw() -> Any:
-        from softrobots.view.figures import helices
-
-        return helices.radius_and_pitch(arguments.angle, arguments.diameter)
-
-    files = write_plot(arguments, draw)
+    files = write_plot(arguments, lambda: helices.radius_and_pitch(arguments.angle, arguments.diameter))
     rows = [("angle [rad]", "smallest contraction [-]", "by the simple rule [-]")]
     rows += [tuple(f"{number:.6f}" for number in row) for row in zip(arguments.angle, exact, simple, strict=True)]  # type: ignore[misc]
     print_answer(arguments, answer_of(facts), aligned(rows), files)
@@ -220,14 +215,10 @@ def _limit(arguments: argparse.Namespace) -> None:
 def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Path] = ()) -> None:
     """Print the facts, and draw the tube."""
     values = {fact.name: fact.value for fact in facts}
-
-    def draw() -> Any:
-        from softrobots.view.figures import helices
-
-        tilt, share = [float(values["angle"])], [float(values["contraction"])]
-        return helices.grid(share, tilt, float(values["diameter"]), values["length"], values["handedness"])
-
-    print_answer(arguments, answer_of(facts), lines_of(facts), [*files, *write_plot(arguments, draw)])
+    angle, contraction, diameter = (float(values[name]) for name in ("angle", "contraction", "diameter"))
+    tube = ([contraction], [angle], diameter, values["length"], values["handedness"])
+    files = [*files, *write_plot(arguments, lambda: helices.grid(*tube))]
+    print_answer(arguments, answer_of(facts), lines_of(facts), files)
 
 
 def _tube_facts(arguments: argparse.Namespace, shape: helix.HelixShape, actuator: helix.Actuator, length: float) -> list[Fact]:

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
-from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, shape_figure, write_plot
+from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
@@ -20,7 +20,9 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.inverse_kinematics import ELBOWS, solve_ik
 from softrobots.statics.time_law import read_waypoints
 from softrobots.statics.tip_search import POSITION_TOLERANCE
-from softrobots.statics.trajectory import METHODS, Trajectory, follow_trajectory
+from softrobots.statics.trajectory import METHODS, follow_trajectory
+from softrobots.view.figures import trajectories
+from softrobots.view.figures.loaded_robot import loaded_shape
 
 _EXAMPLES = """examples:
   softrobots ik inflatable_arm --target 0.9 0.3 0.2 --force 0 10 -15 --elbow up
@@ -99,7 +101,7 @@ def run(arguments: argparse.Namespace) -> None:
         allow_jumps=arguments.allow_jumps,
         progress="waypoints",
     )
-    files = save(arguments, trajectory) + write_plot(arguments, lambda: _path_figure(trajectory))
+    files = save(arguments, trajectory) + write_plot(arguments, lambda: trajectories.poses(trajectory))
     print_answer(arguments, trajectory_answer(trajectory), trajectory_lines(trajectory), files)
 
 
@@ -109,7 +111,7 @@ def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, A
         orientation = pin.rpy.rpyToMatrix(*finite_array("--rpy", arguments.rpy, (3,), "rad"))
     starts = _STARTS if arguments.starts is None else arguments.starts
     solution = solve_ik(model, arguments.target, orientation=orientation, starts=starts, **options)
-    files = save(arguments, solution) + write_plot(arguments, lambda: shape_figure(solution.equilibrium))
+    files = save(arguments, solution) + write_plot(arguments, lambda: loaded_shape(solution.equilibrium))
     print_answer(arguments, solution_answer(solution), solution_lines(solution), files)
 
 
@@ -130,9 +132,3 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
         if wrong:
             value = getattr(arguments, option.removeprefix("--").replace("-", "_"))
             raise ParameterError(option, value, f"given with {requirement}")
-
-
-def _path_figure(trajectory: Trajectory) -> Any:
-    from softrobots.view.figures import trajectories
-
-    return trajectories.poses(trajectory)

@@ -19,6 +19,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.model.loader import load_model
 from softrobots.robots import PccArm
 from softrobots.statics.inverse_kinematics import solve_ik
+from softrobots.view.figures import segments
 
 REST = float(PccArm.segment_lengths[0])
 """Default rest length of a segment [m]."""
@@ -200,13 +201,8 @@ def _answer(
         *further,
         Fact("frame", frame, "", "frame"),
     ]
-
-    def draw() -> Any:
-        from softrobots.view.figures import segments
-
-        return segments.arm(arcs, distance, azimuths, offsets, frame)
-
-    print_answer(arguments, answer_of(facts), _lines(facts), write_plot(arguments, draw))
+    files = write_plot(arguments, lambda: segments.arm(arcs, distance, azimuths, offsets, frame))
+    print_answer(arguments, answer_of(facts), _lines(facts), files)
 
 
 def _lines(facts: list[Fact]) -> list[str]:

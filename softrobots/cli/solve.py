@@ -7,7 +7,7 @@ from typing import Any
 
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
-from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, shape_figure, write_plot
+from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer
 from softrobots.cli.reports.equilibrium_report import coordinate_lines, equilibrium_answer, summary_lines
@@ -19,6 +19,7 @@ from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.sensitivity import compliance
 from softrobots.statics.stability import critical_load
+from softrobots.view.figures.loaded_robot import loaded_shape
 
 _EXAMPLES = """examples:
   softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15
@@ -86,7 +87,7 @@ def run(arguments: argparse.Namespace) -> None:
         _add_compliance(model, equilibrium, answer, lines)
     if arguments.critical_load is not None:
         _add_critical_load(model, equilibrium, arguments, answer, summary)
-    files = save(arguments, equilibrium) + write_plot(arguments, lambda: shape_figure(equilibrium))
+    files = save(arguments, equilibrium) + write_plot(arguments, lambda: loaded_shape(equilibrium))
     print_answer(arguments, answer, [*lines, "", *summary], files)
 
 

@@ -10,8 +10,8 @@ from typing import Any
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
 from softrobots.core.result_file import save_result
-from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.saved_results import save_csv
+from softrobots.view.figures import canvas
 
 
 def add_output(parser: argparse.ArgumentParser, what: str) -> None:
@@ -63,10 +63,8 @@ def check_plot(arguments: argparse.Namespace) -> None:
     """
     if arguments.plot is None:
         return
-    from softrobots.view.figures.canvas import require_matplotlib
-
     check_ending("--plot", arguments.plot, ".png")
-    require_matplotlib()
+    canvas.require_matplotlib()
     new_file(arguments.plot, overwrite=arguments.overwrite)
 
 
@@ -79,27 +77,10 @@ def write_plot(arguments: argparse.Namespace, draw: Callable[[], Any]) -> list[P
     """
     if arguments.plot is None:
         return []
-    from softrobots.view.figures.canvas import write_png
-
-    return [write_png(draw(), arguments.plot, overwrite=arguments.overwrite)]
-
-
-def shape_figure(equilibrium: Equilibrium) -> Any:
-    """Return the figure of a loaded robot; matplotlib is imported only now.
-
-    Raises:
-        MissingDependency: If matplotlib is not installed.
-    """
-    from softrobots.view.figures.loaded_robot import loaded_shape
-
-    return loaded_shape(equilibrium)
+    return [canvas.write_png(draw(), arguments.plot, overwrite=arguments.overwrite)]
 
 
 def check_ending(option: str, file: Path, *endings: str) -> None:
-    """Refuse the file of an option whose name has none of the endings.
-
-    Raises:
-        ParameterError: If it has none.
-    """
+    """Raise a ParameterError for the file of an option whose name has none of the endings."""
     if file.suffix.lower() not in endings:
         raise ParameterError(option, str(file), f"a file name that ends in {' or '.join(endings)}")

@@ -9,10 +9,12 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
-from softrobots.cli.reports.coordinate_units import joined_units, load_units, spring_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
+
+_LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
+"""Unit of the load on a coordinate, by the unit of the coordinate; the load on a given tension is the tension."""
 
 
 def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
@@ -106,6 +108,21 @@ def head_lines(model: SoftModel, load: Load) -> list[str]:
     return aligned(
         [("robot", f"{model.pinocchio.name} (tip: {model.tip})"), *(rows or [("load", "none")]), ("gravity", gravity)]
     )
+
+
+def spring_units(model: SoftModel) -> tuple[str, ...]:
+    """Unit of each elastic coordinate, rad or m."""
+    return tuple("rad" if turns else "m" for turns in model.springs.turning.tolist())
+
+
+def load_units(units: Sequence[str]) -> tuple[str, ...]:
+    """Units of the loads on coordinates of these units."""
+    return tuple(_LOAD_UNITS[unit] for unit in units)
+
+
+def joined_units(units: Sequence[str]) -> str:
+    """The units of a row of numbers as one text: one unit if all have it, else one for each."""
+    return units[0] if len(set(units)) == 1 else ", ".join(units)
 
 
 def _table(what: str, names: tuple[str, ...], values: Any, units: tuple[str, ...], loads: Any) -> list[str]:

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
-from softrobots.cli.reports.coordinate_units import joined_units, load_units, spring_units
 from softrobots.cli.reports.equilibrium_report import (
     coordinate_lines,
     equilibrium_answer,
     head_lines,
+    joined_units,
+    load_units,
     model_answer,
+    spring_units,
     summary_lines,
     wrinkling_margins,
     wrinkling_moments,
