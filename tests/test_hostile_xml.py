@@ -282,11 +282,11 @@ def test_a_huge_mesh_is_not_opened(tmp_path: Path) -> None:
     file = tmp_path / "huge.stl"
     with file.open("wb") as stream:
         stream.truncate(LARGEST_MESH)  # takes no room on the disk
-    assert find_mesh(str(file), ()) == file
+    assert find_mesh(str(file)) == file
     os.truncate(file, LARGEST_MESH + 1)
-    assert find_mesh(str(file), ()) is None
-    assert find_mesh("a" * 5000, ()) is None
-    assert find_mesh(str(tmp_path), ()) is None
+    assert find_mesh(str(file)) is None
+    assert find_mesh("a" * 5000) is None
+    assert find_mesh(str(tmp_path)) is None
 
 
 def test_a_mesh_of_another_kind_is_left_out_and_the_kinds_are_told(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 import softrobots as sr
 from softrobots.description.composition import fix_joints
 from softrobots.description.mesh_files import MissingMeshWarning, find_mesh, with_absolute_paths
-from softrobots.description.third_party import UR5, package_folders, robot_file
+from softrobots.description.third_party import UR5, robot_file
 from softrobots.view.mesh_triangles import Triangles
 from softrobots.view.robot_shapes import RobotShapes, Shape
 from softrobots.view.viewer import Viewer
@@ -133,8 +133,8 @@ def test_without_trimesh_the_mesh_is_still_there(tmp_path: Path, monkeypatch: py
 
 
 def test_find_mesh_wants_a_file(tmp_path: Path) -> None:
-    assert find_mesh(str(tmp_path), ()) is None
-    assert find_mesh("model://a.dae", (str(tmp_path),)) is None
+    assert find_mesh(str(tmp_path)) is None
+    assert find_mesh("model://a.dae") is None
 
 
 @pytest.fixture(scope="module")
@@ -180,5 +180,4 @@ def test_what_is_mounted_on_an_inflated_link_is_not_coloured_as_one() -> None:
 
 
 def test_packages_are_those_of_example_robot_data(carried: sr.SoftModel) -> None:
-    (folder,) = package_folders()
-    assert find_mesh("package://example-robot-data/robots/ur_description/meshes/ur5/visual/base.dae", (folder,)) is not None
+    assert find_mesh("package://example-robot-data/robots/ur_description/meshes/ur5/visual/base.dae") is not None

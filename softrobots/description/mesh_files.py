@@ -15,6 +15,7 @@ from pathlib import Path
 
 from softrobots.core.xml_input import parse_xml
 from softrobots.description.collada_check import collada_problem
+from softrobots.description.third_party import package_folders
 
 _MESH = re.compile(r"""(<mesh\b[^<>]*?\bfilename\s*=\s*)(?:"([^"]*)"|'([^']*)')""")
 
@@ -61,12 +62,10 @@ def with_absolute_paths(urdf: str, folder: Path) -> str:
     return _MESH.sub(absolute, urdf)
 
 
-def find_mesh(name: str, folders: Sequence[str]) -> Path | None:
-    """Return the path of a mesh file; None if it does not exist or is larger than `LARGEST_MESH`.
+def find_mesh(name: str) -> Path | None:
+    """Return the path of a mesh file by its name in a description; None if it does not exist or is above `LARGEST_MESH`.
 
-    Args:
-        name: Its name in the description.
-        folders: Folders that hold packages; those of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH are searched after them.
+    Packages are searched in example-robot-data, then in the folders of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
     """
     scheme, separator, path = name.partition("://")
     if not separator:
@@ -74,7 +73,7 @@ def find_mesh(name: str, folders: Sequence[str]) -> Path | None:
     elif scheme == "package":
         ros = [Path(folder) for folder in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if folder]
         ament = [Path(folder) / "share" for folder in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if folder]
-        candidates = [folder / path for folder in (*map(Path, folders), *ros, *ament)]
+        candidates = [folder / path for folder in (*map(Path, package_folders()), *ros, *ament)]
     else:
         candidates = [Path(path)] if scheme == "file" else []
     return next((file.resolve() for file in candidates if unfit_file(file) == ""), None)
@@ -108,14 +107,11 @@ def remove_mesh_shapes(robot: ElementTree.Element) -> None:
                 link.remove(shape)
 
 
-def only_found(
-    urdf: str, folders: Sequence[str], readable: Callable[[Path], bool] | None = None
-) -> tuple[str, tuple[str, ...]]:
+def only_found(urdf: str, readable: Callable[[Path], bool] | None = None) -> tuple[str, tuple[str, ...]]:
     """Remove visual shapes whose mesh files are missing, and name the others by absolute paths.
 
     Args:
         urdf: URDF text.
-        folders: Folders that hold packages, as for `find_mesh`.
         readable: Whether an existing file can be read; by default every file can.
 
     Returns:
@@ -129,7 +125,7 @@ def only_found(
         for visual in link.findall("visual"):
             for mesh in visual.findall("geometry/mesh"):
                 name = mesh.get("filename", "")
-                file = find_mesh(name, folders)
+                file = find_mesh(name)
                 if file is None or _ends_reader(file) or (readable is not None and not readable(file)):
                     missing[name] = None
                     link.remove(visual)

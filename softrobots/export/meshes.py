@@ -7,7 +7,6 @@ from pathlib import Path
 
 from softrobots.description.mesh_files import find_mesh
 from softrobots.description.rigid_tree import Shape
-from softrobots.description.third_party import package_folders
 
 _STL_HEAD, _STL_FACE, _STL_MOST = 84, 50, 200_000  # bytes, bytes, largest number of faces in MuJoCo
 
@@ -16,7 +15,6 @@ class MeshFiles:
     """Finds mesh files, and counts those left out."""
 
     def __init__(self) -> None:
-        self._folders: list[str] | None = None
         self.left_out = 0
         """Meshes that were not found or that the simulator cannot read."""
 
@@ -29,17 +27,12 @@ class MeshFiles:
         """
         pairs: list[tuple[Shape, Path | None]] = []
         for shape in shapes:
-            file = self._find(shape.filename) if shape.kind == "mesh" else None
+            file = find_mesh(shape.filename) if shape.kind == "mesh" else None
             if shape.kind == "mesh" and (file is None or not readable(file)):
                 self.left_out += 1
             else:
                 pairs.append((shape, file))
         return pairs
-
-    def _find(self, name: str) -> Path | None:
-        if self._folders is None:
-            self._folders = package_folders()
-        return find_mesh(name, self._folders)
 
     def remark(self, why: str) -> tuple[str, ...]:
         """Return the remark on meshes for the head of a file; empty if none is left out."""

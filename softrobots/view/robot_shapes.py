@@ -14,7 +14,6 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ViewerError
 from softrobots.description.mesh_files import MissingMeshWarning, only_found
-from softrobots.description.third_party import package_folders
 from softrobots.model.soft_model import SoftModel
 from softrobots.view.mesh_triangles import ColouredPart, coloured_parts, has_finite_corners, readable
 
@@ -52,8 +51,7 @@ class RobotShapes:
         """
         self._model = model
         pin_model, _ = model.workspace(None)
-        folders = package_folders()
-        drawn, missing = only_found(model.urdf, folders)
+        drawn, missing = only_found(model.urdf)
         try:
             try:
                 self._geometry = pin.buildGeomFromUrdfString(pin_model, drawn, pin.GeometryType.VISUAL)
@@ -61,7 +59,7 @@ class RobotShapes:
             except (ValueError, RuntimeError):
                 whole = False
             if not whole:
-                drawn, missing = only_found(model.urdf, folders, readable)  # takes longer: reads every file
+                drawn, missing = only_found(model.urdf, readable)  # takes longer: reads every file
                 self._geometry = pin.buildGeomFromUrdfString(pin_model, drawn, pin.GeometryType.VISUAL)
         except (ValueError, RuntimeError) as error:
             raise ViewerError(f"the visual shapes of {pin_model.name} cannot be read: {error}") from error

@@ -14,7 +14,6 @@ from typing import Any
 from xml.dom import minidom
 
 from softrobots.description.mesh_files import DRAWN_FILES, find_mesh
-from softrobots.description.third_party import package_folders
 
 _LEFT_OUT = (
     "visual", "collision", "sensor", "light", "plugin", "audio_source", "audio_sink", "particle_emitter", "projector",
@@ -80,7 +79,7 @@ def _found(shape: minidom.Element, folder: Path | None) -> bool:
     name = names[0].firstChild.data.strip()
     if "://" not in name:
         name = str((folder or Path()) / name)
-    file = find_mesh(name, package_folders())
+    file = find_mesh(name)
     if file is None or file.suffix.lower() not in DRAWN_FILES:
         return False
     names[0].firstChild.data = file.as_uri()
