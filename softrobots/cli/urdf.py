@@ -77,7 +77,11 @@ def run(arguments: argparse.Namespace) -> bool:
             new_file(file, overwrite=arguments.overwrite)  # refused before the work
     findings = check_description(source) if arguments.check else ()
     all_ok = all(finding.ok for finding in findings)
-    lines, answer = _report(findings), _answer(findings) if arguments.check else {}
+    lines = _report(findings)
+    answer: dict[str, Any] = {}
+    if arguments.check:
+        rows = [{**finding._asdict(), "ok": finding.ok} for finding in findings]
+        answer = {"ok": all_ok, "findings": rows, "files": []}
     if all_ok:
         answer |= _write(arguments, source)
     lines += [f"{file}: written" for file in answer.get("files", ())]
@@ -110,14 +114,6 @@ def _shortest(robot: Any, name: str) -> Any:
             if dataclasses.replace(robot, **{name: value[0]}) == robot:
                 return value[0]
     return value
-
-
-def _answer(findings: Sequence[Finding]) -> dict[str, Any]:
-    return {
-        "ok": all(finding.ok for finding in findings),
-        "findings": [{**finding._asdict(), "ok": finding.ok} for finding in findings],
-        "files": [],
-    }
 
 
 def _report(findings: Sequence[Finding]) -> list[str]:

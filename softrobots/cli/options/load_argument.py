@@ -25,32 +25,21 @@ def add_loads(parser: argparse.ArgumentParser) -> None:
 
 
 def loads_of(arguments: argparse.Namespace, model: SoftModel) -> dict[str, Any]:
-    """Return the load of the options as keyword arguments of `solve_equilibrium` and `solve_ik`.
-
-    Args:
-        arguments: Arguments of a parser with `add_loads`.
-        model: The robot.
+    """Return the load of the options of `add_loads` as keyword arguments of `solve_equilibrium` and `solve_ik`.
 
     Raises:
         ParameterError: If the six values after a link are not finite numbers, or the moment is not finite.
     """
     wrenches: dict[str, Any] = {}
     for link, *words in arguments.wrench:
-        wrenches[link] = wrenches.get(link, 0.0) + finite_array("--wrench", _numbers(words), (6,), "N, N m")
+        try:
+            numbers = [float(word) for word in words]
+        except ValueError as error:
+            raise ParameterError("--wrench", " ".join(words), f"{' '.join(_WORDS)}: a link and six numbers") from error
+        wrenches[link] = wrenches.get(link, 0.0) + finite_array("--wrench", numbers, (6,), "N, N m")
     if arguments.moment is not None:
         at = model.tip if arguments.frame is None else arguments.frame
         moment = finite_array("--moment", arguments.moment, (3,), "N m")
         wrenches[at] = wrenches.get(at, 0.0) + np.array([0.0, 0.0, 0.0, *moment])
-    return {
-        "force": arguments.force,
-        "wrench": wrenches or None,
-        "frame": arguments.frame,
-        "gravity": gravity_of(arguments),
-    }
-
-
-def _numbers(words: list[str]) -> list[float]:
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise ParameterError("--wrench", " ".join(words), f"{' '.join(_WORDS)}: a link and six numbers") from error
+    load = {"force": arguments.force, "wrench": wrenches or None, "frame": arguments.frame}
+    return {**load, "gravity": gravity_of(arguments)}

@@ -30,11 +30,6 @@ class RobotParameter(NamedTuple):
     text: str
     """Its meaning, unit, bounds and source."""
 
-    @property
-    def line(self) -> str:
-        """Name, default and unit."""
-        return f"{self.name}={self.default}" + (f" [{self.unit}]" if self.unit else "")
-
 
 def robot_parameters(name: str) -> tuple[RobotParameter, ...]:
     """Return the parameters of a robot of `ROBOTS`, from the fields of its class.
@@ -99,7 +94,8 @@ def check_names(names: Iterable[str], known: Sequence[RobotParameter], owner: st
     existing = [parameter.name for parameter in known]
     for name in names:
         if name not in existing:
-            raise NameNotFound(f"parameter of {owner}", name, existing, lines=[parameter.line for parameter in known])
+            lines = [f"{one.name}={one.default}" + (f" [{one.unit}]" if one.unit else "") for one in known]
+            raise NameNotFound(f"parameter of {owner}", name, existing, lines=lines)
 
 
 def make_robot(name: str, words: Sequence[str], values: Mapping[str, Any] | None = None) -> XacroRobot:

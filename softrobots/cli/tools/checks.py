@@ -20,16 +20,15 @@ def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[F
     """Check a robot description: what is in it, every rule of portable URDF, and how tools read it.
 
     Args:
-        source: A robot of this package, the path of a URDF file, or URDF text (starting with `<`); MJCF and SDF are translated.
+        source: What `read_source` takes.
         count: Number of random configurations at which yourdfpy is compared with Pinocchio.
 
     Returns:
         What was checked and what is wrong with it, up to a defect that makes further checks impossible.
 
     Raises:
-        ParameterError: If `source` is something else, or `count` is not positive.
-        DescriptionError: If the file cannot be read, or is neither URDF nor MJCF or SDF that can be translated.
-        MissingDependency: If it is MJCF or SDF and the package that reads that is not installed.
+        ParameterError: If `count` is not positive.
+        SoftRobotsError: Whatever `read_source` raises.
     """
     positive_integer("count", count)
     urdf, label = read_source(source)

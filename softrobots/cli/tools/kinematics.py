@@ -76,7 +76,7 @@ def compare_kinematics(
     the file, those of mimicking joints follow.
 
     Args:
-        source: A robot of this package, the path of a URDF file, or URDF text (starting with `<`); MJCF and SDF are translated.
+        source: What `read_source` takes.
         tools: Names of tools, of `softrobots.cli.tools.known_tools.TOOLS`; by default all that are installed.
         count: Number of random configurations.
         seed: Seed of the draw.
@@ -85,11 +85,11 @@ def compare_kinematics(
         A row for each tool.
 
     Raises:
-        DescriptionError: If the file cannot be read, or Pinocchio refuses it or has joints in it that are not revolute,
-            continuous, prismatic or fixed.
+        SoftRobotsError: Whatever `read_source` raises.
+        DescriptionError: If Pinocchio refuses the file, or a joint is not revolute, continuous, prismatic or fixed.
         NameNotFound: If there is no such tool.
-        MissingDependency: If a tool of `tools` is not installed, or the package that reads MJCF or SDF.
-        ParameterError: If `count` is not positive, or `source` is something else.
+        MissingDependency: If a tool of `tools` is not installed.
+        ParameterError: If `count` is not positive.
     """
     positive_integer("count", count)
     chosen = [find_tool(name) for name in (installed_tools() if tools is None else tools)]

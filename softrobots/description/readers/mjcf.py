@@ -59,7 +59,8 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     shapes = visible_shapes(mujoco, model, text, path)
     bodies = [name_in(model, "body", number) for number in range(model.nbody)]
     joints = [name_in(model, "joint", number) for number in range(model.njnt)]
-    builder = TreeBuilder(_model_name(model), source, bodies, joints, _springs(model, joints))
+    name = bytes(model.names).split(b"\0", 1)[0].decode("utf-8", "replace")
+    builder = TreeBuilder(name, source, bodies, joints, _springs(model, joints))
     for number, name in enumerate(bodies):
         body = Body(
             name,
@@ -127,7 +128,3 @@ def _effort(mujoco: Any, model: Any, joint: int) -> float:
         if driven_joint(mujoco, model, number) == joint
     ]
     return max(limits, default=np.inf)
-
-
-def _model_name(model: Any) -> str:
-    return bytes(model.names).split(b"\0", 1)[0].decode("utf-8", "replace")

@@ -85,7 +85,8 @@ def _tree(plant: Any, source: str, frames: set[str], shapes: dict[str, list[Any]
     names = {edge.child.index(): _name(plant, edge.child, model) for edge in edges}
     names[plant.world_body().index()] = "world"
     joints = {edge.joint.index(): _name(plant, edge.joint, model) for edge in edges if edge.joint.num_velocities()}
-    by_joint, efforts = _springs(plant), _efforts(plant)
+    by_joint, actuators = _springs(plant), map(plant.get_joint_actuator, plant.GetJointActuatorIndices())
+    efforts = {actuator.joint().index(): float(actuator.effort_limit()) for actuator in actuators}
     springs = {name: by_joint[index] for index, name in joints.items() if index in by_joint}
     builder = TreeBuilder(model, source, names.values(), joints.values(), springs)
     for edge in edges:
@@ -117,20 +118,17 @@ def _edges(plant: Any, source: str) -> list[_Edge]:
     bodies = _items(plant.get_body, "BodyIndex", plant.num_bodies())
     loose = [body.scoped_name().get_full() for body in bodies if body.index() not in reached]
     if loose:
+        some = ", ".join(loose[:5]) + (", ..." if len(loose) > 5 else "")
         raise DescriptionError(
-            f"{source} has bodies that are not fixed to the world ({_some(loose)}): a floating base has no equilibrium under "
-            "load; add a fixed joint with the parent world"
+            f"{source} has bodies that are not fixed to the world ({some}): a floating base has no equilibrium under load; add "
+            "a fixed joint with the parent world"
         )
     return edges
 
 
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
-
-
 def _moving_model(plant: Any, edges: list[_Edge], source: str) -> str:
     """Name of the one model that has movable joints, or of the first one if nothing moves."""
-    models = [(_top(plant, edge.child), edge.joint.num_velocities() > 0) for edge in edges]
+    models = [(_models_of(plant, edge.child)[0], edge.joint.num_velocities() > 0) for edge in edges]
     moving = list(dict.fromkeys(name for name, moves in models if moves))
     if len(moving) > 1:
         raise DescriptionError(f"{source} has {len(moving)} models that move ({', '.join(moving)}); one is required in a file")
@@ -191,11 +189,6 @@ def _springs(plant: Any) -> dict[Any, SpringTag]:
     return springs
 
 
-def _efforts(plant: Any) -> dict[Any, float]:
-    actuators = (plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices())
-    return {actuator.joint().index(): float(actuator.effort_limit()) for actuator in actuators}
-
-
 def _body(body: Any, name: str, shapes: dict[str, list[Any]]) -> Body:
     inertia = body.default_spatial_inertia()
     mass = float(inertia.get_mass())
@@ -206,14 +199,15 @@ def _body(body: Any, name: str, shapes: dict[str, list[Any]]) -> Body:
     return Body(name, mass, Placement(read_only(np.array(inertia.get_com()))), read_only(np.array(about_centre)), drawn)
 
 
-def _name(plant: Any, thing: Any, model: str) -> str:
+def _name(plant: Any, element: Any, model: str) -> str:
     """Name of a body, joint or frame, after the names of its models below the robot's own."""
-    within = str(plant.GetModelInstanceName(thing.model_instance())).split("::")
-    return "__".join([*(within[1:] if within[0] == model else within), str(thing.name())])
+    models = _models_of(plant, element)
+    return "__".join([*(models[1:] if models[0] == model else models), str(element.name())])
 
 
-def _top(plant: Any, thing: Any) -> str:
-    return str(plant.GetModelInstanceName(thing.model_instance())).split("::")[0]
+def _models_of(plant: Any, element: Any) -> list[str]:
+    """Names of the models that contain a body, joint or frame, outermost first."""
+    return str(plant.GetModelInstanceName(element.model_instance())).split("::")
 
 
 def _items(get: Any, index: str, count: int) -> Iterator[Any]:
