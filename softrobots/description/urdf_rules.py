@@ -205,15 +205,12 @@ def _hints(document: UrdfDocument) -> Problems:
     named = tag_of(document.root, "tip")
     tip = "tip" if named is None else named.get("link", "")
     carrier = document.carrier.get(tip)
+    hints = document.root.findall("gazebo")
+    preserved = [hint.get("reference") for hint in hints if hint.findtext("preserveFixedJoint", "").strip() == "true"]
     if carrier is None:
         yield "", f"there is no link {tip}"
-    elif carrier.get("type") == "fixed" and not _is_preserved(document, name_of(carrier)):
+    elif carrier.get("type") == "fixed" and name_of(carrier) not in preserved:
         yield tip, f'<gazebo reference="{name_of(carrier)}"> with <preserveFixedJoint>true</preserveFixedJoint> is missing'
-
-
-def _is_preserved(document: UrdfDocument, joint: str) -> bool:
-    hints = [element for element in document.root.findall("gazebo") if element.get("reference") == joint]
-    return any(element.findtext("preserveFixedJoint", "").strip() == "true" for element in hints)
 
 
 def _order_of_hinges(document: UrdfDocument) -> Problems:

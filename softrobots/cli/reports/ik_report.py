@@ -8,14 +8,13 @@ import numpy as np
 
 from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
 from softrobots.cli.reports.equilibrium_report import (
-    coordinate_lines,
     equilibrium_answer,
+    equilibrium_lines,
     head_lines,
     joined_units,
     load_units,
     model_answer,
     spring_units,
-    summary_lines,
     wrinkling_margins,
     wrinkling_moments,
 )
@@ -46,7 +45,7 @@ def solution_lines(solution: IkSolution) -> list[str]:
     rows.append(("tip error", f"{solution.error:.2g} m{turned}, {solution.iterations} steps"))
     rows.append(("motors", f"{formatted(solution.q_motors)} {joined_units(solution.equilibrium.model.actuators.units)}"))
     rows += [("another solution", formatted(other)) for other in solution.alternatives]
-    return [*coordinate_lines(solution.equilibrium), "", *summary_lines(solution.equilibrium), "", *aligned(rows)]
+    return [*equilibrium_lines(solution.equilibrium), "", *aligned(rows)]
 
 
 def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:

@@ -79,12 +79,7 @@ class _Survey:
         self._weights: dict[Path, int] = {}
 
     def weight(self, root: ElementTree.Element, chain: tuple[Path, ...]) -> int:
-        """Return the number of elements to which MuJoCo expands a document.
-
-        Args:
-            root: Its root.
-            chain: The description and the models that lead to this one.
-        """
+        """Return the number of elements to which MuJoCo expands a document, by its root and the files that lead to it."""
         included = set(chain)
         models = [self._model(element, chain) for element in root.iter("model") if element.get("file") is not None]
         each, total, stack = max(models, default=0), 0, [(root, 1)]

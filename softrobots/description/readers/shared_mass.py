@@ -51,13 +51,9 @@ def give_mass(body: Body, point: FloatArray, count: int) -> tuple[Body, float]:
 
 
 def small_ball(name: str, mass: float, point: FloatArray, radius: float) -> Body:
-    """Return a link with a small mass and no shape.
+    """Return a link without shape, with a small mass [kg] at a point, shape (3,) [m]; without inertia if the mass is 0.
 
-    Args:
-        name: Its name.
-        mass: Its mass [kg]; 0 gives a link without inertia.
-        point: Position of the mass, shape (3,) [m].
-        radius: Radius of gyration [m], without effect on the statics.
+    The radius of gyration [m] has no effect on the statics.
     """
     return Body(name, mass, Placement(read_only(point)), read_only(mass * radius**2 * np.eye(3)))
 
