@@ -60,7 +60,7 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(rise, "--pitch", "B", "rise per turn angle [m/rad] (this or --turn-height is required)")
     add_numbers(rise, "--turn-height", "H", "rise of a whole turn, 2 pi times the pitch [m]")
 
-    measure = _form(forms, "measure", _measure, "lengths of both paths, as a tape measures them -> helix, actuator")
+    measure = _form(forms, "measure", _measure, "measured lengths of both paths -> helix, actuator")
     add_numbers(measure, "--outer-arc", "L", "length of the path opposite the actuator [m] (required)", required=True)
     add_numbers(measure, "--inner-arc", "L", "length of the actuator [m] (required)", required=True)
     add_numbers(measure, "--turns", "N", "turns that were measured [-] (%(default)g)", default=1.0)

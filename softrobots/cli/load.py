@@ -26,9 +26,9 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "load",
         help="estimate the force at the tip from motor torques",
-        description="Find the force at the tip, and the shape of the robot, from motor coordinates and torques. Directions in "
-        "which the motors feel nothing are named. Exit status 0 if a force explains the torques, 1 if none does, 2 after bad "
-        "input.",
+        description="Find the force at the tip, and the shape of the robot, from motor coordinates and torques. Directions of "
+        "force that cause no motor torque are listed. Exit status 0 if a force explains the torques, 1 if none does, 2 after "
+        "bad input.",
         epilog=_EXAMPLES,
     )
     add_model(parser)

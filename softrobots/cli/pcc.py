@@ -53,14 +53,14 @@ def add_parser(subparsers: Any) -> None:
     forms = parser.add_subparsers(dest="form", metavar="FORM", required=True, title="forms")
 
     forward = _form(forms, "forward", _forward, "muscle lengths -> arcs and poses")
-    help_text = "muscle lengths, segment by segment from the base, as many a segment as --azimuths has [m]"
+    help_text = "muscle lengths, segment by segment from the base, as many per segment as --azimuths has [m]"
     add_numbers(forward, "lengths", "L", help_text, nargs="+")
     help_text = "largest difference of more than three muscle lengths from those of an arc [m] (%(default)g)"
     add_numbers(forward, "--tolerance", "T", help_text, default=1e-6)
 
     inverse = _form(forms, "inverse", _inverse, "arcs -> muscle lengths and poses")
     help_text = (
-        "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once a segment, base to tip "
+        "an arc: length of the backbone [m], bending angle [rad], azimuth of its plane [rad]; once per segment, base to tip "
         "(required)"
     )
     add_numbers(inverse, "--arc", "LENGTH BENDING AZIMUTH", help_text, action="append", required=True, dest="arcs")
@@ -84,14 +84,14 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
     parser: argparse.ArgumentParser = forms.add_parser(
         name, help=summary, description=f"Constant curvature in closed form: {summary}.", epilog=_JSON
     )
-    help_text = f"distance of the muscles from the backbone, one number or one a segment [m] ({PccArm.muscle_distance})"
+    help_text = f"distance of the muscles from the backbone, one number or one per segment [m] ({PccArm.muscle_distance})"
     add_numbers(parser, "--distance", "D", help_text, nargs="+", default=[PccArm.muscle_distance])
     azimuths = " ".join(f"{azimuth:.4f}".rstrip("0").rstrip(".") for azimuth in constant_curvature.AZIMUTHS)
     help_text = f"azimuths of the muscles of a segment in its base frame, from x towards y, three or more [rad] ({azimuths})"
     add_numbers(parser, "--azimuths", "A", help_text, nargs="+", default=list(constant_curvature.AZIMUTHS))
-    help_text = "turn about the backbone before each segment, one a segment [rad] (0, then pi/3 each)"
+    help_text = "turn about the backbone before each segment, one per segment [rad] (0, then pi/3 each)"
     add_numbers(parser, "--offsets", "A", help_text, nargs="+")
-    help_text = f"rest length of a segment and its muscles, one number or one a segment [m] ({REST})"
+    help_text = f"rest length of a segment and its muscles, one number or one per segment [m] ({REST})"
     add_numbers(parser, "--rest", "L", help_text, nargs="+")
     parser.set_defaults(run=run, frame=FRAMES[0])
     if name != "reach":
@@ -111,7 +111,7 @@ def _forward(arguments: argparse.Namespace) -> None:
     check_plot(arguments)
     lengths, count = np.array(arguments.lengths), len(arguments.azimuths)
     if len(lengths) % count:
-        raise ParameterError("L", arguments.lengths, f"a multiple of {count} numbers, {count} muscles a segment [m]")
+        raise ParameterError("L", arguments.lengths, f"a multiple of {count} numbers, {count} muscles per segment [m]")
     lengths = lengths.reshape(-1, count)
     distance = _per_segment("--distance", arguments.distance, len(lengths))
     arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths, arguments.tolerance)

@@ -66,7 +66,7 @@ def add_parser(subparsers: Any) -> None:
     help_text = "motor joints, then muscles, base to tip [rad, m or N]; with --target, where the search starts (relaxed)"
     add_motors(parser, help_text)
     add_loads(parser)
-    add_numbers(parser, "--target", "X Y Z", "put the loaded tip there by inverse kinematics [m] (no target)")
+    add_numbers(parser, "--target", "X Y Z", "move the loaded tip to this position by inverse kinematics [m] (no target)")
     help_text = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
     parser.add_argument("--result", type=Path, metavar="FILE.npz", help=help_text)
     parser.add_argument("--growth", action="store_true", help="show how a helical tube grows, without load")
