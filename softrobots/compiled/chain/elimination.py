@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import constants
+from softrobots.compiled.chain.elements import constants, vector
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, smaller
 
 
@@ -69,9 +69,7 @@ class Eliminated:
         for j in reversed(range(k)):
             for i in range(j + 1, k):
                 steps[j] = steps[j] - self.lower[i, j] * steps[i]
-        out = constants(np.zeros(k))
-        out[:] = steps
-        return out
+        return vector(steps)
 
     def reduced(self, gradient: Sequence[Scalar]) -> list[Scalar]:
         """Return another right-hand side `L^-1 g'` from `g'`."""

@@ -26,24 +26,6 @@ from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Expression, Scalar
 
 
-@dataclass
-class Kind:
-    """Elements that share their code."""
-
-    number: int
-    """Its number, in names of functions."""
-    rows: list[int]
-    """Its elements."""
-    blocks: list[Block]
-    """Functions of the outward, inward and step pass."""
-    table: list[float]
-    """Numbers in which the elements differ, element by element."""
-    width: int
-    """Count of them for one element."""
-    record: int
-    """Size of the record of an element."""
-
-
 class TableColumns:
     """Numbers of the elements of a kind: equal ones are constants, others go into a table."""
 
@@ -78,6 +60,22 @@ class TableColumns:
     def numbers(self) -> list[float]:
         """The table, element by element."""
         return [column[row] for row in range(self._count) for column in self._columns]
+
+
+@dataclass
+class Kind:
+    """Elements that share their code."""
+
+    number: int
+    """Its number, in names of functions."""
+    rows: list[int]
+    """Its elements."""
+    blocks: list[Block]
+    """Functions of the outward, inward and step pass."""
+    columns: TableColumns
+    """Numbers in which the elements differ."""
+    record: int
+    """Size of the record of an element."""
 
 
 def element_kinds(plan: Plan) -> list[Kind]:
@@ -141,7 +139,7 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
         second = _store_tip_step(step_pass, back, result, plan, tip, multipliers)
     size = hoist([back, step_pass], out, [*state, pivot_shift, *second], 0, "at", overwritten=axes_loads)
     size += hoist([step_pass], back, second, size, "at", overwritten=state)
-    return Kind(number, rows, [out, back, step_pass], columns.numbers, columns.width, size)
+    return Kind(number, rows, [out, back, step_pass], columns, size)
 
 
 def _store_constraints(

@@ -13,15 +13,7 @@ _ROOT_STEPS = 5
 
 
 def solve_small(matrix: Any, right: Vector) -> Vector:
-    """Solve `matrix x = right`; least squares with more rows than columns, minimum norm with fewer.
-
-    Args:
-        matrix: Shape (m, n), the smaller of the two at most three.
-        right: Shape (m,).
-
-    Returns:
-        Shape (n,).
-    """
+    """Solve a system of up to three rows or columns: least squares with more rows, minimum norm with more columns."""
     rows, columns = matrix.shape
     if rows > columns:
         return inverse_small(matrix.T @ matrix) @ (matrix.T @ right)

@@ -37,15 +37,7 @@ class TipMotion:
 
 
 def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
-    """Return the elastostatic Jacobian and the motor torques at a point.
-
-    Args:
-        unknowns: The chain.
-        point: An evaluation with tip columns.
-
-    Returns:
-        The Jacobian, the torques, and their changes by the Newton step.
-    """
+    """Return the response of tip and motors at a point, an evaluation with tip columns."""
     count = unknowns.chain.n_motors
     jacobian = constants(np.zeros((3, count)))
     torques, changes, tip = constants(np.zeros(count)), constants(np.zeros(count)), constants(np.zeros(3))
@@ -65,28 +57,17 @@ def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
 
 
 def step_with_motors(unknowns: Unknowns, point: Evaluation, motors: Vector) -> list[Scalar]:
-    """Return the Newton step of the unknowns when the motors move as well.
-
-    Args:
-        unknowns: The chain.
-        point: An evaluation.
-        motors: Change of the motors, shape (n_motors,).
-
-    Returns:
-        Step of each unknown.
-    """
+    """Return the Newton step of the unknowns when the motors move as well, by `motors`, shape (n_motors,)."""
+    moved = {row: motors[motor] for row in range(len(point.inward_passes)) if (motor := unknowns.motor(row)) is not None}
     bends = constants(np.zeros(3))  # of the motors beyond
-    for row in range(len(point.inward_passes)):
-        motor = unknowns.motor(row)
-        if motor is not None:
-            bends = bends + point.inward_passes[row].motion.bends[:, 0] * motors[motor]
+    for row, by in moved.items():
+        bends = bends + point.inward_passes[row].motion.bends[:, 0] * by
     turn = constants(np.zeros(3))  # of the motors nearer to the base
     sides: list[list[Scalar]] = []
     for row, one in enumerate(point.inward_passes):
-        motor = unknowns.motor(row)
-        if motor is not None:
-            turn = turn + one.motion.twists[:, 0] * motors[motor]
-            bends = bends - one.motion.bends[:, 0] * motors[motor]
+        if row in moved:
+            turn = turn + one.motion.twists[:, 0] * moved[row]
+            bends = bends - one.motion.bends[:, 0] * moved[row]
             sides.append([])
         else:
             coupling = one.motion.bends.T @ turn + one.motion.twists.T @ bends

@@ -48,7 +48,9 @@ class Unknowns:
         if set(self.locked) == set(STRAINS):
             raise ParameterError("locked_strains", self.locked, "three strains at most: with all four a section is rigid")
         constrained = {strain for group in self.chain.held for strain in group}
-        clash = sorted({STRAINS[(strain - self._first_section) % 4] for strain in constrained & self._locked_strains})
+        sections = [element for element in self.chain.elements if isinstance(element, ChainSection)]
+        named = [pair for element in sections for pair in zip(STRAINS, strains_of(element), strict=True)]
+        clash = sorted({name for name, strain in named if name in self.locked and strain in constrained})
         if clash:
             raise ParameterError("locked_strains", self.locked, f"without {', '.join(clash)}, which muscle lengths constrain")
         if self.chain.rest.size and float(np.abs(self.chain.rest).max()) > LARGEST_POSITION:
@@ -189,11 +191,6 @@ class Unknowns:
         pairs = (zip(self.moving(row), values, strict=True) for row, values in enumerate(by_element))
         by_strain = dict(itertools.chain.from_iterable(pairs))
         return [by_strain[strain] for strain in self.strains]
-
-    @property
-    def _first_section(self) -> int:
-        first = [element.strain for element in self.chain.elements if isinstance(element, ChainSection)]
-        return min(first, default=len(self.chain.stiffness))
 
     @cached_property
     def _locked_strains(self) -> frozenset[int]:

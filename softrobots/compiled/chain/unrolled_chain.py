@@ -119,16 +119,7 @@ def evaluate(
 
 
 def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[Scalar]]) -> list[Scalar]:
-    """Solve for the unknowns with another right-hand side.
-
-    Args:
-        unknowns: The chain.
-        point: Its evaluation.
-        sides: Gradient of the unknowns of each element.
-
-    Returns:
-        Step of each unknown.
-    """
+    """Return the step of the unknowns with another right-hand side: the gradient of those of each element."""
     total, columns = constants(np.zeros(3)), {}
     for row in reversed(range(len(point.inward_passes))):
         one = point.inward_passes[row]

@@ -60,7 +60,7 @@ def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
     else:
         parts = looped_program(plan)
         blocks, size, lanes, lane_size = parts.blocks + parts.tip_blocks, parts.size, parts.blocks, parts.lane_size
-        tables |= {**parts.places, **parts.tables}
+        tables |= parts.constants
         tip, entries = parts.tip, [*entries, "look_at_tip"]
         loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
     if unknowns.moved_by_motors:

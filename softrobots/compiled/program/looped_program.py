@@ -24,10 +24,8 @@ class LoopedProgram:
     """Straight-line functions that find equilibria."""
     tip_blocks: list[Block]
     """Straight-line functions of the response of the tip."""
-    tables: dict[str, tuple[float, ...] | tuple[int, ...]]
-    """Tables of numbers that differ between elements."""
-    places: dict[str, int]
-    """Places of the bounds of the loops in the workspace, and the number of steps of a loop."""
+    constants: dict[str, object]
+    """Tables of numbers that differ between elements, places in the workspace, and the number of steps of a loop."""
     lane_size: int
     """Size of the workspace that equilibria need."""
     size: int
@@ -38,11 +36,7 @@ class LoopedProgram:
     """By pass (`outward`, `inward`, `step`, and with `_tip` those of the response of the tip): kind of element and call."""
 
     def loops(self, suffix: str = "") -> str:
-        """Return the functions that loop over the elements.
-
-        Args:
-            suffix: End of all function names: "_lanes" for batches, which have no response of the tip.
-        """
+        """Return the functions that loop over the elements; those of batches end in "_lanes", without response of the tip."""
         passes = [name for name in self.calls if not suffix or name in _PASSES]
         texts = [*(self._loop(name, suffix) for name in passes), _CONTROL.replace("_SUFFIX", suffix)]
         return "\n\n\n".join(texts if suffix else [*texts, TIP_CONTROL])
@@ -109,15 +103,14 @@ def looped_program(plan: Plan) -> LoopedProgram:
     tip = TipLayout(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.held))
     tip_plan = replace(plan, tip=tip)
     tip_blocks, tip_sequence, size = _sequence(tip_plan, element_kinds(tip_plan), tip.end, calls)
-    tables: dict[str, tuple[float, ...] | tuple[int, ...]] = {
-        f"TABLE_{kind.number}": tuple(kind.table) for kind in kinds if kind.table
-    }
-    tables |= dict(zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True))
-    tables["AT_TIP"] = tuple(at for _, at, _, _ in tip_sequence)
-    bounds = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}
+    constants: dict[str, object] = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}
+    constants |= tip.constants()
+    constants |= {f"TABLE_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
+    constants |= dict(zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True))
+    constants["AT_TIP"] = tuple(at for _, at, _, _ in tip_sequence)
     blocks = looped_frame(plan, len(sequence)) + blocks
     tip_blocks = tip_frame(plan, tip) + tip_blocks
-    return LoopedProgram(blocks, tip_blocks, tables, bounds | tip.constants(), lane_size, size, tip, calls)
+    return LoopedProgram(blocks, tip_blocks, constants, lane_size, size, tip, calls)
 
 
 def _sequence(
@@ -141,7 +134,7 @@ def _sequence(
     steps: dict[int, tuple[int, int, int, int]] = {}  # by element
     for kind in kinds:
         for place, row in enumerate(kind.rows):
-            steps[row] = (kind.number, record, place * kind.width, _coordinate(unknowns, layout, row))
+            steps[row] = (kind.number, record, place * kind.columns.width, _coordinate(unknowns, layout, row))
             record += kind.record
         for name, pass_calls in (("outward", outward_calls), ("inward", inward_calls), ("step", step_calls)):
             pass_calls.append((kind.number, f"{name}_{infix}{kind.number}(w, {at}, ROW[i], PLACE[i])"))

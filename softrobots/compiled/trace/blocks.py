@@ -57,11 +57,7 @@ class Block:
             self.store(offset + place, value, base)
 
     def text(self, *, lanes: bool = False) -> str:
-        """Return the text of the function.
-
-        Args:
-            lanes: Write it for many cases: every element of the workspace is `LANES` numbers, with a loop over them.
-        """
+        """Return the text of the function, or of one for many cases: a loop over `LANES` numbers of each element."""
         head = ", ".join([f"{WORKSPACE}: Array", *(f"{name}: int" for name in self.parameters)])
         indent = "    "
         lines = [f"def {self.name}({head}) -> None:", f'{indent}"""{self.purpose}"""']
