@@ -73,8 +73,8 @@ class ShapeTable:
         names = "angle [deg] | contraction | D [m] | Ro [m] | Ri [m] | b [m/rad] | turn distance [m] | realisable | 2 pi b >= D"
         lines = [f"| {names} |", "|" + "---|" * len(_COLUMNS)]
         for row in self.rows:
-            apart = "none" if row.turn_distance is None else f"{row.turn_distance:.5f}"
-            lengths = f"{row.diameter:.5f} | {row.outer_radius:.5f} | {row.inner_radius:.5f} | {row.pitch:.5f} | {apart}"
+            distance = "none" if row.turn_distance is None else f"{row.turn_distance:.5f}"
+            lengths = f"{row.diameter:.5f} | {row.outer_radius:.5f} | {row.inner_radius:.5f} | {row.pitch:.5f} | {distance}"
             answers = " | ".join("yes" if answer else "no" for answer in (row.realisable, row.realisable_by_simple_rule))
             lines.append(f"| {np.degrees(row.angle):.4g} | {row.contraction:.4g} | {lengths} | {answers} |")
         return "\n".join(lines) + "\n"
@@ -121,10 +121,10 @@ def shape_table(contraction: Any, angle: Any, diameter: Any) -> ShapeTable:
     contractions, angles, diameters = np.broadcast_arrays(*checked_actuator(contraction, angle, diameter))
     shape = forward(contractions, angles, diameters)
     contact = self_contact(shape)
-    apart = contact.turn_distance.astype(object)
-    apart[~contact.has_neighbours] = None
+    turn_distance = contact.turn_distance.astype(object)
+    turn_distance[~contact.has_neighbours] = None
     radii, by_rule = (shape.outer_radius, shape.inner_radius), shape.turn_height >= diameters
-    columns = (angles, contractions, diameters, *radii, shape.pitch, apart, ~contact.touches, by_rule)
+    columns = (angles, contractions, diameters, *radii, shape.pitch, turn_distance, ~contact.touches, by_rule)
     return ShapeTable(tuple(ShapeRow(*values) for values in zip(*(column.ravel().tolist() for column in columns), strict=True)))
 
 

@@ -156,15 +156,15 @@ def self_contact(shape: HelixShape, turns: Any = math.inf) -> SelfContact:
     short = np.where(neighbours, short, 0.0)
     angle = 2.0 * np.pi - short
 
-    def spread(values: NDArray[Any]) -> NDArray[Any]:
+    def broadcast(values: NDArray[Any]) -> NDArray[Any]:
         return read_only(np.array(np.broadcast_to(values, common)))
 
     return SelfContact(
-        diameter=spread(shape.diameter),
-        has_neighbours=spread(neighbours),
-        turn_angle=spread(angle),
-        turn_distance=spread(np.hypot(2.0 * radius * np.sin(0.5 * short), pitch * angle)),
-        curvature=spread(curvature_torsion(shape)[0]),
+        diameter=broadcast(shape.diameter),
+        has_neighbours=broadcast(neighbours),
+        turn_angle=broadcast(angle),
+        turn_distance=broadcast(np.hypot(2.0 * radius * np.sin(0.5 * short), pitch * angle)),
+        curvature=broadcast(curvature_torsion(shape)[0]),
     )
 
 

@@ -133,11 +133,10 @@ def grasp_force(
     given = (pressures, radii, depths, heights, counts, diameters)
     shape = common_shape("diameter", *(values.shape for values in given))
     pressures, radii, depths, heights, counts, diameters = (np.array(np.broadcast_to(values, shape)) for values in given)
-    if np.any(depths < 0.0) or np.any(depths > np.minimum(0.5 * diameters, radii)):
-        most = np.minimum(0.5 * diameters, radii)
-        raise ParameterError(
-            "deflection", deflection, f"from 0 to {most.min():.6g} m, the radius of the tube or that of the object"
-        )
+    deepest = np.minimum(0.5 * diameters, radii)
+    if np.any(depths < 0.0) or np.any(depths > deepest):
+        requirement = f"from 0 to {deepest.min():.6g} m, the radius of the tube or that of the object"
+        raise ParameterError("deflection", deflection, requirement)
     if np.any((heights < diameters) & (counts > 1.0)):
         raise ParameterError(
             "turn_height", turn_height, f"at least the diameter of the tube {diameters.max():.6g} m, or the turns collide"

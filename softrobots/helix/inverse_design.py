@@ -87,10 +87,10 @@ def design_grasp(
         StraightTube: If the helix is straight within rounding.
     """
     radius = positive_number("object_radius", object_radius, "m")
-    pressed = non_negative_number("squeeze", squeeze, "m")
-    if pressed >= radius:
+    squeeze_depth = non_negative_number("squeeze", squeeze, "m")
+    if squeeze_depth >= radius:
         raise ParameterError("squeeze", squeeze, f"less than the radius of the object, {radius} m")
-    required = Wish("grasp", "inner", radius - pressed, positive_number("turn_height", turn_height, "m"), pressed)
+    required = Wish("grasp", "inner", radius - squeeze_depth, positive_number("turn_height", turn_height, "m"), squeeze_depth)
     return _design(required, diameter, turns, handedness, on_unrealisable, contraction_limits, angle_limits)
 
 
@@ -278,13 +278,13 @@ def _minima(cost: Callable[[FloatArray], FloatArray]) -> list[tuple[float, float
     lowest = np.flatnonzero(np.isfinite(values) & (values <= padded[:-2]) & (values <= padded[2:]))
     minima = []
     for index in lowest[np.argsort(values[lowest])][:_REFINED]:
-        place, value, step = float(parameter[index]), float(values[index]), 1.0 / (_SAMPLES - 1)
+        minimum, value, step = float(parameter[index]), float(values[index]), 1.0 / (_SAMPLES - 1)
         for _ in range(_ZOOMS):
-            near = np.clip(place + step * np.linspace(-1.0, 1.0, 21), 0.0, 1.0)
-            values_near = cost(near)
+            candidates = np.clip(minimum + step * np.linspace(-1.0, 1.0, 21), 0.0, 1.0)
+            values_near = cost(candidates)
             best = int(np.argmin(values_near))
             if values_near[best] <= value:
-                place, value = float(near[best]), float(values_near[best])
+                minimum, value = float(candidates[best]), float(values_near[best])
             step *= 0.1
-        minima.append((place, value))
+        minima.append((minimum, value))
     return minima

@@ -123,15 +123,15 @@ def shape_error(pattern: Pattern, samples: int = 8) -> ShapeError:
     smooth = _smooth(plan, line.line_arc)
     steps = np.diff(line.centre_arc)
     weights = 0.5 * (np.append(0.0, steps) + np.append(steps, 0.0)) / line.centre_arc[-1]
-    apart = np.linalg.norm(line.points - smooth, axis=-1)
-    aligned = np.linalg.norm(_aligned(line.points, smooth, weights) - smooth, axis=-1)
+    distances = np.linalg.norm(line.points - smooth, axis=-1)
+    aligned_distances = np.linalg.norm(_aligned(line.points, smooth, weights) - smooth, axis=-1)
     radius, pitch = _helix_of_periods(plan, samples)
     return ShapeError(
-        largest=float(apart.max()),
-        rms=float(np.sqrt(weights @ apart**2)),
-        tip=float(apart[-1]),
-        largest_aligned=float(aligned.max()),
-        rms_aligned=float(np.sqrt(weights @ aligned**2)),
+        largest=float(distances.max()),
+        rms=float(np.sqrt(weights @ distances**2)),
+        tip=float(distances[-1]),
+        largest_aligned=float(aligned_distances.max()),
+        rms_aligned=float(np.sqrt(weights @ aligned_distances**2)),
         centre_radius=radius,
         pitch=pitch,
         centre_radius_error=radius - float(shape.centre_radius),

@@ -137,9 +137,9 @@ def forward(contraction: Any, angle: Any, diameter: Any) -> HelixShape:
             f"contraction {actuator.contraction} at angle {actuator.angle} rad leaves the tube straight: no helix radius; "
             "a contraction below 1 or an angle above 0 is required (actuator_curvature_torsion gives (0, 0))"
         )
-    apart, turned = shrink / size / size, 0.5 * (sine / size) ** 2
-    outer = actuator.diameter * (apart + turned)
-    inner = actuator.diameter * (actuator.contraction * apart - turned)
+    contraction_part, angle_part = shrink / size / size, 0.5 * (sine / size) ** 2
+    outer = actuator.diameter * (contraction_part + angle_part)
+    inner = actuator.diameter * (actuator.contraction * contraction_part - angle_part)
     pitch = actuator.diameter * (actuator.contraction * np.sin(2.0 * actuator.angle) / size) / size
     if np.any(np.maximum(outer, pitch) > LARGEST) or np.any(outer <= inner):
         raise StraightTube(f"the helix has a radius of {outer} m and a pitch of {pitch} m/rad: the tube is straight")

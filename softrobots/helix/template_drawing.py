@@ -147,11 +147,11 @@ def _draw_pinch(mark: ET.Element, line: _Line, start: float, end: float, half_ma
 
 def _draw_numbers(sheet: ET.Element, plan: Pattern, window: Window, line: _Line, half_mark: float) -> None:
     """Draw the numbers of pinches and gaps above the line, or below if there is no room; only each n-th of a dense pattern."""
-    around, apart = 1e3 * plan.sheet_width, 1e3 * plan.spacing * line.along
-    every = next((n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500) if n * apart >= 7.0), 1000)
+    around, spacing = 1e3 * plan.sheet_width, 1e3 * plan.spacing * line.along
+    label_step = next((n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500) if n * spacing >= 7.0), 1000)
     halo = {"class": "number", "stroke": "white", "stroke_width": "0.8", "paint_order": "stroke"}
     for number, kind, start, end, base in _shown(plan, window, line):
-        if kind not in ("pinch", "gap") or not (number == 1 or number % every == 0):
+        if kind not in ("pinch", "gap") or not (number == 1 or number % label_step == 0):
             continue
         aside = (half_mark if kind == "pinch" else 0.25 * half_mark) + 2.4
         for side in (-aside, aside):

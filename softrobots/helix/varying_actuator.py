@@ -134,30 +134,30 @@ def bent_tube(
         raise ParameterError("tolerance", tolerance, f"from {_TIGHTEST:g} to {_LOOSEST:g}")
     contractions, angles = checked_profile("contraction", contraction, length), checked_profile("angle", angle, length)
     positions = sample_positions(samples, length)
-    cuts = finite_array("breakpoints", breakpoints, (None,), "m")
-    if np.any(cuts <= 0.0) or np.any(cuts >= length) or np.any(np.diff(cuts) <= 0.0):
+    breaks = finite_array("breakpoints", breakpoints, (None,), "m")
+    if np.any(breaks <= 0.0) or np.any(breaks >= length) or np.any(np.diff(breaks) <= 0.0):
         raise ParameterError("breakpoints", breakpoints, f"increasing, inside the tube, 0 to {length!r} m")
-    ends = sorted({0.0, *contractions.knots, *angles.knots, *cuts.tolist(), length})
+    ends = sorted({0.0, *contractions.knots, *angles.knots, *breaks.tolist(), length})
     pieces = [_Piece(contractions, angles, start, end, diameter, sign) for start, end in itertools.pairwise(ends)]
-    belongs = np.clip(np.searchsorted(ends, positions, side="right") - 1, 0, len(pieces) - 1)
-    local = np.array([pieces[i].actuator(s) for i, s in zip(belongs.tolist(), positions.tolist(), strict=True)])
+    piece_numbers = np.clip(np.searchsorted(ends, positions, side="right") - 1, 0, len(pieces) - 1)
+    actuators = np.array([pieces[i].actuator(s) for i, s in zip(piece_numbers.tolist(), positions.tolist(), strict=True)])
     scale, rotation = _scale(pieces, positions, length, diameter)
     budget = _EVALUATIONS + int(_EVALUATIONS_PER_RAD * rotation) + _EVALUATIONS_PER_RAD * len(pieces)
     smooth = contractions.function is None and angles.function is None
     states = _integrate(
-        [(piece, positions[belongs == place]) for place, piece in enumerate(pieces)],
+        [(piece, positions[piece_numbers == place]) for place, piece in enumerate(pieces)],
         scale=scale,
         accuracy=accuracy,
         longest=math.inf if smooth else max(diameter, 1e-4 * length),
         budget=budget,
     )
-    curvature, torsion = actuator_curvature_torsion(local[:, 0], local[:, 1], diameter, "centre", handedness)
+    curvature, torsion = actuator_curvature_torsion(actuators[:, 0], actuators[:, 1], diameter, "centre", handedness)
     return BentTube(
         rest_positions=positions,
         poses=_poses(states, scale),
         arc_length=scale * states[:, 7],
-        contraction=local[:, 0],
-        angle=local[:, 1],
+        contraction=actuators[:, 0],
+        angle=actuators[:, 1],
         curvature=curvature,
         torsion=torsion,
         diameter=diameter,
@@ -211,10 +211,10 @@ def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter:
     for piece in pieces:
         inside = positions[(positions > piece.start) & (positions < piece.end)].tolist()
         places = [piece.start, *inside, piece.end]
-        rates = [piece.rates(place) for place in places]
-        for (place, after), (one, two) in zip(itertools.pairwise(places), itertools.pairwise(rates), strict=True):
-            total += 0.5 * (after - place) * (one[0] + two[0])
-            rotation += 0.5 * (after - place) * (math.hypot(*one[1:]) + math.hypot(*two[1:]))
+        samples = [(place, *piece.rates(place)) for place in places]
+        for (start, *before), (end, *after) in itertools.pairwise(samples):
+            total += 0.5 * (end - start) * (before[0] + after[0])
+            rotation += 0.5 * (end - start) * (math.hypot(*before[1:]) + math.hypot(*after[1:]))
     if rotation > _MOST_ROTATION:
         raise ParameterError(
             "length",
@@ -232,30 +232,30 @@ def _integrate(
         from scipy.integrate import solve_ivp
     except ImportError as error:
         raise MissingDependency("scipy", "helix") from error
-    cuts = [piece.start for piece, _ in parts[1:]]
-    spent = 0
+    starts = [piece.start for piece, _ in parts[1:]]
+    evaluations = 0
 
     def stuck(place: float, why: str) -> ParameterError:
         requirement = f"such that contraction and angle are smooth between them (stuck at the position {place!r} m: {why})"
-        return ParameterError("breakpoints", cuts, requirement)
+        return ParameterError("breakpoints", starts, requirement)
 
     state = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     states = [np.zeros((0, 8))]
-    for piece, here in parts:
+    for piece, samples in parts:
 
         def counted(position: float, now: FloatArray, piece: _Piece = piece) -> list[float]:
-            nonlocal spent
-            spent += 1
-            if spent > budget:
+            nonlocal evaluations
+            evaluations += 1
+            if evaluations > budget:
                 raise stuck(float(position), f"more than {budget} evaluations")
             return piece.change(position, now, scale)
 
-        times = here if len(here) and here[-1] == piece.end else np.append(here, piece.end)
+        times = samples if len(samples) and samples[-1] == piece.end else np.append(samples, piece.end)
         span = (piece.start, piece.end)
         solution = solve_ivp(counted, span, state, "DOP853", times, max_step=longest, rtol=accuracy, atol=accuracy)
         if not solution.success:
             raise stuck(piece.start, str(solution.message))
-        states.append(solution.y.T[: len(here)])
+        states.append(solution.y.T[: len(samples)])
         state = solution.y[:, -1]
         state[:4] /= np.linalg.norm(state[:4])
     return np.vstack(states)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from softrobots.core.checks import choice, finite_array, finite_number, positive_integer
+from softrobots.core.checks import choice, finite_array, finite_number, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
@@ -140,9 +140,7 @@ def _checked(field: Field[Any], facts: Facts, value: Any, count: int, parts: str
     if facts.options:
         return choice(name, value, facts.options)
     if isinstance(field.default, bool):
-        if not isinstance(value, bool):
-            raise ParameterError(name, value, "True or False")
-        return value
+        return instance_of(name, value, bool, "True or False")
     if isinstance(field.default, int):
         return positive_integer(name, value, None if facts.at_most is None else int(facts.at_most))
     if facts.form == "colour":

@@ -41,8 +41,8 @@ def grown_coordinates(tube: HelixTube, length: float, front: float = 0.0) -> Flo
         raise ParameterError("length", length, f"from {SHORTEST * tube.length} m to the length of the tube, {tube.length} m")
     front = non_negative_number("front", front, "m")
     count = tube.n_sections
-    waiting = grown * count / tube.length - count * SHORTEST
-    shares = SHORTEST + np.clip(waiting - (1.0 - SHORTEST) * np.arange(count), 0.0, 1.0 - SHORTEST)
+    everted_sections = grown * count / tube.length - count * SHORTEST
+    shares = SHORTEST + np.clip(everted_sections - (1.0 - SHORTEST) * np.arange(count), 0.0, 1.0 - SHORTEST)
     pieces = shares * tube.length / count
     to_tip = np.maximum(grown - np.cumsum(pieces) + 0.5 * pieces, 0.0)  # from the middle of each section
     formed = np.minimum(to_tip, front) / front if front > 0.0 else np.ones(count)

@@ -158,9 +158,9 @@ class HelixTube(XacroRobot):
         instance_of("design", design, helix.HelixDesign, "a HelixDesign")
         designed: dict[str, Any] = {name: getattr(design, name) for name in ("contraction", "angle", "diameter", "handedness")}
         designed["length"] = design.tube_length
-        twice = sorted(designed.keys() & fields.keys())
-        if twice:
-            raise ParameterError(twice[0], fields[twice[0]], "left out: the design gives it")
+        fixed_by_design = sorted(designed.keys() & fields.keys())
+        if fixed_by_design:
+            raise ParameterError(fixed_by_design[0], fields[fixed_by_design[0]], "left out: the design gives it")
         curvature, torsion = helix.actuator_curvature_torsion(design.contraction, design.angle, design.diameter)
         turning = math.hypot(curvature, torsion) * design.centre_length
         count = max(4, math.ceil(turning / _SECTION_TURN))
@@ -243,10 +243,10 @@ class HelixTube(XacroRobot):
         """Refuse too few sections of constant strain for the range of their coordinates."""
         if self.chain != "sections":
             return
-        whole = (self.strains - [0.0, 0.0, 0.0, 1.0]) * self.centre_length
-        turning = max(whole[1] / LARGEST_BENDING, abs(whole[2]) / math.pi)
+        total = (self.strains - [0.0, 0.0, 0.0, 1.0]) * self.centre_length
+        turning = max(total[1] / LARGEST_BENDING, abs(total[2]) / math.pi)
         count, fewest = self.elastic_sections, max(1, math.ceil(turning))
-        while fewest <= MOST_SECTIONS and not in_range(whole / fewest, self.centre_length / fewest):
+        while fewest <= MOST_SECTIONS and not in_range(total / fewest, self.centre_length / fewest):
             fewest += 1
         if fewest > MOST_SECTIONS:
             raise ParameterError("length", self.length, f"so short that {MOST_SECTIONS} sections are enough for its turns")

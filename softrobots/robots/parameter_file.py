@@ -182,14 +182,14 @@ def _parse_yaml(text: str) -> Any:
         document = (event for event in events if not isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent))
         first = next(document)
         value = None if isinstance(first, yaml.StreamEndEvent) else _value(first, document, itertools.count(1), 0)
-        more = next((event for event in events if isinstance(event, yaml.DocumentStartEvent)), None)
+        second_document = next((event for event in events if isinstance(event, yaml.DocumentStartEvent)), None)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         raise FileFormatError(f"{'' if mark is None else f'line {mark.line + 1}: '}{error.problem}") from error
     except yaml.YAMLError as error:
         raise FileFormatError(f"it is no YAML: {' '.join(str(error).split())}") from error
-    if more is not None:
-        raise FileFormatError(f"line {more.start_mark.line + 1}: one document is required")
+    if second_document is not None:
+        raise FileFormatError(f"line {second_document.start_mark.line + 1}: one document is required")
     return value
 
 
