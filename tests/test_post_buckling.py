@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 import softrobots as sr
 from softrobots.statics import force_path, post_buckling
 from softrobots.statics.post_buckling import FUNDAMENTAL, RING
-from softrobots.statics.stability import critical_point
+from softrobots.statics.stability import CriticalPoint, critical_point
 from softrobots.view.figures import equilibria
 from tests.support.laws import law
 from tests.support.oracles import arm_balance
@@ -68,7 +68,7 @@ def test_one_hinge_bows_to_either_side_as_its_closed_form_says(power: float, tur
         softest = 1.0 - forces * LEVER * np.cos(angles) / stiffness
         assert branch.softest == pytest.approx(softest, abs=1e-11)
         if label == FUNDAMENTAL:
-            assert np.abs(angles).max() < 1e-12
+            assert np.abs(angles).max() < 1e-9  # rounding of the direction over eigenvalues of 1e-5 beside the crossing
             assert branch.stable.tolist() == (forces < critical * (1.0 - 1e-8)).tolist()
         else:
             assert forces[0] == pytest.approx(critical, rel=1e-12)
@@ -287,11 +287,15 @@ def test_a_branch_tells_why_it_ends(arm: sr.SoftModel, monkeypatch: pytest.Monke
     far = by_label(sr.post_buckling_branches(bent, (), (0, 0, -1), max_force=200.0, largest_step=0.2))
     assert far[RING].ended == "end of range"
     assert far[RING].forces[-1] < 200.0
-    monkeypatch.setattr(force_path, "_MOST_POINTS", 5)
-    few = by_label(sr.post_buckling_branches(link(None, 172.71), (0, 0), PUSH))
+    known: dict[sr.SoftModel, CriticalPoint] = {}
+    monkeypatch.setattr(force_path, "_MOST_POINTS", 100)
+    few = by_label(sr.post_buckling_branches(link(None, 172.71), (0, 0), PUSH, largest_step=1e-3))
     assert {branch.ended for branch in few.values()} == {"points"}
-    assert {len(branch.equilibria) for branch in few.values()} == {5}
+    assert {len(branch.equilibria) for branch in few.values()} == {100}
     monkeypatch.undo()
+    for model, motors, push in ((arm, *FOLDED), (link(None, 172.71), (0, 0), PUSH)):
+        known[model] = critical_point(model, motors, push)
+    monkeypatch.setattr(post_buckling, "critical_point", lambda model, *_, **__: known[model])
     monkeypatch.setattr(force_path, "_NEWTON_STEPS", 1)
     (lost,) = sr.post_buckling_branches(arm, *FOLDED)
     assert lost.ended == "lost"

@@ -88,6 +88,22 @@ def test_an_oblique_push_bends_the_arm_and_has_no_limit(arm: sr.SoftModel, tilt:
     assert max(np.abs(state.q_springs[[0, 2]]).max() for state in states) < 1e-9  # it stays in its plane
 
 
+@each_row("tilt", [1e-4, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8])
+def test_a_nearly_axial_push_bends_the_arm_and_has_no_limit(arm: sr.SoftModel, tilt: float) -> None:
+    """However small the tilt, the path bends away beside the crossing and does not go on straight."""
+    with pytest.raises(sr.NoCriticalLoad, match="stays stable up to 137 N"):
+        sr.critical_load(arm, (0, 0, 0), (-1, 0, tilt), max_force=137.0)
+    with pytest.raises(sr.NoCriticalLoad, match="stays stable up to 137 N"):
+        sr.post_buckling_branches(arm, (0, 0, 0), (-1, 0, tilt), max_force=137.0)
+
+
+@each_row("rest", [1e-3, 1e-6, 1e-8])
+def test_an_arm_that_is_nearly_straight_at_rest_has_no_limit(rest: float) -> None:
+    crooked = sr.load_model(sr.InflatableArm(rest_up=rest))
+    with pytest.raises(sr.NoCriticalLoad, match="stays stable up to 137 N"):
+        sr.critical_load(crooked, (0, 0, 0), (-1, 0, 0), max_force=137.0)
+
+
 def test_a_folded_arm_snaps_at_the_limit(arm: sr.SoftModel) -> None:
     """A limit point: just below the force the state moves on smoothly, just above it jumps far away."""
     motors, direction = (2.41, -0.95, -1.57), np.array([-0.40, -0.88, 1.47])

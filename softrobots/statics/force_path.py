@@ -14,20 +14,25 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, unit_vector
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual
+from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual, scaled
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
 
 TOLERANCE = 1e-12
 """Largest residual of a point, relative to the scale of the load."""
 
+NEUTRAL = 1e-7
+"""Eigenvalue, relative to the springs' own stiffness, up to which it counts as zero."""
+
 _NEWTON_STEPS = 15
 _GAP = 1e-12  # tolerance of a constraint [rad]
 _LONGEST = 1.0  # Newton step [rad]
 _SHORTEST = 1e-5  # step along a path [rad]
+_SHORTEST_STABLE = 1e-10  # step on the way to the loss of stability [rad]
 _BEHIND = 1e-3  # first step along a path behind a knee [rad]
 _TURN = 0.95  # least cosine between the directions of two steps
 _MOST_POINTS = 2000
+_NEARLY_ZERO = 1e-2  # an eigenvalue this small, relative to the first, may vanish in the next step
 
 
 class PathPoint(NamedTuple):
@@ -46,6 +51,17 @@ class PathPoint(NamedTuple):
     def springs(self) -> FloatArray:
         """Elastic coordinates, shape (n_springs,) [rad or m]."""
         return self.state.q_springs
+
+
+class FollowedPath(NamedTuple):
+    """A part of a path."""
+
+    points: list[PathPoint]
+    """Its points, in order."""
+    crossings: list[tuple[int, int]]
+    """Numbers of the points just before which it crosses another path, and by how many eigenvalues become negative there."""
+    ended: str
+    """Why it ends: "largest force", "zero force", "end of range", "points", "unstable" or "lost"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +136,7 @@ class ForcePath:
                 return None
             residual, gap = here.state.residual + torques @ guides, aims - rows @ self.place(here)
             balanced = np.linalg.norm(residual) <= largest_residual(self.model, here.state.scale, TOLERANCE)
-            if balanced and np.abs(gap).max() <= _GAP:
+            if balanced and np.abs(gap).max() <= _GAP * max(1.0, here.force / self.force):
                 return here._replace(across=float(torques[0]) if len(torques) else 0.0)
             equilibrium = [here.state.tangent, -self.force * here.push[:, None], guides.T]
             matrix = np.block([equilibrium, [rows, np.zeros((len(rows), len(guides)))]])
@@ -134,45 +150,104 @@ class ForcePath:
             here = self.at(self.place(here) + step[: n + 1])
         return None
 
+    def eigenvalues(self, point: PathPoint) -> FloatArray:
+        """Return the eigenvalues of the tangent stiffness, relative to the springs' own stiffness, ascending."""
+        return np.asarray(np.linalg.eigvalsh(scaled(point.state.tangent, self.model.stiffness)))
+
     def follow(
-        self, first: list[PathPoint], way: FloatArray, largest_force: float, largest_step: float
-    ) -> tuple[list[PathPoint], str]:
+        self,
+        first: list[PathPoint],
+        way: FloatArray,
+        largest_force: float,
+        largest_step: float,
+        *,
+        growth: float = 0.0,
+        while_stable: bool = False,
+    ) -> FollowedPath:
         """Follow the path from its first points.
+
+        Between two points of one regular path the number of negative eigenvalues changes by one where the force turns, and
+        nowhere else. Steps are halved until that holds, so that they do not jump to another path nearby; where it does not
+        hold between the nearest points, paths cross.
 
         Args:
             first: One point, or more.
             way: Direction of the path at the last of them, shape (n_springs + 1,).
             largest_force: Force at which the path ends [N].
             largest_step: Largest distance between two points [rad].
-
-        Returns:
-            All points; and why the path ends: "largest force", "zero force", "end of range", "points" or "lost".
+            growth: Force that a step may add, relative to the force reached, beyond `largest_step`.
+            while_stable: End at the first point with a negative eigenvalue.
         """
         points, step, way = list(first), largest_step, way / np.linalg.norm(way)
-        knee = 0  # number of points at the last knee
+        crossings: list[tuple[int, int]] = []
+        shortest = _SHORTEST_STABLE if while_stable else _SHORTEST
+        n_stable, knee = len(points), 0  # number of points at the last stable one, and at the last knee
+        before = 0.0  # the step before it was halved at a crossing
+        values, tangent = self.eigenvalues(points[-1]), way
+        nearly_zero = _NEARLY_ZERO * abs(float(values[0]))
         while len(points) < _MOST_POINTS:
-            here = self.place(points[-1])
+            last = points[-1]
+            here, least = self.place(last), shortest * max(1.0, last.force / self.force)
+            with np.errstate(divide="ignore"):
+                longest = np.divide((largest_step, growth * last.force / self.force), (np.linalg.norm(way[:-1]), abs(way[-1])))
+            step = min(step, max(largest_step, float(longest.min())))
             there = self.newton(here + step * way, way[None], np.array([way @ here + step]))
             moved = np.zeros_like(way) if there is None else self.place(there) - here
             if there is None or not way @ moved >= _TURN * np.linalg.norm(moved):
                 step *= 0.5
-                if step < _SHORTEST:
+                if step < least:
                     turned = None if knee == len(points) else self._behind_knee(points[-2:], way)
                     if turned is not None:
                         knee, way, step = len(points), turned, _BEHIND
                         continue
-                    ends = self.model.structure.at_range_end(self.motors, points[-1].springs)
-                    return points, "end of range" if ends else "lost"
+                    ends = self.model.structure.at_range_end(self.motors, last.springs)
+                    return FollowedPath(points, crossings, "end of range" if ends else "lost")
+                continue
+            secant, new_values = moved / np.linalg.norm(moved), self.eigenvalues(there)
+            new_tangent = secant if np.abs(new_values).min() <= NEUTRAL else self._direction(there, secant)
+            more = int((new_values < -NEUTRAL).sum() - (values < -NEUTRAL).sum())
+            regular = knee == len(points) or abs(more) == (new_tangent[-1] * tangent[-1] < 0.0)
+            falls = while_stable and knee < len(points) and nearly_zero < values[0] and new_values[0] < 0.5 * values[0]
+            if step > least and (falls or not regular):
+                before, step = max(before, step), 0.5 * step
                 continue
             if not 0.0 <= there.force <= largest_force:
                 limit, ended = (largest_force, "largest force") if there.force > largest_force else (0.0, "zero force")
                 aim = limit / self.force - 1.0
                 share = (aim - here[-1]) / moved[-1]
-                last = self.newton(here + share * moved, np.eye(len(way))[-1:], np.array([aim]))
-                return points if last is None else [*points, last], ended
+                end = self.newton(here + share * moved, np.eye(len(way))[-1:], np.array([aim]))
+                return FollowedPath(points if end is None else [*points, end], crossings, ended)
+            if not regular:
+                crossings.append((len(points), more))
+                step, before = max(before, step), 0.0
             points.append(there)
-            way, step = moved / np.linalg.norm(moved), min(1.5 * step, largest_step)
-        return points, "points"
+            values, tangent = new_values, new_tangent
+            way, step = tangent if regular else secant, 1.5 * step
+            if values[0] > 0.0:
+                n_stable = len(points)
+            elif while_stable and values[0] < -NEUTRAL:
+                return FollowedPath([*points[:n_stable], there], crossings, "unstable")
+        return FollowedPath(points, crossings, "points")
+
+    def last_stable(self, here: PathPoint, there: PathPoint) -> PathPoint:
+        """Bisect the loss of stability between a stable point of a path and the next down to rounding."""
+        start = self.place(here)
+        way = self.place(there) - start
+        low, high, found = 0.0, 1.0, here
+        while low < 0.5 * (low + high) < high:
+            middle = 0.5 * (low + high)
+            point = self.newton(start + middle * way, way[None], np.array([way @ start + middle * (way @ way)]))
+            if point is not None and point.force >= found.force and self.eigenvalues(point)[0] > 0.0:
+                low, found = middle, point
+            else:
+                high = middle
+        return found
+
+    def _direction(self, point: PathPoint, along: FloatArray) -> FloatArray:
+        """Direction of the path at a point, with the sense of `along`."""
+        matrix = np.vstack([np.column_stack([point.state.tangent, -self.force * point.push]), along])
+        way = np.linalg.solve(matrix, np.eye(len(along))[-1])
+        return np.asarray(way / np.linalg.norm(way))
 
     def _behind_knee(self, last: list[PathPoint], way: FloatArray) -> FloatArray | None:
         """Direction of the path behind the knee of a link, at either end of its plateau; None if there is no knee.

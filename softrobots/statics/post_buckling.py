@@ -30,8 +30,8 @@ from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
-from softrobots.statics.force_path import ForcePath, PathPoint
-from softrobots.statics.stability import NEUTRAL, critical_point
+from softrobots.statics.force_path import NEUTRAL, FollowedPath, ForcePath, PathPoint
+from softrobots.statics.stability import critical_point
 
 FUNDAMENTAL = "fundamental"
 """Label of the path from zero force."""
@@ -122,10 +122,10 @@ def post_buckling_branches(
     with one_blas_thread(model.n_springs):
         origin, here = path.point(critical.origin, 0.0), path.point(path.springs, path.force)
         modes = _modes(path, here) if critical.crosses else np.zeros((0, model.n_springs))
-        branches = [_branch(path, FUNDAMENTAL, modes, *path.follow([origin], path.tangent(origin), most, largest_step))]
+        branches = [_branch(path, FUNDAMENTAL, modes, path.follow([origin], path.tangent(origin), most, largest_step))]
         for label, there in sorted(_leaving(path, modes), key=lambda one: one[0]):
-            points, ended = path.follow([here, there], path.place(there), most, largest_step)
-            branches.append(_branch(path, label, modes, points, ended))
+            followed = path.follow([here, there], path.place(there), most, largest_step)
+            branches.append(_branch(path, label, modes, followed))
     return tuple(branches)
 
 
@@ -203,13 +203,14 @@ def _at_distance(path: ForcePath, along: FloatArray, across: FloatArray | None =
     return path.newton(np.append(aims[0] * along, 0.0), np.column_stack([rows, np.zeros(len(rows))]), aims, guides)
 
 
-def _branch(path: ForcePath, label: str, modes: FloatArray, points: list[PathPoint], ended: str) -> EquilibriumBranch:
+def _branch(path: ForcePath, label: str, modes: FloatArray, followed: FollowedPath) -> EquilibriumBranch:
+    points = followed.points
     equilibria = tuple(
         equilibrium_from_state(path.model, path.motors, path.load(point.force), point.state, method="newton", iterations=number)
         for number, point in enumerate(points)
     )
     away = [float(np.linalg.norm(modes @ (point.springs - path.springs))) for point in points]
-    min_eigenvalues = [float(np.linalg.eigvalsh(scaled(point.state.tangent, path.model.stiffness))[0]) for point in points]
+    min_eigenvalues = [float(path.eigenvalues(point)[0]) for point in points]
     return EquilibriumBranch(
         label=label,
         equilibria=equilibria,
@@ -217,7 +218,7 @@ def _branch(path: ForcePath, label: str, modes: FloatArray, points: list[PathPoi
         amplitude=read_only(np.array(away)),
         energy=read_only(np.array([point.state.energy for point in points])),
         softest=read_only(np.array(min_eigenvalues)),
-        ended=ended,
+        ended=followed.ended,
     )
 
 
