@@ -29,14 +29,7 @@ DAMPING = ("critical", "file")
 
 
 def mass_matrix(model: SoftModel, q_motors: FloatArray) -> FloatArray:
-    """Return the mass matrix with relaxed springs.
-
-    Args:
-        model: A robot without sections of constant strain.
-        q_motors: Motor joints, then muscles (without effect), shape (n_motors,) [rad, m or N].
-
-    Returns:
-        Mass matrix in the order of Pinocchio's velocities, shape (nv, nv) [kg m^2, kg m, kg].
+    """Return the mass matrix with relaxed springs, in the order of Pinocchio's velocities, shape (nv, nv) [kg m^2, kg m, kg].
 
     Raises:
         DescriptionError: If the robot has more joints than Pinocchio supports.
@@ -51,14 +44,7 @@ def mass_matrix(model: SoftModel, q_motors: FloatArray) -> FloatArray:
 
 
 def lowest_frequency(model: SoftModel, mass: FloatArray) -> float:
-    """Return the lowest natural frequency of the spring joints, motors held, without gravity.
-
-    Args:
-        model: A robot with spring joints and without sections of constant strain.
-        mass: Its mass matrix, shape (nv, nv).
-
-    Returns:
-        Frequency `w_1` [rad/s].
+    """Return the lowest natural frequency `w_1` [rad/s] of the spring joints, motors held, without gravity.
 
     Raises:
         DescriptionError: If the springs move no mass.
@@ -82,13 +68,7 @@ def rule_text(frequency: float) -> str:
 
 
 def damped(tree: RigidTree, springs: Mapping[str, SpringTag], frequency: float | None) -> RigidTree:
-    """Return the robot with the damping `2 k / w_1` at its spring joints.
-
-    Args:
-        tree: The robot.
-        springs: Spring by joint.
-        frequency: Lowest frequency `w_1` [rad/s]; None leaves the damping as it is.
-    """
+    """Return the robot with the damping `2 k / w_1` at its spring joints; a frequency of None leaves the damping as it is."""
     if frequency is None:
         return tree
     joints = (

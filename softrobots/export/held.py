@@ -60,12 +60,7 @@ def check_linear(model: Any) -> SoftModel:
 
 
 def check_joint_springs(model: Any) -> SoftModel:
-    """Return `model` if its elasticity is linear joint springs only.
-
-    Raises:
-        ParameterError: If it is not a `SoftModel`, has sections of constant strain, springs that are not linear, or muscles of
-            given length.
-    """
+    """Return `model` if its elasticity is linear joint springs only; refuse what `check_linear` does, and muscle lengths."""
     checked = check_linear(model)
     if checked.muscles and checked.muscle_input != "forces":
         requirement = (
@@ -77,14 +72,7 @@ def check_joint_springs(model: Any) -> SoftModel:
 
 
 def hold(model: Any, q_motors: Any = None) -> HeldRobot:
-    """Hold the actuators of a robot: motors at positions, muscles at tensions.
-
-    Args:
-        model: The robot.
-        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N]; by default `relaxed_motors`.
-
-    Returns:
-        The held joints and the springs, whose references include the muscle tensions.
+    """Hold the actuators of a robot: motors at positions, muscles at tensions; by default `relaxed_motors`.
 
     Raises:
         ParameterError: If `check_joint_springs` refuses the model, or `q_motors` does not fit the robot.
@@ -109,12 +97,7 @@ def locked_joints(model: SoftModel) -> tuple[str, ...]:
 
 
 def weld(tree: RigidTree, positions: Mapping[str, float]) -> RigidTree:
-    """Return a robot with some joints fixed at given positions.
-
-    Args:
-        tree: The robot.
-        positions: Position by joint [rad or m].
-    """
+    """Return a robot with some joints fixed at given positions [rad or m]."""
     joints = (
         replace(joint, kind="fixed", placement=joint.placement_at(positions[joint.name])) if joint.name in positions else joint
         for joint in tree.joints

@@ -21,9 +21,7 @@ class MeshFiles:
     def split(self, shapes: Sequence[Shape], readable: Callable[[Path], bool]) -> list[tuple[Shape, Path | None]]:
         """Return the shapes that can be written, each with its mesh file, or None if it is not a mesh.
 
-        Args:
-            shapes: Shapes.
-            readable: Whether a simulator can read a file; other meshes and missing ones are left out and counted.
+        Meshes that are missing or not readable for a simulator are left out and counted.
         """
         pairs: list[tuple[Shape, Path | None]] = []
         for shape in shapes:

@@ -13,7 +13,7 @@ from softrobots.core.errors import DescriptionError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.export.meshes import MeshFiles, mujoco_reads
 from softrobots.export.prepared import PreparedRobot, checked_gravity, neighbours, prepare, weld_groups
-from softrobots.export.servos import ANGLE_ERROR, Motor, Muscle, Servo
+from softrobots.export.servos import ANGLE_ERROR, Muscle, Servo
 from softrobots.export.xml_text import document
 from softrobots.model.soft_model import SoftModel
 
@@ -217,7 +217,9 @@ def _write_tendons(tendons: ElementTree.Element, muscles: Sequence[Muscle]) -> N
 def _write_actuators(element: ElementTree.Element, robot: PreparedRobot) -> None:
     for motor in robot.motors:
         attributes = {"name": motor.joint.name, "joint": motor.joint.name, **_servo(motor.servo)}
-        ElementTree.SubElement(element, "position", attributes | _range_of(motor))
+        if np.all(np.isfinite(motor.joint.limits)):
+            attributes["ctrlrange"] = number_text(motor.joint.limits)
+        ElementTree.SubElement(element, "position", attributes)
     for muscle in robot.muscles:
         tag = muscle.tag
         attributes = {"name": tag.name, "tendon": tag.name}
@@ -232,11 +234,6 @@ def _write_actuators(element: ElementTree.Element, robot: PreparedRobot) -> None
 def _servo(servo: Servo) -> dict[str, str]:
     gains = {"kp": repr(servo.gain), "kv": repr(servo.damping)}
     return gains | ({"forcerange": number_text((-servo.force, servo.force))} if np.isfinite(servo.force) else {})
-
-
-def _range_of(motor: Motor) -> dict[str, str]:
-    limits = motor.joint.limits
-    return {"ctrlrange": number_text(limits)} if np.all(np.isfinite(limits)) else {}
 
 
 def _command(muscle: Muscle) -> float:

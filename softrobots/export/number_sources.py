@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
-from softrobots.core.checks import instance_of
 from softrobots.robots import HelixTube, InflatableArm, PccArm, XacroRobot
 
 Rules = dict[tuple[str, str], str]
@@ -20,11 +19,6 @@ Rules = dict[tuple[str, str], str]
 
 _Row = tuple[str, float | list[float], str, str, str]  # name, value or one a segment, unit, meaning, expression (of the first)
 _BEND = ("-pi / 2", "pi / 2")
-
-
-def check_robot(robot: Any) -> XacroRobot:
-    """Return `robot` if it is one of this package, or raise ParameterError."""
-    return instance_of("robot", robot, XacroRobot, "an InflatableArm, a PccArm or a HelixTube, or left out")
 
 
 def number_rules(robot: XacroRobot) -> Rules:
@@ -93,10 +87,8 @@ def _tube_shape(robot: HelixTube) -> list[_Row]:
 
 
 def _inflatable_arm(robot: InflatableArm) -> Rules:
-    rules: Rules = {}
-    for motor in range(1, robot.n_links + 2):
-        for name, rule in (("lower", "-motor_limit"), ("upper", "motor_limit"), ("damping", "0.0")):
-            rules[f"motor_{motor}", name] = rule
+    motor = {"lower": "-motor_limit", "upper": "motor_limit", "damping": "0.0"}
+    rules = {(f"motor_{i}", name): rule for i in range(1, robot.n_links + 2) for name, rule in motor.items()}
     for i in range(robot.n_links):
         for side in ("side", "up"):
             joint = f"spring_{i + 1}_{side}"

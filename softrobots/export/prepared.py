@@ -54,8 +54,7 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
 
     Raises:
         ParameterError: If `check_linear` refuses the model; a choice is unknown; `q_motors` does not fit the robot or, driven,
-        is
-            beyond the limits of the actuators; or muscles of given length are to be welded.
+            is beyond the limits of the actuators; or muscles of given length are to be welded.
         DescriptionError: If the robot has moving bodies without mass, or more joints than Pinocchio supports.
     """
     checked = check_linear(model)
@@ -87,11 +86,7 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
 
 
 def checked_gravity(gravity: Any) -> tuple[float, ...]:
-    """Return gravity, shape (3,) [m/s^2]; zeros for None.
-
-    Raises:
-        ParameterError: If the shape differs or a number is not finite.
-    """
+    """Return gravity, shape (3,) [m/s^2], zeros for None, or raise ParameterError."""
     return (0.0, 0.0, 0.0) if gravity is None else tuple(finite_array("gravity", gravity, (3,), "m/s^2").tolist())
 
 
@@ -108,13 +103,7 @@ def neighbours(tree: RigidTree) -> tuple[tuple[str, str], ...]:
 
     Simulators allow the two bodies of a joint to overlap, but these chains have small bodies without shapes between those with
     shapes. A pair is therefore a body with a collision shape and the nearest one towards the root that has one; bodies fixed
-    to each other count as one.
-
-    Args:
-        tree: The robot.
-
-    Returns:
-        Pairs of body names, the one nearer to the root first.
+    to each other count as one. The one nearer to the root comes first.
     """
     group = weld_groups(tree)
     shaped: dict[str, list[str]] = {}

@@ -42,14 +42,7 @@ def block(lines: Iterable[str]) -> str:
 
 
 def filled(template: str, *, name: str, description: Iterable[str], **fields: str) -> str:
-    """Return a template of this folder with its fields substituted.
-
-    Args:
-        template: Name of the file.
-        name: Name of the robot, for the docstring.
-        description: Paragraphs, for the docstring.
-        fields: Text of the other fields, inserted unchanged.
-    """
+    """Return a template of this folder with the name and description of a robot, and other fields, inserted unchanged."""
     text = Template(Path(__file__).with_name(template).read_text(encoding="utf-8"))
     paragraphs = "\n\n".join(textwrap.fill(part, _WIDTH, break_long_words=False) for part in description)
     return text.substitute(name=_in_docstring(name), description=_in_docstring(paragraphs), version=__version__, **fields)

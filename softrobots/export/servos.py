@@ -77,17 +77,7 @@ class Muscle:
 
 
 def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str, float], mass: FloatArray) -> tuple[Motor, ...]:
-    """Return the driven motors with their servos.
-
-    Args:
-        model: The robot.
-        joints: Its joints.
-        positions: Position by motor joint [rad or m].
-        mass: Mass matrix at home, shape (nv, nv).
-
-    Returns:
-        The motors, base to tip.
-    """
+    """Return the driven motors at given positions [rad or m], with servos for the mass matrix at home, shape (nv, nv)."""
     by_name = {joint.name: joint for joint in joints}
     inertia = dict(zip(positions, np.diag(mass)[model.structure.motor_indices].tolist(), strict=True))
     return tuple(
@@ -97,19 +87,9 @@ def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str,
 
 
 def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[Muscle, ...]:
-    """Return the muscles, with servos if their lengths are given.
-
-    Args:
-        model: The robot.
-        values: Their lengths [m] or tensions [N], shape (n_muscles,).
-        mass: Mass matrix at home, shape (nv, nv).
-
-    Returns:
-        The muscles, in the order of the model.
-    """
+    """Return the muscles of given lengths [m] or tensions [N], shape (n_muscles,); those of given length have servos."""
     structure, muscles = model.structure, []
-    arms = structure.moment_arms
-    springs = structure.spring_indices
+    arms, springs = structure.moment_arms, structure.spring_indices
     elastic = mass[np.ix_(springs, springs)]
     for tag, row, value in zip(model.muscles, structure.muscle_matrix, values.tolist(), strict=True):
         motion = row / structure.strain_springs.stiffness

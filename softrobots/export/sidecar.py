@@ -10,12 +10,13 @@ import json
 import math
 from typing import Any
 
+from softrobots.core.checks import instance_of
 from softrobots.core.errors import ParameterError, SoftRobotsError
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag, SpringTag
-from softrobots.export.number_sources import Rules, check_robot, derived_numbers, number_rules
+from softrobots.export.number_sources import Rules, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.robots.fields import XacroRobot, default_text
@@ -79,7 +80,8 @@ def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
         "robot": checked.pinocchio.name,
     }
     if robot is not None:
-        if check_robot(robot).urdf() != checked.urdf:
+        instance_of("robot", robot, XacroRobot, "an InflatableArm, a PccArm or a HelixTube, or left out")
+        if robot.urdf() != checked.urdf:
             raise ParameterError("robot", robot, "the robot that the model was loaded from; it has another description")
         rules = number_rules(robot)
         content |= {"made_by": type(robot).__name__, "xacro": robot.XACRO}

@@ -10,12 +10,7 @@ _WIDTH = 110
 
 
 def document(root: ElementTree.Element, head: Iterable[str]) -> str:
-    """Return a document as text.
-
-    Args:
-        root: Its root element.
-        head: Paragraphs of the comment at its head.
-    """
+    """Return a document as text, with paragraphs as a comment at its head."""
     ElementTree.indent(root)
     paragraphs = (textwrap.wrap(text.replace("--", "- -"), _WIDTH, break_long_words=False) for text in head)
     lines = "\n     ".join(line for paragraph in paragraphs for line in paragraph)

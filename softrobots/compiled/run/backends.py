@@ -156,18 +156,7 @@ def _guarded(function: Callable[..., int], careful: Callable[..., int]) -> Calla
 
 
 def make_run(program: Program, backend: str) -> Run:
-    """Load a program in a back end.
-
-    Args:
-        program: The generated module.
-        backend: "numba" or "python".
-
-    Returns:
-        Its functions.
-
-    Raises:
-        MissingDependency: If `backend` is "numba" and numba is not installed.
-    """
+    """Load a program in the back end "numba" or "python"; see `NumbaRun` for a missing numba."""
     return NumbaRun(program) if backend == "numba" else PythonRun(program)
 
 

@@ -51,11 +51,7 @@ def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
 
 
 def gravity_vector(gravity: Any) -> FloatArray:
-    """Return gravity, shape (3,) [m/s^2]; zero if there is none.
-
-    Raises:
-        ParameterError: If the shape differs or a number is not finite.
-    """
+    """Return gravity, shape (3,) [m/s^2], zero if there is none, or raise ParameterError."""
     return np.zeros(3) if gravity is None else finite_array("gravity", gravity, (3,), "m/s^2")
 
 
@@ -97,26 +93,6 @@ def fail(statuses: Any, bad: Any, errors: Sequence[FloatArray], others: Sequence
         other[failed] = np.nan_to_num(other[failed], posinf=0.0, neginf=0.0)
 
 
-def in_parts(work: Callable[[int, int], None], count: int, threads: int) -> None:
-    """Work on cases in chunks that threads take as they become free.
-
-    Args:
-        work: Function that solves the cases from its first argument up to its second.
-        count: Number of cases.
-        threads: Number of threads.
-
-    Raises:
-        ParameterError: If the number of threads is not positive.
-    """
-    if positive_integer("threads", threads) == 1 or count <= _CHUNK:
-        work(0, count)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        parts = [pool.submit(work, first, min(first + _CHUNK, count)) for first in range(0, count, _CHUNK)]
-        for part in parts:
-            part.result()
-
-
 def solve_batch(
     function: Callable[..., None],
     inputs: Sequence[tuple[int, FloatArray]],
@@ -143,7 +119,16 @@ def solve_batch(
     given = tuple(array if array.flags.writeable else array.copy() for array in arrays)  # all of one type for numba
     places, result_places = tuple(place for place, _ in inputs), tuple(place for place, _ in results)
     outputs, statuses = tuple(np.zeros((count, columns)) for _, columns in results), np.zeros(count, dtype=np.uint8)
-    in_parts(lambda first, last: function(given, places, outputs, result_places, statuses, first, last), count, threads)
+
+    def solve(first: int, last: int) -> None:
+        function(given, places, outputs, result_places, statuses, first, last)
+
+    if positive_integer("threads", threads) == 1 or count <= _CHUNK:
+        solve(0, count)
+    else:
+        starts = range(0, count, _CHUNK)
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(solve, starts, [*starts[1:], count]))
     return list(outputs), statuses
 
 
