@@ -294,7 +294,6 @@ def test_only_blocks_of_the_same_case_number_and_arrays_count(tmp_path: Path) ->
     assert kept.block(0, ARRAYS | {"a": (np.float64, (4,))}) is None
     assert kept.block(0, ARRAYS | {"a": (np.int64, (3,))}) is None
     assert kept.block(0, {"a": ARRAYS["a"]}) is None
-    assert kept.folder == tmp_path / "one"
 
 
 @each_row(

@@ -52,23 +52,10 @@ class Checkpoint:
         self._mark = hashlib.sha256(json.dumps(self._case, sort_keys=True).encode()).hexdigest()
         self._exists = _has_case(self._folder)
         if self._exists:
-            self._check_same(_read_case(self._folder / CASE))
-
-    @property
-    def folder(self) -> Path:
-        """Folder of the blocks."""
-        return self._folder
+            self._check_same()
 
     def block(self, number: int, arrays: Mapping[str, tuple[type, tuple[int, ...]]]) -> dict[str, Any] | None:
-        """Return the arrays of a finished block.
-
-        Args:
-            number: Number of the block.
-            arrays: Data type and shape of each of its arrays, by name.
-
-        Returns:
-            The arrays by name; None if the block is not finished, or is damaged.
-        """
+        """Return the arrays of a finished block by name; None if it is damaged or its names, types or shapes differ."""
         if not self._exists:
             return None
         try:
@@ -93,7 +80,7 @@ class Checkpoint:
             try:
                 write_text(self._folder / CASE, json.dumps(self._case, indent=1) + "\n", overwrite=False)
             except OutputExists:  # another run was first
-                self._check_same(_read_case(self._folder / CASE))
+                self._check_same()
             self._exists = True
         content = {"mark": np.array(f"{self._mark} {number}"), **arrays}
         write_atomically(self._file(number), lambda file: np.savez(file, **content))
@@ -101,7 +88,11 @@ class Checkpoint:
     def _file(self, number: int) -> Path:
         return self._folder / f"block_{number:06d}.npz"
 
-    def _check_same(self, theirs: Mapping[str, str]) -> None:
+    def _check_same(self) -> None:
+        file = self._folder / CASE
+        theirs = read_json(file, _LARGEST_CASE)
+        if not isinstance(theirs, dict) or not all(isinstance(value, str) for value in theirs.values()):
+            raise FileFormatError(f"{file} is not the description of a case: an object of texts is required")
         if theirs == self._case:
             return
         changed = [name for name in self._case if theirs.get(name) != self._case[name]]
@@ -129,13 +120,6 @@ def _has_case(folder: Path) -> bool:
     if names and CASE not in names:
         raise OutputExists(f"{folder} contains {names[0]} and no {CASE}; a folder for finished blocks must be new or empty")
     return bool(names)
-
-
-def _read_case(file: Path) -> dict[str, str]:
-    case = read_json(file, _LARGEST_CASE)
-    if not isinstance(case, dict) or not all(isinstance(value, str) for value in case.values()):
-        raise FileFormatError(f"{file} is not the description of a case: an object of texts is required")
-    return case
 
 
 def _text(value: Any) -> str:

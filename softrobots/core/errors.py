@@ -18,6 +18,10 @@ class SoftRobotsError(Exception):
         """Pickle as message and attributes, so that worker processes can return errors."""
         return _rebuild, (type(self), self.args, self.__dict__)
 
+    def __str__(self) -> str:
+        """Return the message itself, which built-in errors may quote or number."""
+        return str(self.args[0]) if self.args else ""
+
 
 class ParameterError(SoftRobotsError, ValueError):
     """An invalid value: wrong shape, not finite, out of range, unknown option.
@@ -58,10 +62,6 @@ class NameNotFound(SoftRobotsError, LookupError):
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         listed = "".join(f"\n  {line}" for line in lines) or f" {', '.join(self.available) or 'none'}"
         super().__init__(f"no {kind} is called {name!r}{hint}; available:{listed}")
-
-    def __str__(self) -> str:
-        """Return the message itself (subclasses of LookupError may quote it)."""
-        return str(self.args[0])
 
 
 class StraightTube(SoftRobotsError, ValueError):
@@ -132,9 +132,6 @@ class NoCriticalLoad(SoftRobotsError, RuntimeError):
 
 class OutputError(SoftRobotsError, OSError):
     """A result cannot be written."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 class OutputExists(OutputError, FileExistsError):

@@ -121,9 +121,6 @@ class ArmSolver:
             targets: Targets, shape (n, 3) [m].
             loads: Sizes of the load, shape (n,) [N].
             start: Poses to start from, shape (n, n_motors + n_springs) [rad].
-
-        Returns:
-            The results.
         """
         batch = self.compiled.inverse_kinematics(
             targets,

@@ -53,19 +53,7 @@ class BlockResult(NamedTuple):
 
 
 def solve_block(case: SweepCase, targets: FloatArray) -> BlockResult:
-    """Solve some targets for all loads.
-
-    Args:
-        case: Robot and loads.
-        targets: Targets of the tip, shape (n, 3) [m].
-
-    Returns:
-        The results.
-
-    Raises:
-        ParameterError: If the case was made by another version of softrobots.
-        MissingDependency: If the back end of the case is not installed.
-    """
+    """Solve some targets, shape (n, 3) [m], for all loads; errors are those of `ArmSolver`."""
     arm = solver(case)
     levels, n_motors, n_branches = np.array(case.loads), arm.model.n_motors, len(arm.branches)
     near = np.flatnonzero(np.linalg.norm(targets, axis=1) <= arm.model.reach)

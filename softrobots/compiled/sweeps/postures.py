@@ -70,14 +70,7 @@ def branches(model: SoftModel, compiled: CompiledModel) -> tuple[Branch, ...]:
     """Tables of postures within the motor limits: elbow bent up or down, tip before or behind the axis of motor 1.
 
     An arm whose motors turn all round and whose springs rest at zero is over its back in the same postures as forwards, so it
-    has two branches instead of four.
-
-    Args:
-        model: An arm that `check_arm` accepts.
-        compiled: Its compiled form.
-
-    Returns:
-        The branches that have postures.
+    has two branches instead of four. Branches without postures are left out.
     """
     limits = np.clip(model.motor_limits, -np.pi, np.pi)
     same_behind = not model.rest.any() and bool(np.all(limits[:, 0] <= -np.pi) and np.all(limits[:, 1] >= np.pi))
@@ -96,12 +89,7 @@ def branches(model: SoftModel, compiled: CompiledModel) -> tuple[Branch, ...]:
 
 
 def starts(model: SoftModel, tables: Sequence[Branch], targets: FloatArray) -> FloatArray:
-    """Return start poses: the relaxed arm, for each branch and target, within the motor limits.
-
-    Args:
-        model: The arm.
-        tables: Its branches.
-        targets: Targets, shape (n, 3) [m].
+    """Return start poses for targets, shape (n, 3) [m]: the relaxed arm, for each branch and target, within the motor limits.
 
     Returns:
         Motor angles and then springs, branch by branch, shape (n_branches * n, n_motors + n_springs) [rad].
@@ -111,15 +99,7 @@ def starts(model: SoftModel, tables: Sequence[Branch], targets: FloatArray) -> F
 
 
 def within_turns(model: SoftModel, q_motors: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Turn motors by whole turns towards their limits.
-
-    Args:
-        model: The robot.
-        q_motors: Motor angles, shape (n, n_motors) [rad].
-
-    Returns:
-        The angles, and which rows are within the limits, shape (n,).
-    """
+    """Turn motors, shape (n, n_motors) [rad], by whole turns towards their limits; return also which rows are within them."""
     low, high = np.clip(model.motor_limits, -_FREE, _FREE).T
     turns = np.rint((q_motors - 0.5 * (low + high)) / (2.0 * np.pi))
     turned = np.where((q_motors < low) | (q_motors > high), q_motors - 2.0 * np.pi * turns, q_motors)
