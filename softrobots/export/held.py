@@ -59,8 +59,12 @@ def check_linear(model: Any) -> SoftModel:
     return checked
 
 
-def check_joint_springs(model: Any) -> SoftModel:
-    """Return `model` if its elasticity is linear joint springs only; refuse what `check_linear` does, and muscle lengths."""
+def hold(model: Any, q_motors: Any = None) -> HeldRobot:
+    """Hold the actuators of a robot: motors at positions, muscles at tensions; by default `relaxed_motors`.
+
+    Raises:
+        ParameterError: If `check_linear` refuses the model, it has muscles of given length, or `q_motors` does not fit it.
+    """
     checked = check_linear(model)
     if checked.muscles and checked.muscle_input != "forces":
         requirement = (
@@ -68,16 +72,6 @@ def check_joint_springs(model: Any) -> SoftModel:
             "muscles of given length couple the joints of a segment"
         )
         raise ParameterError("model", checked.pinocchio.name, requirement)
-    return checked
-
-
-def hold(model: Any, q_motors: Any = None) -> HeldRobot:
-    """Hold the actuators of a robot: motors at positions, muscles at tensions; by default `relaxed_motors`.
-
-    Raises:
-        ParameterError: If `check_joint_springs` refuses the model, or `q_motors` does not fit the robot.
-    """
-    checked = check_joint_springs(model)
     structure = checked.structure
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     count = len(structure.motor_joints)
