@@ -657,8 +657,6 @@ ALLOWED = {
     ("softrobots/core/json_text.py", "json.loads"): "the reader of all JSON",
     ("softrobots/compiled/run/backends.py", "compile"): "code that compiled/ has generated",
     ("softrobots/compiled/run/backends.py", "exec"): "the same",
-    ("softrobots/compiled/run/numpy_batches.py", "compile"): "the same",
-    ("softrobots/compiled/run/numpy_batches.py", "exec"): "the same",
     ("scripts/environments.py", "json.loads"): "what pip prints",
     ("scripts/studies/fuzzing/worker.py", "json.loads"): "what a process of its own prints",
     ("scripts/measure_coverage.py", "json.loads"): "what coverage writes",
