@@ -45,7 +45,7 @@ class FakePage:
         self.marks.append(target)
 
 
-def told(wanted: Wanted) -> list[object]:
+def as_lists(wanted: Wanted) -> list[object]:
     """As plain lists, which compare."""
     return [None if value is None else np.asarray(value).tolist() for value in wanted[:4]] + [wanted.done]
 
@@ -81,7 +81,7 @@ def live_arm(arm: sr.SoftModel, force: tuple[float, float, float] = (0, 0, -1)) 
     ],
 )
 def test_lines_and_objects_say_what_is_wanted(line: str, expected: Wanted) -> None:
-    assert told(changed(line, NOW, START)) == told(expected)
+    assert as_lists(changed(line, NOW, START)) == as_lists(expected)
 
 
 @each_row(
@@ -118,8 +118,8 @@ def test_lines_that_are_refused(line: str, message: str) -> None:
 
 def test_a_file_says_all_that_differs_from_the_start() -> None:
     lines = read_commands("# how it stands\nforce 0 0 -5\n\ngravity on\nforce 0 0 -6\n", START)
-    assert told(lines) == [[0.0, 0.5, -0.5], None, [0.0, 0.0, -6.0], [0.0, 0.0, -9.81], False]
-    assert told(read_commands('\n{"force": [0, 0, -6],\n "gravity": true}\n', START)) == told(lines)
+    assert as_lists(lines) == [[0.0, 0.5, -0.5], None, [0.0, 0.0, -6.0], [0.0, 0.0, -9.81], False]
+    assert as_lists(read_commands('\n{"force": [0, 0, -6],\n "gravity": true}\n', START)) == as_lists(lines)
     assert read_commands("", START) is START
     with pytest.raises(sr.NameNotFound):
         read_commands("force 0 0 -5\nfroce 1 2 3\n", START)
@@ -228,7 +228,7 @@ def test_the_view_ends_with_its_page(arm: sr.SoftModel) -> None:
 def test_a_view_begins_with_a_solution_and_refuses_other_loads(arm: sr.SoftModel) -> None:
     solution = sr.solve_ik(arm, (0.9, 0.3, 0.2), (0, 0, -3), gravity=sr.EARTH_GRAVITY)
     live = LiveView(FakePage(), solution)
-    assert told(live.start) == [solution.q_motors.tolist(), [0.9, 0.3, 0.2], [0.0, 0.0, -3.0], [0.0, 0.0, -9.81], False]
+    assert as_lists(live.start) == [solution.q_motors.tolist(), [0.9, 0.3, 0.2], [0.0, 0.0, -3.0], [0.0, 0.0, -9.81], False]
     assert tip_force(sr.solve_equilibrium(arm, (0, 0, 0))).tolist() == [0.0, 0.0, 0.0]
     for load in ({"wrench": (0, 0, 0, 0, 1, 0)}, {"force": (0, 0, 1), "frame": "link_1"}):
         with pytest.raises(sr.ParameterError, match="a force on the tip and gravity only"):

@@ -119,8 +119,8 @@ def test_a_missing_or_broken_mesh_is_left_out_with_a_warning(name: str, tmp_path
     with pytest.warns(MissingMeshWarning, match="drawn without 1 mesh files") as caught:
         scene = RobotShapes(load(file))
     assert [type(shape.geometry).__name__ for shape in scene.shapes] == ["Box"]
-    (told,) = (warning.message for warning in caught)
-    assert [Path(mesh).name for mesh in told.meshes] == [Path(name).name]
+    (remark,) = (warning.message for warning in caught)
+    assert [Path(mesh).name for mesh in remark.meshes] == [Path(name).name]
 
 
 def test_without_trimesh_the_mesh_is_still_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

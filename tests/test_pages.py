@@ -159,8 +159,9 @@ def drawn_shapes(name: str) -> set[str]:
     """Names of the shapes of the deformed robot on a committed page."""
     import umsgpack
 
-    paths = [umsgpack.unpackb(command) for command in scene_on(name)[1] if b"set_object" in command]
-    found = (re.match("/meshcat/softrobots/deformed/([^/]+)/", told["path"]) for told in paths if told["type"] == "set_object")
+    commands = [umsgpack.unpackb(command) for command in scene_on(name)[1] if b"set_object" in command]
+    drawn = (command["path"] for command in commands if command["type"] == "set_object")
+    found = (re.match("/meshcat/softrobots/deformed/([^/]+)/", path) for path in drawn)
     return {match[1] for match in found if match}
 
 
@@ -181,9 +182,9 @@ def test_a_page_made_again_is_the_committed_one(tmp_path: Path, capsys: pytest.C
     """
     assert run_script("make_pages", ["--only", "inflatable_arm", "--output", str(tmp_path)]) == 0
     assert "inflatable_arm.html (0.3" in capsys.readouterr().out
-    made, kept = ((folder / "inflatable_arm.html").read_text(encoding="utf-8") for folder in (tmp_path, FOLDER))
-    assert without_scene(made) == without_scene(kept)
-    (script, now), (other, then) = scene_of(made), scene_of(kept)
+    again, kept = ((folder / "inflatable_arm.html").read_text(encoding="utf-8") for folder in (tmp_path, FOLDER))
+    assert without_scene(again) == without_scene(kept)
+    (script, now), (other, then) = scene_of(again), scene_of(kept)
     assert script == other
     assert len(now) == len(then)
     for one, two in zip(now, then, strict=True):
@@ -270,12 +271,12 @@ def test_a_moving_picture_moves_and_repeats(browser: object, tmp_path: Path, mon
     monkeypatch.setattr(view_browser, "open_browser", lambda: nullcontext(browser))
     page = FOLDER / "inflatable_arm.html"
     file = take_animation(page, tmp_path / "a.gif", width=320, height=240, seconds=0.9, frames=3)
-    with Image.open(file) as made:
-        assert (made.n_frames, made.size, made.info["loop"], made.info["duration"]) == (3, (320, 240), 0, 300)
+    with Image.open(file) as picture:
+        assert (picture.n_frames, picture.size, picture.info["loop"], picture.info["duration"]) == (3, (320, 240), 0, 300)
         frames = []
         for number in range(3):
-            made.seek(number)
-            frames.append(np.asarray(made.convert("RGB")).astype(int))
+            picture.seek(number)
+            frames.append(np.asarray(picture.convert("RGB")).astype(int))
     assert all(changed(frames[number], frames[number - 1]) > 500 for number in range(3))
     for options, message in (({"frames": 1}, "frames"), ({"seconds": 0.0}, "seconds")):
         with pytest.raises(sr.ParameterError, match=message):
@@ -292,13 +293,13 @@ def test_the_moving_picture_of_the_readme(tool: Callable[[str], ModuleType]) -> 
 
     file = CHECKOUT / "docs" / "images" / "inflatable_arm.gif"
     assert file.stat().st_size < 1.5e6
-    with Image.open(file) as made:
-        assert 640 <= made.width <= 800
-        assert 4.0 <= made.n_frames * made.info["duration"] / 1000.0 <= 6.0
+    with Image.open(file) as picture:
+        assert 640 <= picture.width <= 800
+        assert 4.0 <= picture.n_frames * picture.info["duration"] / 1000.0 <= 6.0
         frames = []
-        for number in (0, 1, made.n_frames // 2, made.n_frames - 1):
-            made.seek(number)
-            frames.append(np.asarray(made.convert("RGB")).astype(int))
+        for number in (0, 1, picture.n_frames // 2, picture.n_frames - 1):
+            picture.seek(number)
+            frames.append(np.asarray(picture.convert("RGB")).astype(int))
     first, second, middle, last = frames
     assert changed(first, middle) > 3.0 * changed(first, second)
     assert changed(first, last) < 2.0 * changed(first, second)  # no jump

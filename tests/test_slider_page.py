@@ -47,7 +47,7 @@ def wait_for(true: Callable[[], bool], seconds: float = 20.0) -> None:
         time.sleep(0.02)
 
 
-def told(page: SliderPage) -> str:
+def panel_html(page: SliderPage) -> str:
     """The text of the panel, as HTML."""
     return page._panel._text.content
 
@@ -69,9 +69,9 @@ def test_what_is_shown_is_the_equilibrium_of_what_is_set(arm: sr.SoftModel) -> N
         assert same(shown, sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15)))
         assert page.equilibrium is shown
         x, y, z = shown.tip_position
-        assert f"{x:.4f}  {y:.4f}  {z:.4f}" in told(page)
+        assert f"{x:.4f}  {y:.4f}  {z:.4f}" in panel_html(page)
         left = 1.0 - shown.link_moments[1] / arm.spring_groups[1].wrinkling_moment
-        assert f"link 2: {100 * left:.0f} %" in told(page)
+        assert f"link 2: {100 * left:.0f} %" in panel_html(page)
 
 
 def test_muscles_and_robots_without_motors() -> None:
@@ -119,17 +119,17 @@ def test_a_buckled_robot_stays_on_its_side_until_it_is_reset(rod: sr.SoftModel) 
 def test_without_equilibrium_the_last_one_stays_and_the_page_says_so(rod: sr.SoftModel) -> None:
     with SliderPage(rod, full_force=200.0) as page:
         last = page.set(force=(1, 0, -10))
-        assert "NO EQUILIBRIUM" not in told(page)
+        assert "NO EQUILIBRIUM" not in panel_html(page)
         for _ in range(2):
             with pytest.raises(sr.EquilibriumNotFound, match="end of its range"):
                 page.set(force=(1, 0, -100))
             assert page.equilibrium is last
-        assert "NO EQUILIBRIUM" in told(page)
-        assert "end of its range" in told(page)
+        assert "NO EQUILIBRIUM" in panel_html(page)
+        assert "end of its range" in panel_html(page)
         page._panel._force[2].value = -150.0  # as from a browser: nobody is there to catch an error
         wait_for(lambda: page._last.force[2] == -150.0)
         assert same(page.set(force=(1, 0, -10)), last)
-        assert "NO EQUILIBRIUM" not in told(page)
+        assert "NO EQUILIBRIUM" not in panel_html(page)
         page._panel._force[2].value = -5.0  # the thread that follows the sliders is still there
         wait_for(lambda: page.equilibrium.load.wrenches["tip"][2] == -5.0)
     with pytest.raises(sr.EquilibriumNotFound):
@@ -257,7 +257,7 @@ def test_the_rigid_arm_and_the_path_can_be_switched(page: SliderPage) -> None:
     wait_for(lambda: not drawn_boxes(page, "rigid"))
     assert "path" not in page._drawing.handles
     page._panel._path.value = True
-    wait_for(lambda: "path of the tip" in told(page))
+    wait_for(lambda: "path of the tip" in panel_html(page))
     page.set(q_motors=(0, 0.3, 0))
     page.set(q_motors=(0, 0.6, 0))
     points = np.asarray(page._drawing.handles["path"].points)

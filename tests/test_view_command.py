@@ -294,19 +294,19 @@ def test_a_tube_grows_and_a_picture_is_taken_where_it_is_told(
 
 def test_sliders_begin_with_the_loaded_robot(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     """The page itself: tests/test_slider_page.py."""
-    made = []
+    calls = []
 
     class Page:
         url, port, tunnel = "http://127.0.0.1:8123/", 8123, "ssh"
 
         def __init__(self, model: sr.SoftModel, **options: object) -> None:
-            made.append((model.pinocchio.name, {name: np.asarray(value).tolist() for name, value in options.items()}))
+            calls.append((model.pinocchio.name, {name: np.asarray(value).tolist() for name, value in options.items()}))
 
         def __enter__(self) -> Page:
             return self
 
         def __exit__(self, *_: object) -> None:
-            made.append("closed")
+            calls.append("closed")
 
         def wait(self) -> None:
             raise KeyboardInterrupt
@@ -315,7 +315,7 @@ def test_sliders_begin_with_the_loaded_robot(monkeypatch: pytest.MonkeyPatch, ca
     words = "view inflatable_arm --sliders --motors 0 0.5 -0.5 --force 0 0 -3 --gravity --port 8123"
     assert main(words.split()) == 0
     options = {"q_motors": [0.0, 0.5, -0.5], "force": [0.0, 0.0, -3.0], "gravity": [0.0, 0.0, -9.81], "port": 8123}
-    assert made == [("inflatable_arm", options), "closed"]
+    assert calls == [("inflatable_arm", options), "closed"]
     assert "serving http://127.0.0.1:8123/ (Ctrl-C ends)" in capsys.readouterr().out
 
 

@@ -141,8 +141,8 @@ def test_page_and_websocket_work_through_a_forwarded_port(browser: object, arm: 
         page.wait_for_timeout(500)
         show_share(page, 0.0)
         second = pixels(page.screenshot())
-        told = page.locator("#softrobots-legend").inner_text().splitlines()
-        assert told == [*(text for text in legend[:2]), "target (cross)", *legend[3:]]  # no force, a mark
+        rows = page.locator("#softrobots-legend").inner_text().splitlines()
+        assert rows == [*(text for text in legend[:2]), "target (cross)", *legend[3:]]  # no force, a mark
         assert requests == [f"http://127.0.0.1:{port}/static/", f"http://127.0.0.1:{port}/static/main.min.js"]
         page.reload()  # a browser that comes later is told what holds now
         page.get_by_text("target (cross)").wait_for()

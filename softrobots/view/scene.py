@@ -125,12 +125,7 @@ class SceneBuilder:
         return Scene(poses, poses, self._reference())
 
     def trajectory(self, trajectory: Trajectory, seconds: float) -> dict[int, Scene]:
-        """Return the scenes of an animation by number of frame: waypoints, or, of a body that bends, evenly spaced shapes.
-
-        Args:
-            trajectory: A trajectory of the robot.
-            seconds: Duration of the animation [s].
-        """
+        """Return the scenes of an animation by number of frame: waypoints, or, of a body that bends, evenly spaced shapes."""
         frames = even_frames if self._model.structure.section_table else waypoint_frames
         return {frame.number: self._scene(frame, 4) for frame in frames(trajectory, seconds)}
 
@@ -172,15 +167,7 @@ class SceneBuilder:
 
 
 def wrinkling_level(equilibrium: Equilibrium, link: int) -> int:
-    """Return the place in `WRINKLING_COLOURS` of an inflated link at an equilibrium.
-
-    Args:
-        equilibrium: The loaded robot.
-        link: Number of the inflated link, from 0.
-
-    Returns:
-        The place; the last one means wrinkled.
-    """
+    """Return the place in `WRINKLING_COLOURS` of an inflated link, numbered from 0; the last one means wrinkled."""
     limit = equilibrium.model.spring_groups[link].wrinkling_moment
     moment = float(equilibrium.link_moments[link])
     if moment >= limit or equilibrium.saturated[link]:

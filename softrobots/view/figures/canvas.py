@@ -22,20 +22,12 @@ LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 2)), (0, (3, 1, 1, 1, 1,
 
 
 def plain_words(name: str) -> str:
-    """Return the name of a robot or joint for a figure: on one line, with the dollar sign of matplotlib's formulas escaped.
-
-    Args:
-        name: The name, from a file of unknown origin.
-    """
+    """Return a name from a file for a figure: on one line, with the dollar sign of matplotlib's formulas escaped."""
     return (name if name.isprintable() else name.encode("unicode_escape").decode()).replace("$", r"\$")
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Return matplotlib's colour, style and marker of a line; they repeat after six lines.
-
-    Args:
-        number: Number of the line, from 0.
-    """
+    """Return matplotlib's colour, style and marker of a line, numbered from 0; they repeat after six lines."""
     return {
         "color": COLOURS[number % len(COLOURS)],
         "ls": LINES[number % len(LINES)],

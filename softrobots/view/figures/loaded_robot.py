@@ -62,33 +62,30 @@ def shape(equilibrium: Equilibrium) -> Any:
         raise ParameterError("equilibrium", equilibrium, "an Equilibrium of a robot with sections")
     figure, axes = new_space((7.0, 7.0), "Shape under load")
     forces = dict(zip((muscle.name for muscle in equilibrium.model.muscles), equilibrium.muscle_forces, strict=True))
-    segments, labelled = body(equilibrium), set()
-
-    def label(text: str) -> str | None:
-        return None if text in labelled else labelled.add(text) or text  # type: ignore[func-returns-value]
-
-    model = equilibrium.model
+    segments, model = body(equilibrium), equilibrium.model
     lengths_given = model.muscle_input == "lengths" or not model.muscles
     unloaded = body_at(model, equilibrium.q_motors, model.rest) if lengths_given else ()
     meaning = "without load, same muscle lengths" if model.muscles else "without load"
     for segment in unloaded:
-        axes.plot(*segment.backbone.T, color="0.5", lw=1.5, ls=":", label=label(meaning))
+        axes.plot(*segment.backbone.T, color="0.5", lw=1.5, ls=":", label=meaning)
     for segment in segments:
-        axes.plot(*segment.backbone.T, color="0.15", lw=3.0, label=label("backbone"))
+        axes.plot(*segment.backbone.T, color="0.15", lw=3.0, label="backbone")
         for name, points in segment.muscles.items():
             pushes = forces[name] < 0.0
             text = "muscle that pushes" if pushes else "muscle that pulls"
-            axes.plot(*points.T, color=_PUSH if pushes else _PULL, lw=1.6, ls="--" if pushes else "-", label=label(text))
+            axes.plot(*points.T, color=_PUSH if pushes else _PULL, lw=1.6, ls="--" if pushes else "-", label=text)
         for name, points in segment.lines.items():
-            axes.plot(*points.T, color=_PULL, lw=1.6, label=label(name))
+            axes.plot(*points.T, color=_PULL, lw=1.6, label=name)
         turned = float(np.arccos(np.clip(np.sum(segment.poses[1:, :3, 2] * segment.poses[:-1, :3, 2], axis=1), -1, 1)).sum())
         rings = max(6, round(turned / 0.7))
         for pose in segment.poses[:: max(1, len(segment.poses) // rings)]:
             axes.plot(*_circle(pose, segment.radius).T, color="0.7", lw=0.8)
-        axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label=label("end of a segment"))
+        axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label="end of a segment")
     arrow = force_arrow(axes, equilibrium)
     equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
-    axes.legend(loc="upper left", fontsize=9)
+    handles, labels = axes.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))  # one line of each meaning
+    axes.legend(named.values(), named.keys(), loc="upper left", fontsize=9)
     return figure
 
 

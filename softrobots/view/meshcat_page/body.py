@@ -31,11 +31,8 @@ class BodyDrawing:
     def animate(self, animation: Any, scenes: Mapping[int, Scene]) -> None:
         """Draw the body of every scene and let an animation show one after the other: meshcat can switch visibility, not bend.
 
-        The tip of a growing tube is drawn round, and the wall that has not everted yet as a dark string inside.
-
-        Args:
-            animation: A meshcat animation.
-            scenes: Scenes by number of frame.
+        The tip of a growing tube is drawn round, and the wall that has not everted yet as a dark string inside. The scenes are
+        given by number of frame.
         """
         self._root.delete()
         numbers = sorted(scenes)

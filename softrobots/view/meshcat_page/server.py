@@ -50,15 +50,12 @@ def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str,
 
 def end_server(server: subprocess.Popen[bytes]) -> None:
     """End a server process and wait for its end."""
-    server.terminate()
-    try:
-        server.wait(5.0)
-    except subprocess.TimeoutExpired:
-        server.kill()
-        server.wait()
-    for stream in (server.stdin, server.stdout, server.stderr):
-        if stream is not None:
-            stream.close()
+    with server:  # closes its streams and waits
+        server.terminate()
+        try:
+            server.wait(5.0)
+        except subprocess.TimeoutExpired:
+            server.kill()
 
 
 def connect(zmq_url: str, web_url: str) -> Any:
