@@ -163,9 +163,11 @@ def _design(arguments: argparse.Namespace) -> None:
     facts = _tube_facts(arguments, design.shape, actuator, design.tube_length)
     deviation = design.deviation
     if deviation is not None:
-        off = (round(part, 12) + 0.0 for part in deviation[:2])  # without rounding errors
-        labels = {"radius_deviation": "radius, less the required", "turn_height_deviation": "rise of a turn, less the required"}
-        facts += [Fact(name, part, "m", text) for part, (name, text) in zip(off, labels.items(), strict=True)]
+        radius, turn_height = (round(part, 12) + 0.0 for part in deviation[:2])  # without rounding errors
+        facts += [
+            Fact("radius_deviation", radius, "m", "radius, less the required"),
+            Fact("turn_height_deviation", turn_height, "m", "rise of a turn, less the required"),
+        ]
     files: list[Path] = []
     if arguments.output is not None:
         files.append(design.save(arguments.output, overwrite=arguments.overwrite))

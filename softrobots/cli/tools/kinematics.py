@@ -72,7 +72,7 @@ def compare_kinematics(
 ) -> tuple[KinematicsRow, ...]:
     """Compare where tools place the links of a URDF with where Pinocchio places them.
 
-    Pinocchio reads the file by itself: nothing of this package stands between. Joint coordinates are drawn within the limits of
+    Pinocchio reads the file itself, without this package. Joint coordinates are drawn within the limits of
     the file, those of mimicking joints follow.
 
     Args:
@@ -96,23 +96,25 @@ def compare_kinematics(
     for tool in chosen:
         tool.load()
     with as_file(source) as (file, label):
-        truth = _pinocchio_poses(file, label, count, seed)
-        return tuple(_compare(tool, file, label, truth) for tool in chosen)
+        expected = _pinocchio_poses(file, label, count, seed)
+        return tuple(_compare(tool, file, label, expected) for tool in chosen)
 
 
 @dataclass(frozen=True)
-class _Truth:
+class _Expected:
+    """Movable joints of a file, and for each configuration their coordinates and Pinocchio's poses of the links."""
+
     joints: tuple[str, ...]
     values: tuple[Mapping[str, float], ...]
     poses: tuple[Poses, ...]
 
 
-def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow:
+def _compare(tool: Tool, file: Path, label: str, expected: _Expected) -> KinematicsRow:
     facts: dict[str, Any] = {
         "tool": tool.name,
         "version": str(tool.version),
         "file": label,
-        "joints_in_file": len(truth.joints),
+        "joints_in_file": len(expected.joints),
         "precision": tool.precision,
         "limits": tool.limits,
     }
@@ -120,28 +122,28 @@ def _compare(tool: Tool, file: Path, label: str, truth: _Truth) -> KinematicsRow
     try:
         with open_in(tool, file) as robot:
             loaded = time.perf_counter()
-            placed = [robot.poses(values) for values in truth.values]
+            placed = [robot.poses(values) for values in expected.values]
             finished = time.perf_counter()
     except SoftRobotsError:
         raise
-    except Exception as error:  # a tool raises what it likes if it refuses a file
-        facts |= {"joints": 0, "links": 0, "lost_links": tuple(truth.poses[0]), "position_error": 0.0, "rotation_error": 0.0}
+    except Exception as error:  # a tool may raise anything if it refuses a file
+        facts |= {"joints": 0, "links": 0, "lost_links": tuple(expected.poses[0]), "position_error": 0.0, "rotation_error": 0.0}
         problem = f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else 'no reason given'}"
         return KinematicsRow(**facts, load_time=time.perf_counter() - start, pose_time=0.0, problem=problem)
-    kept = [link for link in truth.poses[0] if link in placed[0]]
-    pairs = [(here[link], there[link]) for here, there in zip(placed, truth.poses, strict=True) for link in kept]
+    kept = [link for link in expected.poses[0] if link in placed[0]]
+    pairs = [(here[link], there[link]) for here, there in zip(placed, expected.poses, strict=True) for link in kept]
     errors = np.array([pose_error(one, other) for one, other in pairs]).reshape(-1, 2)
     broken = not np.all(np.isfinite(errors))
     position, rotation = (0.0, 0.0) if broken or not len(errors) else errors.max(axis=0).tolist()
     return KinematicsRow(
         **facts,
-        joints=len(set(robot.joints) & set(truth.joints)),
+        joints=len(set(robot.joints) & set(expected.joints)),
         links=len(kept),
-        lost_links=tuple(link for link in truth.poses[0] if link not in kept),
+        lost_links=tuple(link for link in expected.poses[0] if link not in kept),
         position_error=position,
         rotation_error=rotation,
         load_time=loaded - start,
-        pose_time=(finished - loaded) / len(truth.values),
+        pose_time=(finished - loaded) / len(expected.values),
         problem="a pose that is not finite" if broken else "",
     )
 
@@ -183,7 +185,7 @@ def is_urdf_file(path: Path) -> bool:
     return parse_xml(read_xml(path), str(path)).tag == "robot"
 
 
-def _pinocchio_poses(file: Path, label: str, count: int, seed: int) -> _Truth:
+def _pinocchio_poses(file: Path, label: str, count: int, seed: int) -> _Expected:
     """Joint coordinates within the limits, and Pinocchio's poses of every link there."""
     text, _ = read_source(file)
     root = parse_xml(text, str(file))
@@ -193,9 +195,9 @@ def _pinocchio_poses(file: Path, label: str, count: int, seed: int) -> _Truth:
         raise DescriptionError(f"Pinocchio refuses {label}: {error} (its parser prints the reason on stderr)") from error
     links = [link.get("name", "") for link in root.findall("link")]
     joints = {name: model.joints[model.getJointId(name)] for name in model.names if name != "universe"}
-    strange = [name for name, joint in joints.items() if joint.nv != 1]
-    if strange:
-        raise DescriptionError(f"{label} has joints that are not revolute, continuous or prismatic: {', '.join(strange)}")
+    unsupported = [name for name, joint in joints.items() if joint.nv != 1]
+    if unsupported:
+        raise DescriptionError(f"{label} has joints that are not revolute, continuous or prismatic: {', '.join(unsupported)}")
     if not 0 < len(joints) <= MAX_DOF:
         raise DescriptionError(f"{label} has {len(joints)} movable joints; from 1 to {MAX_DOF} can be compared")
     data, rng = model.createData(), np.random.default_rng(seed)
@@ -209,7 +211,7 @@ def _pinocchio_poses(file: Path, label: str, count: int, seed: int) -> _Truth:
         pin.framesForwardKinematics(model, data, q)
         values.append(drawn)
         poses.append({link: data.oMf[model.getFrameId(link, pin.FrameType.BODY)].homogeneous.copy() for link in links})
-    return _Truth(tuple(joints), tuple(values), tuple(poses))
+    return _Expected(tuple(joints), tuple(values), tuple(poses))
 
 
 def _draw(model: Any, joint: Any, rng: np.random.Generator) -> float:

@@ -1,4 +1,4 @@
-"""The packages that softrobots requires, out of its own metadata, and which of them are installed."""
+"""The packages that softrobots requires, from its own metadata, and which of them are installed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where each tool places the links of a URDF file: one adapter a tool, all of one form."""
+"""Where each tool places the links of a URDF file: one adapter per tool, a function of its module and the file."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _mimicking(file: Path) -> tuple[str, ...]:
 
 
 def _along_the_tree(file: Path, steps: Callable[[str, str], FloatArray]) -> dict[str, FloatArray]:
-    """Poses of all links out of the pose of each in its parent, `steps(child, parent)`."""
+    """Poses of all links from the pose of each in its parent, `steps(child, parent)`."""
     carriers = _carriers(file)
     poses: dict[str, FloatArray] = {}
     for link in carriers:
@@ -99,7 +99,7 @@ def _urchin(urchin: Any, file: Path) -> LoadedRobot:
 
 
 def _viser(extras: Any, file: Path) -> LoadedRobot:
-    """What `ViserUrdf` tells a server to draw, recorded instead of sent: no port is opened, and shapes are dropped."""
+    """Record what `ViserUrdf` would send to a server: no port is opened, and shapes are dropped."""
     import pinocchio as pin
 
     frames: dict[str, Any] = {}
