@@ -7,7 +7,6 @@ import numpy as np
 from softrobots.compiled.chain.elements import vector
 from softrobots.compiled.chain.elimination import eliminate_multipliers
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion_layout import load_outboard, sides, store_outboard
 from softrobots.compiled.chain.unknowns import Segment
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar
@@ -23,27 +22,25 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
     chain, recursion, tip, infix = plan.unknowns.chain, plan.recursion, plan.tip, plan.infix
     softness = [float(np.sum(1.0 / chain.stiffness[list(chain.held[group])])) for group in segment.groups]  # of each sum
     count = len(softness)
-    column_places = sides(recursion.column, None if tip is None else tip.column)
-    turn_places = sides(recursion.turn, None if tip is None else tip.turn)
     add = Block(f"add_multipliers_{infix}{number}", "Add the multipliers of a segment, without coupling.")
     add.store_all(recursion.matrix + 6, [0.0] * (count * (count + 7) // 2))
     if tip is None:
         add.store_all(recursion.gaps, [0.0] * count)
         add.store_all(recursion.constraint_torques, [0.0] * count)
-    for place in column_places:
+    for place in plan.columns:
         add.store_all(place + 3, [0.0] * count)
     eliminate = Block(f"eliminate_multipliers_{infix}{number}", "Eliminate the multipliers of a segment.", ("at",))
-    outboard, state = load_outboard(eliminate, recursion, 3 + count, tip)
+    outboard, state = plan.load_outboard(eliminate, 3 + count)
     gaps: list[Scalar] = [0.0] * count
     if tip is None:
         arrived = eliminate.loads(recursion.gaps, count)
         state = [*state, *arrived]
         gaps = [*arrived]
     eliminated, beyond = eliminate_multipliers(outboard, gaps, softness)
-    store_outboard(eliminate, recursion, beyond, tip)
+    plan.store_outboard(eliminate, beyond)
     eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
     solve = Block(f"solve_multipliers_{infix}{number}", "Find the multipliers of a segment.", ("at",), eliminate.trace)
-    turns = [solve.loads(place, 3) for place in turn_places]
+    turns = [solve.loads(place, 3) for place in plan.turns]
     sums = solve.loads(recursion.steps, 3)
     if tip is None:
         totals = eliminate.loads(recursion.constraint_torques, count)
@@ -54,7 +51,7 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
             error = error + torque * torque
         solve.store(recursion.steps + 1, error)
         state = [*state, *totals]
-    for side, (place, turn) in enumerate(zip(turn_places, turns, strict=True)):
+    for side, (place, turn) in enumerate(zip(plan.turns, turns, strict=True)):
         multipliers = eliminated.steps(side, vector(turn)).tolist()
         solve.store_all(place + 3, multipliers)
         if tip is not None:

@@ -1,4 +1,4 @@
-"""Places of the numbers of one case in the workspace of generated code."""
+"""Places of numbers in the workspace of generated code: of a case, of a looped recursion, of the response of its tip."""
 
 from __future__ import annotations
 
@@ -109,3 +109,89 @@ class Layout:
         places = {name.upper(): place for name, place in vars(self).items() if name not in ("unknowns", "singles", "prepared")}
         places |= {name.upper(): self.single(name) for name in SINGLES}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
+
+
+@dataclass(frozen=True)
+class RecursionLayout:
+    """Places of the sums, behind the numbers of the case.
+
+    Muscle lengths constrain at most three sums of a segment: bending about two axes, and elongation. So there are at most three
+    multipliers.
+    """
+
+    first: int
+    """First of the places."""
+    axes: int = field(init=False)
+    """Axes behind the last element of the outward pass (9)."""
+    lever: int = field(init=False)
+    """Levers of force and weight (6)."""
+    matrix: int = field(init=False)
+    """`P` of the elimination, upper triangle by columns (21)."""
+    column: int = field(init=False)
+    """`s` of the elimination (6)."""
+    turn: int = field(init=False)
+    """Turn of all elements nearer to the base, and multipliers (6)."""
+    sums: int = field(init=False)
+    """Elastic energy, squared weight, range margin, smallest pivot, number of negative pivots (5)."""
+    steps: int = field(init=False)
+    """Slope, squared residual, squared step (3)."""
+    gaps: int = field(init=False)
+    """Difference of the constrained sums of a segment from their given values (3)."""
+    constraint_torques: int = field(init=False)
+    """Sums of the torques of the constraints; in the step pass the mean of each (3)."""
+    force: int = field(init=False)
+    """Force and gravity in the axes behind the leading motors (6)."""
+    base: int = field(init=False)
+    """Axes and origin of the frame behind the leading motors (12)."""
+    end: int = field(init=False)
+    """The first place behind."""
+
+    def __post_init__(self) -> None:
+        """Compute the places."""
+        sums = dict(sums=5, steps=3, gaps=3, constraint_torques=3)
+        assign_places(self, self.first, axes=9, lever=6, matrix=21, column=6, turn=6, **sums, force=6, base=12, end=0)
+
+
+@dataclass(frozen=True)
+class TipLayout:
+    """Places of the response of the tip; `m` motor joints, `n` unknowns, `h` constraints, world axes, row by row."""
+
+    first: int
+    """First of the places."""
+    motors: int
+    """Number of motor joints."""
+    unknowns: int
+    """Number of unknowns."""
+    n_constraints: int
+    """Number of constrained sums."""
+    jacobian: int = field(init=False)
+    """Elastostatic Jacobian of the motor joints (3, m) [m/rad or m/m]."""
+    motor_torques: int = field(init=False)
+    """Load on each motor joint (m) [N m or N]."""
+    tip_columns: int = field(init=False)
+    """Derivative of the unknowns with respect to a force on the tip, `K^-1 J_k^T` (3, n) [rad/N or m/N]."""
+    constraint_loads: int = field(init=False)
+    """Load on each constrained sum (h) [N m or N]."""
+    constraint_columns: int = field(init=False)
+    """Derivative of the tip with respect to the constrained sums (3, h) [m/rad or -]."""
+    twists: int = field(init=False)
+    """Turn per motor joint of all beyond it, in the axes behind the leading motors (3, m)."""
+    column: int = field(init=False)
+    """`s` of the elimination of the three right-hand sides (18); see `RecursionLayout`."""
+    turn: int = field(init=False)
+    """Their turns of all elements nearer to the base, and multipliers (18)."""
+    bends: int = field(init=False)
+    """Their sums of `c x` over the strains so far (9)."""
+    end: int = field(init=False)
+    """The first place behind."""
+
+    def __post_init__(self) -> None:
+        """Compute the places."""
+        m, n, h = self.motors, self.unknowns, self.n_constraints
+        results = dict(jacobian=3 * m, motor_torques=m, tip_columns=3 * n, constraint_loads=h, constraint_columns=3 * h)
+        assign_places(self, self.first, **results, twists=3 * m, column=18, turn=18, bends=9, end=0)
+
+    def constants(self) -> dict[str, int]:
+        """Return the places of the results by their names in generated code."""
+        names = ("jacobian", "motor_torques", "tip_columns", "constraint_loads", "constraint_columns")
+        return {name.upper(): getattr(self, name) for name in names}

@@ -17,10 +17,9 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Load, constants, vector
 from softrobots.compiled.chain.elimination import Outboard
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
-from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout, load_outboard, sides, store_outboard
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Expression, Scalar
@@ -121,7 +120,7 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
         pivot_shift=pivot_shift if tip is None else 0.0,
     )
     back.store_all(recursion.lever, [one for load in result.loads for one in load.lever])
-    store_outboard(back, recursion, result.beyond, tip)
+    plan.store_outboard(back, result.beyond)
     if tip is None:
         state = [*state, *_store_constraints(back, element, result, recursion, multipliers)]
         back.store_all(
@@ -183,8 +182,8 @@ def _store_tip_step(
     step_pass: Block, back: Block, result: InwardPass, plan: Plan, tip: TipLayout, multipliers: int
 ) -> list[Expression]:
     """Trace the response of an element to a force on the tip; for a motor, its column of the Jacobian so far."""
-    layout, recursion = plan.layout, plan.recursion
-    turn_loads = [step_pass.loads(place, 3 + multipliers) for place in sides(recursion.turn, tip.turn)]
+    layout = plan.layout
+    turn_loads = [step_pass.loads(place, 3 + multipliers) for place in plan.turns]
     bend_loads = [step_pass.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
     if result.eliminated is None:
         twist, bend = result.motion.twists[:, 0], result.motion.bends[:, 0]
@@ -195,7 +194,7 @@ def _store_tip_step(
             back.store(tip.twists + axis * tip.motors, twist[axis], "q")
     else:
         steps = [result.eliminated.steps(side, vector(turn)) for side, turn in enumerate(turn_loads)]
-        for place, turn, step in zip(sides(recursion.turn, tip.turn), turn_loads, steps, strict=True):
+        for place, turn, step in zip(plan.turns, turn_loads, steps, strict=True):
             step_pass.store_all(place, (vector(turn) + result.twists @ step)[:3].tolist())
         for axis, (nearer, step) in enumerate(zip(bend_loads, steps[1:], strict=True)):
             step_pass.store_all(tip.tip_columns + axis * tip.unknowns - layout.unknown, step.tolist(), "q")
@@ -257,5 +256,5 @@ def _arriving(
     if plan.weight:
         loads.append(Load(vector(forces[3:]), vector(levers[3:]), element.mass_beyond))
     sums = block.loads(recursion.sums, 5)
-    beyond, state = load_outboard(block, recursion, 3 + multipliers, plan.tip)
+    beyond, state = plan.load_outboard(block, 3 + multipliers)
     return [*levers, *state, *sums], loads, beyond, Balance(sums[0], sums[1], sums[2])

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 from softrobots.compiled.chain.elements import Load, vector
 from softrobots.compiled.chain.elimination import Outboard
+from softrobots.compiled.chain.layout import RecursionLayout, TipLayout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, inward
-from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
 from softrobots.compiled.chain.unrolled_chain import seen_backwards
 from softrobots.compiled.trace.blocks import Block
 

@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.recursion_layout import RecursionLayout, TipLayout
+import numpy as np
+
+from softrobots.compiled.chain.elements import constants, vector
+from softrobots.compiled.chain.elimination import Outboard
+from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Expression
 
 
 @dataclass(frozen=True)
@@ -35,3 +40,39 @@ class Plan:
     def infix(self) -> str:
         """Part of the names of functions that tells those of the response of the tip from others."""
         return "" if self.tip is None else "tip_"
+
+    @property
+    def columns(self) -> list[int]:
+        """Place of `s` of the elimination for each right-hand side: of the balance, and of the three of the tip."""
+        return _sides(self.recursion.column, None if self.tip is None else self.tip.column)
+
+    @property
+    def turns(self) -> list[int]:
+        """Place of the turn of all elements nearer to the base, and of the multipliers, for each right-hand side."""
+        return _sides(self.recursion.turn, None if self.tip is None else self.tip.turn)
+
+    def load_outboard(self, block: Block, n: int) -> tuple[Outboard, list[Expression]]:
+        """Read the sums of the outboard elements, with `n` components; return them and the elements of matrix and columns."""
+        upper = block.loads(self.recursion.matrix, n * (n + 1) // 2)
+        columns = [block.loads(place, n) for place in self.columns]
+        matrix = constants(np.zeros((n, n)))
+        for (row, other), value in zip(_upper(n), upper, strict=True):
+            matrix[row, other] = matrix[other, row] = value
+        min_pivot, n_negative_pivots = block.loads(self.recursion.sums + 3, 2)
+        outboard = Outboard(matrix, [vector(column) for column in columns], min_pivot, n_negative_pivots)
+        return outboard, [*upper, *(one for column in columns for one in column)]
+
+    def store_outboard(self, block: Block, outboard: Outboard) -> None:
+        """Write the sums that an element hands on."""
+        block.store_all(self.recursion.matrix, [outboard.matrix[row, other] for row, other in _upper(len(outboard.matrix))])
+        for place, column in zip(self.columns, outboard.columns, strict=True):
+            block.store_all(place, column.tolist())
+
+
+def _sides(first: int, others: int | None) -> list[int]:
+    return [first] if others is None else [first, *(others + 6 * axis for axis in range(3))]
+
+
+def _upper(n: int) -> list[tuple[int, int]]:
+    """Indices of the upper triangle by columns: those of three rows come first."""
+    return [(row, column) for column in range(n) for row in range(column + 1)]

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled import settings
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.layout import Layout, TipLayout
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
 from softrobots.compiled.drivers import lane_drivers, motor_drivers, muscle_drivers, path_drivers, trigonometry

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, constants, vector
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.layout import Layout, RecursionLayout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance
-from softrobots.compiled.chain.recursion_layout import RecursionLayout
 from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.program.passes import decide, go_on, point_numbers
 from softrobots.compiled.trace.blocks import Block

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from softrobots.compiled.chain.constrained_segments import segment_blocks
-from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.layout import Layout, TipLayout
 from softrobots.compiled.chain.looped_chain import Kind, element_kinds
 from softrobots.compiled.chain.looped_tip import CONTROL as TIP_CONTROL
 from softrobots.compiled.chain.looped_tip import tip_frame
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import looped_frame
 from softrobots.compiled.trace.blocks import Block

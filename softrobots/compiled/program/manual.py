@@ -5,8 +5,8 @@ from __future__ import annotations
 import textwrap
 from typing import NamedTuple
 
+from softrobots.compiled.chain.layout import TipLayout
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion_layout import TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns, strains_of
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
