@@ -11,7 +11,7 @@ class Status(IntEnum):
     CERTIFIED = 0
     """In balance to 1e-10 of the load, and certified stable."""
     UNSTABLE = 1
-    """In balance, but not stable: neutral, or a saddle that the descent did not inward."""
+    """In balance, but not stable: neutral, or a saddle that the descent did not leave."""
     UNSETTLED = 2
     """Not in balance after the largest number of steps; also where a load presses a section to the end of its range."""
     OUT_OF_RANGE = 3

@@ -133,7 +133,7 @@ def _joints(document: UrdfDocument) -> Problems:
 
 
 def _mimics(document: UrdfDocument) -> Problems:
-    """A mimic of a mimic is misread by yourdfpy and urchin; a master outward of its follower is refused by Pinocchio."""
+    """A mimic of a mimic is misread by yourdfpy and urchin; Pinocchio refuses one of a joint off its path to the root."""
     mimics = {name: mimic for name, joint in document.moving.items() for mimic in joint.findall("mimic")}
     for name, mimic in mimics.items():
         master = mimic.get("joint", "")
