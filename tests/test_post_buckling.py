@@ -137,6 +137,71 @@ def test_the_arm_of_two_links_on_every_branch_by_the_dh_table(arm: sr.SoftModel)
     assert min(np.abs(one - descended).max() for one in stable) < 1e-9
 
 
+def stable_minima(stiffness: np.ndarray, force: float, rng: np.random.Generator, starts: int) -> list[np.ndarray]:
+    """Minima of the energy of the arm of two links under an axial push, by descent on the DH table from many starts."""
+    springs = rng.uniform(-2.5, 2.5, (starts, 4))
+    straight, pushes = np.zeros((starts, 3)), np.tile([-force, 0.0, 0.0], (starts, 1))
+    for _ in range(200):
+        residual, tangent, _ = arm_balance(straight, springs, pushes, stiffness)
+        lift = np.maximum(0.0, 0.05 * stiffness.min() - np.linalg.eigvalsh(tangent)[:, 0])
+        step = -np.linalg.solve(tangent + lift[:, None, None] * np.eye(4), residual[..., None])[..., 0]
+        springs = springs + step * np.minimum(1.0, 0.2 / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
+    residual, tangent, _ = arm_balance(straight, springs, pushes, stiffness)
+    settled = np.linalg.norm(residual, axis=1) < 1e-8 * stiffness.max()
+    lowest = settled & (np.linalg.eigvalsh(tangent)[:, 0] > 1e-6 * stiffness.min())
+    found: list[np.ndarray] = []
+    for point in springs[lowest]:
+        if all(np.abs(point - other).max() > 1e-5 for other in found):
+            found.append(point)
+    return found
+
+
+def compare_with_minima(stiffness: np.ndarray, beyond: float, rng: np.random.Generator, starts: int) -> int:
+    """The stable ends of the branches are the minima, no more and no fewer; their number."""
+    names = ("spring_1_side", "spring_1_up", "spring_2_side", "spring_2_up")
+    model = sr.load_model(sr.InflatableArm().urdf(), springs=dict(zip(names, stiffness.tolist(), strict=True)))
+    force = beyond * sr.critical_load(model, (0, 0, 0), PUSH)
+    found = by_label(sr.post_buckling_branches(model, (0, 0, 0), PUSH, max_force=force))
+    assert {branch.ended for branch in found.values()} == {"largest force"}
+    ends = [springs_of(branch)[-1] for branch in found.values() if branch.stable[-1]]
+    minima = stable_minima(stiffness, force, rng, starts)
+    for some, others in ((ends, minima), (minima, ends)):
+        for one in some:
+            assert min(np.abs(one - other).max() for other in others) < 1e-5
+    return len(ends)
+
+
+@pytest.mark.parametrize("difference", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+def test_springs_that_are_nearly_equal_have_all_four_stable_branches(difference: float, rng: np.random.Generator) -> None:
+    """Also where the second branches leave the path a little later, unstable, and become stable where they are crossed."""
+    stiffness = 172.71 * np.array([1.0, 1.0 + difference, 1.0, 1.0 + difference])
+    assert compare_with_minima(stiffness, 1.2, rng, 100) == 4
+
+
+@pytest.mark.study
+def test_no_stable_branch_of_a_random_arm_is_missed(rng: np.random.Generator) -> None:
+    """200 arms; in every other one the springs of a link are nearly equal."""
+    for case in range(200):
+        stiffness = 172.71 * np.exp(rng.uniform(-0.7, 0.7, 4))
+        if case % 2:
+            stiffness[1::2] = stiffness[::2] * (1.0 + 10.0 ** rng.uniform(-9.0, -2.0, 2))
+        compare_with_minima(stiffness, rng.uniform(1.02, 1.6), rng, 300)
+
+
+def test_branches_that_leave_branches_are_named_after_them() -> None:
+    """The branches of the stiffer direction become stable where saddles leave them; each is found once."""
+    found = by_label(sr.post_buckling_branches(link(172.71, 172.9), (0, 0), PUSH))
+    axes = {f"{sign}spring_1_{name}" for sign in "+-" for name in ("side", "up")}
+    saddles = {f"{up}spring_1_up > {side}spring_1_side" for up in "+-" for side in "+-"}
+    assert set(found) == {FUNDAMENTAL} | axes | saddles
+    assert found[FUNDAMENTAL].crossings == pytest.approx([172.71 / LEVER, 172.9 / LEVER], rel=1e-4)
+    for label in saddles:
+        parent = found[label.partition(" > ")[0]]
+        assert parent.crossings == pytest.approx(found[label].forces[:1], rel=1e-4)
+        assert parent.stable[-1]
+        assert not found[label].stable.any()
+
+
 @pytest.fixture(scope="module")
 def rod() -> sr.SoftModel:
     """A passive rod of three sections along z."""
@@ -163,15 +228,18 @@ def test_a_round_rod_buckles_into_a_ring_and_is_said_to_be_neutral(rod: sr.SoftM
         assert not turned.stable
 
 
-def test_a_rod_that_is_not_round_has_two_branches() -> None:
-    """The lumped rod under its weight, its hinges about x stiffer: it bows about y."""
-    made = sr.load_model(sr.PccArm(segment_lengths=(0.5,), chain="lumped", hinges=2, muscle_azimuths=()))
-    table = {name: (k * (1.2 if "bend_x" in name else 1.0), rest) for name, (k, rest) in made.spring_table.items()}
-    stiff = sr.load_model(made.urdf, springs=table)
+def test_a_rod_that_is_not_round_has_two_stable_branches() -> None:
+    """The lumped rod under its weight, its hinges about x stiffer: it bows about y; later, unstable, about x."""
+    lumped = sr.load_model(sr.PccArm(segment_lengths=(0.5,), chain="lumped", hinges=2, muscle_azimuths=()))
+    table = {name: (k * (1.2 if "bend_x" in name else 1.0), rest) for name, (k, rest) in lumped.spring_table.items()}
+    stiff = sr.load_model(lumped.urdf, springs=table)
     found = by_label(sr.post_buckling_branches(stiff, (), (0, 0, -1), gravity=sr.EARTH_GRAVITY))
-    assert len(found) == 3
-    assert all(label == FUNDAMENTAL or "bend_y" in label for label in found)
-    assert all(branch.stable[1:].all() for label, branch in found.items() if label != FUNDAMENTAL)
+    soft, hard = ([branch for label, branch in found.items() if f"bend_{axis}" in label] for axis in "yx")
+    assert len(found) == 5
+    assert len(soft) == len(hard) == 2
+    assert all(branch.stable[1:].all() for branch in soft)
+    assert not any(branch.stable.any() for branch in hard)
+    assert hard[0].forces[0] > 1.1 * soft[0].forces[0]
 
 
 def test_at_a_limit_point_the_path_itself_turns_back(arm: sr.SoftModel) -> None:

@@ -229,19 +229,32 @@ class ForcePath:
                 return FollowedPath([*points[:n_stable], there], crossings, "unstable")
         return FollowedPath(points, crossings, "points")
 
-    def last_stable(self, here: PathPoint, there: PathPoint) -> PathPoint:
-        """Bisect the loss of stability between a stable point of a path and the next down to rounding."""
-        start = self.place(here)
+    def before_change(self, here: PathPoint, there: PathPoint) -> PathPoint:
+        """Bisect, down to rounding, the last point between two that has as few eigenvalues below zero as the first."""
+        start, negative = self.place(here), int((self.eigenvalues(here) <= 0.0).sum())
         way = self.place(there) - start
         low, high, found = 0.0, 1.0, here
         while low < 0.5 * (low + high) < high:
             middle = 0.5 * (low + high)
             point = self.newton(start + middle * way, way[None], np.array([way @ start + middle * (way @ way)]))
-            if point is not None and point.force >= found.force and self.eigenvalues(point)[0] > 0.0:
+            # Where it is stable, the force rises along a path.
+            if point is None or (not negative and point.force < found.force):
+                high = middle
+            elif (self.eigenvalues(point) <= 0.0).sum() == negative:
                 low, found = middle, point
             else:
                 high = middle
         return found
+
+    def passes(self, points: list[PathPoint], other: PathPoint) -> bool:
+        """Whether the path goes through another point between some of its points, in order."""
+        places, aim = np.array([self.place(point) for point in points]), self.place(other)
+        ways = np.diff(places, axis=0)
+        shares = np.clip(((aim - places[:-1]) * ways).sum(axis=1) / (ways**2).sum(axis=1), 0.0, 1.0)[:, None]
+        nearest = places[:-1] + shares * ways
+        k = int(np.argmin(np.linalg.norm(nearest - aim, axis=1)))
+        there = self.newton(nearest[k], ways[k][None], np.array([ways[k] @ aim]))
+        return there is not None and bool(np.linalg.norm(self.place(there) - aim) <= _SHORTEST)
 
     def _direction(self, point: PathPoint, along: FloatArray) -> FloatArray:
         """Direction of the path at a point, with the sense of `along`."""

@@ -12,15 +12,18 @@ springs of equal stiffness) branches may leave in any direction of their plane: 
 vanishes at distance `a`. It vanishes in some directions only if the robot is not round (two springs of a universal joint, in
 fourth order: eight branches), and in all of them if it is (a section of constant strain). Then the buckled equilibria form a
 *ring*: each can be moved to the next without a force; it is neutral, not stable (`EquilibriumBranch.neutral`).
+
+The same is done wherever another path crosses the fundamental one later, or crosses a branch (a *secondary* crossing): there
+the number of negative eigenvalues changes although the force does not turn.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,7 +34,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.force_path import NEUTRAL, FollowedPath, ForcePath, PathPoint
-from softrobots.statics.stability import critical_point
+from softrobots.statics.stability import CriticalPoint, critical_point
 
 FUNDAMENTAL = "fundamental"
 """Label of the path from zero force."""
@@ -42,11 +45,11 @@ RING = "ring"
 BEYOND = 1.25
 """Default limit of the force on branches, relative to the critical force."""
 
-_AWAY = 0.03  # largest change of a spring at which a branch is sought [rad or m]
+_NEAR = 1e-3  # largest change of a spring at which a branch along one mode is sought [rad or m]
+_AWAY = 0.03  # the same in a plane of modes, where directions differ in fourth order only
 _DIRECTIONS = 48  # of a plane of modes in which branches are sought
 _ROUND = 1e-6  # torque across a direction that counts as zero, relative to the springs' at that distance
 _TIE = 0.99  # share of the largest change from which a spring is part of the label
-
 
 Found = TypeVar("Found")
 
@@ -56,7 +59,10 @@ class EquilibriumBranch:
     """A sequence of equilibria under a force that grows or falls."""
 
     label: str
-    """`FUNDAMENTAL`; `RING`; or the springs that move most at its start, with their sign, e.g. "+spring_1_up"."""
+    """`FUNDAMENTAL`; `RING`; or the springs that move most at its start, with their sign, e.g. "+spring_1_up".
+
+    A branch that leaves another branch has the label of that one before it, e.g. "+spring_1_up > -spring_1_side".
+    """
     equilibria: tuple[Equilibrium, ...]
     """Equilibria from zero force, or from the critical point, on."""
     forces: FloatArray
@@ -67,6 +73,8 @@ class EquilibriumBranch:
     """Elastic energy and potential of the load, shape (n,) [J]."""
     softest: FloatArray
     """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, shape (n,)."""
+    crossings: FloatArray
+    """Forces at which it crosses another path, or its stability jumps at a plateau, shape (k,) [N]."""
     ended: str
     """Why it ends: "largest force", "zero force", "end of range" of a section, "points", or "lost"."""
 
@@ -91,7 +99,7 @@ def post_buckling_branches(
     max_force: float | None = None,
     largest_step: float = 0.05,
 ) -> tuple[EquilibriumBranch, ...]:
-    """Follow the equilibrium path under a growing force, and every branch that leaves it at the critical load.
+    """Follow the equilibrium path under a growing force, every branch that leaves it, and the branches that leave those.
 
     At a limit point nothing branches off: the path itself turns back, and is followed to its end. Branches continue beyond the
     knee of a link with a largest moment.
@@ -107,38 +115,89 @@ def post_buckling_branches(
             as much as a radian.
 
     Returns:
-        The fundamental path first, then the branches, by label.
+        The fundamental path first, then the branches in the order of the crossings at which they were found, by label.
 
     Raises:
         ParameterError: If an argument is out of range, the model has no springs, or it is unstable under gravity alone.
         NameNotFound: If the frame does not exist.
         NoCriticalLoad: If the path is stable up to `max_force`, or as far as it could be followed.
-        NeutralEquilibrium: If more than two modes buckle at the same force, or a branch cannot be found where it begins.
+        NeutralEquilibrium: If more than two modes buckle at the critical force, or a branch cannot be found where it begins
+            there. At later crossings only those that are found are followed.
     """
     positive_number("largest_step", largest_step, "rad")
     critical = critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force)
     path = critical.path
     most = BEYOND * path.force if max_force is None else float(max_force)
     with one_blas_thread(model.n_springs):
-        origin, here = path.point(critical.origin, 0.0), path.point(path.springs, path.force)
-        modes = _modes(path, here) if critical.crosses else np.zeros((0, model.n_springs))
-        branches = [_branch(path, FUNDAMENTAL, modes, path.follow([origin], path.tangent(origin), most, largest_step))]
-        for label, there in sorted(_leaving(path, modes), key=lambda one: one[0]):
-            followed = path.follow([here, there], path.place(there), most, largest_step)
-            branches.append(_branch(path, label, modes, followed))
-    return tuple(branches)
-
-
-def _modes(path: ForcePath, critical: PathPoint) -> FloatArray:
-    """Buckling modes at the critical point, orthonormal, shape (1 or 2, n_springs)."""
-    stiffness = path.model.stiffness
-    values, vectors = np.linalg.eigh(scaled(critical.state.tangent, stiffness))
-    soft = vectors[:, values <= NEUTRAL] / np.sqrt(stiffness)[:, None]
-    if soft.shape[1] > 2:
-        raise NeutralEquilibrium(
-            f"{soft.shape[1]} modes buckle at {critical.force:.6g} N; branches are sought where one or two do"
+        origin = path.point(critical.origin, 0.0)
+        first = path.follow([origin], path.tangent(origin), most, largest_step)
+        modes = (
+            _modes(path, max([1, *(more for _, more in first.crossings[:1])]))
+            if critical.crosses
+            else np.zeros((0, model.n_springs))
         )
-    return np.asarray(np.linalg.qr(soft)[0].T)
+        found = [_Branch(FUNDAMENTAL, path, modes, first)]
+        if critical.crosses:
+            found += _leaving_branches(found, found[0], path, modes, most, largest_step)
+        for branch in found:  # those that leave it are added at the end
+            for crossing, modes in _crossings(branch, critical):
+                try:
+                    found += _leaving_branches(found, branch, crossing, modes, most, largest_step)
+                except NeutralEquilibrium:
+                    continue  # the crossing is named
+        return tuple(_result(branch) for branch in found)
+
+
+class _Branch(NamedTuple):
+    """A branch as it is found."""
+
+    label: str
+    path: ForcePath
+    """Its reference point is where the branch begins; the critical point of the fundamental path."""
+    modes: FloatArray
+    """Buckling modes there, shape (0 to 2, n_springs)."""
+    followed: FollowedPath
+
+
+def _modes(path: ForcePath, count: int) -> FloatArray:
+    """Buckling modes at the reference point, orthonormal: `count`, or all that are neutral, shape (1 or 2, n_springs).
+
+    Raises:
+        NeutralEquilibrium: If there are more than two.
+    """
+    stiffness = path.model.stiffness
+    values, vectors = np.linalg.eigh(scaled(path.point(path.springs, path.force).state.tangent, stiffness))
+    order = np.argsort(np.abs(values))[: max(count, int((np.abs(values) <= NEUTRAL).sum()))]
+    if len(order) > 2:
+        raise NeutralEquilibrium(f"{len(order)} modes buckle at {path.force:.6g} N; branches are sought where one or two do")
+    return np.asarray(np.linalg.qr(vectors[:, order] / np.sqrt(stiffness)[:, None])[0].T)
+
+
+def _crossings(branch: _Branch, critical: CriticalPoint) -> Iterator[tuple[ForcePath, FloatArray]]:
+    """Paths with their reference point where others cross a branch, beyond the critical point, and the modes there."""
+    if branch.label == RING:
+        return
+    points = branch.followed.points
+    for number, more in branch.followed.crossings[int(branch.label == FUNDAMENTAL and critical.crosses) :]:
+        last = branch.path.before_change(points[number - 1], points[number])
+        crossing = replace(branch.path, springs=last.springs, force=last.force)
+        if np.abs(branch.path.eigenvalues(last)).min() <= NEUTRAL:  # else a link comes onto its plateau
+            yield crossing, _modes(crossing, abs(more))
+
+
+def _leaving_branches(
+    known: list[_Branch], parent: _Branch, path: ForcePath, modes: FloatArray, largest_force: float, largest_step: float
+) -> list[_Branch]:
+    """The branches, not known yet, that leave a path at its reference point."""
+    here, new = path.point(path.springs, path.force), []
+    for name, there in sorted(_leaving(path, modes), key=lambda one: one[0]):
+        if any(branch.path.passes(branch.followed.points, there) for branch in known):
+            continue
+        label = name if parent.label == FUNDAMENTAL else f"{parent.label} > {name}"
+        if any(branch.label == label for branch in known):
+            label += f" at {path.force:.6g} N"
+        new.append(_Branch(label, path, modes, path.follow([here, there], path.place(there), largest_force, largest_step)))
+    return new
 
 
 def _leaving(path: ForcePath, modes: FloatArray) -> list[tuple[str, PathPoint]]:
@@ -152,16 +211,21 @@ def _leaving(path: ForcePath, modes: FloatArray) -> list[tuple[str, PathPoint]]:
         along = np.cos(angle) * modes[0] + np.sin(angle) * modes[1]
         return along, _at_distance(path, along, np.cos(angle) * modes[1] - np.sin(angle) * modes[0])
 
+    def across(angle: float) -> float:
+        point = at(angle)[1]
+        return math.nan if point is None else point.across
+
     between = 2.0 * np.pi / _DIRECTIONS
     around = [(angle, *at(angle)) for angle in (between * (np.arange(_DIRECTIONS) + 0.5)).tolist()]
     known = [(angle, along, point) for angle, along, point in around if point is not None]
     _all_found(path, len(around), known)
     crossings = (
-        at(_zero(lambda angle: _across(at(angle)[1]), low, low + (high - low) % (2.0 * np.pi)))
+        at(_zero(across, low, low + (high - low) % (2.0 * np.pi)))
         for (low, _, one), (high, _, other) in zip(known, [*known[1:], *known[:1]], strict=True)
         if one.across * other.across < 0.0 and (high - low) % (2.0 * np.pi) < 1.5 * between
     )
-    if all(abs(point.across) <= _ROUND * _torque_at(path, along) for _, along, point in known):
+    torques = [np.linalg.norm(path.model.stiffness * along) * _distance(path.model, along) for _, along, _ in known]
+    if all(abs(point.across) <= _ROUND * torque for (_, _, point), torque in zip(known, torques, strict=True)):
         # Nearly round: a point without torque across.
         balanced = (point for _, _, point in known if point.across == 0.0)
         found = next(balanced, None) or next((point for _, point in crossings if point is not None), None)
@@ -180,18 +244,13 @@ def _all_found(path: ForcePath, least: int, found: list[Found]) -> list[Found]:
     return found
 
 
-def _distance(model: SoftModel, along: FloatArray) -> float:
+def _distance(model: SoftModel, along: FloatArray, largest: float = _AWAY) -> float:
     """Distance along a unit vector at which branches are sought: before the knee of any link."""
     stiffness = model.stiffness
     knees = [
         group.max_moment / float(stiffness[group.springs[0]]) for group in model.spring_groups if group.max_moment is not None
     ]
-    return min([_AWAY, *(0.5 * knee for knee in knees)]) / float(np.abs(along).max())
-
-
-def _torque_at(path: ForcePath, along: FloatArray) -> float:
-    """Torque of the springs at that distance."""
-    return float(np.linalg.norm(path.model.stiffness * along)) * _distance(path.model, along)
+    return min([largest, *(0.5 * knee for knee in knees)]) / float(np.abs(along).max())
 
 
 def _at_distance(path: ForcePath, along: FloatArray, across: FloatArray | None = None) -> PathPoint | None:
@@ -199,26 +258,27 @@ def _at_distance(path: ForcePath, along: FloatArray, across: FloatArray | None =
     guides = np.zeros((0, len(along))) if across is None else across[None]
     rows = np.concatenate([along[None], guides])
     aims = np.zeros(len(rows))
-    aims[0] = _distance(path.model, along)
+    aims[0] = _distance(path.model, along, _NEAR if across is None else _AWAY)
     return path.newton(np.append(aims[0] * along, 0.0), np.column_stack([rows, np.zeros(len(rows))]), aims, guides)
 
 
-def _branch(path: ForcePath, label: str, modes: FloatArray, followed: FollowedPath) -> EquilibriumBranch:
-    points = followed.points
+def _result(branch: _Branch) -> EquilibriumBranch:
+    path, points = branch.path, branch.followed.points
     equilibria = tuple(
         equilibrium_from_state(path.model, path.motors, path.load(point.force), point.state, method="newton", iterations=number)
         for number, point in enumerate(points)
     )
-    away = [float(np.linalg.norm(modes @ (point.springs - path.springs))) for point in points]
-    min_eigenvalues = [float(path.eigenvalues(point)[0]) for point in points]
     return EquilibriumBranch(
-        label=label,
+        label=branch.label,
         equilibria=equilibria,
         forces=read_only(np.array([point.force for point in points])),
-        amplitude=read_only(np.array(away)),
+        amplitude=read_only(
+            np.array([float(np.linalg.norm(branch.modes @ (point.springs - path.springs))) for point in points])
+        ),
         energy=read_only(np.array([point.state.energy for point in points])),
-        softest=read_only(np.array(min_eigenvalues)),
-        ended=followed.ended,
+        softest=read_only(np.array([float(path.eigenvalues(point)[0]) for point in points])),
+        crossings=read_only(np.array([points[number].force for number, _ in branch.followed.crossings])),
+        ended=branch.followed.ended,
     )
 
 
@@ -227,10 +287,6 @@ def _name(model: SoftModel, along: FloatArray) -> str:
     largest = float(np.abs(along).max())
     names = zip(model.spring_joints, along.tolist(), strict=True)
     return " ".join(f"{'+' if value > 0.0 else '-'}{name}" for name, value in names if abs(value) >= _TIE * largest)
-
-
-def _across(point: PathPoint | None) -> float:
-    return math.nan if point is None else point.across
 
 
 def _zero(function: Callable[[float], float], low: float, high: float) -> float:

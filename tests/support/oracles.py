@@ -105,7 +105,7 @@ def paper_closed_loop(
 
 
 def arm_balance(
-    motors: np.ndarray, springs: np.ndarray, forces: np.ndarray, stiffness: float
+    motors: np.ndarray, springs: np.ndarray, forces: np.ndarray, stiffness: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residual (n, 4), tangent stiffness (n, 4, 4) and tip (n, 3) of the weightless paper's arm, for n cases.
 
