@@ -324,11 +324,11 @@ def extras() -> dict[str, set[str]]:
 
 
 def test_the_extra_that_an_error_names_holds_the_package() -> None:
-    """Every `MissingDependency(package, extra)` of the source with words for both."""
+    """Every `MissingDependency(package, extra)`, and `of_imports` of it, in the source with words for both."""
     known, seen = extras(), 0
     for file in PACKAGE.rglob("*.py"):
         for node in nodes_of(file):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "MissingDependency":
+            if isinstance(node, ast.Call) and ast.unparse(node.func).removesuffix(".of_imports") == "MissingDependency":
                 words = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
                 if len(words) == 2:
                     seen += 1

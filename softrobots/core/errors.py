@@ -7,7 +7,8 @@ from the built-in exception that a caller would expect.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -156,6 +157,15 @@ class MissingDependency(SoftRobotsError, ImportError):
     def __init__(self, package: str, extra: str) -> None:
         """Create the error with the command that installs the extra."""
         super().__init__(f"{package} is not installed; it is part of an extra: pip install 'softrobots[{extra}]'")
+
+    @classmethod
+    @contextmanager
+    def of_imports(cls, package: str, extra: str) -> Iterator[None]:
+        """Raise this error if an import in the block fails."""
+        try:
+            yield
+        except ImportError as error:
+            raise cls(package, extra) from error
 
 
 def _rebuild(kind: type[SoftRobotsError], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> SoftRobotsError:

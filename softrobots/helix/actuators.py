@@ -216,10 +216,8 @@ class ActuatorTable:
     @cached_property
     def _cubic(self) -> Any:
         """SciPy's monotone cubic interpolation of the rows."""
-        try:
+        with MissingDependency.of_imports("scipy", "helix"):
             from scipy.interpolate import PchipInterpolator
-        except ImportError as error:
-            raise MissingDependency("scipy", "helix") from error
         return PchipInterpolator(self.pressure, self.contraction)
 
 

@@ -228,10 +228,8 @@ def _integrate(
     parts: list[tuple[_Piece, FloatArray]], *, scale: float, accuracy: float, longest: float, budget: int
 ) -> FloatArray:
     """States at the samples in each piece, shape (n, 8)."""
-    try:
+    with MissingDependency.of_imports("scipy", "helix"):
         from scipy.integrate import solve_ivp
-    except ImportError as error:
-        raise MissingDependency("scipy", "helix") from error
     starts = [piece.start for piece, _ in parts[1:]]
     evaluations = 0
 

@@ -45,10 +45,8 @@ def open_browser() -> Iterator[Any]:
         MissingDependency: If Playwright is not installed.
     """
     path = find_chromium()
-    try:
+    with MissingDependency.of_imports("playwright", "pictures"):
         from playwright.sync_api import sync_playwright
-    except ImportError as error:
-        raise MissingDependency("playwright", "pictures") from error
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(_OPTIONS))
         try:

@@ -55,12 +55,10 @@ def _in_threads(work: Callable[[Block], Answer], blocks: Sequence[Block], thread
 
 
 def _on_cluster(work: Callable[[Block], Answer], blocks: Sequence[Block], address: str) -> Iterator[tuple[int, Answer]]:
-    try:
+    with MissingDependency.of_imports("distributed", "cluster"):
         from distributed import Client
         from distributed import as_completed as as_completed_there
         from distributed.comm.addressing import parse_host_port
-    except ImportError as error:
-        raise MissingDependency("distributed", "cluster") from error
     try:
         parse_host_port(address)
     except (AttributeError, TypeError, ValueError) as error:  # a client of such an address takes a minute to close

@@ -43,10 +43,8 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
         DescriptionError: If MuJoCo refuses it, it has no bodies, a number is not finite, it has a feature listed in
             `softrobots.description.readers.mjcf_refusals`, or exceeds a limit of `softrobots.description.readers.mjcf_limits`.
     """
-    try:
+    with MissingDependency.of_imports("mujoco", "interop"):
         import mujoco
-    except ImportError as error:
-        raise MissingDependency("mujoco", "interop") from error
     check_mjcf(parse_xml(text, source), source, path)
     try:
         model = mujoco.MjModel.from_xml_string(text) if path is None else mujoco.MjModel.from_xml_path(str(path))

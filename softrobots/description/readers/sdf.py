@@ -55,11 +55,9 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
             ones, other force elements than springs, constraints, or a feature listed in
             `softrobots.description.readers.sdf_refusals`.
     """
-    try:
+    with MissingDependency.of_imports("drake", "interop"):
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.plant import MultibodyPlant
-    except ImportError as error:
-        raise MissingDependency("drake", "interop") from error
     root = parse_xml(text, source)
     for kind, most in _MOST.items():
         count = sum(1 for _ in root.iter(kind))

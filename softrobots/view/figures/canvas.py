@@ -42,10 +42,8 @@ def require_matplotlib() -> Any:
     Raises:
         MissingDependency: If matplotlib is not installed.
     """
-    try:
+    with MissingDependency.of_imports("matplotlib", "plot"):
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingDependency("matplotlib", "plot") from error
     return Figure
 
 

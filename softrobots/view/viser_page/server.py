@@ -31,11 +31,9 @@ def start_server(label: str, port: int | None = None) -> Any:
         MissingDependency: If viser is not installed.
         ViewerError: If the port is not free.
     """
-    try:
+    with MissingDependency.of_imports("viser", "viser"):
         import rich
         import viser
-    except ImportError as error:
-        raise MissingDependency("viser", "viser") from error
 
     class Server(viser.ViserServer):  # type: ignore[misc]
         """Viser's server without the public tunnel that any page which finds the port could request."""
