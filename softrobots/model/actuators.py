@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.muscle_lengths import MuscleLengths
 
@@ -63,8 +64,9 @@ class Actuators:
     def checked(self, value: Any, field: str) -> FloatArray:
         """Return positions that the robot can have, as a new array; see `SoftModel.checked_motors`."""
         motors = finite_array(field, value, (len(self.names),), self._unit)
-        if self._lengths is not None:
-            self._lengths.check(field, motors)
+        requirement = None if self._lengths is None else self._lengths.refusal(motors)
+        if requirement is not None:
+            raise ParameterError(field, motors, requirement)
         return motors
 
     def admit(self, motors: FloatArray) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING
 from softrobots.core.checks import FloatArray, read_only
-from softrobots.core.errors import DescriptionError, ParameterError
+from softrobots.core.errors import DescriptionError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.coordinates import Coordinates, ReducedLoad
 from softrobots.model.joint_loads import JointLoad
@@ -135,19 +135,11 @@ class MuscleLengths:
         basis[count:, count:] = scale[count:, None] * directions
         return basis
 
-    def check(self, field: str, motors: FloatArray) -> None:
-        """Refuse lengths that the robot cannot have.
-
-        Raises:
-            ParameterError: If a length is not positive, if no arc explains the lengths of a segment, or if they would bend a
-                section beyond the range of the chain or leave it without length.
-        """
-        requirement = self.refusal(motors)
-        if requirement is not None:
-            raise ParameterError(field, motors, requirement)
-
     def refusal(self, motors: FloatArray) -> str | None:
-        """Return the requirement that muscle lengths fail; None if the robot can have them."""
+        """Return the requirement that muscle lengths fail; None if the robot can have them.
+
+        They are positive, one arc explains those of a segment, and no section bends beyond its range or loses its length.
+        """
         if np.any(motors[len(motors) - len(self._tags) :] <= 0.0):
             return "positive muscle lengths [m]"
         change = self._change(motors)
