@@ -95,8 +95,9 @@ def critical_point(
             last = path.before_change(*followed.points[-2:])
             crosses = bool(followed.crossings) and path.eigenvalues(last)[0] <= NEUTRAL
             return CriticalPoint(replace(path, springs=last.springs, force=last.force), bool(crosses), path.springs)
-    reached = followed.points[-1].force
+    complete = followed.ended == "largest force"
+    reached = largest if complete else followed.points[-1].force
     message = f"the equilibrium stays stable up to {reached:.6g} N along {path.unit.tolist()}"
-    if followed.ended != "largest force":
+    if not complete:
         message += f"; its path could not be followed further (limit: {largest:.6g} N)"
     raise NoCriticalLoad(message, max_force=reached)
