@@ -290,7 +290,7 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
     force = rng.normal(size=3) * size
     load = Load.of(model, force, gravity=gravity)
     run = program_at(model, motors, force, gravity)
-    actuation, held = run[2], len(model.chain().held)
+    actuation, held = run[2], len(model.chain().constrained)
     offsets = []
     for _ in range(3):
         springs = model.rest + 0.3 * (drawn(model, rng)[1] - model.rest)

@@ -284,9 +284,6 @@ def test_newton_counts_its_states_and_gives_up_where_it_is_told(arm: sr.SoftMode
     assert loose is not None
     assert fewer < needed
     assert largest_residual(arm, found.scale, 1e-10) < loose.error <= largest_residual(arm, found.scale, 1e-3)
-    first = np.linalg.norm(np.linalg.solve(tangent_of(arm, REST, force), residual_of(arm, REST, force)))
-    assert newton(arm, MOTORS, load, REST, largest_step=1.0001 * first)[0] is not None
-    assert newton(arm, MOTORS, load, REST, largest_step=0.9999 * first) == (None, 1)
 
 
 def test_newton_gives_up_at_a_singular_tangent_and_a_step_of_half_a_radian() -> None:

@@ -688,6 +688,31 @@ def test_points_off_the_line_are_refused(arc: Any):
         pinch_pattern(REFERENCE, 0.02).locate(arc)
 
 
+def test_rounding_beyond_the_ends_of_the_line_is_no_error():
+    """A part in 1e9 of the line."""
+    plan = pinch_pattern((0.5, 0.1, D, 7.0), 0.02)
+    for arc in (-0.9e-9 * plan.line_length, (1.0 + 0.9e-9) * plan.line_length):
+        assert float(plan.locate(arc).arc) == arc
+    for arc in (-1.1e-9 * plan.line_length, (1.0 + 1.1e-9) * plan.line_length):
+        assert refused(lambda arc=arc: plan.locate(arc)).field == "arc"
+
+
+def test_rounding_at_the_seam_starts_the_next_wrap():
+    """Just before the seam a point rounds to a whole turn: the seam itself, in whole wraps, never at its far side."""
+    plan = pinch_pattern((0.5, 0.1, D, 1.0), 0.02, handedness="left")
+    found = plan.locate([0.0, 1e-20, 1e-3])
+    assert found.wrap.dtype == np.int64
+    assert found.wrap.tolist() == [0, 0, -1]
+    assert found.y[:2].tolist() == [0.0, 0.0]
+    assert found.y[2] == pytest.approx(math.pi * D - 1e-3 * math.sin(0.1), abs=1e-15)
+
+
+def test_what_is_no_pattern_is_refused_by_name():
+    error = refused(lambda: helix.discrete_centre_line(REFERENCE))
+    assert (error.field, error.value) == ("pattern", REFERENCE)
+    assert "pattern must be a Pattern (returned by helix.pinch_pattern)" in str(error)
+
+
 @each_row(
     ("call", "arguments"),
     [

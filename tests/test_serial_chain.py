@@ -155,7 +155,7 @@ def test_motors_springs_and_limits_are_those_of_the_model() -> None:
     assert chain.stiffness.tolist() == [900.0, 30.0]
     assert chain.rest.tolist() == [0.02, -0.1]
     assert chain.limits.tolist() == [[-2.0, 2.0], [-np.inf, np.inf]]
-    assert (chain.n_motors, chain.reach, chain.held) == (2, model.reach, ())
+    assert (chain.n_motors, chain.reach, chain.constrained) == (2, model.reach, ())
 
 
 @pytest.mark.parametrize("kind", ["pcc", "pcc_lumped", "uneven", "stacked", "four"])
@@ -163,14 +163,16 @@ def test_muscle_lengths_hold_sums_of_strains(kind: str, rng: np.random.Generator
     """For any lengths that fit together and any elastic coordinates, and with four muscles a segment too."""
     model = pcc(elastic_sections=3, muscle_azimuths=(0.0, 1.5, 3.0, 4.5)) if kind == "four" else ROBOTS[kind]()
     chain = model.chain()
-    assert len(chain.held) == 6  # two bendings and the elongation of two segments
-    assert sorted({place for group in chain.held for place in group}) == np.flatnonzero(chain.spread.any(axis=1)).tolist()
+    assert len(chain.constrained) == 6  # two bendings and the elongation of two segments
+    assert (
+        sorted({place for group in chain.constrained for place in group}) == np.flatnonzero(chain.spread.any(axis=1)).tolist()
+    )
     for _ in range(3):
         motors, elastic = drawn(model, rng)
         change = motors[chain.n_motors :] - chain.muscle_rest
         strains = chain.spread @ change + chain.free @ elastic
-        sums = np.array([strains[list(group)].sum() for group in chain.held])
-        assert np.abs(sums - chain.held_slope @ change).max() < 1e-13  # rad; rounding of a radian
+        sums = np.array([strains[list(group)].sum() for group in chain.constrained])
+        assert np.abs(sums - chain.constrained_slope @ change).max() < 1e-13  # rad; rounding of a radian
         assert np.abs(chain.muscle_matrix @ strains - change).max() < 1e-13  # m: those are the lengths
         assert np.abs(chain.elastic @ strains - elastic).max() < 1e-12
 
@@ -188,7 +190,7 @@ def test_elastic_coordinates_do_without_what_lengths_prescribe(kind: str) -> Non
 def test_tensions_hold_nothing() -> None:
     chain = ROBOTS["pcc_forces"]().chain()
     assert chain.muscle_input == "forces"
-    assert (chain.held, chain.held_slope.shape, chain.muscle_matrix.shape) == ((), (0, 6), (6, 16))
+    assert (chain.constrained, chain.constrained_slope.shape, chain.muscle_matrix.shape) == ((), (0, 6), (6, 16))
     assert np.array_equal(chain.elastic, np.eye(16))
     assert np.array_equal(chain.free, np.eye(16))
     assert not chain.spread.any()

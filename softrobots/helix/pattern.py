@@ -239,7 +239,7 @@ def _sheet_points(arc: FloatArray, angle: float, diameter: float, handedness: st
     wrap = np.where(y >= around, wrap + 1.0, wrap)
     y = np.where((y >= around) | (y < 0.0), 0.0, y)  # rounding at the seam
     x = math.cos(angle) * arc
-    arc, x, y = (read_only(np.array(values, dtype=np.float64)) for values in (arc, x, y))
+    arc, x, y = (read_only(np.array(values)) for values in (arc, x, y))
     wraps = wrap.astype(np.int64)
     wraps.setflags(write=False)
     return SheetPoints(arc, x, y, wraps)

@@ -97,9 +97,9 @@ class SerialChain:
     """Muscle lengths where the strains are zero, shape (n_muscles,) [m]."""
     muscle_matrix: FloatArray
     """Derivative of the muscle lengths with respect to the strains, shape (n_muscles, n_strains)."""
-    held: tuple[tuple[int, ...], ...]
+    constrained: tuple[tuple[int, ...], ...]
     """Groups of strains whose sum the given muscle lengths constrain, base to tip; empty without given lengths."""
-    held_slope: FloatArray
+    constrained_slope: FloatArray
     """Derivative of those sums with respect to the muscle lengths, shape (n_groups, n_muscles)."""
     elastic: FloatArray
     """Elastic coordinates by strains, shape (n_springs, n_strains); the identity without given lengths."""

@@ -213,9 +213,8 @@ def newton(
     *,
     tolerance: float = TOLERANCE,
     max_iterations: int = 20,
-    largest_step: float = LARGEST_STEP,
 ) -> tuple[ElasticState | None, int]:
-    """Undamped Newton, also to unstable equilibria; gives up at a singular tangent or a step above `largest_step`.
+    """Undamped Newton, also to unstable equilibria; gives up at a singular tangent or a step above `LARGEST_STEP`.
 
     Returns:
         The equilibrium, or None, and the evaluations spent.
@@ -229,7 +228,7 @@ def newton(
             step = np.linalg.solve(state.tangent, -state.residual)
         except np.linalg.LinAlgError:
             return None, iteration
-        if float(step @ step) > largest_step**2:
+        if float(step @ step) > LARGEST_STEP**2:
             return None, iteration
         state = problem.state(state.q_springs + step)
     return None, max_iterations

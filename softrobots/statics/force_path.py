@@ -229,18 +229,18 @@ class ForcePath:
                 return FollowedPath([*points[:n_stable], there], crossings, "unstable")
         return FollowedPath(points, crossings, "points")
 
-    def before_change(self, here: PathPoint, there: PathPoint) -> PathPoint:
-        """Bisect, down to rounding, the last point between two that has as few eigenvalues below zero as the first."""
-        start, negative = self.place(here), int((self.eigenvalues(here) <= 0.0).sum())
+    def before_change(self, here: PathPoint, there: PathPoint, level: float = 0.0) -> PathPoint:
+        """Bisect, down to rounding, the last point between two that has as many eigenvalues up to a level as the first."""
+        start, below = self.place(here), int((self.eigenvalues(here) <= level).sum())
         way = self.place(there) - start
         low, high, found = 0.0, 1.0, here
         while low < 0.5 * (low + high) < high:
             middle = 0.5 * (low + high)
             point = self.newton(start + middle * way, way[None], np.array([way @ start + middle * (way @ way)]))
             # Where it is stable, the force rises along a path.
-            if point is None or (not negative and point.force < found.force):
+            if point is None or (not below and point.force < found.force):
                 high = middle
-            elif (self.eigenvalues(point) <= 0.0).sum() == negative:
+            elif (self.eigenvalues(point) <= level).sum() == below:
                 low, found = middle, point
             else:
                 high = middle

@@ -61,7 +61,7 @@ class EquilibriumBranch:
     label: str
     """`FUNDAMENTAL`; `RING`; or the springs that move most at its start, with their sign, e.g. "+spring_1_up".
 
-    A branch that leaves another branch has the label of that one before it, e.g. "+spring_1_up > -spring_1_side".
+    A branch that leaves another has its label in front, "+spring_1_up > -spring_1_side"; namesakes are numbered.
     """
     equilibria: tuple[Equilibrium, ...]
     """Equilibria from zero force, or from the critical point, on."""
@@ -179,9 +179,9 @@ def _crossings(branch: _Branch, critical: CriticalPoint) -> Iterator[tuple[Force
         return
     points = branch.followed.points
     for number, more in branch.followed.crossings[int(branch.label == FUNDAMENTAL and critical.crosses) :]:
-        last = branch.path.before_change(points[number - 1], points[number])
+        last = branch.path.before_change(points[number - 1], points[number], -NEUTRAL)
         crossing = replace(branch.path, springs=last.springs, force=last.force)
-        if np.abs(branch.path.eigenvalues(last)).min() <= NEUTRAL:  # else a link comes onto its plateau
+        if np.abs(branch.path.eigenvalues(last)).min() <= 2.0 * NEUTRAL:  # else a link comes onto its plateau
             yield crossing, _modes(crossing, abs(more))
 
 
@@ -191,11 +191,11 @@ def _leaving_branches(
     """The branches, not known yet, that leave a path at its reference point."""
     here, new = path.point(path.springs, path.force), []
     for name, there in sorted(_leaving(path, modes), key=lambda one: one[0]):
-        if any(branch.path.passes(branch.followed.points, there) for branch in known):
+        if any(branch.path.passes(branch.followed.points, there) for branch in known + new):
             continue
-        label = name if parent.label == FUNDAMENTAL else f"{parent.label} > {name}"
-        if any(branch.label == label for branch in known):
-            label += f" at {path.force:.6g} N"
+        name = name if parent.label == FUNDAMENTAL else f"{parent.label} > {name}"
+        namesakes = sum(branch.label.partition(" (")[0] == name for branch in known + new)
+        label = f"{name} ({namesakes + 1})" if namesakes else name
         new.append(_Branch(label, path, modes, path.follow([here, there], path.place(there), largest_force, largest_step)))
     return new
 

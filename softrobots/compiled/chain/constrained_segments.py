@@ -20,7 +20,7 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
         and the size of the record.
     """
     chain, recursion, tip, infix = plan.unknowns.chain, plan.recursion, plan.tip, plan.infix
-    softness = [float(np.sum(1.0 / chain.stiffness[list(chain.held[group])])) for group in segment.groups]  # of each sum
+    softness = [float(np.sum(1.0 / chain.stiffness[list(chain.constrained[group])])) for group in segment.groups]  # of each sum
     count = len(softness)
     add = Block(f"add_multipliers_{infix}{number}", "Add the multipliers of a segment, without coupling.")
     add.store_all(recursion.matrix + 6, [0.0] * (count * (count + 7) // 2))
@@ -46,7 +46,7 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
         totals = eliminate.loads(recursion.constraint_torques, count)
         error: Scalar = sums[1]
         for place, (group, total, gap, soft) in enumerate(zip(segment.groups, totals, gaps, softness, strict=True)):
-            solve.store(recursion.constraint_torques + place, total * (1.0 / len(chain.held[group])))
+            solve.store(recursion.constraint_torques + place, total * (1.0 / len(chain.constrained[group])))
             torque = gap * (1.0 / soft)  # of closing the gap
             error = error + torque * torque
         solve.store(recursion.steps + 1, error)

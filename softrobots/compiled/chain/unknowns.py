@@ -28,7 +28,7 @@ class Segment(NamedTuple):
     last: int
     """Its last element."""
     groups: tuple[int, ...]
-    """Its groups of `SerialChain.held`, one multiplier each."""
+    """Its groups of `SerialChain.constrained`, one multiplier each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Unknowns:
                 raise NameNotFound("section strain", name, STRAINS)
         if set(self.locked) == set(STRAINS):
             raise ParameterError("locked_strains", self.locked, "three strains at most: with all four a section is rigid")
-        constrained = {strain for group in self.chain.held for strain in group}
+        constrained = {strain for group in self.chain.constrained for strain in group}
         sections = [element for element in self.chain.elements if isinstance(element, ChainSection)]
         named = [pair for element in sections for pair in zip(STRAINS, strains_of(element), strict=True)]
         clash = sorted({name for name, strain in named if name in self.locked and strain in constrained})
@@ -81,7 +81,7 @@ class Unknowns:
     def segments(self) -> tuple[Segment, ...]:
         """The constrained segments."""
         segments: list[Segment] = []
-        for group, constrained in enumerate(self.chain.held):
+        for group, constrained in enumerate(self.chain.constrained):
             rows = [row for row, element in enumerate(self.chain.elements) if set(strains_of(element)) & set(constrained)]
             new = Segment(min(rows), max(rows), (group,))
             for place, one in enumerate(segments):
@@ -96,7 +96,7 @@ class Unknowns:
     def multiplier(self) -> dict[int, int]:
         """By constrained strain: the number of its multiplier in its segment."""
         numbered = [(number, group) for segment in self.segments for number, group in enumerate(segment.groups)]
-        return {strain: number for number, group in numbered for strain in self.chain.held[group]}
+        return {strain: number for number, group in numbered for strain in self.chain.constrained[group]}
 
     @cached_property
     def masses_beyond(self) -> tuple[float, ...]:

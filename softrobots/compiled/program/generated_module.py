@@ -101,14 +101,14 @@ def _lanes(size: int) -> int:
 def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, tables: dict[str, object]) -> str:
     chain, strains = unknowns.chain, unknowns.strains
     min_pivot = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
-    group = {strain: row for row, one in enumerate(chain.held) for strain in one}
+    group = {strain: row for row, one in enumerate(chain.constrained) for strain in one}
     numbers = {name: value for name, value in vars(settings).items() if name.isupper()}
     values: dict[str, object] = numbers | layout.constants()
     values |= {
         "WORKSPACE_SIZE": size,
         "LANE_SIZE": lane_size,
         "LANES": _lanes(lane_size),
-        "N_CONSTRAINTS": len(chain.held),
+        "N_CONSTRAINTS": len(chain.constrained),
         **{status.name: status.value for status in Status},
         "REACH": float(chain.reach),
         "N_VARIED": layout.varied,

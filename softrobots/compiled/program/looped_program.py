@@ -99,7 +99,7 @@ def looped_program(plan: Plan) -> LoopedProgram:
     kinds = element_kinds(plan)
     # Before the records stand the share of the step, and the bounds of the loops.
     blocks, sequence, lane_size = _sequence(plan, kinds, recursion.end + 3, calls)
-    tip = TipLayout(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.held))
+    tip = TipLayout(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.constrained))
     tip_plan = replace(plan, tip=tip)
     tip_blocks, tip_sequence, size = _sequence(tip_plan, element_kinds(tip_plan), tip.end, calls)
     constants: dict[str, object] = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}

@@ -57,10 +57,10 @@ def _inputs(plan: Plan) -> list[Place]:
         places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
     if unknowns.pulled:
         places.append(Place("PULL", n, "load of the muscle tensions on each unknown [N m or N]; put_muscles writes it"))
-    if unknowns.chain.held:
+    if unknowns.chain.constrained:
         places.append(Place("START", n, "unknowns with the muscle lengths [rad or m]; put_muscles writes them"))
     starts = "for settle_from, reach and follow" if searches else "for settle_from"
-    held = ", with the muscle lengths, as in START" if unknowns.chain.held else ""
+    held = ", with the muscle lengths, as in START" if unknowns.chain.constrained else ""
     places.append(Place("UNKNOWN", n, f"start of the search [rad or m]; {starts}{held}"))
     if searches:
         places.append(Place("TORQUES", layout.motors, "load on each motor, minus what it exerts [N m or N]; for estimate"))

@@ -22,7 +22,7 @@ class Actuation:
         self._model, self._chain, self._strains = model, unknowns.chain, list(unknowns.strains)
         chain = unknowns.chain
         self._count = chain.n_motors
-        self._plain = len(chain.held) == 0 and len(self._strains) == len(chain.stiffness)
+        self._plain = len(chain.constrained) == 0 and len(self._strains) == len(chain.stiffness)
         self._tensions = len(chain.muscle_rest) > 0 and chain.muscle_input == "forces"
         self._lengths = len(chain.muscle_rest) > 0 and not self._tensions
         self._relaxed = chain.free @ model.rest  # strains at rest of elastic coordinates and muscles
@@ -44,7 +44,9 @@ class Actuation:
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.jacobian, self._count)
         if self._lengths:
-            return np.concatenate([joints, _rows(w, tip.constraint_columns, tip.n_constraints) @ chain.held_slope], axis=1)
+            return np.concatenate(
+                [joints, _rows(w, tip.constraint_columns, tip.n_constraints) @ chain.constrained_slope], axis=1
+            )
         if self._tensions:  # a tension adds the energy t A s
             by_force = _rows(w, tip.tip_columns, tip.unknowns)
             return np.concatenate([joints, -by_force @ chain.muscle_matrix[:, self._strains].T], axis=1)
@@ -58,10 +60,10 @@ class Actuation:
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.motor_torques, self._count, 1)[0]
         if self._lengths:
-            first = [self._strains.index(group[0]) for group in chain.held]
+            first = [self._strains.index(group[0]) for group in chain.constrained]
             spread = _rows(w, run.layout.start, len(self._strains), 1)[0] - chain.rest[self._strains]
             held = _rows(w, tip.constraint_loads, tip.n_constraints, 1)[0] - (chain.stiffness[self._strains] * spread)[first]
-            return np.concatenate([joints, held @ chain.held_slope])
+            return np.concatenate([joints, held @ chain.constrained_slope])
         return np.asarray(joints)
 
     def rows(self, motors: FloatArray, layout: Layout) -> list[tuple[int, FloatArray]]:
