@@ -50,7 +50,6 @@ _AWAY = 0.03  # the same in a plane of modes, where directions differ in fourth 
 _DIRECTIONS = 48  # of a plane of modes in which branches are sought
 _ROUND = 1e-6  # torque across a direction that counts as zero, relative to the springs' at that distance
 _TIE = 0.99  # share of the largest change from which a spring is part of the label
-
 Found = TypeVar("Found")
 
 
@@ -189,7 +188,8 @@ def _leaving_branches(
     known: list[_Branch], parent: _Branch, path: ForcePath, modes: FloatArray, largest_force: float, largest_step: float
 ) -> list[_Branch]:
     """The branches, not known yet, that leave a path at its reference point."""
-    here, new = path.point(path.springs, path.force), []
+    here = path.point(path.springs, path.force)
+    new: list[_Branch] = []
     for name, there in sorted(_leaving(path, modes), key=lambda one: one[0]):
         if any(branch.path.passes(branch.followed.points, there) for branch in known + new):
             continue

@@ -92,7 +92,8 @@ def critical_point(
             raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
         followed = path.follow([origin], path.tangent(origin), largest, _LARGEST_STEP, growth=_GROWTH, while_stable=True)
         if followed.ended == "unstable":
-            last = path.before_change(*followed.points[-2:])
+            stable, unstable = followed.points[-2:]
+            last = path.before_change(stable, unstable)
             crosses = bool(followed.crossings) and path.eigenvalues(last)[0] <= NEUTRAL
             return CriticalPoint(replace(path, springs=last.springs, force=last.force), bool(crosses), path.springs)
     complete = followed.ended == "largest force"
