@@ -250,10 +250,13 @@ class ForcePath:
         """Whether the path goes through another point between some of its points, in order."""
         places, aim = np.array([self.place(point) for point in points]), self.place(other)
         ways = np.diff(places, axis=0)
-        shares = np.clip(((aim - places[:-1]) * ways).sum(axis=1) / (ways**2).sum(axis=1), 0.0, 1.0)[:, None]
-        nearest = places[:-1] + shares * ways
+        shares = ((aim - places[:-1]) * ways).sum(axis=1) / (ways**2).sum(axis=1)
+        nearest = places[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * ways
         k = int(np.argmin(np.linalg.norm(nearest - aim, axis=1)))
-        there = self.newton(nearest[k], ways[k][None], np.array([ways[k] @ aim]))
+        way = ways[k] / np.linalg.norm(ways[k])
+        if not -0.1 < shares[k] < 1.1 or not abs(self._direction(other, way) @ way) >= _TURN:
+            return False  # beyond its ends (points lie on arcs, not on their chords), or on a path that crosses it
+        there = self.newton(nearest[k], way[None], np.array([way @ aim]))
         return there is not None and bool(np.linalg.norm(self.place(there) - aim) <= _SHORTEST)
 
     def _direction(self, point: PathPoint, along: FloatArray) -> FloatArray:
