@@ -27,6 +27,7 @@ def test_the_picture_is_current(script: ModuleType, capsys: pytest.CaptureFixtur
     assert status == 0, f"python scripts/draw_architecture.py draws it anew: {capsys.readouterr().out}"
 
 
+@pytest.mark.study
 def test_a_picture_is_drawn_and_checked(script: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     first, second = tmp_path / "a.png", tmp_path / "b.png"
     assert script.main(["--output", str(first)]) == script.main(["--output", str(second)]) == 0

@@ -153,6 +153,7 @@ def test_a_force_that_made_the_torques_is_found(name: str, gravity: Any, rng: np
     assert one.unexplained <= 1e-9 * (1.0 + np.linalg.norm(torques))
 
 
+@pytest.mark.study
 def test_no_estimate_touches_another(rng: np.random.Generator) -> None:
     model, c = robot("sections"), solver("sections")
     cases = [drawn(model, rng) for _ in range(6)]

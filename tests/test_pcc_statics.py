@@ -594,6 +594,7 @@ def test_self_weight_is_that_of_a_heavy_rod(name: str, gravity: tuple, tilt: flo
     assert orders(angles)[0] > 1.8
 
 
+@pytest.mark.study
 def test_a_steel_rod_of_50_links_is_right_to_a_tenth_of_a_millimetre() -> None:
     """A spring-steel rod of 0.6 m, bent by up to 90 degrees; 50 sub-links lumped, or 30 sections."""
     rod = steel_rod()

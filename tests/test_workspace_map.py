@@ -69,7 +69,7 @@ def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: WorkspaceMap
 
 
 @law("compiled.sweeps.map_workspace", "compiled.sweeps.WorkspaceMap")
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.floats(0.1, 1.3), st.floats(-1.2, 1.2), st.floats(0.0, 60.0))
 def test_what_a_map_says_of_a_target_holds(arm: sr.SoftModel, x: float, z: float, load: float) -> None:
     """Reached: an equilibrium on Pinocchio has the tip there. Not reached: Pinocchio's solver does not get there."""
@@ -290,6 +290,7 @@ def test_threads_give_the_same_bytes(arm: sr.SoftModel) -> None:
     assert 0 < one.reached.sum() < one.reached.size
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("small_blocks")
 def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
     arm: sr.SoftModel, tool: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
