@@ -184,6 +184,7 @@ FORMS: list[tuple[str, str, list[Any], str]] = [
     ("backbone", "s", [0.5, [[0.5]]], "shape (n,) of finite numbers"),
     ("arc_from_strains", "strains", [0.5, [0.1, 0.2, 0.0], [[0.1]] * 4], "of shape (..., 4) (it has shape ("),
     ("muscles_from_arc", "azimuths", [0.5, [[0.0, 2.0, 4.0]]], "shape (n,) of finite numbers [rad]"),
+    ("muscles_from_arc", "arc", [0.5, None], "an Arc"),
     ("arc_from_muscles", "lengths", [0.5, [0.5, 0.5], [[0.5]] * 3], "of shape (..., 3), one a muscle (not ("),
     ("muscle_residual", "lengths", [0.5, [0.5, 0.5]], "of shape (..., 3), one a muscle (not ("),
     ("chain_muscle_jacobian", "lengths", [0.5, [0.5, 0.5, 0.5]], "of shape (..., S, N), one row a segment"),

@@ -22,7 +22,8 @@ KILLED, TIMED_OUT, SURVIVED, NOT_TESTED = "killed", "timed out", "survived", "no
 """What became of a mutant."""
 
 WORDING = "the wording of an error"
-"""The rule: only a text in a `raise` differs, by upper or lower case or by XX around it, and it is no name of a parameter."""
+"""The rule: only a text in a `raise`, or of a check that raises (`instance_of`), differs, by upper or lower case or by
+XX around it, and it is no name of a parameter."""
 
 # Exit codes of the process that ran the tests: 1 and 3 of pytest, negative ones of a signal (24: out of time).
 _STATUS = {0: SURVIVED, 5: SURVIVED, 33: SURVIVED, 1: KILLED, 3: KILLED, -9: KILLED, -11: KILLED, -6: KILLED}
@@ -143,10 +144,10 @@ def _changed(lines: list[str]) -> list[str]:
 
 
 def _unworded(function: ast.FunctionDef) -> str:
-    """A function as text without its name, and without the case and the XX of words in `raise`."""
+    """A function as text without its name, and without the case and the XX of words in errors."""
     words: set[int] = set()
     for node in ast.walk(function):
-        if isinstance(node, ast.Raise):
+        if isinstance(node, ast.Raise) or (isinstance(node, ast.Call) and ast.unparse(node.func) == "instance_of"):
             words |= {id(part) for part in ast.walk(node) if isinstance(part, ast.Constant) and _is_wording(part.value)}
 
     class Blank(ast.NodeTransformer):
