@@ -123,8 +123,8 @@ def excluded_by_settings(file: Path) -> list[tuple[str, str]]:
         values = settings.get_option(option) or []
         for value in values if isinstance(values, list) else [values]:
             if value != PRAGMA:  # what it leaves out is found in the code
-                said = [line.partition(json.dumps(value))[2] for line in lines if json.dumps(value) in line]
-                found.append((f"{option.partition(':')[2]} {value}", said[0].partition("#")[2].strip() if said else ""))
+                reasons = [line.partition(json.dumps(value))[2] for line in lines if json.dumps(value) in line]
+                found.append((f"{option.partition(':')[2]} {value}", reasons[0].partition("#")[2].strip() if reasons else ""))
     return found
 
 
