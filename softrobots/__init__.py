@@ -31,11 +31,12 @@ from softrobots.model.springs import SpringGroup
 from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
 from softrobots.robots.growth import grown_coordinates
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate, estimate_load
 from softrobots.statics.loads import EARTH_GRAVITY, distributed_force
-from softrobots.statics.post_buckling import EquilibriumBranch, post_buckling_branches
+from softrobots.statics.post_buckling import post_buckling_branches
 from softrobots.statics.saved_results import save_csv
 from softrobots.statics.sensitivity import compliance, elastostatic_jacobian
 from softrobots.statics.stability import critical_load

@@ -84,7 +84,7 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
     ("words", "message"),
     [
         ([], "required: COMMAND"),
-        (["nothing"], "invalid choice: 'nothing'; choose from urdf, export, solve, load, ik, "),
+        (["nothing"], "invalid choice: 'nothing'; choose from urdf, export, solve, branches, load, "),
         (["slove"], "invalid choice: 'slove' (did you mean 'solve'?)"),
         (["solve", "inflatable_arm", "--method", "newtn"], "invalid choice: 'newtn' (did you mean 'newton'?)"),
         (["urdf", "inflatable_arm", "--nothing"], "unrecognized arguments: --nothing"),

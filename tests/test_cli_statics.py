@@ -257,6 +257,33 @@ def test_the_picture_shows_loaded_and_relaxed_arm(arm: sr.SoftModel, tool) -> No
         loaded_shape(arm)
 
 
+# --- softrobots branches
+
+
+def test_branches_are_printed_saved_and_drawn(answer, told, tool, tmp_path: Path) -> None:
+    tool("matplotlib")
+    file, picture = tmp_path / "b.npz", tmp_path / "b.png"
+    words = ["branches", "inflatable_arm", "--set", "link_lengths=[0.6]", "--direction", "-1", *"00", "--largest-step", "0.2"]
+    found = answer(*words, "-o", str(file), "--plot", str(picture))
+    saved = sr.load_result(file)
+    assert [row["label"] for row in found["branches"]] == [branch.label for branch in saved]
+    for row, branch in zip(found["branches"], saved, strict=True):
+        assert row["forces"] == branch.forces.tolist()
+        assert row["stable"] == branch.stable.tolist()
+        assert row["q_springs"] == [one.q_springs.tolist() for one in branch.equilibria]
+    assert found["files"] == [str(file), str(picture)]
+    assert picture.stat().st_size > 10_000
+    status, out, _ = told(*words)
+    assert status == 0
+    assert "fundamental is crossed at 303 N" in out
+    assert len(re.findall(r"114|303 to 378.75", out)) == 8
+
+
+def test_a_pull_has_no_branches(told) -> None:
+    status, out, _ = told("branches", "inflatable_arm", "--direction", "1", "0", "0", "--max-force", "50")
+    assert (status, out) == (1, "no branches: the equilibrium stays stable up to 50 N along [1.0, 0.0, 0.0]\n")
+
+
 # --- softrobots load
 
 

@@ -502,6 +502,10 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("trajectory", {"following": np.array("x" * 81)}, "following must be 1 to 80 printable"),
         ("workspace", {"refused": np.array(-1)}, "must be an array of non-negative integers"),
         ("workspace_map", {"grid_x": np.array([0.8, 0.6])}, "increasing"),
+        ("branches", {"labels": np.array([1, 2])}, "labels is not a text"),
+        ("branches", {"ends": np.array(["\n", "lost"])}, "ends must be 1 to 80 printable"),
+        ("branches", {"n_crossings": np.array([-1, 2])}, "must be an array of non-negative integers"),
+        ("branches", {"frame": np.array("nowhere")}, "nowhere"),
         ("ik_solution", {"steps": np.array(2.5)}, "must be an array of non-negative integers"),
     ],
 )

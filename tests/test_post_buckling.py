@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots.statics import force_path, post_buckling
-from softrobots.statics.post_buckling import FUNDAMENTAL, RING
+from softrobots.statics.equilibrium_branch import FUNDAMENTAL, RING
 from softrobots.statics.stability import CriticalPoint, critical_point
 from softrobots.view.figures import equilibria
 from tests.support.laws import law

@@ -26,6 +26,7 @@ def results(arm: sr.SoftModel) -> dict[str, object]:
         "ik_solution": sr.solve_ik(arm, (0.7, 0.2, 0.4), FORCE),
         "load_estimate": sr.estimate_load(arm, motors, sr.solve_equilibrium(arm, motors, FORCE).motor_torques, torque_std=0.1),
         "trajectory": sr.follow_trajectory(arm, path.positions, FORCE, times=path.times),
+        "branches": sr.post_buckling_branches(arm, (0, 0, 0), (-1, 0, 0), largest_step=0.2),
     }
 
 
@@ -53,7 +54,7 @@ def same(one: object, other: object, path: str = "") -> None:
         assert one == other, path
 
 
-@pytest.mark.parametrize("kind", ["equilibrium", "ik_solution", "load_estimate", "trajectory"])
+@pytest.mark.parametrize("kind", ["equilibrium", "ik_solution", "load_estimate", "trajectory", "branches"])
 def test_what_is_saved_comes_back_equal(results: dict, kind: str, tmp_path: Path) -> None:
     file = sr.save_result(results[kind], tmp_path / kind)
     assert file.suffix == ".npz"
@@ -66,6 +67,27 @@ def test_springs_said_by_the_caller_come_back(tmp_path: Path) -> None:
     model = sr.load_model(BRANCHED, springs=SPRINGS, motors=["elbow"], tip="finger")
     state = sr.solve_equilibrium(model, (0.3,), (0, 0, -2))
     same(state, sr.load_result(sr.save_result(state, tmp_path / "a.npz")))
+
+
+def test_branches_that_are_not_what_they_claim_are_refused(results: dict, tmp_path: Path) -> None:
+    fields = dict(np.load(sr.save_result(results["branches"], tmp_path / "a.npz")))
+    assert len(fields["labels"]) > 1
+    for number, (name, change, words) in enumerate(
+        [
+            ("pushes", 1.01, "claims a residual"),
+            ("forces", 1.01, "forces are not those of its loads"),
+            ("q_springs", 1.001, "claims a residual"),
+            ("points", 2, "one row for each branch"),
+            ("crossings", np.nan, "crossings"),
+        ]
+    ):
+        path = tmp_path / f"b{number}.npz"
+        np.savez(path, **(fields | {name: fields[name] * change}))
+        with pytest.raises(sr.FileFormatError, match=words):
+            sr.load_result(path)
+    for wrong in ((), (1, 2), list(results["branches"])):
+        with pytest.raises(sr.ParameterError, match="tuple of EquilibriumBranch"):
+            sr.save_result(wrong, tmp_path / "c.npz")
 
 
 def test_nothing_is_overwritten_silently(results: dict, tmp_path: Path) -> None:
@@ -227,7 +249,10 @@ def test_files_that_are_not_ours_are_refused(tmp_path: Path) -> None:
 
 
 def test_other_objects_are_refused(arm: sr.SoftModel, results: dict, tmp_path: Path) -> None:
-    with pytest.raises(sr.ParameterError, match="ImposedDisplacement, LoadEstimate, Trajectory, Workspace, WorkspaceMap"):
+    with pytest.raises(
+        sr.ParameterError,
+        match="ImposedDisplacement, LoadEstimate, Trajectory, Workspace, WorkspaceMap, tuple of EquilibriumBranch",
+    ):
         sr.save_result(arm, tmp_path / "a.npz")
     with pytest.raises(sr.ParameterError, match="a Trajectory"):
         sr.save_csv(results["equilibrium"], tmp_path / "a.csv")

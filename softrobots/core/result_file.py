@@ -36,6 +36,18 @@ class Kind(NamedTuple):
     """Return the result of named arrays; any exception means that they do not fit."""
     many: bool = False
     """Whether a result has any number of configurations, so that only `npz_file.LARGEST` limits it."""
+    items: type | None = None
+    """Class of the items where `cls` is `tuple`."""
+
+    def holds(self, result: Any) -> bool:
+        """Return whether a result is of this kind."""
+        if self.items is None or not issubclass(type(result), self.cls):
+            return isinstance(result, self.cls)
+        return bool(result) and all(isinstance(one, self.items) for one in result)
+
+    def __str__(self) -> str:
+        """Return the name of the class."""
+        return self.cls.__name__ if self.items is None else f"{self.cls.__name__} of {self.items.__name__}"
 
     @property
     def largest(self) -> int:
@@ -53,8 +65,8 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
     The file appears complete or not at all: it is written under another name and renamed.
 
     Args:
-        result: An equilibrium, imposed displacement, load estimate, IK solution, trajectory, workspace or
-            workspace map.
+        result: An equilibrium, imposed displacement, load estimate, IK solution, trajectory, workspace, workspace map, or
+            the branches that `post_buckling_branches` returns.
         path: File to write; `.npz` is added if it has no suffix.
         overwrite: Replace an existing file.
 
@@ -66,9 +78,9 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
-    name = next((name for name, kind in KINDS.items() if isinstance(result, kind.cls)), None)
+    name = next((name for name, kind in KINDS.items() if kind.holds(result)), None)
     if name is None:
-        raise ParameterError("result", result, f"one of {', '.join(kind.cls.__name__ for kind in KINDS.values())}")
+        raise ParameterError("result", result, f"one of {', '.join(map(str, KINDS.values()))}")
     path = as_path("path", path)
     target = new_file(path if path.suffix or path.is_dir() else path.with_suffix(".npz"), overwrite=overwrite)
     fields = {"format": np.array(FORMAT), "kind": np.array(name), **KINDS[name].to_arrays(result)}

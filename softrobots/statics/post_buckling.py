@@ -21,26 +21,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.core.checks import FloatArray, positive_number, read_only
+from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import scaled
-from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.equilibrium import equilibrium_from_state
+from softrobots.statics.equilibrium_branch import FUNDAMENTAL, RING, EquilibriumBranch
 from softrobots.statics.force_path import NEUTRAL, FollowedPath, ForcePath, PathPoint
 from softrobots.statics.stability import CriticalPoint, critical_point
-
-FUNDAMENTAL = "fundamental"
-"""Label of the path from zero force."""
-
-RING = "ring"
-"""Label of a branch out of a ring; the others are the same robot, bent in another direction."""
 
 BEYOND = 1.25
 """Default limit of the force on branches, relative to the critical force."""
@@ -51,41 +45,6 @@ _DIRECTIONS = 48  # of a plane of modes in which branches are sought
 _ROUND = 1e-6  # torque across a direction that counts as zero, relative to the springs' at that distance
 _TIE = 0.99  # share of the largest change from which a spring is part of the label
 Found = TypeVar("Found")
-
-
-@dataclass(frozen=True, eq=False)
-class EquilibriumBranch:
-    """A sequence of equilibria under a force that grows or falls."""
-
-    label: str
-    """`FUNDAMENTAL`; `RING`; or the springs that move most at its start, with their sign, e.g. "+spring_1_up".
-
-    A branch that leaves another has its label in front, "+spring_1_up > -spring_1_side"; namesakes are numbered.
-    """
-    equilibria: tuple[Equilibrium, ...]
-    """Equilibria from zero force, or from the critical point, on."""
-    forces: FloatArray
-    """Force along the direction at each of them, shape (n,) [N]."""
-    amplitude: FloatArray
-    """Distance of the springs from the critical point along the buckling modes, shape (n,) [rad or m]; 0 without a mode."""
-    energy: FloatArray
-    """Elastic energy and potential of the load, shape (n,) [J]."""
-    softest: FloatArray
-    """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, shape (n,)."""
-    crossings: FloatArray
-    """Forces at which it crosses another path, or its stability jumps at a plateau, shape (k,) [N]."""
-    ended: str
-    """Why it ends: "largest force", "zero force", "end of range" of a section, "points", or "lost"."""
-
-    @cached_property
-    def stable(self) -> Any:
-        """Which are certified stable, shape (n,), truth values."""
-        return np.array([equilibrium.stable for equilibrium in self.equilibria])
-
-    @cached_property
-    def neutral(self) -> Any:
-        """Which are neutral, shape (n,), truth values: all of a ring, and the critical point itself."""
-        return np.abs(self.softest) <= NEUTRAL
 
 
 def post_buckling_branches(
@@ -268,18 +227,11 @@ def _result(branch: _Branch) -> EquilibriumBranch:
         equilibrium_from_state(path.model, path.motors, path.load(point.force), point.state, method="newton", iterations=number)
         for number, point in enumerate(points)
     )
-    return EquilibriumBranch(
-        label=branch.label,
-        equilibria=equilibria,
-        forces=read_only(np.array([point.force for point in points])),
-        amplitude=read_only(
-            np.array([float(np.linalg.norm(branch.modes @ (point.springs - path.springs))) for point in points])
-        ),
-        energy=read_only(np.array([point.state.energy for point in points])),
-        softest=read_only(np.array([float(path.eigenvalues(point)[0]) for point in points])),
-        crossings=read_only(np.array([points[number].force for number, _ in branch.followed.crossings])),
-        ended=branch.followed.ended,
-    )
+    amplitude = np.array([float(np.linalg.norm(branch.modes @ (point.springs - path.springs))) for point in points])
+    pairs = [points[number - 1 : number + 1] for number, _ in branch.followed.crossings]
+    crossings = np.array([path.before_change(here, there, -NEUTRAL).force for here, there in pairs])
+    forces, energy = np.array([(point.force, point.state.energy) for point in points]).T
+    return EquilibriumBranch.of(branch.label, equilibria, forces, amplitude, energy, crossings, branch.followed.ended)
 
 
 def _name(model: SoftModel, along: FloatArray) -> str:

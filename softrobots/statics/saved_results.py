@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import choice, finite_array, finite_number, increasing, instance_of, read_only
+from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, increasing, instance_of, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import csv_text, write_text
 from softrobots.core.json_text import parse_json
@@ -25,6 +25,7 @@ from softrobots.statics.displacement_control import DisplacementControl, Probe
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
 from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_result
 from softrobots.statics.inverse_kinematics import IkSolution, checked_orientation
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
@@ -56,15 +57,16 @@ def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
     return model, Load.of(model, wrench=load["wrenches"], gravity=load["gravity"])
 
 
-def _pack_rows(equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
+def _pack_rows(equilibria: tuple[Equilibrium, ...], *, one_load: bool = True) -> dict[str, Any]:
     first = equilibria[0]
-    if any(not e.load.same_as(first.load) for e in equilibria):
+    if one_load and any(not e.load.same_as(first.load) for e in equilibria):
         raise ParameterError("result", first.model, "equilibria under one load; these have several")
     columns = {name: [getattr(equilibrium, name) for equilibrium in equilibria] for name in _COLUMNS}
     return _pack_model(first.model, first.load) | columns | {"solver": [equilibrium.method for equilibrium in equilibria]}
 
 
-def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
+def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, frame: str = "") -> tuple[Equilibrium, ...]:
+    """Equilibria under one load, each with one more force, shape (n, 3) [N], at a frame."""
     model, load = _unpack_model(fields)
     count = len(fields["q_motors"])
     if count == 0 or any(len(fields[name]) != count for name in (*_COLUMNS, "solver")):
@@ -78,8 +80,9 @@ def _unpack_rows(fields: Mapping[str, Any]) -> tuple[Equilibrium, ...]:
     equilibria = []
     for row in range(count):
         model.checked_motors(motors[row])
-        state = elastic_state(model, motors[row], springs[row], load)
-        found = equilibrium_from_state(model, motors[row], load, state, method=solvers[row], iterations=iterations[row])
+        at = load if forces is None else load.plus(frame, np.append(forces[row], np.zeros(3)))
+        state = elastic_state(model, motors[row], springs[row], at)
+        found = equilibrium_from_state(model, motors[row], at, state, method=solvers[row], iterations=iterations[row])
         # Rounding differs between machines; a coordinate shifted by 1e-9 rad exceeds this.
         if found.residual > 1.001 * residual[row] + largest_residual(model, state.scale, 1e-12):
             raise FileFormatError(
@@ -195,6 +198,45 @@ def _unpack_map(fields: Mapping[str, Any]) -> WorkspaceMap:
     return unpacked(model, load.gravity, fields)
 
 
+def _pack_branches(branches: tuple[EquilibriumBranch, ...]) -> dict[str, Any]:
+    rows = tuple(equilibrium for branch in branches for equilibrium in branch.equilibria)
+    forces = {name: np.array([row.load.wrenches[name][:3] for row in rows]) for name in rows[0].load.wrenches}
+    frame = max(forces, key=lambda name: float(np.ptp(forces[name], axis=0).max()))  # the one that is pushed
+    return _pack_rows(rows, one_load=False) | {
+        "frame": frame,
+        "pushes": forces[frame] - forces[frame][0],
+        "labels": [branch.label for branch in branches],
+        "ends": [branch.ended for branch in branches],
+        "points": [len(branch.equilibria) for branch in branches],
+        "forces": np.concatenate([branch.forces for branch in branches]),
+        "amplitudes": np.concatenate([branch.amplitude for branch in branches]),
+        "n_crossings": [len(branch.crossings) for branch in branches],
+        "crossings": np.concatenate([branch.crossings for branch in branches]),
+    }
+
+
+def _unpack_branches(fields: Mapping[str, Any]) -> tuple[EquilibriumBranch, ...]:
+    pushes = finite_array("pushes", fields["pushes"], (len(fields["q_motors"]), 3), "N")
+    rows = _unpack_rows(fields, pushes, text(fields, "frame"))
+    forces, amplitudes = (finite_array(name, fields[name], (len(rows),)) for name in ("forces", "amplitudes"))
+    points, n_crossings = counts(fields, "points"), counts(fields, "n_crossings")
+    crossings = finite_array("crossings", fields["crossings"], (sum(n_crossings),), "N")
+    names = [[label({name: word}, name) for word in np.atleast_1d(fields[name])] for name in ("labels", "ends")]
+    if sum(points) != len(rows) or 0 in points or {len(points)} != {len(n_crossings), *map(len, names)}:
+        raise FileFormatError("its arrays must have one row for each branch, and one for each of their points")
+    if np.abs(np.linalg.norm(pushes, axis=1) - np.abs(forces)).max() > 1e-9 * np.abs(forces).max():
+        raise FileFormatError("its forces are not those of its loads")
+    states = (elastic_state(row.model, row.q_motors, row.q_springs, row.load) for row in rows)
+    energies = np.array([state.energy for state in states])
+    ends = np.cumsum(points)[:-1]
+    columns = [np.split(column, ends) for column in (np.arange(len(rows)), forces, amplitudes, energies)]
+    others = np.split(crossings, np.cumsum(n_crossings)[:-1])
+    return tuple(
+        EquilibriumBranch.of(label, tuple(rows[place] for place in places), force, amplitude, energy, crossed, ended)
+        for label, ended, places, force, amplitude, energy, crossed in zip(*names, *columns, others, strict=True)
+    )
+
+
 KINDS.update(
     equilibrium=Kind(Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
     ik_solution=Kind(IkSolution, _pack_solution, _unpack_solution),
@@ -203,6 +245,7 @@ KINDS.update(
     trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True),
     workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True),
     workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True),
+    branches=Kind(tuple, _pack_branches, _unpack_branches, many=True, items=EquilibriumBranch),
 )
 
 

@@ -209,6 +209,7 @@ def results() -> dict[str, Any]:
         "trajectory": sr.follow_trajectory(model, path.positions, (0, 0, -5), times=path.times),
         "workspace": sr.sample_workspace(model, 5, force=(0, 0, -5)),
         "workspace_map": map_workspace(model, grid, (0.0, 5.0), backend="python"),
+        "branches": sr.post_buckling_branches(model, (0, 0, 0), (-1, 0, 0), max_force=115.0, largest_step=0.5)[:2],
     }
 
 
@@ -224,6 +225,9 @@ def read_result(file: Path) -> None:
     result: Any = sr.load_result(file)
     if isinstance(result, WorkspaceMap):
         finite(result.payload, result.q_motors, result.q_springs)
+        return
+    if isinstance(result, tuple):
+        finite(*(branch.forces for branch in result), *(branch.energy for branch in result))
         return
     for held in getattr(result, "equilibria", (getattr(result, "equilibrium", result),)):
         finite(held.q_motors, held.q_springs)

@@ -1,0 +1,72 @@
+"""A branch: equilibria of a robot under a force that grows or falls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.statics.elastic_state import scaled
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.force_path import NEUTRAL
+
+FUNDAMENTAL = "fundamental"
+"""Label of the path from zero force."""
+
+RING = "ring"
+"""Label of a branch out of a ring; the others are the same robot, bent in another direction."""
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumBranch:
+    """A sequence of equilibria under a force that grows or falls."""
+
+    label: str
+    """`FUNDAMENTAL`; `RING`; or the springs that move most at its start, with their sign, e.g. "+spring_1_up".
+
+    A branch that leaves another has its label in front, "+spring_1_up > -spring_1_side"; namesakes are numbered.
+    """
+    equilibria: tuple[Equilibrium, ...]
+    """Equilibria from zero force, or from the critical point, on."""
+    forces: FloatArray
+    """Force along the direction at each of them, shape (n,) [N]."""
+    amplitude: FloatArray
+    """Distance of the springs from the critical point along the buckling modes, shape (n,) [rad or m]; 0 without a mode."""
+    energy: FloatArray
+    """Elastic energy and potential of the load, shape (n,) [J]."""
+    softest: FloatArray
+    """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, shape (n,)."""
+    crossings: FloatArray
+    """Forces at which it crosses another path, or its stability jumps at a plateau, shape (k,) [N]."""
+    ended: str
+    """Why it ends: "largest force", "zero force", "end of range" of a section, "points", or "lost"."""
+
+    @cached_property
+    def stable(self) -> Any:
+        """Which are certified stable, shape (n,), truth values."""
+        return np.array([equilibrium.stable for equilibrium in self.equilibria])
+
+    @cached_property
+    def neutral(self) -> Any:
+        """Which are neutral, shape (n,), truth values: all of a ring, and the critical point itself."""
+        return np.abs(self.softest) <= NEUTRAL
+
+    @classmethod
+    def of(
+        cls,
+        label: str,
+        equilibria: tuple[Equilibrium, ...],
+        forces: FloatArray,
+        amplitude: FloatArray,
+        energy: FloatArray,
+        crossings: FloatArray,
+        ended: str,
+    ) -> EquilibriumBranch:
+        """Return a branch with read-only arrays and the stability of its equilibria."""
+        tangents = (scaled(one.tangent_stiffness, one.model.stiffness) for one in equilibria)
+        softest = np.array([float(np.linalg.eigvalsh(tangent)[0]) for tangent in tangents])
+        forces, amplitude, energy, softest, crossings = map(read_only, (forces, amplitude, energy, softest, crossings))
+        return cls(label, equilibria, forces, amplitude, energy, softest, crossings, ended)
