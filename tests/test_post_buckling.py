@@ -141,7 +141,7 @@ def stable_minima(stiffness: np.ndarray, force: float, rng: np.random.Generator,
     """Minima of the energy of the arm of two links under an axial push, by descent on the DH table from many starts."""
     springs = rng.uniform(-2.5, 2.5, (starts, 4))
     straight, pushes = np.zeros((starts, 3)), np.tile([-force, 0.0, 0.0], (starts, 1))
-    for _ in range(200):
+    for _ in range(120):
         residual, tangent, _ = arm_balance(straight, springs, pushes, stiffness)
         lift = np.maximum(0.0, 0.05 * stiffness.min() - np.linalg.eigvalsh(tangent)[:, 0])
         step = -np.linalg.solve(tangent + lift[:, None, None] * np.eye(4), residual[..., None])[..., 0]
@@ -179,13 +179,15 @@ def test_springs_that_are_nearly_equal_have_all_four_stable_branches(difference:
 
 
 @pytest.mark.study
-def test_no_stable_branch_of_a_random_arm_is_missed(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("seed", range(4))
+def test_no_stable_branch_of_a_random_arm_is_missed(seed: int) -> None:
     """200 arms; in every other one the springs of a link are nearly equal."""
-    for case in range(200):
+    rng = np.random.default_rng(seed)
+    for case in range(50):
         stiffness = 172.71 * np.exp(rng.uniform(-0.7, 0.7, 4))
         if case % 2:
             stiffness[1::2] = stiffness[::2] * (1.0 + 10.0 ** rng.uniform(-9.0, -2.0, 2))
-        compare_with_minima(stiffness, rng.uniform(1.02, 1.6), rng, 300)
+        compare_with_minima(stiffness, rng.uniform(1.02, 1.6), rng, 150)
 
 
 def test_branches_that_leave_branches_are_named_after_them() -> None:

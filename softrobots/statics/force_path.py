@@ -188,7 +188,7 @@ class ForcePath:
         while len(points) < _MOST_POINTS:
             last = points[-1]
             here, least = self.place(last), shortest * max(1.0, last.force / self.force)
-            with np.errstate(divide="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore"):
                 longest = np.divide((largest_step, growth * last.force / self.force), (np.linalg.norm(way[:-1]), abs(way[-1])))
             step = min(step, max(largest_step, float(longest.min())))
             there = self.newton(here + step * way, way[None], np.array([way @ here + step]))
@@ -213,10 +213,7 @@ class ForcePath:
                 continue
             if not 0.0 <= there.force <= largest_force:
                 limit, ended = (largest_force, "largest force") if there.force > largest_force else (0.0, "zero force")
-                aim = limit / self.force - 1.0
-                share = (aim - here[-1]) / moved[-1]
-                end = self.newton(here + share * moved, np.eye(len(way))[-1:], np.array([aim]))
-                return FollowedPath(points if end is None else [*points, end], crossings, ended)
+                return FollowedPath([*points, *self._at_force(limit, here, moved)], crossings, ended)
             if not regular:
                 crossings.append((len(points), more))
                 step, before = max(before, step), 0.0
@@ -248,6 +245,8 @@ class ForcePath:
 
     def passes(self, points: list[PathPoint], other: PathPoint) -> bool:
         """Whether the path goes through another point between some of its points, in order."""
+        if len(points) < 2:
+            return False
         places, aim = np.array([self.place(point) for point in points]), self.place(other)
         ways = np.diff(places, axis=0)
         shares = ((aim - places[:-1]) * ways).sum(axis=1) / (ways**2).sum(axis=1)
@@ -259,10 +258,19 @@ class ForcePath:
         there = self.newton(nearest[k], way[None], np.array([way @ aim]))
         return there is not None and bool(np.linalg.norm(self.place(there) - aim) <= _SHORTEST)
 
+    def _at_force(self, force: float, here: FloatArray, moved: FloatArray) -> list[PathPoint]:
+        """The point of a force between a place and the next one; none if Newton does not converge."""
+        aim = force / self.force - 1.0
+        point = self.newton(here + (aim - here[-1]) / moved[-1] * moved, np.eye(len(here))[-1:], np.array([aim]))
+        return [] if point is None else [point]
+
     def _direction(self, point: PathPoint, along: FloatArray) -> FloatArray:
-        """Direction of the path at a point, with the sense of `along`."""
+        """Direction of the path at a point, with the sense of `along`; that itself where the path is not regular."""
         matrix = np.vstack([np.column_stack([point.state.tangent, -self.force * point.push]), along])
-        way = np.linalg.solve(matrix, np.eye(len(along))[-1])
+        try:
+            way = np.linalg.solve(matrix, np.eye(len(along))[-1])
+        except np.linalg.LinAlgError:
+            return along
         return np.asarray(way / np.linalg.norm(way))
 
     def _behind_knee(self, last: list[PathPoint], way: FloatArray) -> FloatArray | None:
