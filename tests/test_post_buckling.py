@@ -196,12 +196,26 @@ def test_branches_that_leave_branches_are_named_after_them() -> None:
     axes = {f"{sign}spring_1_{name}" for sign in "+-" for name in ("side", "up")}
     saddles = {f"{up}spring_1_up > {side}spring_1_side" for up in "+-" for side in "+-"}
     assert set(found) == {FUNDAMENTAL} | axes | saddles
-    assert found[FUNDAMENTAL].crossings == pytest.approx([172.71 / LEVER, 172.9 / LEVER], rel=1e-4)
+    assert found[FUNDAMENTAL].crossings == pytest.approx([172.71 / LEVER, 172.9 / LEVER], rel=1e-6)
     for label in saddles:
         parent = found[label.partition(" > ")[0]]
         assert parent.crossings == pytest.approx(found[label].forces[:1], rel=1e-4)
         assert parent.stable[-1]
         assert not found[label].stable.any()
+
+
+def test_a_later_crossing_of_too_many_modes_is_named_and_the_rest_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    modes_at = post_buckling._modes
+
+    def refusing(path: force_path.ForcePath, count: int) -> np.ndarray:
+        if path.force > 172.8 / LEVER:
+            raise sr.NeutralEquilibrium("3 modes")
+        return modes_at(path, count)
+
+    monkeypatch.setattr(post_buckling, "_modes", refusing)
+    found = by_label(sr.post_buckling_branches(link(172.71, 172.9), (0, 0), PUSH))
+    assert set(found) == {FUNDAMENTAL, "+spring_1_side", "-spring_1_side"}
+    assert found[FUNDAMENTAL].crossings == pytest.approx([172.71 / LEVER, 172.9 / LEVER], rel=1e-6)
 
 
 @pytest.fixture(scope="module")

@@ -71,9 +71,11 @@ def _answer(found: Sequence[EquilibriumBranch]) -> dict[str, Any]:
     units = {"forces": "N", "crossings": "N", "tip_positions": "m", "energy": "J", "softest": "-", "q_springs": "rad or m"}
     names = ("label", "ended", "forces", "crossings", "energy", "softest", "stable", "neutral")
     rows = [
-        {name: getattr(branch, name) for name in names}
-        | {"q_springs": [one.q_springs for one in branch.equilibria]}
-        | {"tip_positions": [one.tip_position for one in branch.equilibria]}
+        {
+            **{name: getattr(branch, name) for name in names},
+            "q_springs": [one.q_springs for one in branch.equilibria],
+            "tip_positions": [one.tip_position for one in branch.equilibria],
+        }
         for branch in found
     ]
     return {"branches": rows, "units": units}

@@ -53,13 +53,21 @@ class PathPoint(NamedTuple):
         return self.state.q_springs
 
 
+class Crossing(NamedTuple):
+    """Two points of a path between which another path crosses it, and how many eigenvalues change their sign there."""
+
+    before: PathPoint
+    after: PathPoint
+    modes: int
+
+
 class FollowedPath(NamedTuple):
     """A part of a path."""
 
     points: list[PathPoint]
     """Its points, in order."""
-    crossings: list[tuple[int, int]]
-    """Numbers of the points just before which it crosses another path, and by how many eigenvalues become negative there."""
+    crossings: list[Crossing]
+    """Where other paths cross it, or its stability jumps at a plateau."""
     ended: str
     """Why it ends: "largest force", "zero force", "end of range", "points", "unstable" or "lost"."""
 
@@ -111,9 +119,19 @@ class ForcePath:
         """Evaluate the robot at a place, in equilibrium or not."""
         return self.point(self.springs + place[:-1], self.force * (1.0 + float(place[-1])))
 
-    def tangent(self, point: PathPoint) -> FloatArray:
-        """Return the direction of the path under growing force at a point of regular tangent stiffness."""
-        return np.append(self.force * np.linalg.solve(point.state.tangent, point.push), 1.0)
+    def direction(self, point: PathPoint, along: FloatArray | None = None) -> FloatArray:
+        """Return the unit direction at a point, shape (n_springs + 1,), in the sense of another one, by default growing force.
+
+        Where the path is singular, that sense itself.
+        """
+        force = np.eye(len(self.springs) + 1)[-1]
+        sense = force if along is None else along
+        matrix = np.vstack([np.column_stack([point.state.tangent, -self.force * point.push]), sense])
+        try:
+            way = np.linalg.solve(matrix, force)
+        except np.linalg.LinAlgError:
+            return sense
+        return np.asarray(way / np.linalg.norm(way))
 
     def newton(
         self, start: FloatArray, rows: FloatArray, aims: FloatArray, across: FloatArray | None = None
@@ -179,12 +197,12 @@ class ForcePath:
             while_stable: End at the first point with a negative eigenvalue.
         """
         points, step, way = list(first), largest_step, way / np.linalg.norm(way)
-        crossings: list[tuple[int, int]] = []
+        crossings: list[Crossing] = []
         shortest = _SHORTEST_STABLE if while_stable else _SHORTEST
         n_stable, knee = len(points), 0  # number of points at the last stable one, and at the last knee
         before = 0.0  # the step before it was halved at a crossing
         values, tangent = self.eigenvalues(points[-1]), way
-        nearly_zero = _NEARLY_ZERO * abs(float(values[0]))
+        nearly_zero = _NEARLY_ZERO * abs(values[0])
         while len(points) < _MOST_POINTS:
             last = points[-1]
             here, least = self.place(last), shortest * max(1.0, last.force / self.force)
@@ -204,9 +222,9 @@ class ForcePath:
                     return FollowedPath(points, crossings, "end of range" if ends else "lost")
                 continue
             secant, new_values = moved / np.linalg.norm(moved), self.eigenvalues(there)
-            new_tangent = secant if np.abs(new_values).min() <= NEUTRAL else self._direction(there, secant)
-            more = int((new_values < -NEUTRAL).sum() - (values < -NEUTRAL).sum())
-            regular = knee == len(points) or abs(more) == (new_tangent[-1] * tangent[-1] < 0.0)
+            new_tangent = secant if np.abs(new_values).min() <= NEUTRAL else self.direction(there, secant)
+            changed = abs(int((new_values < -NEUTRAL).sum() - (values < -NEUTRAL).sum()))
+            regular = knee == len(points) or changed == (new_tangent[-1] * tangent[-1] < 0.0)
             falls = while_stable and knee < len(points) and nearly_zero < values[0] and new_values[0] < 0.5 * values[0]
             if step > least and (falls or not regular):
                 before, step = max(before, step), 0.5 * step
@@ -215,7 +233,7 @@ class ForcePath:
                 limit, ended = (largest_force, "largest force") if there.force > largest_force else (0.0, "zero force")
                 return FollowedPath([*points, *self._at_force(limit, here, moved)], crossings, ended)
             if not regular:
-                crossings.append((len(points), more))
+                crossings.append(Crossing(last, there, changed))
                 step, before = max(before, step), 0.0
             points.append(there)
             values, tangent = new_values, new_tangent
@@ -253,7 +271,7 @@ class ForcePath:
         nearest = places[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * ways
         k = int(np.argmin(np.linalg.norm(nearest - aim, axis=1)))
         way = ways[k] / np.linalg.norm(ways[k])
-        if not -0.1 < shares[k] < 1.1 or not abs(self._direction(other, way) @ way) >= _TURN:
+        if not -0.1 < shares[k] < 1.1 or not abs(self.direction(other, way) @ way) >= _TURN:
             return False  # beyond its ends (points lie on arcs, not on their chords), or on a path that crosses it
         there = self.newton(nearest[k], way[None], np.array([way @ aim]))
         return there is not None and bool(np.linalg.norm(self.place(there) - aim) <= _SHORTEST)
@@ -263,15 +281,6 @@ class ForcePath:
         aim = force / self.force - 1.0
         point = self.newton(here + (aim - here[-1]) / moved[-1] * moved, np.eye(len(here))[-1:], np.array([aim]))
         return [] if point is None else [point]
-
-    def _direction(self, point: PathPoint, along: FloatArray) -> FloatArray:
-        """Direction of the path at a point, with the sense of `along`; that itself where the path is not regular."""
-        matrix = np.vstack([np.column_stack([point.state.tangent, -self.force * point.push]), along])
-        try:
-            way = np.linalg.solve(matrix, np.eye(len(along))[-1])
-        except np.linalg.LinAlgError:
-            return along
-        return np.asarray(way / np.linalg.norm(way))
 
     def _behind_knee(self, last: list[PathPoint], way: FloatArray) -> FloatArray | None:
         """Direction of the path behind the knee of a link, at either end of its plateau; None if there is no knee.

@@ -88,19 +88,16 @@ def post_buckling_branches(
     most = BEYOND * path.force if max_force is None else float(max_force)
     with one_blas_thread(model.n_springs):
         origin = path.point(critical.origin, 0.0)
-        first = path.follow([origin], path.tangent(origin), most, largest_step)
-        modes = (
-            _modes(path, max([1, *(more for _, more in first.crossings[:1])]))
-            if critical.crosses
-            else np.zeros((0, model.n_springs))
-        )
-        found = [_Branch(FUNDAMENTAL, path, modes, first)]
+        followed = path.follow([origin], path.direction(origin), most, largest_step)
+        count = max([1, *(crossing.modes for crossing in followed.crossings[:1])])
+        modes = _modes(path, count) if critical.crosses else np.zeros((0, model.n_springs))
+        found = [_branch(FUNDAMENTAL, path, modes, followed)]
         if critical.crosses:
             found += _leaving_branches(found, found[0], path, modes, most, largest_step)
         for branch in found:  # those that leave it are added at the end
-            for crossing, modes in _crossings(branch, critical):
+            for crossing, count in _crossings(branch, critical):
                 try:
-                    found += _leaving_branches(found, branch, crossing, modes, most, largest_step)
+                    found += _leaving_branches(found, branch, crossing, _modes(crossing, count), most, largest_step)
                 except NeutralEquilibrium:
                     continue  # the crossing is named
         return tuple(_result(branch) for branch in found)
@@ -115,6 +112,13 @@ class _Branch(NamedTuple):
     modes: FloatArray
     """Buckling modes there, shape (0 to 2, n_springs)."""
     followed: FollowedPath
+    crossings: list[PathPoint]
+    """The last point before each of its crossings."""
+
+
+def _branch(label: str, path: ForcePath, modes: FloatArray, followed: FollowedPath) -> _Branch:
+    crossings = [path.before_change(crossing.before, crossing.after, -NEUTRAL) for crossing in followed.crossings]
+    return _Branch(label, path, modes, followed, crossings)
 
 
 def _modes(path: ForcePath, count: int) -> FloatArray:
@@ -131,16 +135,14 @@ def _modes(path: ForcePath, count: int) -> FloatArray:
     return np.asarray(np.linalg.qr(vectors[:, order] / np.sqrt(stiffness)[:, None])[0].T)
 
 
-def _crossings(branch: _Branch, critical: CriticalPoint) -> Iterator[tuple[ForcePath, FloatArray]]:
-    """Paths with their reference point where others cross a branch, beyond the critical point, and the modes there."""
+def _crossings(branch: _Branch, critical: CriticalPoint) -> Iterator[tuple[ForcePath, int]]:
+    """Paths with their reference point where others cross a branch, beyond the critical point, and the number of modes."""
     if branch.label == RING:
         return
-    points = branch.followed.points
-    for number, more in branch.followed.crossings[int(branch.label == FUNDAMENTAL and critical.crosses) :]:
-        last = branch.path.before_change(points[number - 1], points[number], -NEUTRAL)
-        crossing = replace(branch.path, springs=last.springs, force=last.force)
+    known = int(branch.label == FUNDAMENTAL and critical.crosses)
+    for last, crossing in list(zip(branch.crossings, branch.followed.crossings, strict=True))[known:]:
         if np.abs(branch.path.eigenvalues(last)).min() <= 2.0 * NEUTRAL:  # else a link comes onto its plateau
-            yield crossing, _modes(crossing, abs(more))
+            yield replace(branch.path, springs=last.springs, force=last.force), crossing.modes
 
 
 def _leaving_branches(
@@ -155,7 +157,7 @@ def _leaving_branches(
         name = name if parent.label == FUNDAMENTAL else f"{parent.label} > {name}"
         namesakes = sum(branch.label.partition(" (")[0] == name for branch in known + new)
         label = f"{name} ({namesakes + 1})" if namesakes else name
-        new.append(_Branch(label, path, modes, path.follow([here, there], path.place(there), largest_force, largest_step)))
+        new.append(_branch(label, path, modes, path.follow([here, there], path.place(there), largest_force, largest_step)))
     return new
 
 
@@ -228,8 +230,7 @@ def _result(branch: _Branch) -> EquilibriumBranch:
         for number, point in enumerate(points)
     )
     amplitude = np.array([float(np.linalg.norm(branch.modes @ (point.springs - path.springs))) for point in points])
-    pairs = [points[number - 1 : number + 1] for number, _ in branch.followed.crossings]
-    crossings = np.array([path.before_change(here, there, -NEUTRAL).force for here, there in pairs])
+    crossings = np.array([point.force for point in branch.crossings])
     forces, energy = np.array([(point.force, point.state.energy) for point in points]).T
     return EquilibriumBranch.of(branch.label, equilibria, forces, amplitude, energy, crossings, branch.followed.ended)
 

@@ -90,12 +90,12 @@ def critical_point(
         origin = path.point(path.springs, 0.0)
         if first_state is None or path.eigenvalues(origin)[0] <= 0.0:
             raise ParameterError("gravity", gravity, "a load under which the robot is stable before it is pushed")
-        followed = path.follow([origin], path.tangent(origin), largest, _LARGEST_STEP, growth=_GROWTH, while_stable=True)
+        followed = path.follow([origin], path.direction(origin), largest, _LARGEST_STEP, growth=_GROWTH, while_stable=True)
         if followed.ended == "unstable":
             stable, unstable = followed.points[-2:]
             last = path.before_change(stable, unstable)
-            crosses = bool(followed.crossings) and path.eigenvalues(last)[0] <= NEUTRAL
-            return CriticalPoint(replace(path, springs=last.springs, force=last.force), bool(crosses), path.springs)
+            crosses = bool(followed.crossings and path.eigenvalues(last)[0] <= NEUTRAL)
+            return CriticalPoint(replace(path, springs=last.springs, force=last.force), crosses, path.springs)
     complete = followed.ended == "largest force"
     reached = largest if complete else followed.points[-1].force
     message = f"the equilibrium stays stable up to {reached:.6g} N along {path.unit.tolist()}"
