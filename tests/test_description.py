@@ -38,6 +38,8 @@ ODD = {
     "stiffness": (250.0, 120.0, 80.0),
     "rest_up": 0.1,
     "max_moment": (20.0, 15.5, 9.45),
+    "wrist": (0.08, 0.12),
+    "wrist_limits": (1.5, 1.2, 3.0),
 }
 ODD_PCC = {
     "segment_lengths": (0.5, 0.4, 0.3),
@@ -192,15 +194,18 @@ link = st.fixed_dictionaries(
 
 
 @law("InflatableArm")
-@given(st.lists(link, min_size=1, max_size=6))
+@given(
+    st.lists(link, min_size=1, max_size=6),
+    st.none() | st.tuples(st.just(0.0) | st.floats(1e-3, 0.5), st.floats(1e-2, 0.5)),
+)
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_any_valid_arm_obeys_the_rules_of_portable_urdf(links: list[dict]) -> None:
+def test_any_valid_arm_obeys_the_rules_of_portable_urdf(links: list[dict], wrist: tuple[float, float] | None) -> None:
     """Positive mass above 1e-6 kg, triangle inequality, finite limits, unique names, both copies of every spring."""
     columns = {name: [item[name] for item in links] for name in links[0] if name != "share"}
     offsets = [item["share"] * item["link_lengths"] for item in links]
     walls = [2 * np.pi * item["radius"] * item["wall_thickness"] * item["density"] * item["link_lengths"] for item in links]
     assume(min(wall * min(item["share"], 1 - item["share"]) for wall, item in zip(walls, links, strict=True)) > 2.1e-5)
-    root = ElementTree.fromstring(sr.InflatableArm(**columns, hinge_offset=offsets).urdf())
+    root = ElementTree.fromstring(sr.InflatableArm(**columns, hinge_offset=offsets, wrist=wrist).urdf())
     assert root.get("version") is None
     assert root[0].tag == "mujoco"
     assert root.find("link").get("name") == "world"

@@ -8,12 +8,16 @@ from dataclasses import dataclass
 
 from softrobots import inflated_beam
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, parameter, per_part
+from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, numbers, parameter, per_part
 
 
 @dataclass(frozen=True, kw_only=True)
 class InflatableArm(XacroRobot):
-    """The inflatable arm of [Troise 2021]: N inflated links, N + 1 motors, two springs a link.
+    """The inflatable arm of [Troise 2021]: N inflated links, N + 1 motors, two springs a link; on demand a wrist.
+
+    The wrist has three more motors whose axes meet in one point, base to tip: pitch about -y, yaw about +z, roll about +x, the
+    axis of the hand. It is regular when straight, and singular at a yaw of a quarter turn, where pitch and roll turn about
+    parallel axes.
 
     Every per-link field accepts one number for all links or one for each, and is stored as a tuple with one number a link.
 
@@ -98,6 +102,24 @@ class InflatableArm(XacroRobot):
     base_mass: float = parameter(
         2.0, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
     )
+    wrist: Sequence[float] | None = parameter(
+        None,
+        "m",
+        "Lengths of a wrist of three motors: from the end of the last link to its centre, and from there to the tip; "
+        "without it, the tip is the end of the last link",
+        "Troise 2021, section 1 (the arm places a 3-dof wrist; its lengths are not published)",
+        at_least=0.0,
+        form="special",
+    )
+    wrist_mass: float = parameter(0.3, "kg", "Mass of the wrist, spread evenly over its lengths", "assumed", above=0.0)
+    wrist_limits: Sequence[float] = parameter(
+        (2.0, 2.0, math.pi),
+        "rad",
+        "Pitch, yaw and roll of the wrist turn between minus and plus these angles",
+        "assumed",
+        above=0.0,
+        form="special",
+    )
 
     XACRO = "inflatable_arm.urdf.xacro"
 
@@ -111,6 +133,16 @@ class InflatableArm(XacroRobot):
         for radius, wall in zip(self._each("radius"), self._each("wall_thickness"), strict=True):
             if wall > 0.1 * radius:
                 raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius {radius} m")
+        if self.wrist is not None:
+            lengths = numbers("wrist", self.wrist, None, "m")
+            if len(lengths) != 2 or lengths[0] < 0.0 or lengths[1] <= 0.0:
+                requirement = "two lengths: to the wrist centre, at least 0, and from there to the tip, above 0 [m]; or None"
+                raise ParameterError("wrist", self.wrist, requirement)
+            object.__setattr__(self, "wrist", lengths)
+        limits = numbers("wrist_limits", self.wrist_limits, 3, "rad", "motors of the wrist")
+        if min(limits) <= 0.0:
+            raise ParameterError("wrist_limits", self.wrist_limits, "above 0 [rad]")
+        object.__setattr__(self, "wrist_limits", limits)
 
     @property
     def n_links(self) -> int:
@@ -120,7 +152,7 @@ class InflatableArm(XacroRobot):
     @property
     def n_joints(self) -> int:
         """Number of movable joints of the chain."""
-        return 3 * self.n_links + 1
+        return 3 * self.n_links + (1 if self.wrist is None else 4)
 
     @property
     def volume(self) -> float:
