@@ -178,7 +178,7 @@ def test_a_limit_is_where_it_is_told(call: str, name: str, taken: list[Any], out
 
 # Call, argument, of a wrong form, and what is required.
 FORMS: list[tuple[str, str, list[Any], str]] = [
-    ("deflection", "force", [[1.0]], "a finite number [N]"),
+    ("deflection", "force", [["1.0"], [None]], "an array of finite numbers [N]"),
     ("fit_characterisation", "angle", [[[0.1, 0.2, 0.3]]], "shape (n,) of finite numbers [rad] (it has shape (1, 3))"),
     ("fit_characterisation", "moment", [[1.0, 2.0]], "shape (12,) of finite numbers [N m] (it has shape (2,))"),
     ("backbone", "s", [0.5, [[0.5]]], "shape (n,) of finite numbers"),
@@ -223,12 +223,25 @@ def test_each_method_of_a_bending_test_tells_what_it_refuses(method: str) -> Non
         assert caught.value.field == name
         assert f"[{UNIT_OF[name]}]" in caught.value.requirement
     if len(names) == 2:
-        with pytest.raises(sr.ParameterError, match=r"shape \(2,\) of finite numbers \[N\] \(it has shape \(1,\)\)"):
-            getattr(test, method)([0.1, 0.2], [0.1])
+        with pytest.raises(sr.ParameterError, match=r"force = \(\(2,\), \(3,\)\): force must be of a shape that broadcasts"):
+            getattr(test, method)([0.1, 0.2], [0.1, 0.2, 0.3])
 
 
 # Call, argument, shape of it, shape of the others that does not go with it.
 NO_COMMON_SHAPE = [
+    ("wrinkling_moment", "radius", "pressure"),
+    ("required_pressure", "radius", "moment"),
+    ("required_tabulated_pressure", "radius", "moment"),
+    ("inflated volume", "radius", "length"),
+    ("tank_volume", "tank_pressure", "pressure"),
+    ("tank_pressure", "tank_volume", "ambient_pressure"),
+    ("moment", "stiffness", "angle"),
+    ("moment", "max_moment", "angle"),
+    ("deflection", "position", "young_modulus"),
+    ("deflection", "force", "radius"),
+    ("deflection", "wall_thickness", "pressure"),
+    ("stiffness_from_young_modulus", "young_modulus", "poisson_ratio"),
+    ("young_modulus_from_stiffness", "stiffness", "length"),
     ("Arc", "azimuth", "length"),
     ("HelixShape", "pitch", "outer_radius"),
     ("forward", "diameter", "contraction"),
@@ -255,6 +268,34 @@ def test_shapes_that_do_not_broadcast_are_told(call: str, name: str, other: str)
         function(**given | {name: [given[name]] * 2, other: three})
     assert caught.value.field == name
     assert "broadcasts" in caught.value.requirement
+
+
+@each_row(
+    ("call", "name", "values", "told"),
+    [
+        ("wrinkling_moment", "pressure", [[1e4, 2e4], [3e4, -4e4]], "zero or positive [Pa] (entry (1, 1) is -40000)"),
+        ("required_tabulated_pressure", "moment", [1.0, math.inf], "of finite numbers [N m] (entry 1 is inf)"),
+        ("deflection", "position", [0.1, 0.2, 0.7], "within [0, 0.6] m, the length of the beam (entry 2 is 0.7)"),
+        ("stiffness_from_young_modulus", "wall_thickness", [5e-4, 6e-3], "tenth of the radius 0.055 m (entry 1 is 0.006)"),
+        ("stiffness_from_young_modulus", "radius", [0.055, 1e-3], "tenth of the radius 0.001 m (entry 1 is 0.0005)"),
+        ("young_modulus_from_stiffness", "poisson_ratio", [0.3, 0.6], "in (-1, 0.5] (entry 1 is 0.6)"),
+        (
+            "young_modulus_from_stiffness",
+            "stiffness",
+            [170.0, 1e-3],
+            "the stiffness due to the pressure alone (entry 1 is 0.001)",
+        ),
+        ("moment", "max_moment", [[20.0], [0.0]], "positive [N m] (entry (1, 0) is 0)"),
+        ("inflated volume", "length", [0.6, math.nan], "of finite numbers [m] (entry 1 is nan)"),
+        ("tank_volume", "tank_pressure", [3e7, 2e4], "above the pressure 30000.0 Pa of the inflated volume (entry 1 is 20000)"),
+        ("BendingTest", "angle", [0.1, 2.0], "within +-pi/2 rad, both excluded (entry 1 is 2)"),
+    ],
+)
+def test_a_bad_entry_of_an_array_is_told_with_its_place(call: str, name: str, values: Any, told: str) -> None:
+    function, given = CALLS[call]
+    with pytest.raises(sr.ParameterError) as caught:
+        function(**given | {name: values})
+    assert told in str(caught.value)
 
 
 # Call, argument, the value that the documentation names as its default.

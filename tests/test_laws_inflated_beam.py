@@ -12,8 +12,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from softrobots import ParameterError, inflated_beam
+from tests.support.closed_form_calls import CALLS
 from tests.support.laws import law
 
+BROADCASTING = ["wrinkling_moment", "required_pressure", "required_tabulated_pressure", "deflection", "moment"]
+BROADCASTING += ["stiffness_from_young_modulus", "young_modulus_from_stiffness"]
+BROADCASTING += ["inflated volume", "tank_volume", "tank_pressure"]
 ROUNDING = 1e-14  # a few dozen operations on positive numbers
 
 
@@ -194,6 +198,28 @@ def test_moment_is_the_slope_of_its_energy(angle: float, stiffness: float, most:
     # At the knee the slope bends: half a step of stiffness. Elsewhere rounding of the energy over the step.
     bound = 1e-13 * max(energy(angle), most**2 / stiffness) / step
     assert abs(found - slope) <= bound + (0.5 * stiffness * step if abs(abs(angle) * stiffness - most) < 2e-4 * most else 0.0)
+
+
+@settings(max_examples=8)
+@given(data=st.data())
+@pytest.mark.parametrize("name", BROADCASTING)
+def test_arrays_are_taken_element_by_element(name: str, data: st.DataObject) -> None:
+    """Arguments are numbers, rows or columns: the answer is that of each pair of numbers, to the rounding of powers.
+
+    Numbers alone give a number.
+    """
+    function, given = getattr(inflated_beam, name.removeprefix("inflated ")), CALLS[name][1]
+    random = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    shapes = {key: data.draw(st.sampled_from([(), (3,), (2, 1), (2, 3)])) for key in given}
+    arguments = {key: value * random.uniform(0.8, 1.0, shapes[key]) for key, value in given.items()}
+    found = function(**arguments)
+    shape = np.broadcast_shapes(*shapes.values())
+    assert np.shape(found) == shape
+    for place in np.ndindex(shape):
+        numbers = {key: float(np.broadcast_to(value, shape)[place]) for key, value in arguments.items()}
+        one = function(**numbers)
+        assert one is None or isinstance(one, float)
+        assert (found if shape == () else found[place]) == pytest.approx(np.inf if one is None and shape else one, rel=1e-15)
 
 
 # --- Characterisation

@@ -54,23 +54,41 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
     else:  # on a short list the comparison is several times faster than NumPy's reductions
         accepted = all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
     if not accepted:
-        raise ParameterError(name, value, _array_text(shape, unit) + _too_large(bool(np.all(np.isfinite(array)))))
+        requirement = _array_text(shape, unit) + _too_large(bool(np.all(np.isfinite(array))))
+        refuse_where(name, value, ~(np.abs(array) <= LARGEST), requirement)
     return array
+
+
+def refuse_where(name: str, value: Any, bad: Any, requirement: str, *others: Any) -> None:
+    """Raise ParameterError if a condition holds anywhere; for an array the error names the first such place.
+
+    Args:
+        name: Name of the parameter.
+        value: Its value, a number or an array.
+        bad: Truth values, of a shape to which `value` and `others` broadcast.
+        requirement: What it must be, in which `{}` stands for the entries of `others` at that place.
+        others: Numbers that the requirement depends on.
+    """
+    if not np.any(bad):
+        return
+    places = np.asarray(bad)
+    place = tuple(map(int, np.unravel_index(int(np.argmax(places)), places.shape)))
+    entry, *limits = (float(np.broadcast_to(numbers, places.shape)[place]) for numbers in (value, *others))
+    where = f" (entry {place if len(place) > 1 else place[0]} is {entry:.6g})" if place else ""
+    raise ParameterError(name, value, requirement.format(*limits) + where)
 
 
 def positive_array(name: str, value: Any, unit: str) -> FloatArray:
     """Return `value` as an array of finite positive numbers, any shape, or raise ParameterError."""
     array = finite_array(name, value, None, unit)
-    if np.any(array < 1.0 / LARGEST):
-        raise ParameterError(name, value, f"positive [{unit}]" + _too_small(bool(np.any(array <= 0.0))))
+    refuse_where(name, value, array < 1.0 / LARGEST, f"positive [{unit}]" + _too_small(bool(np.any(array <= 0.0))))
     return array
 
 
 def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
     """Return `value` as an array of finite numbers, zero or positive, any shape, or raise ParameterError."""
     array = finite_array(name, value, None, unit)
-    if np.any(array < 0.0):
-        raise ParameterError(name, value, f"zero or positive [{unit}]")
+    refuse_where(name, value, array < 0.0, f"zero or positive [{unit}]")
     return array
 
 

@@ -2,7 +2,7 @@
 
 Notation of [Troise 2021], section 2.1: a tube of length `L`, radius `r` and wall thickness `t` (thin wall), gauge
 pressure `p`; cap force `P = p pi r^2`, wall section `S = 2 pi r t`, second moment `I = pi r^3 t`, shear coefficient
-`j = 0.5`, shear modulus `G = E / (2 (1 + nu))`.
+`j = 0.5`, shear modulus `G = E / (2 (1 + nu))`. Every argument is a number or an array; arrays broadcast.
 
 References:
     [Troise 2021]: M. Troise, M. Gaidano, P. Palmieri, S. Mauro, Applied Sciences 11(6):2558, doi:10.3390/app11062558.
@@ -11,18 +11,17 @@ References:
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, finite_number, non_negative_number, positive_number
-from softrobots.core.errors import ParameterError
+from softrobots.core.checks import FloatArray, common_shape, finite_array, non_negative_array, positive_array, refuse_where
 
 SHEAR_COEFFICIENT = 0.5
 """Shear coefficient `j` of a circular thin tube [-], [Troise 2021] section 2.1 after Cowper."""
 
 
-def wrinkling_moment(pressure: float, radius: float) -> float:
+def wrinkling_moment(pressure: Any, radius: Any) -> Any:
     """Return the bending moment at which the first wrinkle appears: `M_w = (pi/4) pi p r^3`, [Troise 2021] (3).
 
     Every linear model of this package is valid below it.
@@ -32,15 +31,17 @@ def wrinkling_moment(pressure: float, radius: float) -> float:
         radius: Tube radius [m], positive.
 
     Returns:
-        The moment [N m].
+        The moment [N m], the common shape.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    return math.pi**2 / 4.0 * non_negative_number("pressure", pressure, "Pa") * positive_number("radius", radius, "m") ** 3
+    pressures, radii = non_negative_array("pressure", pressure, "Pa"), positive_array("radius", radius, "m")
+    common_shape("radius", pressures.shape, radii.shape)
+    return math.pi**2 / 4.0 * pressures * radii**3
 
 
-def required_pressure(moment: float, radius: float) -> float:
+def required_pressure(moment: Any, radius: Any) -> Any:
     """Return the gauge pressure whose wrinkling moment is `moment`: the inverse of [Troise 2021] (3).
 
     Args:
@@ -48,43 +49,54 @@ def required_pressure(moment: float, radius: float) -> float:
         radius: Tube radius [m], positive.
 
     Returns:
-        The pressure [Pa].
+        The pressure [Pa], the common shape.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    return non_negative_number("moment", moment, "N m") / wrinkling_moment(1.0, radius)
+    moments, of_one_pascal = non_negative_array("moment", moment, "N m"), wrinkling_moment(1.0, radius)
+    common_shape("radius", moments.shape, of_one_pascal.shape)
+    return moments / of_one_pascal
 
 
-def _section(pressure: float, radius: float, wall_thickness: float) -> tuple[float, float, float]:
-    """Return cap force [N], wall section [m^2] and second moment of area [m^4] of a pressurised thin tube."""
-    pressure = non_negative_number("pressure", pressure, "Pa")
-    radius = positive_number("radius", radius, "m")
-    wall_thickness = positive_number("wall_thickness", wall_thickness, "m")
-    if wall_thickness > 0.1 * radius:
-        raise ParameterError("wall_thickness", wall_thickness, f"a thin wall, at most a tenth of the radius {radius} m")
-    return pressure * math.pi * radius**2, 2.0 * math.pi * radius * wall_thickness, math.pi * radius**3 * wall_thickness
+class _Section(NamedTuple):
+    """A pressurised thin tube: arrays that broadcast."""
 
+    cap_force: FloatArray
+    """`P` [N]."""
+    wall: FloatArray
+    """Section `S` of the wall [m^2]."""
+    second_moment: FloatArray
+    """`I` [m^4]."""
+    shear_ratio: FloatArray
+    """`j G / E` [-]."""
 
-def _shear_ratio(poisson_ratio: float) -> float:
-    """Return `j G / E`."""
-    nu = finite_number("poisson_ratio", poisson_ratio, "-")
-    if not -1.0 < nu <= 0.5:
-        raise ParameterError("poisson_ratio", poisson_ratio, "in (-1, 0.5]")
-    return SHEAR_COEFFICIENT / (2.0 * (1.0 + nu))
+    @classmethod
+    def of(cls, pressure: Any, radius: Any, wall_thickness: Any, poisson_ratio: Any, **others: FloatArray) -> _Section:
+        """Check a tube, and that other arguments broadcast with it."""
+        p, r = non_negative_array("pressure", pressure, "Pa"), positive_array("radius", radius, "m")
+        t, nu = positive_array("wall_thickness", wall_thickness, "m"), finite_array("poisson_ratio", poisson_ratio, None, "-")
+        arrays = {"pressure": p, "radius": r, "wall_thickness": t, "poisson_ratio": nu} | others
+        shape: tuple[int, ...] = ()
+        for name, array in arrays.items():
+            shape = common_shape(name, shape, array.shape)
+        too_thick = "a thin wall, at most a tenth of the radius {} m"
+        refuse_where("wall_thickness", wall_thickness, t > 0.1 * r, too_thick, r)
+        refuse_where("poisson_ratio", poisson_ratio, (nu <= -1.0) | (nu > 0.5), "in (-1, 0.5]")
+        return cls(p * math.pi * r**2, 2.0 * math.pi * r * t, math.pi * r**3 * t, SHEAR_COEFFICIENT / (2.0 * (1.0 + nu)))
 
 
 def deflection(
     position: Any,
-    force: float,
+    force: Any,
     *,
-    length: float,
-    radius: float,
-    wall_thickness: float,
-    pressure: float,
-    young_modulus: float,
-    poisson_ratio: float = 0.3,
-) -> FloatArray:
+    length: Any,
+    radius: Any,
+    wall_thickness: Any,
+    pressure: Any,
+    young_modulus: Any,
+    poisson_ratio: Any = 0.3,
+) -> Any:
     r"""Return the deflection of an inflated cantilever under a transverse tip force.
 
     .. math:: v(x) = F / ((E + P/S) I) (l x^2/2 - x^3/6) + F x / (P + j G S)
@@ -93,7 +105,7 @@ def deflection(
     equilibrium with a tip force (a cantilever has `v(l) = F l^3/(3 E I)` plus shear).
 
     Args:
-        position: Distance `x` from the clamp [m], any shape, within [0, length].
+        position: Distance `x` from the clamp [m], within [0, length].
         force: Transverse tip force `F` [N].
         length: Distance `l` of the force from the clamp [m], positive.
         radius: Tube radius [m], positive.
@@ -103,32 +115,30 @@ def deflection(
         poisson_ratio: Poisson ratio of the wall [-], in (-1, 0.5].
 
     Returns:
-        Deflection [m], shape of `position`.
+        Deflection [m], the common shape.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    length = positive_number("length", length, "m")
-    x = finite_array("position", position, None, "m")
-    if np.any((x < 0.0) | (x > length)):
-        raise ParameterError("position", position, f"within [0, {length}] m, the length of the beam")
-    force = finite_number("force", force, "N")
-    cap_force, wall_section, second_moment = _section(pressure, radius, wall_thickness)
-    modulus = positive_number("young_modulus", young_modulus, "Pa")
-    bending = (modulus + cap_force / wall_section) * second_moment
-    shear = cap_force + _shear_ratio(poisson_ratio) * modulus * wall_section
-    return np.asarray(force / bending * (length * x**2 / 2.0 - x**3 / 6.0) + force * x / shear)
+    x, loads = finite_array("position", position, None, "m"), finite_array("force", force, None, "N")
+    lengths, modulus = positive_array("length", length, "m"), positive_array("young_modulus", young_modulus, "Pa")
+    others = {"young_modulus": modulus, "length": lengths, "position": x, "force": loads}
+    section = _Section.of(pressure, radius, wall_thickness, poisson_ratio, **others)
+    refuse_where("position", position, (x < 0.0) | (x > lengths), "within [0, {}] m, the length of the beam", lengths)
+    bending = (modulus + section.cap_force / section.wall) * section.second_moment
+    shear = section.cap_force + section.shear_ratio * modulus * section.wall
+    return loads / bending * (lengths * x**2 / 2.0 - x**3 / 6.0) + loads * x / shear
 
 
 def stiffness_from_young_modulus(
-    young_modulus: float,
+    young_modulus: Any,
     *,
-    pressure: float,
-    length: float,
-    radius: float,
-    wall_thickness: float,
-    poisson_ratio: float = 0.3,
-) -> float:
+    pressure: Any,
+    length: Any,
+    radius: Any,
+    wall_thickness: Any,
+    poisson_ratio: Any = 0.3,
+) -> Any:
     """Return the stiffness `k` of the pseudo-rigid hinge from Young's modulus.
 
     `k = tau / theta` with `tau = F L` and `theta = v(L) / L`, `v` from [Troise 2021] (1) with the tip at the full length
@@ -143,34 +153,34 @@ def stiffness_from_young_modulus(
         poisson_ratio: Poisson ratio of the wall [-], in (-1, 0.5].
 
     Returns:
-        The stiffness [N m/rad].
+        The stiffness [N m/rad], the common shape.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
-    length = positive_number("length", length, "m")
+    lengths = positive_array("length", length, "m")
     tip = deflection(
-        length,
+        lengths,
         1.0,
-        length=length,
+        length=lengths,
         radius=radius,
         wall_thickness=wall_thickness,
         pressure=pressure,
         young_modulus=young_modulus,
         poisson_ratio=poisson_ratio,
     )
-    return float(length**2 / tip)
+    return lengths**2 / tip
 
 
 def young_modulus_from_stiffness(
-    stiffness: float,
+    stiffness: Any,
     *,
-    pressure: float,
-    length: float,
-    radius: float,
-    wall_thickness: float,
-    poisson_ratio: float = 0.3,
-) -> float:
+    pressure: Any,
+    length: Any,
+    radius: Any,
+    wall_thickness: Any,
+    poisson_ratio: Any = 0.3,
+) -> Any:
     r"""Return Young's modulus of the wall from a hinge stiffness; inverse of `stiffness_from_young_modulus`.
 
     With :math:`a = k L / (3 I)`, :math:`b = k / (c L)`, :math:`s = P/S`, :math:`t = P/c` and :math:`c = j S/(2 (1 + nu))`
@@ -186,24 +196,24 @@ def young_modulus_from_stiffness(
         poisson_ratio: Poisson ratio of the wall [-], in (-1, 0.5].
 
     Returns:
-        The modulus [Pa].
+        The modulus [Pa], the common shape.
 
     Raises:
-        ParameterError: If an argument is out of range, or the stiffness is not above that of the pressure alone.
+        ParameterError: If an argument is out of range, the shapes do not broadcast, or the stiffness is not above that of the
+            pressure alone.
     """
-    stiffness = positive_number("stiffness", stiffness, "N m/rad")
-    length = positive_number("length", length, "m")
-    cap_force, wall_section, second_moment = _section(pressure, radius, wall_thickness)
-    c = _shear_ratio(poisson_ratio) * wall_section
-    bending, shear = stiffness * length / (3.0 * second_moment), stiffness / (c * length)
-    stress, shear_stress = cap_force / wall_section, cap_force / c
+    k, lengths = positive_array("stiffness", stiffness, "N m/rad"), positive_array("length", length, "m")
+    section = _Section.of(pressure, radius, wall_thickness, poisson_ratio, length=lengths, stiffness=k)
+    c = section.shear_ratio * section.wall
+    bending, shear = k * lengths / (3.0 * section.second_moment), k / (c * lengths)
+    stress, shear_stress = section.cap_force / section.wall, section.cap_force / c
     middle = 0.5 * ((bending - stress) + (shear - shear_stress))
-    half_difference = math.hypot(0.5 * ((bending - stress) - (shear - shear_stress)), math.sqrt(bending) * math.sqrt(shear))
-    if middle >= 0.0:
-        modulus = middle + half_difference
-    else:  # product of both roots over the other root
-        modulus = (bending * shear_stress + shear * stress - stress * shear_stress) / (half_difference - middle)
-    if modulus <= 0.0:
-        floor = stiffness / (bending / stress + shear / shear_stress)
-        raise ParameterError("stiffness", stiffness, f"above {floor:.6g} N m/rad, the stiffness due to the pressure alone")
-    return modulus
+    half_difference = np.hypot(0.5 * ((bending - stress) - (shear - shear_stress)), np.sqrt(bending) * np.sqrt(shear))
+    larger = half_difference + np.abs(middle)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # of the choice that is not taken
+        product = bending * shear_stress + shear * stress - stress * shear_stress
+        modulus = np.where(middle >= 0.0, larger, product / larger)  # product of both roots over the other root
+        least = k / (bending / stress + shear / shear_stress)
+    too_soft = "above {:.6g} N m/rad, the stiffness due to the pressure alone"
+    refuse_where("stiffness", stiffness, ~(modulus > 0.0), too_soft, least)
+    return modulus[()]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_number
+from softrobots.core.checks import FloatArray, common_shape, finite_array, non_negative_number, positive_number, refuse_where
 from softrobots.core.errors import ParameterError
 
 
@@ -56,7 +56,7 @@ class BendingTest:
         """Distance of the probe's line from the hinge, `a = h - l1` [m]."""
         return self.probe_distance - self.hinge_offset
 
-    def displacement(self, angle: Any) -> FloatArray:
+    def displacement(self, angle: Any) -> Any:
         """Return the displacement of the probe at a hinge angle.
 
         Args:
@@ -69,9 +69,9 @@ class BendingTest:
             ParameterError: If an angle is not finite or out of range.
         """
         theta = _bent(angle)
-        return np.asarray(self.arm * np.tan(theta) - self.offset * (1.0 / np.cos(theta) - 1.0))
+        return self.arm * np.tan(theta) - self.offset * (1.0 / np.cos(theta) - 1.0)
 
-    def angle(self, displacement: Any) -> FloatArray:
+    def angle(self, displacement: Any) -> Any:
         """Return the hinge angle at a displacement of the probe: the inverse of `displacement`.
 
         Args:
@@ -84,9 +84,9 @@ class BendingTest:
             ParameterError: If a number is not finite.
         """
         centre = finite_array("displacement", displacement, None, "m") - self.offset  # from the axis at rest
-        return np.asarray(np.arctan2(centre, self.arm) + np.arcsin(self.offset / np.hypot(self.arm, centre)))
+        return np.arctan2(centre, self.arm) + np.arcsin(self.offset / np.hypot(self.arm, centre))
 
-    def contact(self, angle: Any) -> FloatArray:
+    def contact(self, angle: Any) -> Any:
         """Return the distance of the contact point from the hinge along the bent axis: `a / cos(angle) - c tan(angle)`.
 
         Args:
@@ -99,44 +99,44 @@ class BendingTest:
             ParameterError: If an angle is not finite or out of range.
         """
         theta = _bent(angle)
-        return np.asarray((self.arm - self.offset * np.sin(theta)) / np.cos(theta))
+        return (self.arm - self.offset * np.sin(theta)) / np.cos(theta)
 
-    def moment(self, displacement: Any, force: Any) -> FloatArray:
+    def moment(self, displacement: Any, force: Any) -> Any:
         """Return the moment at the hinge from displacement and force.
 
         Args:
             displacement: Displacements [m], any shape.
-            force: Forces on the link along the probe's line [N], the same shape.
+            force: Forces on the link along the probe's line [N], a shape that broadcasts with it.
 
         Returns:
             Moments [N m].
 
         Raises:
-            ParameterError: If a number is not finite or the shapes differ.
+            ParameterError: If a number is not finite or the shapes do not broadcast.
         """
-        theta = self.angle(displacement)
-        loads = finite_array("force", force, theta.shape, "N")
-        return np.asarray(loads * (self.arm - self.offset * np.sin(theta)) / np.cos(theta) ** 2)
+        theta, loads = self.angle(displacement), finite_array("force", force, None, "N")
+        common_shape("force", theta.shape, loads.shape)
+        return loads * (self.arm - self.offset * np.sin(theta)) / np.cos(theta) ** 2
 
-    def small_angles(self, displacement: Any, force: Any) -> tuple[FloatArray, FloatArray]:
+    def small_angles(self, displacement: Any, force: Any) -> tuple[Any, Any]:
         """Return hinge angle `v / a` and moment `F a`, the paper's evaluation.
 
         Args:
             displacement: Displacements [m], any shape.
-            force: Forces on the link along the probe's line [N], the same shape.
+            force: Forces on the link along the probe's line [N], a shape that broadcasts with it.
 
         Returns:
-            Angles [rad] and moments [N m].
+            Angles [rad], shape of `displacement`, and moments [N m], shape of `force`.
 
         Raises:
-            ParameterError: If a number is not finite or the shapes differ.
+            ParameterError: If a number is not finite or the shapes do not broadcast.
         """
-        moved = finite_array("displacement", displacement, None, "m")
-        return np.asarray(moved / self.arm), self.arm * finite_array("force", force, moved.shape, "N")
+        moved, loads = finite_array("displacement", displacement, None, "m"), finite_array("force", force, None, "N")
+        common_shape("force", moved.shape, loads.shape)
+        return moved / self.arm, self.arm * loads
 
 
 def _bent(value: Any) -> FloatArray:
     angles = finite_array("angle", value, None, "rad")
-    if np.any(np.abs(angles) >= 0.5 * np.pi):
-        raise ParameterError("angle", value, "within +-pi/2 rad, both excluded")
+    refuse_where("angle", value, np.abs(angles) >= 0.5 * np.pi, "within +-pi/2 rad, both excluded")
     return angles

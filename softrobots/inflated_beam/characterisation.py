@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, positive_number
+from softrobots.core.checks import FloatArray, common_shape, finite_array, positive_array, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam.beam import required_pressure, wrinkling_moment
 
@@ -40,41 +40,43 @@ MEAN_STIFFNESS = 172.71
 """Mean stiffness of the prototype link [N m/rad], as printed in [Troise 2021]; the six rows average 172.7117."""
 
 
-def required_tabulated_pressure(moment: float, radius: float) -> float | None:
+def required_tabulated_pressure(moment: Any, radius: Any) -> Any:
     """Return the smallest pressure of [Troise 2021] Table 3 whose wrinkling moment is at least `moment`.
 
     Args:
-        moment: Bending moment [N m], zero or positive.
-        radius: Tube radius [m], positive.
+        moment: Bending moment [N m], zero or positive, a number or an array.
+        radius: Tube radius [m], positive, a number or an array that broadcasts with it.
 
     Returns:
-        The pressure [Pa]; None if the moment exceeds the highest row.
+        The pressure [Pa], the common shape. Where the moment exceeds the highest row, infinity; None for a single number.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
     exact = required_pressure(moment, radius)
-    return next((row.pressure for row in TABLE_3 if row.pressure >= exact), None)
+    pressures = np.append([row.pressure for row in TABLE_3], np.inf)
+    found = pressures[np.searchsorted(pressures, exact)]
+    return found if np.ndim(found) else float(found) if np.isfinite(found) else None
 
 
-def moment(angle: Any, *, stiffness: float, max_moment: float) -> FloatArray:
+def moment(angle: Any, *, stiffness: Any, max_moment: Any) -> Any:
     """Return the moment of a link bent by an angle: `tau = sign(theta) min(k |theta|, M_max)`, [Troise 2021] section 4.
 
     Args:
-        angle: Hinge angle [rad], any shape.
-        stiffness: Stiffness `k` [N m/rad], positive.
-        max_moment: Saturation moment `M_max` [N m], positive.
+        angle: Hinge angle [rad], a number or an array.
+        stiffness: Stiffness `k` [N m/rad], positive, a number or an array that broadcasts.
+        max_moment: Saturation moment `M_max` [N m], positive, a number or an array that broadcasts.
 
     Returns:
-        Moment [N m], shape of `angle`.
+        Moment [N m], the common shape.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
     theta = finite_array("angle", angle, None, "rad")
-    stiffness = positive_number("stiffness", stiffness, "N m/rad")
-    max_moment = positive_number("max_moment", max_moment, "N m")
-    return np.asarray(np.clip(stiffness * theta, -max_moment, max_moment))
+    k, most = positive_array("stiffness", stiffness, "N m/rad"), positive_array("max_moment", max_moment, "N m")
+    common_shape("max_moment", common_shape("stiffness", theta.shape, k.shape), most.shape)
+    return np.clip(k * theta, -most, most)
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def fit_characterisation(angle: Any, moment: Any, *, pressure: float, radius: fl
     """
     theta = finite_array("angle", angle, (None,), "rad")
     tau = finite_array("moment", moment, theta.shape, "N m")
-    limit = wrinkling_moment(positive_number("pressure", pressure, "Pa"), radius)
+    limit = float(wrinkling_moment(positive_number("pressure", pressure, "Pa"), positive_number("radius", radius, "m")))
     tau = np.where(theta < 0.0, -tau, tau)
     theta = np.abs(theta)
     order = np.lexsort((tau, theta))  # by angle, then by moment: independent of the order of the input

@@ -41,7 +41,7 @@ class SpringGroup:
     @property
     def wrinkling_moment(self) -> float:
         """Moment of the first wrinkle [N m], [Troise 2021] (3)."""
-        return inflated_beam.wrinkling_moment(self.pressure, self.radius)
+        return float(inflated_beam.wrinkling_moment(self.pressure, self.radius))
 
 
 class _Plateau(NamedTuple):

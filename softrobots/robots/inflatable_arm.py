@@ -157,7 +157,7 @@ class InflatableArm(XacroRobot):
     @property
     def volume(self) -> float:
         """Volume of all links together [m^3]."""
-        return sum(inflated_beam.volume(*size) for size in zip(self.link_lengths, self._each("radius"), strict=True))
+        return float(inflated_beam.volume(self.link_lengths, self._each("radius")).sum())
 
     def tank_volume(self, tank_pressure: float, *, ambient_pressure: float = 0.0) -> float:
         """Volume of the tank that inflates the whole arm once, isothermally [m^3]; see `inflated_beam.tank_volume`.
@@ -171,7 +171,9 @@ class InflatableArm(XacroRobot):
         Raises:
             ParameterError: If the links differ in pressure or a pressure is out of range.
         """
-        return inflated_beam.tank_volume(self.volume, self._one_pressure(), tank_pressure, ambient_pressure=ambient_pressure)
+        return float(
+            inflated_beam.tank_volume(self.volume, self._one_pressure(), tank_pressure, ambient_pressure=ambient_pressure)
+        )
 
     def tank_pressure(self, tank_volume: float, *, ambient_pressure: float = 0.0) -> float:
         """Gauge pressure of a full tank that inflates the whole arm once [Pa]; see `inflated_beam.tank_pressure`.
@@ -183,7 +185,9 @@ class InflatableArm(XacroRobot):
         Raises:
             ParameterError: If the links differ in pressure or a value is out of range.
         """
-        return inflated_beam.tank_pressure(self.volume, self._one_pressure(), tank_volume, ambient_pressure=ambient_pressure)
+        return float(
+            inflated_beam.tank_pressure(self.volume, self._one_pressure(), tank_volume, ambient_pressure=ambient_pressure)
+        )
 
     def _one_pressure(self) -> float:
         pressures = self._each("pressure")

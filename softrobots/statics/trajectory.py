@@ -81,7 +81,7 @@ class Trajectory:
         if self.link_moments is None:
             return None
         largest = zip(self.link_moments.max(axis=0), self.model.spring_groups, strict=True)
-        return max(inflated_beam.required_pressure(moment, group.radius) for moment, group in largest)
+        return max(float(inflated_beam.required_pressure(moment, group.radius)) for moment, group in largest)
 
     @property
     def wrinkling_margin(self) -> float | None:

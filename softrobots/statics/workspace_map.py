@@ -177,7 +177,7 @@ def required_pressures(model: SoftModel, q_springs: FloatArray) -> FloatArray:
     """
     torques = model.stiffness * (q_springs - model.rest)
     moments = [np.linalg.norm(torques[:, list(group.springs)], axis=1) for group in model.spring_groups]
-    return np.stack(moments, axis=1) * [required_pressure(1.0, group.radius) for group in model.spring_groups]
+    return np.asarray(required_pressure(np.stack(moments, axis=1), [group.radius for group in model.spring_groups]))
 
 
 def packed(result: WorkspaceMap) -> dict[str, Any]:

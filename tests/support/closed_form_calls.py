@@ -72,10 +72,16 @@ def _wish(**arguments: Any) -> Any:
     return _whole_design(**ACTUATOR, turns=3.0, wish=helix.Wish(**arguments))
 
 
+def _tabulated(moment: Any, radius: Any) -> Any:
+    """Without the infinity that stands for moments beyond the table, in arrays."""
+    found = inflated_beam.required_tabulated_pressure(moment, radius)
+    return np.minimum(found, 1e9) if isinstance(found, np.ndarray) else found
+
+
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "wrinkling_moment": (inflated_beam.wrinkling_moment, {"pressure": 3e4, "radius": 0.055}),
     "required_pressure": (inflated_beam.required_pressure, {"moment": 10.0, "radius": 0.055}),
-    "required_tabulated_pressure": (inflated_beam.required_tabulated_pressure, {"moment": 10.0, "radius": 0.055}),
+    "required_tabulated_pressure": (_tabulated, {"moment": 10.0, "radius": 0.055}),
     "deflection": (inflated_beam.deflection, {"position": 0.3, "force": 1.0, "young_modulus": 1e8, **WALL}),
     "stiffness_from_young_modulus": (inflated_beam.stiffness_from_young_modulus, {"young_modulus": 1e8, **WALL}),
     "young_modulus_from_stiffness": (inflated_beam.young_modulus_from_stiffness, {"stiffness": 170.0, **WALL}),

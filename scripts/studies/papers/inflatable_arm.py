@@ -83,7 +83,7 @@ def deflection() -> list[Row]:
 
     def modulus(pressure: float, ratio: float) -> float:
         found = inflated_beam.young_modulus_from_stiffness(stiffness, pressure=pressure, **_TUBE, poisson_ratio=ratio)
-        return 1e-6 * found
+        return 1e-6 * float(found)
 
     low, high = MODULUS_RANGE
     at = {pressure: f"E from the mean k at {pressure / 1e3:g} kPa" for pressure in MODULUS_RANGE}
