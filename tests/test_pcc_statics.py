@@ -662,9 +662,8 @@ def test_turning_the_load_by_the_symmetry_of_the_muscles_turns_the_answer(
 ) -> None:
     """+120 degrees about z: the muscle at 0 takes the place of the third, the third that of the second, that of the first.
 
-    Without gravity to the solver's 1e-13; with it the tiny links, whose slices do not turn with the arm, weigh in: 1e-8."""
-    arm, turning, after = model(muscles), turn_z(2 * np.pi / 3), [1, 2, 0, 4, 5, 3]
-    allowed = 1e-10 if gravity is None else 1e-7
+    To the solver's 1e-13."""
+    arm, turning, after, allowed = model(muscles), turn_z(2 * np.pi / 3), [1, 2, 0, 4, 5, 3], 1e-10
     for _ in range(3):
         motors = random_lengths(rng, sr.PccArm(), 0.05) if muscles == "lengths" else rng.uniform(-20, 20, 6)
         mid, tip = rng.uniform(-1, 1, 6) * (1, 1, 1, 0.1, 0.1, 0.1), rng.uniform(-1, 1, 6) * (1, 1, 1, 0.1, 0.1, 0.1)
