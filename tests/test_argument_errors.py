@@ -20,7 +20,7 @@ UNITS = {
     "m/rad": "pitch",
     "m^3": "inflated_volume tank_volume",
     "rad": "angle bending azimuth azimuths offsets start_azimuth angle_limits",
-    "Pa": "pressure young_modulus tank_pressure ambient_pressure",
+    "Pa": "pressure young_modulus shear_modulus tank_pressure ambient_pressure",
     "N": "force",
     "N m": "moment max_moment",
     "N m/rad": "stiffness",

@@ -59,6 +59,50 @@ shares_ = st.floats(0.0, 1.0)
 factors_ = decades(1e-3, 1e3)
 
 
+# --- Two hinges
+
+
+@law("inflated_beam.beam_stiffness", "inflated_beam.BeamStiffness")
+@settings(max_examples=40)
+@given(tubes_, moduli_, st.one_of(st.none(), moduli_))
+def test_the_stiffness_of_a_tube_is_that_of_its_wall_under_tension(tube: Tube, modulus: float, shear: float | None) -> None:
+    """Round the wall, whose length carries p r / 2: (E t + p r / 2) y^2 against bending, (G t + p r / 2) r^2 against torsion.
+
+    The sums over 12 places are exact for a cosine squared. Half of the wall, and the force on the cap, against shear.
+    """
+    _, r, t, p, _ = tube
+    angle = 2.0 * math.pi * np.arange(12) / 12.0
+    each, g = 2.0 * math.pi * r / 12.0, modulus / 2.6 if shear is None else shear
+    found = inflated_beam.beam_stiffness(modulus, pressure=p, radius=r, wall_thickness=t, shear_modulus=shear)
+    expected = inflated_beam.BeamStiffness(
+        bending=np.sum((modulus * t + 0.5 * p * r) * (r * np.cos(angle)) ** 2) * each,
+        shear=p * math.pi * r**2 + 0.5 * 12 * g * t * each,
+        twisting=12 * (g * t + 0.5 * p * r) * r**2 * each,
+    )
+    assert found == pytest.approx(expected, rel=ROUNDING)
+
+
+@law("inflated_beam.two_hinges", "inflated_beam.TwoHinges")
+@settings(max_examples=40)
+@given(tubes_, moduli_)
+def test_two_hinges_give_way_as_the_beam(tube: Tube, modulus: float) -> None:
+    """Under a small force and moment at the end: the energy of the beam, integrated along it, and that of the springs."""
+    length, sizes = tube.length, {"pressure": tube.pressure, "radius": tube.radius, "wall_thickness": tube.wall_thickness}
+    beam = inflated_beam.beam_stiffness(modulus, **sizes)
+    assume(6.0 * beam.bending < 0.999 * beam.shear * length**2)
+    found = inflated_beam.two_hinges(beam, length)
+    assert isinstance(found, inflated_beam.TwoHinges)
+    nodes, weights = np.polynomial.legendre.leggauss(2)  # exact for the square of a moment that is linear
+    along, share = 0.5 * length * (1.0 + nodes), 0.5 * length * weights
+    places = 0.5 * length + found.distance * np.array([-1.0, 1.0])
+    assert places[0] > 0.0
+    for force, moment in ((1.0, 0.0), (0.0, length), (1.0, -0.3 * length)):
+        smooth = share @ ((force * (length - along) + moment) ** 2 / beam.bending + force**2 / beam.shear)
+        lumped = np.sum((force * (length - places) + moment) ** 2) / found.stiffness
+        assert lumped == pytest.approx(smooth, rel=10.0 * ROUNDING)
+    assert found.twist_stiffness == pytest.approx(1.0 / (share @ np.full(2, 1.0 / beam.twisting)), rel=ROUNDING)
+
+
 # --- Bending
 
 

@@ -96,7 +96,7 @@ def test_one_value_stands_for_parts_that_have_the_same(told, tmp_path: Path) -> 
     file = tmp_path / "arm.yaml"
     assert told("urdf", "inflatable_arm", "--set", "radius=[0.06,0.05]", "--save-parameters", str(file))[0] == 0
     values = read_parameters(file).values
-    assert (values["link_lengths"], values["radius"], values["stiffness"]) == ((0.6, 0.6), (0.06, 0.05), 172.71)
+    assert (values["link_lengths"], values["radius"], values["pressure"]) == ((0.6, 0.6), (0.06, 0.05), 50e3)
 
 
 def test_words_mean_what_they_mean_in_yaml_1_2(tmp_path: Path) -> None:

@@ -84,15 +84,23 @@ def _read_joint(joint: ElementTree.Element, source: str, springs: dict[str, Spri
 
 
 def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[str]) -> InflatedLinkTag:
-    names = tuple(element.get("springs", "").split())
-    if not names or any(name not in springs for name in names):
+    names, twist = tuple(element.get("springs", "").split()), element.get("twist")
+    if not names or any(name not in springs for name in (*names, *([] if twist is None else [twist]))):
         raise DescriptionError(
-            f"an inflated_link of {source} names the springs {' '.join(names) or '(none)'}; "
+            f"an inflated_link of {source} names the springs {' '.join(names) or '(none)'}"
+            f"{'' if twist is None else f' and the twist {twist!r}'}; "
             f"springs that exist are required: {', '.join(springs) or 'none'}"
+        )
+    hinges = element.get("hinges", "1")
+    if hinges not in map(str, range(1, len(names) + 1)) or len(names) % int(hinges):
+        raise DescriptionError(
+            f"the inflated_link of {' '.join(names)} in {source} has hinges = {hinges!r}; a divisor of {len(names)} is required"
         )
     where = f"the inflated_link of {' '.join(names)} in {source}"
     most = _positive(element, "max_moment", where) if "max_moment" in element.attrib else None
-    tag = InflatedLinkTag(names, _number(element, "radius", where), _number(element, "pressure", where), most)
+    tag = InflatedLinkTag(
+        names, _number(element, "radius", where), _number(element, "pressure", where), most, int(hinges), twist
+    )
     if tag.radius <= 0.0 or tag.pressure < 0.0:
         raise DescriptionError(f"{where} has radius {tag.radius} and pressure {tag.pressure}; required > 0 and >= 0")
     return tag

@@ -30,13 +30,17 @@ class InflatedLinkTag:
     """The springs that represent one inflated link, with the properties that set its wrinkling moment."""
 
     springs: tuple[str, ...]
-    """Names of the spring joints, or of coordinates of a section, `<section>_bend_x` and so on."""
+    """Names of the spring joints that bend it, hinge after hinge, or of coordinates of a section, `<section>_bend_x` etc."""
     radius: float
     """Tube radius [m]."""
     pressure: float
     """Gauge pressure [Pa]."""
     max_moment: float | None = None
     """Largest moment of the link, beyond wrinkling [N m]; None for linear springs."""
+    hinges: int = 1
+    """Number of hinges, each with as many of the springs."""
+    twist: str | None = None
+    """Name of the spring joint that twists it; None if it does not twist."""
 
 
 @dataclass(frozen=True, kw_only=True)

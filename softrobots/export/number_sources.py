@@ -33,7 +33,9 @@ def number_rules(robot: XacroRobot) -> Rules:
 def derived_numbers(robot: XacroRobot) -> dict[str, dict[str, Any]]:
     """Return value, unit, meaning and source of the numbers that expressions name besides the parameters."""
     rows: list[_Row] = []
-    if isinstance(robot, PccArm):
+    if isinstance(robot, InflatableArm):
+        rows = _link_stiffness(robot)
+    elif isinstance(robot, PccArm):
         name = "elastic_sections" if robot.chain == "sections" else "hinges"
         lengths = [length / getattr(robot, name) for length in robot.segment_lengths]
         rows = [("section_lengths", lengths, "m", "Rest length of a section, by segment", f"segment_lengths[0] / {name}")]
@@ -41,6 +43,44 @@ def derived_numbers(robot: XacroRobot) -> dict[str, dict[str, Any]]:
         rows = [*_tube_stiffness(robot), *_tube_shape(robot)]
     keys = ("value", "unit", "meaning", "source")
     return {name: dict(zip(keys, facts, strict=True)) for name, *facts in rows}
+
+
+def _link_stiffness(robot: InflatableArm) -> list[_Row]:
+    two, springs = robot.link_model == "two_hinges", list(robot.spring_stiffness)
+    meaning = "Stiffness of each spring that bends a link"
+    if not two and robot.young_modulus is None:
+        return [] if robot.stiffness else [("spring_stiffness", springs, "N m/rad", meaning, repr(springs[0]))]
+    stress, second = "pressure[0] * radius[0] / (2 * wall_thickness[0])", "pi * radius[0]**3 * wall_thickness[0]"
+    modulus = robot.wall_modulus
+    source = "young_modulus[0]" if robot.young_modulus else repr(modulus[0])
+    if robot.stiffness:
+        source = f"stiffness[0] * link_lengths[0] / (2 * {second}) - {stress}"
+    shear = "shear_modulus[0]" if robot.shear_modulus else "wall_modulus[0] / 2.6"
+    bending, shearing, twisting = (stiffness.tolist() for stiffness in robot.beams)
+    area = "pressure[0] * pi * radius[0]**2 + 0.5 * shear_of_wall[0] * 2 * pi * radius[0] * wall_thickness[0]"
+    one = "1 / (link_lengths[0] / (3 * bending[0]) + 1 / (link_lengths[0] * shearing[0]))"
+    rows: list[_Row] = [
+        ("wall_modulus", list(modulus), "Pa", "Young's modulus of the wall", source),
+        (
+            "shear_of_wall",
+            list(robot.wall_shear_modulus),
+            "Pa",
+            "Shear modulus of the wall",
+            shear,
+        ),
+        ("bending", bending, "N m2", "Bending stiffness of a link", f"(wall_modulus[0] + {stress}) * {second}"),
+        ("shearing", shearing, "N", "Shear stiffness of a link", area),
+    ]
+    if not robot.stiffness:
+        rows.append(("spring_stiffness", springs, "N m/rad", meaning, "2 * bending[0] / link_lengths[0]" if two else one))
+    if two:
+        distance = "link_lengths[0] * sqrt(1 / 12 + bending[0] / (shearing[0] * link_lengths[0]**2))"
+        rows.append(("hinge_distance", robot.hinges.distance.tolist(), "m", "Distance of the hinges from the middle", distance))
+    if robot.torsion:
+        torsion, twist = f"(shear_of_wall[0] + {stress}) * 2 * {second}", robot.hinges.twist_stiffness.tolist()
+        rows.append(("twisting", twisting, "N m2", "Torsional stiffness of a link", torsion))
+        rows.append(("twist_stiffness", twist, "N m/rad", "Stiffness of its spring", "twisting[0] / link_lengths[0]"))
+    return rows
 
 
 def _tube_stiffness(robot: HelixTube) -> list[_Row]:
@@ -89,13 +129,17 @@ def _tube_shape(robot: HelixTube) -> list[_Row]:
 def _inflatable_arm(robot: InflatableArm) -> Rules:
     motor = {"lower": "-motor_limit", "upper": "motor_limit", "damping": "0.0"}
     rules = {(f"motor_{i}", name): rule for i in range(1, robot.n_links + 2) for name, rule in motor.items()}
+    stiffness = "spring_stiffness" if robot.stiffness is None else "stiffness"
+    hinges, share = (("",), "") if robot.link_model == "paper" else (("_a", "_b"), " / 2")
     for i in range(robot.n_links):
-        for side in ("side", "up"):
-            joint = f"spring_{i + 1}_{side}"
-            rules[joint, "stiffness"], rules[joint, "rest"] = f"stiffness[{i}]", f"rest_{side}[{i}]"
+        bending = {f"spring_{i + 1}{hinge}_{side}": f"rest_{side}[{i}]{share}" for hinge in hinges for side in ("side", "up")}
+        twist = {f"spring_{i + 1}_twist": "0.0"} if robot.torsion else {}
+        for joint, rest in (bending | twist).items():
+            rules[joint, "stiffness"] = f"{'twist_stiffness' if joint in twist else stiffness}[{i}]"
+            rules[joint, "rest"] = rest
             rules[joint, "lower"], rules[joint, "upper"] = _BEND
             rules[joint, "damping"] = f"spring_damping[{i}]"
-        link = f"spring_{i + 1}_side spring_{i + 1}_up"
+        link = " ".join(bending)
         rules |= {(link, name): f"{name}[{i}]" for name in ("radius", "pressure", "max_moment")}
         rules[link, "wrinkling_moment"] = f"pi**2 / 4 * pressure[{i}] * radius[{i}]**3"
     return rules

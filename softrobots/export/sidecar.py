@@ -157,7 +157,13 @@ class _Parts:
         entry = {key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()}
         moment = wrinkling_moment(tag.pressure, tag.radius)
         source = self._rules.get((name, "wrinkling_moment"), "pi**2 / 4 * pressure * radius**3")
-        return {"springs": list(tag.springs), **entry, "wrinkling_moment": {"value": moment, "unit": "N m", "source": source}}
+        hinges = {} if tag.hinges == 1 else {"hinges": tag.hinges} | ({} if tag.twist is None else {"twist": tag.twist})
+        return {
+            "springs": list(tag.springs),
+            **hinges,
+            **entry,
+            "wrinkling_moment": {"value": moment, "unit": "N m", "source": source},
+        }
 
     def _section(self, tag: SectionTag | LumpedSectionTag) -> dict[str, Any]:
         entry: dict[str, Any] = {"name": tag.name, "segment": tag.segment}

@@ -19,14 +19,19 @@ from softrobots.inflated_beam.characterisation import (
     required_tabulated_pressure,
 )
 from softrobots.inflated_beam.inflation import tank_pressure, tank_volume, volume
+from softrobots.inflated_beam.two_hinges import POISSON_RATIO, BeamStiffness, TwoHinges, beam_stiffness, two_hinges
 
 __all__ = [
     "MEAN_STIFFNESS",
+    "POISSON_RATIO",
     "SHEAR_COEFFICIENT",
     "TABLE_3",
+    "BeamStiffness",
     "BendingTest",
     "Characterisation",
     "CharacterisationRow",
+    "TwoHinges",
+    "beam_stiffness",
     "deflection",
     "fit_characterisation",
     "moment",
@@ -35,6 +40,7 @@ __all__ = [
     "stiffness_from_young_modulus",
     "tank_pressure",
     "tank_volume",
+    "two_hinges",
     "volume",
     "wrinkling_moment",
     "young_modulus_from_stiffness",

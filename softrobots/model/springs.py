@@ -25,10 +25,10 @@ stiffness, the derivative of that, shape (n, n), read-only."""
 
 @dataclass(frozen=True)
 class SpringGroup:
-    """The springs that stand for one inflated link."""
+    """The springs that stand for one inflated link, at one hinge or more."""
 
     springs: tuple[int, ...]
-    """Their places in `SoftModel.spring_joints`."""
+    """Places in `SoftModel.spring_joints` of those that bend it, hinge after hinge."""
     radius: float
     """Tube radius [m]."""
     pressure: float
@@ -37,6 +37,28 @@ class SpringGroup:
     """Number of the segment, if the group is one of its sections."""
     max_moment: float | None = None
     """Largest moment, beyond wrinkling [N m]; None: the springs are linear."""
+    n_hinges: int = 1
+    """Number of hinges, each with as many of the springs."""
+    twist: int | None = None
+    """Place of the spring that twists it, or None."""
+
+    @property
+    def hinges(self) -> tuple[tuple[int, ...], ...]:
+        """The places by hinge, base to tip."""
+        each = len(self.springs) // self.n_hinges
+        return tuple(self.springs[first : first + each] for first in range(0, len(self.springs), each))
+
+    def moments(self, torques: FloatArray) -> FloatArray:
+        """Return the moment of the link: of the hinge that carries most, the Euclidean norm over its springs.
+
+        Args:
+            torques: Load carried by each spring of the robot, shape (..., n_springs) [N m].
+
+        Returns:
+            Moments, shape (...) [N m].
+        """
+        by_hinge = [np.linalg.norm(torques[..., list(hinge)], axis=-1) for hinge in self.hinges]
+        return np.asarray(np.max(by_hinge, axis=0))
 
     @property
     def wrinkling_moment(self) -> float:
@@ -45,7 +67,7 @@ class SpringGroup:
 
 
 class _Plateau(NamedTuple):
-    """An inflated link whose moment has reached its plateau."""
+    """A hinge of an inflated link whose moment has reached the plateau."""
 
     places: tuple[int, ...]
     """Places of its springs among the elastic coordinates."""
@@ -64,8 +86,8 @@ class Springs:
     r"""Springs of the elastic coordinates: independent and linear, but for inflated links with a largest moment.
 
     A linear spring has :math:`\tau = k (y - y_0)`, [Troise 2021] (2). The moment of an inflated link with a largest moment `M`
-    is the law of `inflated_beam.moment` along the direction in which the link is bent, the same in all directions because the
-    tube is round: with the angles `s = y - rest` of its springs and :math:`\rho = |s|`,
+    is, at each of its hinges, the law of `inflated_beam.moment` along the direction in which it is bent, the same in all
+    directions because the tube is round: with the angles `s = y - rest` of the springs of a hinge and :math:`\rho = |s|`,
 
     .. math:: \tau = \min(k \rho, M) \, s / \rho
 
@@ -82,7 +104,7 @@ class Springs:
     turning: Any
     """Which coordinates are angles rather than distances, shape (n,), truth values."""
     groups: tuple[SpringGroup, ...] = ()
-    """The springs of each inflated link; those of a group with `max_moment` have a plateau."""
+    """The springs of each inflated link; the hinges of a group with `max_moment` have a plateau."""
 
     @cached_property
     def linear(self) -> bool:
@@ -123,15 +145,16 @@ class Springs:
         return read_only(np.diag(self.stiffness))
 
     def _plateaus(self, y: FloatArray) -> list[_Plateau]:
-        """The links on their plateau at coordinates `y`."""
+        """The hinges on their plateau at coordinates `y`."""
         plateaus = []
         for group in self.groups:
             if group.max_moment is not None:
                 stiffness = float(self.stiffness[group.springs[0]])
-                angles = [float(y[place] - self.rest[place]) for place in group.springs]
-                bend = math.hypot(*angles)
-                if stiffness * bend > group.max_moment:
-                    plateaus.append(_Plateau(group.springs, stiffness, group.max_moment, angles, bend))
+                for hinge in group.hinges:
+                    angles = [float(y[place] - self.rest[place]) for place in hinge]
+                    bend = math.hypot(*angles)
+                    if stiffness * bend > group.max_moment:
+                        plateaus.append(_Plateau(hinge, stiffness, group.max_moment, angles, bend))
         return plateaus
 
 
@@ -159,7 +182,9 @@ def spring_groups(
         if link.max_moment is not None and (places or any(name in joints for name in link.springs)):
             _check_plateau(link, springs, joints)
         if len(places) == len(link.springs):
-            groups.append(SpringGroup(places, link.radius, link.pressure, segments.get(link.springs[0]), link.max_moment))
+            twist = names.index(link.twist) if link.twist in names else None
+            segment = segments.get(link.springs[0])
+            groups.append(SpringGroup(places, link.radius, link.pressure, segment, link.max_moment, link.hinges, twist))
     return tuple(groups)
 
 

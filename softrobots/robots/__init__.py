@@ -13,6 +13,7 @@ from softrobots.robots.pcc_arm import PccArm
 
 ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
     "inflatable_arm": InflatableArm,
+    "inflatable_arm_two_hinges": partial(InflatableArm, link_model="two_hinges"),
     "pcc_arm": PccArm,
     "pcc_arm_lumped": partial(PccArm, chain="lumped"),
     "helix_tube": HelixTube,

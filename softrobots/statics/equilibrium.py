@@ -84,11 +84,12 @@ class Equilibrium:
     def link_moments(self) -> FloatArray:
         """Moment at each inflated link, both springs combined (Euclidean norm), shape (n_links,) [N m].
 
-        Empty if the model names no inflated links. The springs of a section carry the moment at its middle; its entry is the
-        largest along it, with the moment linear between the middles of the sections of a segment, and beyond them.
+        Of a link with two hinges it is the larger of theirs. Empty if the model names no inflated links. The springs of a
+        section carry the moment at its middle; its entry is the largest along it, with the moment linear between the middles
+        of the sections of a segment, and beyond them.
         """
         groups = self.model.spring_groups
-        moments = np.array([np.linalg.norm(self.spring_torques[list(group.springs)]) for group in groups])
+        moments = np.array([group.moments(self.spring_torques) for group in groups])
         for segment in {group.segment for group in groups} - {None}:
             rows = [row for row, group in enumerate(groups) if group.segment == segment]
             moments[rows] = _largest_along(moments[rows])

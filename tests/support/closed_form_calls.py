@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,11 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "deflection": (inflated_beam.deflection, {"position": 0.3, "force": 1.0, "young_modulus": 1e8, **WALL}),
     "stiffness_from_young_modulus": (inflated_beam.stiffness_from_young_modulus, {"young_modulus": 1e8, **WALL}),
     "young_modulus_from_stiffness": (inflated_beam.young_modulus_from_stiffness, {"stiffness": 170.0, **WALL}),
+    "beam_stiffness": (
+        inflated_beam.beam_stiffness,
+        {"young_modulus": 1e8, "shear_modulus": 3e7, **{name: WALL[name] for name in ("pressure", "radius", "wall_thickness")}},
+    ),
+    "two_hinges": (partial(inflated_beam.two_hinges, inflated_beam.BeamStiffness(36.0, 4000.0, 29.0)), {"length": 0.6}),
     "moment": (inflated_beam.moment, {"angle": 0.1, "stiffness": 170.0, "max_moment": 20.0}),
     "fit_characterisation": (
         inflated_beam.fit_characterisation,

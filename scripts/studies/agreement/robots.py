@@ -12,7 +12,6 @@ import pinocchio as pin
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots import inflated_beam
 from studies.interop.cases import TOLERANCE
 from studies.shared.checkout import test_support
 
@@ -80,13 +79,7 @@ class Study(NamedTuple):
 
 def link_stiffness() -> float:
     """EI of the inflated link at 50 kPa, [Troise 2021] (1): (E + P/S) I, with the modulus of the mean stiffness [N m^2]."""
-    arm: Any = sr.InflatableArm(link_lengths=(0.6,))
-    (pressure,), (radius,), (wall,), (stiffness,) = arm.pressure, arm.radius, arm.wall_thickness, arm.stiffness
-    modulus = inflated_beam.young_modulus_from_stiffness(
-        stiffness, pressure=pressure, length=0.6, radius=radius, wall_thickness=wall
-    )
-    stress = pressure * radius / (2.0 * wall)  # cap force over section
-    return float((modulus + stress) * math.pi * radius**3 * wall)
+    return float(sr.InflatableArm(link_lengths=(0.6,)).beams.bending[0])
 
 
 def inflatable_link(force: float) -> Study:

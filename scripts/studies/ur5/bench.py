@@ -134,7 +134,7 @@ class UR5Bench:
         """
         if not finite_number("beyond", beyond) > 1.0:
             raise ParameterError("beyond", beyond, "above 1")
-        stiffness = float(np.ravel(self.link.stiffness)[0])
+        stiffness = self.link.spring_stiffness[0]
         if self.link.max_moment is None:
             angle = 0.95 * inflated_beam.wrinkling_moment(self.pressure, self.radius) / stiffness
         else:

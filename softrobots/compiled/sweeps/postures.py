@@ -57,8 +57,8 @@ def check_arm(model: SoftModel) -> None:
             spring belongs to no inflated link.
         DescriptionError: If it is not a serial chain.
     """
-    springs = sorted(place for group in model.spring_groups for place in group.springs)
-    if model.n_motors != 3 or model.muscles or not springs or springs != list(range(model.n_springs)):
+    springs = {place for group in model.spring_groups for place in (*group.springs, group.twist)} - {None}
+    if model.n_motors != 3 or model.muscles or not springs or springs != set(range(model.n_springs)):
         raise ParameterError("model", model, "an arm with three motors whose springs are those of inflated links")
     first, turning = model.chain().elements[0], model.actuators.turning
     upright = np.abs(first.rotation[:, 2] - (0.0, 0.0, 1.0)).max() < 1e-12 and np.abs(first.translation[:2]).max() < 1e-12
