@@ -188,7 +188,10 @@ def test_inflated_links() -> None:
     assert [link["springs"] for link in links] == [[f"spring_{i}_side", f"spring_{i}_up"] for i in (1, 2, 3)]
     assert [link["wrinkling_moment"]["value"] for link in links] == [wrinkling_moment(6e4, r) for r in (0.06, 0.05, 0.04)]
     assert [link["max_moment"]["value"] for link in links] == [20.0] * 3
-    assert "max_moment" not in read(to_json(sr.load_model(sr.InflatableArm())))["inflated_links"][0]
+    assert not {"max_moment", "moment_law"} & read(to_json(sr.load_model(sr.InflatableArm())))["inflated_links"][0].keys()
+    slack = read(to_json(sr.load_model(sr.InflatableArm(moment_law="slack_wall"))))
+    assert [link["moment_law"] for link in slack["inflated_links"]] == ["slack_wall"] * 2
+    assert "slack_wall" in slack["conventions"]["moment_law"]
 
 
 # --- Parameters

@@ -14,6 +14,7 @@ from softrobots.description.expansion import XACRO_NAMESPACE
 from softrobots.description.urdf_structure import check_structure, urdf_root
 from softrobots.description.urdf_tags import (
     COORDINATES,
+    MOMENT_LAWS,
     NAMESPACE,
     ROLES,
     InflatedLinkTag,
@@ -98,11 +99,18 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
         )
     where = f"the inflated_link of {' '.join(names)} in {source}"
     most = _positive(element, "max_moment", where) if "max_moment" in element.attrib else None
-    tag = InflatedLinkTag(
-        names, _number(element, "radius", where), _number(element, "pressure", where), most, int(hinges), twist
-    )
+    law = element.get("moment_law", "linear" if most is None else "plateau")
+    if law not in MOMENT_LAWS or (law == "plateau") != (most is not None):
+        raise DescriptionError(
+            f"{where} has moment_law {law!r} and {'no max_moment' if most is None else f'max_moment {most}'}; required: one of "
+            f"{', '.join(MOMENT_LAWS)}, with max_moment for a plateau only"
+        )
+    radius, pressure = _number(element, "radius", where), _number(element, "pressure", where)
+    tag = InflatedLinkTag(names, radius, pressure, most, int(hinges), twist, law == "slack_wall")
     if tag.radius <= 0.0 or tag.pressure < 0.0:
         raise DescriptionError(f"{where} has radius {tag.radius} and pressure {tag.pressure}; required > 0 and >= 0")
+    if tag.slack_wall and tag.pressure == 0.0:
+        raise DescriptionError(f"{where} has moment_law 'slack_wall' and no pressure; required > 0: it bears no moment without")
     return tag
 
 

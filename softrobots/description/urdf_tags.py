@@ -14,6 +14,9 @@ ROLES = ("motor", "spring", "section", "locked")
 COORDINATES = ("bend_x", "bend_y", "twist", "stretch")
 """The coordinates of a section, `softrobots.constant_curvature.strain_chain.STRAINS`."""
 
+MOMENT_LAWS = ("linear", "plateau", "slack_wall")
+"""Laws of the moment of an inflated link: `inflated_beam.moment` is that with a plateau, `slack_wall_moment` the last one."""
+
 
 @dataclass(frozen=True)
 class SpringTag:
@@ -36,11 +39,13 @@ class InflatedLinkTag:
     pressure: float
     """Gauge pressure [Pa]."""
     max_moment: float | None = None
-    """Largest moment of the link, beyond wrinkling [N m]; None for linear springs."""
+    """Moment of the plateau, beyond wrinkling [N m]; None for the other laws."""
     hinges: int = 1
     """Number of hinges, each with as many of the springs."""
     twist: str | None = None
     """Name of the spring joint that twists it; None if it does not twist."""
+    slack_wall: bool = False
+    """Whether the moment is that of a wall that goes slack."""
 
 
 @dataclass(frozen=True, kw_only=True)

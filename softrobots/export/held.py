@@ -54,7 +54,10 @@ def check_linear(model: Any) -> SoftModel:
         )
         raise ParameterError("model", checked.pinocchio.name, requirement)
     if not checked.springs.linear:
-        requirement = "a robot with linear springs, without max_moment: simulators have no other law for joint springs"
+        requirement = (
+            "a robot with linear springs, without max_moment and without moment_law slack_wall: the moment of such a link "
+            "depends on the angles of both its joints together, and the springs of simulators are each of one joint"
+        )
         raise ParameterError("model", checked.pinocchio.name, requirement)
     return checked
 

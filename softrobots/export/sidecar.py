@@ -44,6 +44,9 @@ _CONVENTIONS = {
     "wrinkling_moment": "moment at the first wrinkle of an inflated link [Troise 2021] (3); the springs are good below it",
     "max_moment": "moment of an inflated link never above this, along its bend: min(stiffness |s|, max_moment) s / |s|, with "
     "s = q - rest of its springs",
+    "moment_law": "slack_wall: along the bend s of an inflated link, whose wall goes slack at M1 = pi pressure radius**3 / 2, "
+    "the moment is stiffness |s| up to M1, and M1 (u - sin u cos u) / D beyond, with the u in (0, pi) of D = sin u - u cos u = "
+    "pi M1 / (stiffness |s|)",
     "sections": "the six joints of a section of constant strain follow four coordinates (bending about x and y, twist, "
     "elongation) with the stiffness EI / length, EI / length, GJ / length, EA / length; rest: strains kx, ky, twist, stretch "
     "where all joints are at zero",
@@ -154,7 +157,11 @@ class _Parts:
         values = {"radius": (tag.radius, "m"), "pressure": (tag.pressure, "Pa")}
         if tag.max_moment is not None:
             values["max_moment"] = (tag.max_moment, "N m")
-        entry = {key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()}
+        entry: dict[str, Any] = {
+            key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()
+        }
+        if tag.slack_wall:
+            entry["moment_law"] = "slack_wall"
         moment = wrinkling_moment(tag.pressure, tag.radius)
         source = self._rules.get((name, "wrinkling_moment"), "pi**2 / 4 * pressure * radius**3")
         hinges = {} if tag.hinges == 1 else {"hinges": tag.hinges} | ({} if tag.twist is None else {"twist": tag.twist})

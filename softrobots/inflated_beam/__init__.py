@@ -19,6 +19,7 @@ from softrobots.inflated_beam.characterisation import (
     required_tabulated_pressure,
 )
 from softrobots.inflated_beam.inflation import tank_pressure, tank_volume, volume
+from softrobots.inflated_beam.membrane_tube import MomentLimits, SlackWallMoment, moment_limits, slack_wall_moment
 from softrobots.inflated_beam.two_hinges import POISSON_RATIO, BeamStiffness, TwoHinges, beam_stiffness, two_hinges
 
 __all__ = [
@@ -30,13 +31,17 @@ __all__ = [
     "BendingTest",
     "Characterisation",
     "CharacterisationRow",
+    "MomentLimits",
+    "SlackWallMoment",
     "TwoHinges",
     "beam_stiffness",
     "deflection",
     "fit_characterisation",
     "moment",
+    "moment_limits",
     "required_pressure",
     "required_tabulated_pressure",
+    "slack_wall_moment",
     "stiffness_from_young_modulus",
     "tank_pressure",
     "tank_volume",

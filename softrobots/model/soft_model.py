@@ -273,7 +273,7 @@ class SoftModel:
         """The robot as a serial chain from base to tip, for compiled solvers; read on first use, without Pinocchio's workspace.
 
         Raises:
-            DescriptionError: If a joint is not between base and tip, or neither turns nor slides, or if a link has a largest
+            DescriptionError: If a joint is not between base and tip, or neither turns nor slides, or if the moment of a link is
                 moment.
         """
         return self._chain
@@ -282,8 +282,8 @@ class SoftModel:
     def _chain(self) -> SerialChain:
         if not self.springs.linear:
             raise DescriptionError(
-                f"an inflated link of {self.pinocchio.name} has max_moment; compiled solvers need linear springs "
-                "(solve_equilibrium accepts the others, too)"
+                f"an inflated link of {self.pinocchio.name} has max_moment or moment_law slack_wall; compiled solvers need "
+                "linear springs (solve_equilibrium accepts the others, too)"
             )
         return read_chain(self.pinocchio, self.structure, self.frame_id(self.tip), limits=self.motor_limits, reach=self.reach)
 

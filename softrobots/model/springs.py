@@ -1,4 +1,4 @@
-"""Springs: energy, torque and tangent of the elastic coordinates, linear or with the plateau of a wrinkled inflated link."""
+"""Springs: energy, torque and tangent of the elastic coordinates, linear or by the law of an inflated link beyond wrinkling."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.description.urdf_tags import InflatedLinkTag
+from softrobots.inflated_beam.membrane_tube import softening
 
 POSITIVE = 1e-9
 """Smallest eigenvalue of a tangent stiffness that counts as positive, relative to the springs' own stiffness."""
@@ -36,11 +37,13 @@ class SpringGroup:
     segment: int | None = None
     """Number of the segment, if the group is one of its sections."""
     max_moment: float | None = None
-    """Largest moment, beyond wrinkling [N m]; None: the springs are linear."""
+    """Moment of the plateau, beyond wrinkling [N m]; None: there is none."""
     n_hinges: int = 1
     """Number of hinges, each with as many of the springs."""
     twist: int | None = None
     """Place of the spring that twists it, or None."""
+    slack_wall: bool = False
+    """Whether the moment follows the wall as it goes slack, `inflated_beam.slack_wall_moment`."""
 
     @property
     def hinges(self) -> tuple[tuple[int, ...], ...]:
@@ -60,39 +63,54 @@ class SpringGroup:
         by_hinge = [np.linalg.norm(torques[..., list(hinge)], axis=-1) for hinge in self.hinges]
         return np.asarray(np.max(by_hinge, axis=0))
 
+    @cached_property
+    def slack_moment(self) -> float:
+        """Moment at which the first fibre of the wall goes slack, without axial force [N m]."""
+        return float(inflated_beam.moment_limits(self.pressure, self.radius).slack)
+
+    @property
+    def largest_moment(self) -> float | None:
+        """Moment that no bend exceeds: the plateau, or collapse with a slack wall, `pi p r^3` [N m]; None if linear."""
+        return 2.0 * self.slack_moment if self.slack_wall else self.max_moment
+
     @property
     def wrinkling_moment(self) -> float:
         """Moment of the first wrinkle [N m], [Troise 2021] (3)."""
         return float(inflated_beam.wrinkling_moment(self.pressure, self.radius))
 
 
-class _Plateau(NamedTuple):
-    """A hinge of an inflated link whose moment has reached the plateau."""
+class _Softened(NamedTuple):
+    """A hinge of an inflated link beyond the linear part of its law."""
 
     places: tuple[int, ...]
     """Places of its springs among the elastic coordinates."""
     stiffness: float
-    """Stiffness of each of them [N m/rad]."""
-    max_moment: float
-    """Moment of the plateau [N m]."""
+    """Stiffness of each of them near rest [N m/rad]."""
     angles: list[float]
     """Angle of each spring from rest [rad]."""
     bend: float
     """Norm of the angles [rad]."""
+    moment: float
+    """Moment along the bend [N m]."""
+    tangent: float
+    """Its derivative with respect to the bend [N m/rad]."""
+    missing: float
+    """What linear springs would store more [J]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    r"""Springs of the elastic coordinates: independent and linear, but for inflated links with a largest moment.
+    r"""Springs of the elastic coordinates: independent and linear, but for inflated links with another law of their moment.
 
-    A linear spring has :math:`\tau = k (y - y_0)`, [Troise 2021] (2). The moment of an inflated link with a largest moment `M`
-    is, at each of its hinges, the law of `inflated_beam.moment` along the direction in which it is bent, the same in all
-    directions because the tube is round: with the angles `s = y - rest` of the springs of a hinge and :math:`\rho = |s|`,
+    A linear spring has :math:`\tau = k (y - y_0)`, [Troise 2021] (2). The moment of an inflated link is, at each of its hinges,
+    a law of the angle along the direction in which it is bent, the same in all directions because the tube is round: with the
+    angles `s = y - rest` of the springs of a hinge and :math:`\rho = |s|`,
 
-    .. math:: \tau = \min(k \rho, M) \, s / \rho
+    .. math:: \tau = M(\rho) \, s / \rho, \qquad U = \int_0^\rho M \, d\rho
 
-    The energy grows as :math:`M \rho` beyond :math:`\rho = M / k`; there the tangent is zero along `s`, and :math:`M / \rho`
-    across. The tangent jumps at the knee; torque and energy do not.
+    and the tangent is `dM/drho` along `s` and :math:`M / \rho` across. A *plateau* has :math:`M = \min(k \rho, M_{max})`,
+    `inflated_beam.moment`: its tangent jumps at the knee; torque and energy do not. A *slack wall* is
+    `inflated_beam.slack_wall_moment`: torque and tangent are continuous, and the tangent is positive.
     """
 
     names: tuple[str, ...]
@@ -104,12 +122,12 @@ class Springs:
     turning: Any
     """Which coordinates are angles rather than distances, shape (n,), truth values."""
     groups: tuple[SpringGroup, ...] = ()
-    """The springs of each inflated link; the hinges of a group with `max_moment` have a plateau."""
+    """The springs of each inflated link, with the law of their moment."""
 
     @cached_property
     def linear(self) -> bool:
-        """Whether no link has a largest moment."""
-        return all(group.max_moment is None for group in self.groups)
+        """Whether the moment of every link is linear."""
+        return all(group.max_moment is None and not group.slack_wall for group in self.groups)
 
     def at(self, y: FloatArray) -> SpringState:
         """Return energy, torque and tangent at coordinates `y`, shape (n,) [rad or m]."""
@@ -118,22 +136,23 @@ class Springs:
         energy, tangent = 0.5 * float(torque.dot(stretch)), self._tangent
         if self.linear:
             return energy, torque, tangent
-        plateaus = self._plateaus(y)
-        if plateaus:
+        softened = self._softened(y)
+        if softened:
             tangent = tangent.copy()
-        for places, stiffness, max_moment, angles, bend in plateaus:
-            energy -= 0.5 * stiffness * (bend - max_moment / stiffness) ** 2
-            across = max_moment / bend
-            for row, one in zip(places, angles, strict=True):
-                torque[row] = max_moment * (one / bend)
-                tangent[row, row] += across - stiffness
-                for column, other in zip(places, angles, strict=True):
-                    tangent[row, column] -= across / (bend * bend) * (one * other)
+        for hinge in softened:
+            energy -= hinge.missing
+            across = hinge.moment / hinge.bend
+            bending = (hinge.tangent - across) / (hinge.bend * hinge.bend)
+            for row, one in zip(hinge.places, hinge.angles, strict=True):
+                torque[row] = hinge.moment * (one / hinge.bend)
+                tangent[row, row] += across - hinge.stiffness
+                for column, other in zip(hinge.places, hinge.angles, strict=True):
+                    tangent[row, column] += bending * (one * other)
         return energy, torque, read_only(tangent)
 
     def saturated(self, y: FloatArray) -> frozenset[int]:
-        """Return the places of the springs whose link is on its plateau at coordinates `y`, shape (n,)."""
-        return frozenset(place for plateau in self._plateaus(y) for place in plateau.places)
+        """Return the places of the springs whose hinge is on its plateau at coordinates `y`, shape (n,)."""
+        return frozenset(place for hinge in self._softened(y) if hinge.tangent == 0.0 for place in hinge.places)
 
     @cached_property
     def least_tangent(self) -> FloatArray:
@@ -144,18 +163,26 @@ class Springs:
     def _tangent(self) -> FloatArray:
         return read_only(np.diag(self.stiffness))
 
-    def _plateaus(self, y: FloatArray) -> list[_Plateau]:
-        """The hinges on their plateau at coordinates `y`."""
-        plateaus = []
+    def _softened(self, y: FloatArray) -> list[_Softened]:
+        """The hinges beyond the linear part of their law at coordinates `y`."""
+        softened = []
         for group in self.groups:
-            if group.max_moment is not None:
-                stiffness = float(self.stiffness[group.springs[0]])
-                for hinge in group.hinges:
-                    angles = [float(y[place] - self.rest[place]) for place in hinge]
-                    bend = math.hypot(*angles)
-                    if stiffness * bend > group.max_moment:
-                        plateaus.append(_Plateau(hinge, stiffness, group.max_moment, angles, bend))
-        return plateaus
+            first = group.slack_moment if group.slack_wall else group.max_moment
+            if first is None:
+                continue
+            stiffness = float(self.stiffness[group.springs[0]])
+            for hinge in group.hinges:
+                angles = [float(y[place] - self.rest[place]) for place in hinge]
+                bend = math.hypot(*angles)
+                if stiffness * bend <= first:
+                    continue
+                law = first, 0.0, 0.5 * stiffness * (bend - first / stiffness) ** 2  # a plateau
+                if group.slack_wall:
+                    ratio = stiffness * bend / first
+                    moment, tangent, energy, _ = softening(ratio, ratio ** (-1.0 / 3.0))
+                    law = first * moment, stiffness * tangent, first**2 / stiffness * (0.5 * ratio**2 - energy)
+                softened.append(_Softened(hinge, stiffness, angles, bend, *law))
+        return softened
 
 
 def spring_groups(
@@ -173,23 +200,25 @@ def spring_groups(
         The groups, in the order of the links.
 
     Raises:
-        DescriptionError: If the springs of a link with a largest moment differ in stiffness, or are not all elastic coordinates
-            by themselves (sections of constant strain, and hinges that muscle lengths constrain, are not).
+        DescriptionError: If the springs of a link whose moment is not linear differ in stiffness, or are not all elastic
+            coordinates by themselves (sections of constant strain, and hinges that muscle lengths constrain, are not).
     """
     groups, names = [], springs.names
     for link in links:
         places = tuple(names.index(name) for name in link.springs if name in names)
-        if link.max_moment is not None and (places or any(name in joints for name in link.springs)):
-            _check_plateau(link, springs, joints)
+        if (link.slack_wall or link.max_moment is not None) and (places or any(name in joints for name in link.springs)):
+            _check_springs(link, springs, joints)
         if len(places) == len(link.springs):
             twist = names.index(link.twist) if link.twist in names else None
             segment = segments.get(link.springs[0])
-            groups.append(SpringGroup(places, link.radius, link.pressure, segment, link.max_moment, link.hinges, twist))
+            law = link.max_moment, link.hinges, twist, link.slack_wall
+            groups.append(SpringGroup(places, link.radius, link.pressure, segment, *law))
     return tuple(groups)
 
 
-def _check_plateau(link: InflatedLinkTag, springs: Springs, joints: Collection[str]) -> None:
-    subject = f"the inflated_link of {' '.join(link.springs)} has max_moment {link.max_moment} N m"
+def _check_springs(link: InflatedLinkTag, springs: Springs, joints: Collection[str]) -> None:
+    law = "moment_law slack_wall" if link.max_moment is None else f"max_moment {link.max_moment} N m"
+    subject = f"the inflated_link of {' '.join(link.springs)} has {law}"
     names = [name for name in springs.names if name in joints]
     if not all(name in names for name in link.springs):
         raise DescriptionError(

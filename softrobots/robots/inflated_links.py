@@ -10,6 +10,7 @@ import numpy as np
 
 from softrobots import inflated_beam
 from softrobots.core.errors import ParameterError
+from softrobots.description.urdf_tags import MOMENT_LAWS
 from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, parameter, per_part
 
 LINK_MODELS = ("paper", "two_hinges")
@@ -110,6 +111,14 @@ class InflatedLinks(XacroRobot):
         "Troise 2021, section 4",
         above=0.0,
     )
+    moment_law: str | None = parameter(
+        None,
+        "",
+        "Law of the moment of a link: linear, plateau at max_moment, or slack_wall, which softens as the wall goes slack; "
+        "without it, linear or, with max_moment, plateau",
+        "chosen; slack_wall is membrane theory, Comer and Levy 1963",
+        options=MOMENT_LAWS,
+    )
     density: PerPart = per_part(1300.0, "kg/m^3", "Density of the wall", "assumed, PVC-coated fabric; not published", above=0.0)
     cap_mass: PerPart = per_part(
         0.1,
@@ -126,6 +135,11 @@ class InflatedLinks(XacroRobot):
             if wall > 0.1 * radius:
                 raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius {radius} m")
         self._check_springs()
+        if self.moment_law is not None and (self.moment_law == "plateau") != (self.max_moment is not None):
+            requirement = "plateau with max_moment, linear or slack_wall without; or None, which is linear or plateau"
+            raise ParameterError("moment_law", self.moment_law, f"{requirement} (max_moment is {self.max_moment})")
+        if self.moment_law == "slack_wall" and min(self._each("pressure")) == 0.0:
+            raise ParameterError("pressure", self.pressure, "above 0 [Pa] with a slack wall, which bears no moment without")
 
     @property
     def n_links(self) -> int:

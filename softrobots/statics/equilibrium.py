@@ -20,7 +20,7 @@ from softrobots.statics.elastostatics import METHODS, solve_springs
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 
-_NEAR_PLATEAU = 0.99  # share of the largest moment at which a link explains why there is no equilibrium
+_NEAR_PLATEAU, _NEAR_COLLAPSE = 0.99, 0.95  # shares of the largest moment at which a link explains why there is no equilibrium
 _LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are computed from the shape
 
 
@@ -227,11 +227,13 @@ def _hint(best: Equilibrium) -> str:
     if best.method == "fixed_point":
         return "; method='newton' converges for larger loads"
     for moment, group in zip(best.link_moments, best.model.spring_groups, strict=True):
-        if group.max_moment is not None and moment >= _NEAR_PLATEAU * group.max_moment:
+        most = group.largest_moment
+        if most is not None and moment >= (_NEAR_COLLAPSE if group.slack_wall else _NEAR_PLATEAU) * most:
             springs = ", ".join(best.model.spring_joints[place] for place in group.springs)
+            state = "near the collapse of its slack wall" if group.slack_wall else "on the plateau of its moment"
             return (
-                f"; the link of {springs} is on the plateau of its moment, {group.max_moment:g} N m, and cannot carry a dead "
-                f"moment beyond it; solve_imposed_displacement finds equilibria there for a given displacement"
+                f"; the link of {springs} is {state}, {most:g} N m, and cannot carry a dead moment beyond it; "
+                f"solve_imposed_displacement finds equilibria there for a given displacement"
             )
     if not best.conservative:
         return "; under a world-fixed moment the load grows from zero, then the moments alone, until the path turns back"

@@ -92,6 +92,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "two_hinges": (partial(inflated_beam.two_hinges, inflated_beam.BeamStiffness(36.0, 4000.0, 29.0)), {"length": 0.6}),
     "moment": (inflated_beam.moment, {"angle": 0.1, "stiffness": 170.0, "max_moment": 20.0}),
+    "moment_limits": (inflated_beam.moment_limits, {"pressure": 3e4, "radius": 0.055, "axial_force": -50.0}),
+    "slack_wall_moment": (inflated_beam.slack_wall_moment, {"angle": 0.1, "stiffness": 170.0, "slack_moment": 12.0}),
     "fit_characterisation": (
         inflated_beam.fit_characterisation,
         {"angle": BENT, "moment": np.minimum(170.0 * BENT, 20.0), "pressure": 3e4, "radius": 0.055},
