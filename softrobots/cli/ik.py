@@ -28,6 +28,7 @@ _EXAMPLES = """examples:
   softrobots ik inflatable_arm --target 0.9 0.3 0.2 --force 0 10 -15 --elbow up
   softrobots ik inflatable_arm --waypoints path.csv --force 0 10 -15 -o followed.csv --plot poses.png
   softrobots ik pcc_arm --target 0.3 -0.2 0.9 --orientation 0.5 0 1 --gravity
+  softrobots ik inflatable_arm --set wrist=[0.08,0.12] --target 0.9 0.3 0.1 --rpy 0 1.57 0 --force 0 10 -15
   softrobots ik inflatable_arm --target 0.9 0.3 0.2 --gravity --json
 """
 
@@ -48,7 +49,10 @@ def add_parser(subparsers: Any) -> None:
     add_model(parser)
     what = parser.add_mutually_exclusive_group(required=True)
     add_numbers(what, "--target", "X Y Z", "position of the loaded tip, world axes [m] (this or --waypoints is required)")
-    help_text = "CSV file of positions of the loaded tip, columns t, x, y, z [s, m]; without t 0.05 s apart"
+    help_text = (
+        "CSV file of positions of the loaded tip, columns t, x, y, z [s, m]; without t 0.05 s apart; with columns roll, pitch, "
+        "yaw as in URDF [rad], of poses"
+    )
     what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=help_text)
     how = parser.add_mutually_exclusive_group()
     add_numbers(how, "--orientation", "X Y Z", "direction of the tip's z axis at --target, of any length [-] (any direction)")
@@ -57,7 +61,8 @@ def add_parser(subparsers: Any) -> None:
     help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
     add_numbers(parser, "--start", "Q", help_text, nargs="+")
     help_text = (
-        "side of the last motor joint, above or below the line from the first one to the tip; of a path at its start (either)"
+        "side of the last motor joint, without a wrist, above or below the line from the first one to the tip; of a path at "
+        "its start (either)"
     )
     parser.add_argument("--elbow", choices=ELBOWS, help=help_text)
     help_text = "newton, fixed_point of the paper, or paper: its closed loop, for --waypoints (%(default)s)"
@@ -94,7 +99,7 @@ def run(arguments: argparse.Namespace) -> None:
     gain = _GAIN if arguments.gain is None else arguments.gain
     trajectory = follow_trajectory(
         model,
-        path.positions,
+        path.targets,
         **options,
         times=path.times,
         gain=gain,

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
+from softrobots.core.checks import FloatArray, choice, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import ElasticState
@@ -19,6 +19,7 @@ from softrobots.statics.elastostatics import METHODS, solve_springs
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
+from softrobots.statics.spherical_wrist import spherical_wrist
 from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_search import POSITION_TOLERANCE, SAME, LocalSolution, search
 
@@ -53,6 +54,15 @@ class IkSolution:
         """Actuator coordinates, shape (n_motors,) [rad, m or N]."""
         return self.equilibrium.q_motors
 
+    @property
+    def wrist_singularity(self) -> str | None:
+        """What is singular of the wrist, with the names of its motors; None if nothing is, or there is no spherical wrist.
+
+        There, two of its motors turn the tip alike: many angles of both give the same pose, and the solution is one of them.
+        """
+        wrist = spherical_wrist(self.equilibrium.model)
+        return None if wrist is None else wrist.singularity(self.equilibrium.q)
+
 
 def solve_ik(
     model: SoftModel,
@@ -73,20 +83,22 @@ def solve_ik(
 
     Searches from `q_motors0` and from random coordinates within the limits (always the same ones), and returns, of the
     solutions found, the one that changes `q_motors0` least. Of a robot with more actuators than the target has
-    conditions the change is minimal; if it has muscles, the first search that succeeds decides.
+    conditions the change is minimal; if it has muscles, the first search that succeeds decides. For full poses of a robot with
+    a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts in the orientation, with both of
+    its solutions (`statics.spherical_wrist`).
 
     Args:
         model: The robot, with at least one actuator.
-        target: Target of the tip, shape (3,) [m], world axes.
+        target: Target of the tip, world axes: a position, shape (3,) [m], or a pose, `pinocchio.SE3` or shape (4, 4).
         force: Force at `frame`, shape (3,) [N], world axes.
-        orientation: Target orientation, for robots with enough actuators: a rotation matrix (tip axes in world axes), shape
-            (3, 3), or the direction of the tip's z axis, shape (3,), any length but zero; None: any.
+        orientation: Target orientation beside a position, for robots with enough actuators: a rotation matrix (tip axes in
+            world axes), shape (3, 3), or the direction of the tip's z axis, shape (3,), any length but zero; None: any.
         wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
         frame: Frame of `force` and `wrench`; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         q_motors0: Start of the search, shape (n_motors,) [rad, m or N]; `SoftModel.relaxed_motors` by default.
-        elbow: "up" or "down": only solutions whose last motor joint lies above or below the line from the first motor joint
-            to the tip; None: any.
+        elbow: "up" or "down": only solutions whose last motor joint (without those of a spherical wrist) lies above or below
+            the line from the first motor joint to the tip; None: any.
         method: Solver of the springs, "newton" or "fixed_point".
         tolerance: Largest distance of the tip from the target [m].
         starts: Number of searches, the one from `q_motors0` included.
@@ -102,7 +114,7 @@ def solve_ik(
         EquilibriumNotFound: If none of the starts has an equilibrium.
     """
     check_model(model)
-    goal = Goal(finite_array("target", target, (3,), "m"), checked_orientation(orientation))
+    goal = Goal.of(target, orientation)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     choice("method", method, METHODS)
     if elbow is not None:
@@ -114,7 +126,7 @@ def solve_ik(
     freedom = model.actuators.basis.shape[1]
     if goal.rotation is not None and freedom < goal.rows:
         raise ParameterError(
-            "orientation", orientation, f"None for this robot: it has {freedom} freedoms, {goal.rows} are needed"
+            "orientation", goal.rotation, f"None for this robot: it has {freedom} freedoms, {goal.rows} are needed"
         )
 
     def allowed(local: LocalSolution[ElasticState]) -> bool:
@@ -122,12 +134,17 @@ def solve_ik(
 
     tip = LoadedTip(model, goal, load, method)
     ended: list[LocalSolution[ElasticState]] = []
-    for start in _starts(model, first, positive_integer("starts", starts, 10_000)):
-        local = search(tip, start, model.rest, home=first, tolerance=tolerance)
-        if local is not None:
-            ended.append(local)
-            if model.muscles and freedom > goal.rows and local.arrived(tolerance) and allowed(local):
-                break
+    begins = _starts(model, first, positive_integer("starts", starts, 10_000))
+    wrist = spherical_wrist(model) if goal.rows == 6 else None
+    for tried in [begins] if wrist is None else [[first, *wrist.starts(tip, begins)], begins[1:]]:
+        for start in tried:
+            local = search(tip, start, model.rest, home=first, tolerance=tolerance)
+            if local is not None:
+                ended.append(local)
+                if model.muscles and freedom > goal.rows and local.arrived(tolerance) and allowed(local):
+                    break
+        if any(local.arrived(tolerance) and allowed(local) for local in ended):
+            break
     if not ended:
         _raise_unsolved(model, first, load, method, starts)
     sided = [local for local in ended if allowed(local)]
@@ -155,6 +172,7 @@ def solve_ik(
             f"within {best.error:.6g} m{'' if goal.rotation is None else f' and {best.angle:.6g} rad'}, "
             f"at {solution.equilibrium.tip_position.round(9).tolist()} m with motors {best.q_motors.round(6).tolist()}"
             + ("" if sided else ", with the elbow on the other side")
+            + (f"; {solution.wrist_singularity}" if goal.rows == 6 and solution.wrist_singularity else "")
             + (f"; {method!r} found no equilibrium at {unsolved} of the motor coordinates tried" if unsolved else ""),
             best=solution,
             residual=best.error,
@@ -180,26 +198,8 @@ def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
     return motors
 
 
-def checked_orientation(value: Any) -> FloatArray | None:
-    """Return a target orientation of the tip: a rotation matrix, shape (3, 3), or a unit direction, shape (3,), or None.
-
-    Raises:
-        ParameterError: If it is something else.
-    """
-    if value is None:
-        return None
-    given = finite_array("orientation", value, None)
-    if given.shape == (3,) and float(np.linalg.norm(given)) > 0.0:
-        return np.asarray(given / np.linalg.norm(given))
-    if given.shape == (3, 3) and np.allclose(given @ given.T, np.eye(3), rtol=0.0, atol=1e-9) and np.linalg.det(given) > 0.0:
-        return given
-    raise ParameterError(
-        "orientation", value, "a rotation matrix, shape (3, 3), or a direction different from zero, shape (3,)"
-    )
-
-
 def elbow_side(model: SoftModel, q: FloatArray) -> str:
-    """Whether the last motor joint lies above or below the line from the first motor joint to the tip: "up" or "down"."""
+    """Whether the last motor joint, without a wrist, is above or below the line from the first to the tip: "up" or "down"."""
     first, last, tip = (frame_placement(model, q, name).translation for name in (*_ends(model), model.tip))
     along = tip - first
     length = float(along @ along)
@@ -208,11 +208,12 @@ def elbow_side(model: SoftModel, q: FloatArray) -> str:
 
 
 def _ends(model: SoftModel) -> tuple[str, str]:
-    return model.structure.motor_joints[0], model.structure.motor_joints[-1]
+    joints = model.structure.motor_joints
+    return joints[0], joints[-1 if len(joints) < 4 or spherical_wrist(model) is None else -4]
 
 
 def _has_elbow(model: SoftModel) -> bool:
-    """Whether the last motor joint is away from the first one."""
+    """Whether the last motor joint, without a wrist, is away from the first one."""
     if len(model.structure.motor_joints) < 2:
         return False
     q = model.embed(model.coordinates.at(model.relaxed_motors, model.rest).joints)

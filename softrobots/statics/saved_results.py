@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, increasing, instance_of, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
@@ -27,11 +28,11 @@ from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_result
-from softrobots.statics.inverse_kinematics import IkSolution, checked_orientation
+from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
 from softrobots.statics.load_estimation import LoadEstimate, estimate_at
 from softrobots.statics.loads import Load
-from softrobots.statics.tip_goal import Goal
+from softrobots.statics.tip_goal import Goal, checked_orientation
 from softrobots.statics.trajectory import Trajectory
 from softrobots.statics.workspace import FIELDS, Workspace, workspace_at
 from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
@@ -166,12 +167,18 @@ def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
 
 def _pack_trajectory(trajectory: Trajectory) -> dict[str, Any]:
     rows = _pack_rows(trajectory.equilibria)
-    return rows | {"times": trajectory.times, "targets": trajectory.targets, "following": trajectory.method}
+    targets = {"targets": trajectory.targets, "orientations": trajectory.orientations}
+    return rows | targets | {"times": trajectory.times, "following": trajectory.method}
 
 
 def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
     equilibria = _unpack_rows(fields)
+    orientations = None
+    if "orientations" in fields:
+        given = finite_array("orientations", fields["orientations"], (len(equilibria), 3, 3))
+        orientations = read_only(np.array([checked_orientation(one) for one in given]))
     return Trajectory(
+        orientations=orientations,
         times=read_only(increasing("times", finite_array("times", fields["times"], (len(equilibria),), "s"), "s")),
         targets=read_only(finite_array("targets", fields["targets"], (len(equilibria), 3), "m")),
         equilibria=equilibria,
@@ -253,8 +260,8 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
     """Save a trajectory as a CSV table, one line a waypoint, full precision.
 
     Columns: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z` [m],
-    `tip_error` [m], one for each motor and spring [rad] (`joint_x` where a joint is
-    called `x`), `moment_<i>` [N m] for each inflated link.
+    `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and spring [rad]
+    (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link.
 
     Args:
         trajectory: The trajectory.
@@ -274,6 +281,12 @@ def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = Fals
     names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error"]
     names += [f"joint_{name}" if name in names else name for name in (*model.motor_joints, *model.spring_joints)]
     columns = [trajectory.times[:, None], trajectory.targets, trajectory.tip_positions, trajectory.tip_error[:, None]]
+    if trajectory.orientations is not None and trajectory.orientation_error is not None:
+        names[8:8] = ["roll", "pitch", "yaw", "orientation_error"]
+        columns += [
+            np.array([pin.rpy.matrixToRpy(one) for one in trajectory.orientations]),
+            trajectory.orientation_error[:, None],
+        ]
     columns += [trajectory.q_motors, trajectory.q_springs]
     if moments is not None:
         names += [f"moment_{i + 1}" for i in range(moments.shape[1])]

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array, increasing, positive_integer, positive_number, read_only
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path
+from softrobots.statics.tip_goal import Goal
 
+_ANGLES = ("roll", "pitch", "yaw")
 _INTERVAL = 0.05  # [s], between waypoints without times
 _MOST_STEPS = 1_000_000
 
@@ -25,6 +28,17 @@ class Path3D:
     """Time of each waypoint, increasing, shape (n,) [s]."""
     positions: FloatArray
     """Target positions, shape (n, 3) [m], world axes."""
+    orientations: FloatArray | None = None
+    """Target orientations, shape (n, 3, 3); None: any."""
+
+    @property
+    def targets(self) -> FloatArray:
+        """Positions, shape (n, 3), or with orientations poses, shape (n, 4, 4), for `follow_trajectory` [m]."""
+        if self.orientations is None:
+            return self.positions
+        poses = np.tile(np.eye(4), (len(self.positions), 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = self.orientations, self.positions
+        return read_only(poses)
 
 
 def quintic(share: Any) -> FloatArray:
@@ -50,9 +64,11 @@ def quintic(share: Any) -> FloatArray:
 def straight_line(start: Any, end: Any, duration: float, steps: int = 200) -> Path3D:
     """Point-to-point motion on a straight line with the quintic time law.
 
+    Between two poses the tip also turns, about one axis, by the same law.
+
     Args:
-        start: First position, shape (3,) [m].
-        end: Last position, shape (3,) [m].
+        start: First position, shape (3,) [m], or pose, `pinocchio.SE3` or shape (4, 4).
+        end: Last position or pose, of the same kind.
         duration: Time from start to end [s], positive.
         steps: Number of intervals, at most a million; there are `steps + 1` waypoints.
 
@@ -62,10 +78,26 @@ def straight_line(start: Any, end: Any, duration: float, steps: int = 200) -> Pa
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or not positive, or there are too many steps.
     """
-    a, b = finite_array("start", start, (3,), "m"), finite_array("end", end, (3,), "m")
+    a, b = (_position_or_pose(name, value) for name, value in (("start", start), ("end", end)))
+    if a.shape != b.shape:
+        raise ParameterError("end", end, "of the same kind as start: two positions, or two poses")
     duration, steps = positive_number("duration", duration, "s"), positive_integer("steps", steps, _MOST_STEPS)
     s = np.linspace(0.0, 1.0, steps + 1)
-    return Path3D(read_only(s * duration), read_only(a + quintic(s)[:, None] * (b - a)))
+    times, share = read_only(s * duration), quintic(s)
+    if a.shape == (3,):
+        return Path3D(times, read_only(a + share[:, None] * (b - a)))
+    turn = pin.log3(a[:3, :3].T @ b[:3, :3])
+    rotations = np.array([a[:3, :3] @ pin.exp3(one * turn) for one in share])
+    return Path3D(times, read_only(a[:3, 3] + share[:, None] * (b[:3, 3] - a[:3, 3])), read_only(rotations))
+
+
+def _position_or_pose(name: str, value: Any) -> FloatArray:
+    """Return a position, shape (3,), or a pose, shape (4, 4)."""
+    given = value.homogeneous if isinstance(value, pin.SE3) else value
+    if np.shape(given) != (4, 4):
+        return finite_array(name, given, (3,), "m")
+    goal = Goal.of(given)
+    return np.block([[np.asarray(goal.rotation), goal.position[:, None]], [np.eye(4)[3]]])
 
 
 def waypoints(positions: Any, times: Any) -> Path3D:
@@ -91,7 +123,8 @@ def waypoints(positions: Any, times: Any) -> Path3D:
 def read_waypoints(path: str | Path) -> Path3D:
     """Read waypoints from a CSV file with a header line that names the columns `t, x, y, z` [s, m, m, m].
 
-    Other columns and empty lines are ignored. Without a column `t` the waypoints are 0.05 s apart.
+    With columns `roll, pitch, yaw` as in URDF [rad] they are poses. Other columns and empty lines are ignored. Without a column
+    `t` the waypoints are 0.05 s apart.
 
     Args:
         path: The file.
@@ -101,13 +134,21 @@ def read_waypoints(path: str | Path) -> Path3D:
 
     Raises:
         ParameterError: If the path is not one.
-        FileFormatError: If the file cannot be read or is too large, lacks a column, has fewer than two waypoints, times that do
-            not increase, or (naming the line) a cell that is not a finite number, or more or fewer cells than the first line.
+        FileFormatError: If the file cannot be read or is too large, lacks a column, has some of the angles only, fewer than two
+            waypoints, times that do not increase, or (naming the line) a cell that is not a finite number, or more or fewer
+            cells than the first line.
     """
     path = as_path("path", path)
-    table = read_table(path, ("x", "y", "z"), ("t",))
+    table = read_table(path, ("x", "y", "z"), ("t", *_ANGLES))
     times = table.numbers[:, 0] if table.columns[0] == "t" else _INTERVAL * np.arange(len(table.numbers))
+    turned = [name for name in _ANGLES if name in table.columns]
+    if turned and len(turned) < 3:
+        raise FileFormatError(f"{path}: of roll, pitch and yaw it has {', '.join(turned)}; all three or none are required")
     try:
-        return waypoints(table.numbers[:, -3:], times)
+        found = waypoints(table.numbers[:, -3:], times)
+        angles = table.numbers[:, -6:-3]
+        return (
+            replace(found, orientations=read_only(np.array([pin.rpy.rpyToMatrix(*one) for one in angles]))) if turned else found
+        )
     except ParameterError as error:
         raise FileFormatError(f"{path}: {error}") from error

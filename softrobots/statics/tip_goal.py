@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, finite_array
+from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState
 from softrobots.statics.elastostatics import balanced_state
@@ -25,6 +26,52 @@ class Goal(NamedTuple):
     """Position, shape (3,) [m], world axes."""
     rotation: FloatArray | None = None
     """Orientation of the tip, shape (3, 3), or the direction of its z axis, shape (3,), of length 1; None: any."""
+    offset: FloatArray | None = None
+    """The point that shall be at the position, in the axes of the tip, from its origin, shape (3,) [m]; None: the origin."""
+
+    @classmethod
+    def of(cls, target: Any, orientation: Any = None) -> Goal:
+        """Return the goal of a target: a position, shape (3,) [m], or a pose, `pinocchio.SE3` or shape (4, 4), in world axes.
+
+        Args:
+            target: The target.
+            orientation: For a position only: a rotation matrix, shape (3, 3), the direction of the tip's z axis, shape (3,), or
+                None for any.
+
+        Raises:
+            ParameterError: If one of them is something else.
+        """
+        given = target.homogeneous if isinstance(target, pin.SE3) else target
+        if np.shape(given) != (4, 4):
+            return cls(finite_array("target", given, (3,), "m"), checked_orientation(orientation))
+        if orientation is not None:
+            raise ParameterError("orientation", orientation, "None where the target is a pose, which has one")
+        pose = finite_array("target", given, (4, 4))
+        if not np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0)) or not _is_rotation(pose[:3, :3]):
+            raise ParameterError("target", target, "a pose: rotation and translation above a last row (0, 0, 0, 1)")
+        return cls(pose[:3, 3], checked_orientation(pose[:3, :3]))
+
+    @classmethod
+    def path(cls, targets: Any) -> list[Goal]:
+        """Return the goals of a path: positions, shape (n, 3) [m], or poses, shape (n, 4, 4) or a sequence of `pinocchio.SE3`.
+
+        Raises:
+            ParameterError: If it is something else, or empty.
+        """
+        if isinstance(targets, list | tuple) and targets and all(isinstance(one, pin.SE3) for one in targets):
+            targets = [one.homogeneous for one in targets]
+        rows = finite_array("targets", targets, None, "m")
+        if len(rows) == 0 or rows.shape[1:] not in ((3,), (4, 4)):
+            requirement = "at least one target position, shape (n, 3), or pose, shape (n, 4, 4) [m]"
+            raise ParameterError("targets", targets, f"{requirement}; it has shape {rows.shape}")
+        return [cls.of(row) for row in rows]
+
+    def halfway(self, other: Goal) -> Goal:
+        """Return the goal in the middle: of the line between the positions, and of the turn between two orientations."""
+        if self.rotation is None or other.rotation is None or other.rotation.ndim == 1:
+            return other._replace(position=0.5 * (self.position + other.position))
+        turn = pin.exp3(0.5 * pin.log3(self.rotation.T @ other.rotation))
+        return Goal(0.5 * (self.position + other.position), self.rotation @ turn)
 
     @property
     def rows(self) -> int:
@@ -34,7 +81,8 @@ class Goal(NamedTuple):
     def missing(self, model: SoftModel, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return translation [m] and rotation vector [rad] from the tip to the goal, shape (3,) each, world axes."""
         pose = frame_placement(model, q, model.tip)
-        return self.position - pose.translation, self._turn(pose.rotation)
+        reached = pose.translation if self.offset is None else pose.act(self.offset)
+        return self.position - reached, self._turn(pose.rotation)
 
     def _turn(self, rotation: FloatArray) -> FloatArray:
         if self.rotation is None:
@@ -51,6 +99,9 @@ class Goal(NamedTuple):
     def jacobian(self, model: SoftModel, q: FloatArray) -> FloatArray:
         """Return the tip Jacobian in the components of the goal, shape (3 or 6, nv), rotations times the lever [m/rad]."""
         columns = frame_jacobian(model, q, model.tip)
+        if self.offset is not None:
+            lever = frame_placement(model, q, model.tip).rotation @ self.offset
+            columns[:3] -= pin.skew(lever) @ columns[3:]
         if self.rotation is None:
             return columns[:3]
         turning = columns[3:]
@@ -78,9 +129,13 @@ class LoadedTip:
         """Number of conditions of the goal."""
         return self.goal.rows
 
-    def towards(self, position: FloatArray) -> LoadedTip:
-        """Return a copy with another target position, shape (3,) [m], and no orientation target."""
-        return replace(self, goal=Goal(position))
+    def towards(self, target: Goal) -> LoadedTip:
+        """Return a copy with another goal."""
+        return replace(self, goal=target)
+
+    def halfway(self, one: Goal, other: Goal) -> Goal:
+        """Return the goal between two."""
+        return one.halfway(other)
 
     def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ElasticState] | None:
         """Solve for the elastic coordinates from a start, shape (n_springs,); None if they do not converge."""
@@ -103,3 +158,30 @@ class LoadedTip:
         """Return the derivatives of tip and elastic coordinates by the actuators; see `sensitivity.tip_motion`."""
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
         return tip_motion(motors, springs, state.tangent, state.load.coupling)
+
+
+def checked_orientation(value: Any) -> FloatArray | None:
+    """Return a target orientation of the tip: a rotation matrix, shape (3, 3), or a unit direction, shape (3,), or None.
+
+    A matrix that is a rotation to 1e-9 becomes the nearest one, so that the tip can have it exactly.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    if value is None:
+        return None
+    given = finite_array("orientation", value, None)
+    if given.shape == (3,) and float(np.linalg.norm(given)) > 0.0:
+        return np.asarray(given / np.linalg.norm(given))
+    if given.shape == (3, 3) and _is_rotation(given, 1e-13):
+        return given
+    if given.shape == (3, 3) and _is_rotation(given):
+        left, _, right = np.linalg.svd(given)
+        return np.asarray(left @ right)
+    raise ParameterError(
+        "orientation", value, "a rotation matrix, shape (3, 3), or a direction different from zero, shape (3,)"
+    )
+
+
+def _is_rotation(matrix: FloatArray, tolerance: float = 1e-9) -> bool:
+    return bool(np.allclose(matrix @ matrix.T, np.eye(3), rtol=0.0, atol=tolerance) and np.linalg.det(matrix) > 0.0)

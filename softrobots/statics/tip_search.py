@@ -7,7 +7,7 @@ At every step the elastic coordinates are in equilibrium; the step uses the exac
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -84,8 +84,11 @@ class SoughtTip(Protocol[State]):
     def rows(self) -> int:
         """Number of conditions: 3 for a position, up to 6 with an orientation."""
 
-    def towards(self, position: FloatArray) -> SoughtTip[State]:
-        """Return a copy with another target position, shape (3,) [m], and no orientation target."""
+    def towards(self, target: Any) -> SoughtTip[State]:
+        """Return a copy with another target, of the kind that the robot's solver takes."""
+
+    def halfway(self, one: Any, other: Any) -> Any:
+        """Return the target in the middle between two."""
 
     def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[State] | None:
         """Solve for the elastic coordinates from a start, shape (n_springs,); None if they do not converge."""
@@ -177,8 +180,8 @@ def search(
 
 def advance(
     tip: SoughtTip[State],
-    last: FloatArray,
-    target: FloatArray,
+    last: Any,
+    target: Any,
     here: LocalSolution[State],
     tolerance: float = POSITION_TOLERANCE,
     halvings: int = _HALVINGS,
@@ -187,8 +190,8 @@ def advance(
 
     Args:
         tip: The robot; its goal is ignored.
-        last: The previous waypoint, shape (3,) [m].
-        target: The waypoint, shape (3,) [m].
+        last: The previous waypoint, a target of `SoughtTip.towards`.
+        target: The waypoint.
         here: The robot at the previous waypoint.
         tolerance: Distance at which a search ends [m].
         halvings: How often the distance may be halved.
@@ -207,11 +210,11 @@ def advance(
         motors = actuators.go(here.q_motors, actuators.basis @ step)
         springs = here.state.q_springs + follow @ (motors - here.q_motors)
         found = search(there, motors, springs, home=here.q_motors, tolerance=tolerance, damping=_WARM_DAMPING)
-        if found is not None and found.error <= tolerance and _apart(tip.model, found.q_motors, here.q_motors) <= 1.0:
+        if found is not None and found.arrived(tolerance) and _apart(tip.model, found.q_motors, here.q_motors) <= 1.0:
             return found
     if halvings == 0:
         return None
-    middle = 0.5 * (last + target)
+    middle = tip.halfway(last, target)
     half = advance(tip, last, middle, here, tolerance, halvings - 1)
     return None if half is None else advance(tip, middle, target, half, tolerance, halvings - 1)
 

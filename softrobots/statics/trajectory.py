@@ -22,6 +22,7 @@ from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik, start_motors
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
+from softrobots.statics.spherical_wrist import NEAR_SINGULAR, spherical_wrist
 from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_search import POSITION_TOLERANCE, LocalSolution, advance
 
@@ -42,6 +43,8 @@ class Trajectory:
     """The loaded robot at each waypoint."""
     method: str
     """Method of `follow_trajectory`, or a label of the caller for a trajectory from elsewhere."""
+    orientations: FloatArray | None = None
+    """Target orientations of the tip, shape (n, 3, 3); None: any."""
 
     @property
     def model(self) -> SoftModel:
@@ -67,6 +70,14 @@ class Trajectory:
     def tip_error(self) -> FloatArray:
         """Distance of the loaded tip from its target, shape (n,) [m]."""
         return read_only(np.linalg.norm(self.tip_positions - self.targets, axis=1))
+
+    @cached_property
+    def orientation_error(self) -> FloatArray | None:
+        """Angle between the loaded tip and its target orientation, shape (n,) [rad]; None without target orientations."""
+        if self.orientations is None:
+            return None
+        rows = zip(self.targets, self.orientations, self.equilibria, strict=True)
+        return read_only(np.linalg.norm([Goal(*goal).missing(self.model, e.q)[1] for *goal, e in rows], axis=1))
 
     @cached_property
     def link_moments(self) -> FloatArray | None:
@@ -117,7 +128,7 @@ def follow_trajectory(
     allow_jumps: bool = False,
     progress: bool | str = False,
 ) -> Trajectory:
-    """Find motor coordinates that move the loaded tip through target positions.
+    """Find motor coordinates that move the loaded tip through target positions, or poses.
 
     "newton" and "fixed_point" reach every waypoint within `tolerance`, each search starting from the last waypoint and its
     elastostatic Jacobian. "paper" is [Troise 2021] (8, 9) in position form, `dq_m/dt = [J^#]_m (v_d + K e)` with the springs
@@ -126,7 +137,8 @@ def follow_trajectory(
 
     Args:
         model: The robot, with at least one motor.
-        targets: Target positions, shape (n, 3) [m], world axes.
+        targets: Target positions, shape (n, 3) [m], world axes; or poses of the tip, shape (n, 4, 4) or a sequence of
+            `pinocchio.SE3`, not for "paper".
         force: Force at `frame`, shape (3,) [N], constant over the path, world axes.
         wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
         frame: Frame of `force` and `wrench`; the tip by default.
@@ -146,16 +158,21 @@ def follow_trajectory(
         The trajectory.
 
     Raises:
-        ParameterError: If an argument has the wrong shape, is not finite or out of range.
+        ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has not enough actuators
+            for poses.
         NameNotFound: If a frame does not exist.
-        TargetUnreachable: If a waypoint cannot be reached, or not without a jump; names it and the distance that remains.
+        TargetUnreachable: If a waypoint cannot be reached, or not without a jump; names it, the distance that remains, and the
+            wrist if it is near a singular pose there: the path then goes past that pose with a faster and faster wrist, while a
+            path straight through it is followed.
         EquilibriumNotFound: If a waypoint has no equilibrium.
     """
     check_model(model)
     choice("method", method, METHODS)
-    points = finite_array("targets", targets, (None, 3), "m")
-    if len(points) == 0:
-        raise ParameterError("targets", targets, "at least one target position [m]")
+    goals = Goal.path(targets)
+    points = np.array([goal.position for goal in goals])
+    orientations = None if goals[0].rotation is None else read_only(np.array([goal.rotation for goal in goals]))
+    if method == "paper" and orientations is not None:
+        raise ParameterError("method", method, "'newton' or 'fixed_point' for poses: it follows positions")
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     positive_number("gain", gain, "1/s")
     start_motors(model, q_motors0)
@@ -172,7 +189,7 @@ def follow_trajectory(
     inner = "newton" if method == "newton" else "fixed_point"
     options = {"wrench": dict(load.wrenches), "gravity": gravity, "method": inner, "tolerance": tolerance}
     try:
-        begin = solve_ik(model, points[0], q_motors0=q_motors0, elbow=elbow, **options)
+        begin = solve_ik(model, points[0], orientation=goals[0].rotation, q_motors0=q_motors0, elbow=elbow, **options)
     except TargetUnreachable as error:
         raise _named(error, 1, len(points)) from error
 
@@ -180,11 +197,11 @@ def follow_trajectory(
         steps = (
             _paper_steps(model, points, moments, load, first, gain)
             if method == "paper"
-            else _exact_steps(LoadedTip(model, Goal(points[0]), load, inner), points, first, tolerance, allow_jumps)
+            else _exact_steps(LoadedTip(model, goals[0], load, inner), goals, first, tolerance, allow_jumps)
         )
         bar = with_progress(steps, progress, label=f"waypoints ({method})", unit="wp", total=len(points) - 1)
         equilibria = (first, *bar)
-        return Trajectory(read_only(moments), read_only(points), equilibria, method)
+        return Trajectory(read_only(moments), read_only(points), equilibria, method, orientations)
 
     try:
         return follow_from(begin.equilibrium)
@@ -193,7 +210,8 @@ def follow_trajectory(
             raise
         for motors in begin.alternatives:  # the same tip, another shoulder or elbow: perhaps no limit blocks the path
             with contextlib.suppress(TargetUnreachable):
-                return follow_from(solve_ik(model, points[0], q_motors0=motors, starts=1, **options).equilibrium)
+                first = solve_ik(model, points[0], orientation=goals[0].rotation, q_motors0=motors, starts=1, **options)
+                return follow_from(first.equilibrium)
         raise
 
 
@@ -204,24 +222,29 @@ def _named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachab
 
 
 def _exact_steps(
-    tip: LoadedTip, points: FloatArray, first: Equilibrium, tolerance: float, allow_jumps: bool
+    tip: LoadedTip, goals: list[Goal], first: Equilibrium, tolerance: float, allow_jumps: bool
 ) -> Iterable[Equilibrium]:
     model, load, method = tip.model, tip.load, tip.method
     here = LocalSolution(first.q_motors, elastic_state(model, first.q_motors, first.q_springs, load), 0.0)
-    for number, (last, target) in enumerate(pairwise(points), start=2):
+    for number, (last, target) in enumerate(pairwise(goals), start=2):
         reached = advance(tip, last, target, here, tolerance)
         if reached is None:
             try:
                 reached = _jump(tip, target, here.q_motors, tolerance)
             except TargetUnreachable as error:
-                raise _named(error, number, len(points)) from error
+                raise _named(error, number, len(goals)) from error
             if not allow_jumps:
                 apart = reached.q_motors - here.q_motors
+                wrist = spherical_wrist(model) if target.rotation is not None else None
+                singular = None if wrist is None else wrist.singularity(here.state.q, NEAR_SINGULAR)
                 solution = equilibrium_from_state(model, reached.q_motors, load, reached.state, method=method, iterations=0)
                 raise TargetUnreachable(
-                    f"waypoint {number} of {len(points)}: no continuous motion reaches it from the previous one; the nearest "
-                    f"solution is a jump of the motors by {apart.round(4).tolist()} rad (allow_jumps=True takes it)",
-                    best=IkSolution(target, None, solution, reached.error, 0.0, reached.iterations, ()),
+                    f"waypoint {number} of {len(goals)}: no continuous motion reaches it from the previous one; the nearest "
+                    f"solution is a jump of the motors by {apart.round(4).tolist()} rad (allow_jumps=True takes it)"
+                    + (f"; {singular}" if singular else ""),
+                    best=IkSolution(
+                        target.position, target.rotation, solution, reached.error, reached.angle, reached.iterations, ()
+                    ),
                     residual=reached.error,
                     iterations=reached.iterations,
                 )
@@ -229,13 +252,18 @@ def _exact_steps(
         yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
 
 
-def _jump(tip: LoadedTip, target: FloatArray, start: FloatArray, tolerance: float) -> LocalSolution[ElasticState]:
+def _jump(tip: LoadedTip, target: Goal, start: FloatArray, tolerance: float) -> LocalSolution[ElasticState]:
     """Solution for a waypoint from any start, where the path from the previous one is blocked."""
     model, load = tip.model, tip.load
-    wrench, gravity = dict(load.wrenches), load.gravity
-    ik = solve_ik(model, target, wrench=wrench, gravity=gravity, q_motors0=start, method=tip.method, tolerance=tolerance)
+    options: dict[str, Any] = {
+        "wrench": dict(load.wrenches),
+        "gravity": load.gravity,
+        "method": tip.method,
+        "tolerance": tolerance,
+    }
+    ik = solve_ik(model, target.position, orientation=target.rotation, q_motors0=start, **options)
     state = elastic_state(model, ik.q_motors, ik.equilibrium.q_springs, load)
-    return LocalSolution(ik.q_motors, state, ik.error, iterations=ik.iterations)
+    return LocalSolution(ik.q_motors, state, ik.error, ik.orientation_error, ik.iterations)
 
 
 def _paper_steps(

@@ -34,6 +34,7 @@ def solution_answer(solution: IkSolution) -> dict[str, Any]:
         Fact("orientation_error", solution.orientation_error, "rad"),
         Fact("iterations", solution.iterations, "-"),
         Fact("alternatives", solution.alternatives, units),
+        Fact("wrist_singularity", solution.wrist_singularity),
     ]
     return {**answer_of(facts), "equilibrium": equilibrium_answer(solution.equilibrium)}
 
@@ -45,6 +46,7 @@ def solution_lines(solution: IkSolution) -> list[str]:
     rows.append(("tip error", f"{solution.error:.2g} m{turned}, {solution.iterations} steps"))
     rows.append(("motors", f"{formatted(solution.q_motors)} {joined_units(solution.equilibrium.model.actuators.units)}"))
     rows += [("another solution", formatted(other)) for other in solution.alternatives]
+    rows += [("NOTE", solution.wrist_singularity)] if solution.wrist_singularity else []
     return [*equilibrium_lines(solution.equilibrium), "", *aligned(rows)]
 
 
@@ -56,6 +58,8 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         Fact("targets", trajectory.targets, "m"),
         Fact("tip_positions", trajectory.tip_positions, "m"),
         Fact("tip_error", trajectory.tip_error, "m"),
+        Fact("orientations", trajectory.orientations, "-"),
+        Fact("orientation_error", trajectory.orientation_error, "rad"),
         Fact("q_motors", trajectory.q_motors, joined_units(model.actuators.units)),
         Fact("motor_torques", _motor_torques(trajectory), joined_units(load_units(model.actuators.units))),
         Fact("q_springs", trajectory.q_springs, joined_units(spring_units(model))),
@@ -83,10 +87,11 @@ def trajectory_lines(trajectory: Trajectory) -> list[str]:
         column = motors[:, place]
         ends = (f"{value:.6f}" for value in (column[0], column[-1], column.min(), column.max()))
         rows.append((name, *ends, unit, f"{np.abs(torques[:, place]).max():.6f}", load))
-    count, worst = len(equilibria), int(np.argmax(trajectory.tip_error))
+    count, worst, turned = len(equilibria), int(np.argmax(trajectory.tip_error)), trajectory.orientation_error
     summary = [
         ("waypoints", f"{count}, {trajectory.times[-1] - trajectory.times[0]:g} s, by {trajectory.method}"),
         ("largest tip error", f"{trajectory.tip_error[worst]:.2g} m at waypoint {worst + 1}"),
+        *([] if turned is None else [("largest angle", f"{turned.max():.2g} rad at waypoint {int(np.argmax(turned)) + 1}")]),
         ("stable", _everywhere([equilibrium.stable for equilibrium in equilibria])),
         ("within limits", _everywhere([equilibrium.within_limits for equilibrium in equilibria])),
     ]

@@ -233,8 +233,11 @@ class _SoughtTip:
     def rows(self) -> int:
         return 3
 
-    def towards(self, position: FloatArray) -> _SoughtTip:
-        return replace(self, target=position)
+    def towards(self, target: FloatArray) -> _SoughtTip:
+        return replace(self, target=target)
+
+    def halfway(self, one: FloatArray, other: FloatArray) -> FloatArray:
+        return 0.5 * (one + other)
 
     def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ChainState] | None:
         if not self.model.actuators.admit(q_motors):
