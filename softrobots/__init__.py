@@ -25,7 +25,7 @@ from softrobots.core.errors import (
 )
 from softrobots.core.result_file import load_result, save_result
 from softrobots.description.composition import mount
-from softrobots.model.loader import load_model
+from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup
 from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
@@ -111,6 +111,7 @@ __all__ = [
     "straight_line",
     "view",
     "waypoints",
+    "with_springs",
 ]
 
 

@@ -394,6 +394,14 @@ def test_ik_passes_its_other_options_on(answer, arm: sr.SoftModel) -> None:
     assert found["iterations"] == solution.iterations
 
 
+def test_solve_says_which_springs_are_given(told: Told) -> None:
+    status, out, _ = told("solve", "inflatable_arm", "--set", "rest_up=0.1", "--spring", "spring_2_up=90")
+    assert status == 0
+    assert re.search(r"^springs +given: spring_2_up; of the file: 3$", out, re.M)
+    assert re.search(r"^spring_2_up +0\.100000 +rad", out, re.M)  # it keeps its rest
+    assert "given:" not in told("solve", "inflatable_arm")[1]
+
+
 def test_ik_turns_the_tip(answer) -> None:
     """The direction of the tip of a robot that has the freedom."""
     found = answer("ik", "pcc_arm", "--target", "0.3", "-0.2", "0.9", "--orientation", "0.5", "0", "1", "--gravity")

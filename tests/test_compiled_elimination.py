@@ -475,7 +475,7 @@ def moved_by_motors(request: pytest.FixtureRequest, arm: SoftModel, odd_arm: Sof
     if request.param == "between":
         table = {"spring_1_side": (90.0, 0.1), "spring_2_up": (60.0, 0.0)}
         names = [name for name in [*arm.motor_joints, *arm.spring_joints] if name not in table]
-        return sr.load_model(arm.urdf, springs=table, motors=tuple(names))
+        return sr.load_model(arm.urdf, springs=dict.fromkeys(arm.spring_joints) | table, motors=tuple(names))
     return {"arm": arm, "odd_arm": odd_arm, "odd": robot("odd")}[request.param]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import pickle
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,6 +19,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.export.sidecar import to_json
 from softrobots.view.meshcat_page.page_commands import RESOLUTION
 from tests.support.law_robots import ROBOTS, Case, cases, model, triples
 from tests.support.laws import law
@@ -131,6 +133,45 @@ def test_a_model_that_was_sent_elsewhere_gives_the_same_bytes(kind: str, case: C
         options = {"motors": robot.structure.motor_joints, "tip": robot.tip, "muscles": robot.muscle_input}
         if kind != "limp":  # the springs of a link with a plateau must be equal
             assert sr.load_model(robot.urdf, springs=table, **options) != robot
+
+
+@law("with_springs")
+@pytest.mark.parametrize("kind", ["arm", "limp", "three_links", "pcc_lumped", "helix_lumped", "mounted", "foreign"])
+@given(case=cases(), factor=st.floats(0.5, 2.0), rests=st.lists(st.floats(-0.2, 0.2), min_size=3, max_size=3))
+@settings(max_examples=2)
+def test_a_model_with_other_springs_is_the_one_loaded_anew(kind: str, case: Case, factor: float, rests: list[float]) -> None:
+    """With these springs in the text, or beside it: the same model, equilibrium and files; the first model stays as it is."""
+    robot, force = model(kind), case.force(kind)
+    before, table = robot.spring_table, dict(robot.spring_table)
+    changed = list(table)[: 2 * len(rests)] if kind != "limp" else list(table)  # a link with a plateau has equal springs
+    for place, name in enumerate(changed):
+        table[name] = (factor * table[name][0], rests[place % len(rests)])
+    other = sr.with_springs(robot, {name: table[name] for name in changed})
+    assert robot.spring_table == before
+    assert other.spring_table == table
+    options = {"motors": robot.structure.motor_joints, "tip": robot.tip, "muscles": robot.muscle_input}
+    anew = sr.load_model(robot.urdf, springs=table, **options)
+    assert (other, hash(other), other.joint_roles, to_json(other)) == (anew, hash(anew), anew.joint_roles, to_json(anew))
+    assert (other == robot) == (table == before)
+    found = [sr.solve_equilibrium(each, case.motors(each), force, gravity=case.gravity) for each in (other, anew)]
+    if kind != "foreign":  # its file has no springs
+        text = robot.urdf
+        for name in changed:
+            tag = rf'(<joint name="{name}".*?<softrobots:spring )[^>]*/>'
+            numbers = 'stiffness="{!r}" rest="{!r}"/>'.format(*table[name])
+            text = re.sub(tag, rf"\g<1>{numbers}", text, count=1, flags=re.DOTALL)
+        written = sr.load_model(text, **options)
+        assert set(written.joint_roles.values()) <= {"motor", "spring", "section"}
+        found.append(sr.solve_equilibrium(written, case.motors(written), force, gravity=case.gravity))
+    for one in found[1:]:
+        for name in ("q_springs", "motor_torques", "tangent_stiffness", "tip_position"):
+            assert getattr(one, name).tobytes() == getattr(found[0], name).tobytes()
+    with TemporaryDirectory() as folder:
+        loaded = sr.load_result(sr.save_result(found[0], Path(folder) / "a.npz"))
+    assert loaded.model == other
+    if kind in ("arm", "three_links"):
+        compiled = sr.compile(other, backend="python").equilibrium(case.motors(other), force, gravity=case.gravity)
+        assert np.allclose(compiled.q_springs, found[0].q_springs, rtol=0.0, atol=1e-9)
 
 
 # --- Results

@@ -31,8 +31,7 @@ ONE_LINK = sr.InflatableArm(link_lengths=(0.6,))
 def link(side: float | None, up: float | None) -> sr.SoftModel:
     """One link with a spring, or two, at one point [N m/rad]; a joint without one is locked."""
     given = {"spring_1_side": side, "spring_1_up": up}
-    springs = {name: stiffness for name, stiffness in given.items() if stiffness is not None}
-    return sr.load_model(ONE_LINK.urdf(), springs=springs, motors=("motor_1", "motor_2"))
+    return sr.load_model(ONE_LINK.urdf(), springs=given, motors=("motor_1", "motor_2"))
 
 
 def by_label(branches: tuple[sr.EquilibriumBranch, ...]) -> dict[str, sr.EquilibriumBranch]:
@@ -52,7 +51,7 @@ def springs_of(branch: sr.EquilibriumBranch) -> np.ndarray:
 def test_one_hinge_bows_to_either_side_as_its_closed_form_says(power: float, turn: float, lift: float, beyond: float) -> None:
     """k theta = F L sin theta: a pitchfork at F = k / L, wherever the link points and however stiff it is."""
     stiffness = 10.0**power
-    model = sr.load_model(link(None, 1.0).urdf, springs={"spring_1_up": stiffness}, motors=("motor_1", "motor_2"))
+    model = sr.with_springs(link(None, 1.0), {"spring_1_up": stiffness})
     along = np.array([np.cos(turn) * np.cos(lift), np.sin(turn) * np.cos(lift), np.sin(lift)])
     critical = stiffness / LEVER
     found = by_label(sr.post_buckling_branches(model, (turn, lift), -along, max_force=beyond * critical, largest_step=0.2))

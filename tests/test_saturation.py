@@ -165,13 +165,13 @@ def test_a_bad_attribute_is_refused(text: str, limp: sr.SoftModel) -> None:
 
 
 def test_springs_of_a_link_with_a_plateau_must_be_alike(limp: sr.SoftModel) -> None:
-    springs = dict(limp.spring_table)
+    springs: dict[str, tuple[float, float] | None] = dict(limp.spring_table)
     with pytest.raises(sr.DescriptionError, match=r"same stiffness, not 172\.71, 100\.0"):
         sr.load_model(limp.urdf, springs=springs | {"spring_2_up": (100.0, 0.0)})
-    del springs["spring_2_up"]
+    springs["spring_2_up"] = None
     with pytest.raises(sr.DescriptionError, match=r"spring_2_side spring_2_up has max_moment 15\.0.*spring_1_side"):
         sr.load_model(limp.urdf, springs=springs)
-    del springs["spring_2_side"]  # a link that the caller makes rigid has no plateau
+    springs["spring_2_side"] = None  # a link that the caller makes rigid has no plateau
     half = sr.load_model(limp.urdf, springs=springs, motors=limp.motor_joints)
     assert [group.max_moment for group in half.spring_groups] == [21.76]
     assert sr.load_model(limp.urdf, springs={}).springs.linear

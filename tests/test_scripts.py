@@ -202,6 +202,6 @@ def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
         trajectories.tip_errors({"a": loaded.tip_error[:3]}, loaded.times)
     with pytest.raises(sr.ParameterError, match="13 waypoints"):
         trajectories.motor_angles(loaded, sr.follow_trajectory(arm, path.positions[:3]))
-    plain = sr.load_model(arm.urdf, springs={"spring_1_up": 100.0}, motors=arm.motor_joints)
+    plain = sr.load_model(arm.urdf, springs=dict.fromkeys(arm.spring_joints) | {"spring_1_up": 100.0}, motors=arm.motor_joints)
     with pytest.raises(sr.ParameterError, match="with inflated links"):
         trajectories.link_moments(sr.follow_trajectory(plain, path.positions[:2]))

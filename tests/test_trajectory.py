@@ -95,7 +95,7 @@ def test_moments_pressure_and_margin(arm: sr.SoftModel) -> None:
 
 
 def test_a_robot_without_inflated_links_has_no_moments(arm: sr.SoftModel) -> None:
-    plain = sr.load_model(arm.urdf, springs={"spring_1_up": 100.0}, motors=arm.motor_joints)
+    plain = sr.load_model(arm.urdf, springs=dict.fromkeys(arm.spring_joints) | {"spring_1_up": 100.0}, motors=arm.motor_joints)
     found = sr.follow_trajectory(plain, PATH.positions[:5], FORCE)
     assert (found.link_moments, found.required_pressure, found.wrinkling_margin) == (None, None, None)
 

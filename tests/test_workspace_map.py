@@ -245,7 +245,7 @@ def test_other_robots_are_refused(odd_arm: sr.SoftModel, arm: sr.SoftModel) -> N
     grid = TargetGrid.plane(1.2, 2)
     with pytest.raises(sr.ParameterError, match="three motors"):
         map_workspace(odd_arm, grid, LOADS)
-    plain = sr.load_model(arm.urdf, springs={"spring_1_up": 100.0}, motors=arm.motor_joints)
+    plain = sr.load_model(arm.urdf, springs=dict.fromkeys(arm.spring_joints) | {"spring_1_up": 100.0}, motors=arm.motor_joints)
     with pytest.raises(sr.ParameterError, match="inflated links"):
         map_workspace(plain, grid, LOADS)
     sideways = arm.urdf.replace('<axis xyz="0.0 0.0 1.0"/>', '<axis xyz="1.0 0.0 0.0"/>', 1)

@@ -47,7 +47,7 @@ PAGES = {
         (
             *_top("InflatableArm", "PccArm", "HelixTube", "ROBOTS", "robots.Robot", "robots.fields.XacroRobot"),
             *(f"softrobots.robots.fields.{name}" for name in ("parameter", "per_part", "check_parameters", "Facts")),
-            *_top("load_model", "SoftModel", "SpringGroup", "grown_coordinates"),
+            *_top("load_model", "with_springs", "SoftModel", "SpringGroup", "grown_coordinates"),
             *(f"softrobots.robots.parameter_file.{name}" for name in ("read_robot", "read_parameters", "write_parameters")),
             *_top("mount", "description.composition.fix_joints", "description.third_party.robot_file", "__version__"),
         ),

@@ -18,7 +18,6 @@ from typing import Any
 
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import RigidTree
-from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import SpringTag
 from softrobots.model.soft_model import SoftModel, check_model
 
@@ -83,14 +82,7 @@ def hold(model: Any, q_motors: Any = None) -> HeldRobot:
     springs = dict(zip(structure.spring_joints, tags, strict=True))
     motors = dict(zip(structure.motor_joints, values[:count].tolist(), strict=True))
     tensions = dict(zip((muscle.name for muscle in checked.muscles), values[count:].tolist(), strict=True))
-    return HeldRobot(MappingProxyType(motors), MappingProxyType(springs), locked_joints(checked), MappingProxyType(tensions))
-
-
-def locked_joints(model: SoftModel) -> tuple[str, ...]:
-    """Return the movable joints of the description that the model locks at zero, base to tip."""
-    moving = set(model.pinocchio.names)
-    joints = read_rigid_tree(model.urdf).joints
-    return tuple(joint.name for joint in joints if joint.movable and joint.name not in moving)
+    return HeldRobot(MappingProxyType(motors), MappingProxyType(springs), structure.locked_joints, MappingProxyType(tensions))
 
 
 def weld(tree: RigidTree, positions: Mapping[str, float]) -> RigidTree:

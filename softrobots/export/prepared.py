@@ -16,7 +16,7 @@ from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import SpringTag
 from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix, rule_text
-from softrobots.export.held import ACTUATORS, check_linear, hold, locked_joints, weld
+from softrobots.export.held import ACTUATORS, check_linear, hold, weld
 from softrobots.export.servos import Motor, Muscle, motors_of, muscles_of
 from softrobots.model.soft_model import SoftModel
 
@@ -63,7 +63,7 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     structure, tree = checked.structure, read_rigid_tree(checked.urdf)
     positions = dict(zip(structure.motor_joints, values.tolist(), strict=False))
-    fixed = dict.fromkeys(locked_joints(checked), 0.0)
+    fixed = dict.fromkeys(structure.locked_joints, 0.0)
     springs: Mapping[str, SpringTag] = {name: SpringTag(*spring) for name, spring in checked.spring_table.items()}
     welded = actuators == "welded"
     if welded:

@@ -14,7 +14,6 @@ from softrobots.core.checks import instance_of
 from softrobots.core.errors import ParameterError, SoftRobotsError
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
-from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag, SpringTag
 from softrobots.export.number_sources import Rules, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
@@ -101,7 +100,7 @@ class _Parts:
 
     def __init__(self, model: SoftModel, rules: Rules) -> None:
         self._model, self._rules = model, rules
-        self._tags, self._springs = read_tags(model.urdf), model.spring_table
+        self._tags, self._springs, self._roles = model.structure.tags, model.spring_table, model.joint_roles
 
     def all(self) -> dict[str, Any]:
         """Return all of them by kind."""
@@ -129,7 +128,7 @@ class _Parts:
 
     def _joint(self, joint: Joint) -> dict[str, Any]:
         position, stiffness, damping = _SLIDING if joint.kind == "prismatic" else _TURNING
-        entry: dict[str, Any] = {"name": joint.name, "type": joint.kind, "role": self._role(joint.name)}
+        entry: dict[str, Any] = {"name": joint.name, "type": joint.kind, "role": self._roles[joint.name].split()[-1]}
         entry |= {"parent": joint.parent, "child": joint.child}
         if joint.kind != "continuous":
             bounds = zip(("lower", "upper"), joint.limits, strict=True)
@@ -140,17 +139,9 @@ class _Parts:
             spring = SpringTag(*self._springs[joint.name])
             for name, unit in (("stiffness", stiffness), ("rest", position)):
                 entry[name] = self._number(joint.name, name, getattr(spring, name), unit, "softrobots:spring")
-                if self._tags.springs.get(joint.name) != spring:
+                if self._roles[joint.name] == "given spring":
                     entry[name]["source"] = _CALLER
         return entry
-
-    def _role(self, joint: str) -> str:
-        structure = self._model.structure
-        if joint in structure.motor_joints:
-            return "motor"
-        if joint in structure.spring_joints:
-            return "spring"
-        return "section" if joint in structure.section_joints else "locked"
 
     def _inflated_link(self, tag: Any) -> dict[str, Any]:
         name = " ".join(tag.springs)

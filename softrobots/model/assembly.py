@@ -12,6 +12,7 @@ from softrobots.constant_curvature.strain_chain import STRAINS, joint_positions
 from softrobots.core.checks import LARGEST, FloatArray, read_only
 from softrobots.description.urdf_tags import LumpedSectionTag, RobotTags, SectionTag, SpringTag
 from softrobots.model.actuators import Actuators
+from softrobots.model.chain_reader import chain_length
 from softrobots.model.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, rest_coordinates
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscles import MuscleForces, Segments, muscle_matrix
@@ -30,6 +31,7 @@ def assemble(
     motors: Sequence[str],
     tip: str,
     muscle_input: str = "lengths",
+    locked: Sequence[str] = (),
 ) -> SoftModel:
     """Build the model of a robot; `softrobots.load_model` has checked the arguments.
 
@@ -41,6 +43,7 @@ def assemble(
         motors: Names of the motor joints.
         tip: Name of the tip frame.
         muscle_input: What `q_motors` holds of the muscles, "lengths" or "forces".
+        locked: Names of the movable joints of the text that are fixed in `rigid`.
 
     Returns:
         The model.
@@ -77,8 +80,10 @@ def assemble(
         coordinates, elastic = given_lengths, given_lengths.springs
 
     structure = Structure(
+        tags=tags,
         motor_joints=motor_joints,
         spring_joints=spring_joints,
+        locked_joints=tuple(locked),
         motor_indices=motor_indices,
         spring_indices=spring_indices,
         constant_strain=bool(sections),
@@ -99,8 +104,7 @@ def assemble(
         np.array([float((1.0 / strain_springs.stiffness[list(segments[m.segment]["bend_x"])]).sum()) for m in tags.muscles]),
         given_lengths,
     )
-    segment_of = {name: row.segment for name, row in structure.section_of.items()}
-    groups = spring_groups(tags.inflated_links, elastic, spring_joints, segment_of)
+    data = PinocchioData(rigid)
     return SoftModel(
         pinocchio=rigid,
         urdf=urdf,
@@ -108,9 +112,51 @@ def assemble(
         structure=structure,
         actuators=actuators,
         coordinates=coordinates,
-        springs=replace(elastic, groups=groups),
-        data=PinocchioData(rigid),
+        springs=_grouped(elastic, structure),
+        data=data,
+        reach=chain_length(rigid, data.frame_ids[tip], {joint for row in structure.section_table for joint in row.joint_names}),
     )
+
+
+def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
+    """Build a model again with another spring at each of its spring joints.
+
+    Pinocchio's model and workspace are shared. Only muscles need more than the springs: the free coordinates of given lengths
+    and the scale of given tensions depend on the stiffness.
+
+    Args:
+        model: The model.
+        springs: Springs by joint name.
+
+    Raises:
+        DescriptionError: If the springs of an inflated link cannot have a largest moment.
+    """
+    structure = model.structure
+    if structure.muscles:
+        again = assemble(
+            model.pinocchio,
+            model.urdf,
+            structure.tags,
+            springs=springs,
+            motors=structure.motor_joints,
+            tip=model.tip,
+            muscle_input=model.muscle_input,
+            locked=structure.locked_joints,
+        )
+        return replace(again, data=model.data)
+    stiffness, rest = structure.strain_springs.stiffness.copy(), structure.strain_springs.rest.copy()
+    for place, name in enumerate(structure.spring_joints):
+        stiffness[place], rest[place] = springs[name].stiffness, springs[name].rest
+    elastic = replace(structure.strain_springs, stiffness=read_only(stiffness), rest=read_only(rest))
+    structure = replace(structure, strain_springs=elastic)
+    return replace(model, structure=structure, springs=_grouped(elastic, structure))
+
+
+def _grouped(elastic: Springs, structure: Structure) -> Springs:
+    """The springs of the elastic coordinates with the groups of the inflated links."""
+    links = structure.tags.inflated_links
+    segment_of = {name: row.segment for name, row in structure.section_of.items()} if links else {}
+    return replace(elastic, groups=spring_groups(links, elastic, structure.spring_joints, segment_of))
 
 
 def velocity_indices(rigid: Any, names: Sequence[str]) -> Any:

@@ -18,16 +18,16 @@ from softrobots.core.errors import DescriptionError, NameNotFound, ParameterErro
 from softrobots.description.sources import Robot, read_source
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import RobotTags, SectionTag, SpringTag
-from softrobots.model.assembly import assemble
+from softrobots.model.assembly import assemble, reassemble
 from softrobots.model.coordinates import rest_coordinates
 from softrobots.model.muscles import MUSCLE_INPUTS
-from softrobots.model.soft_model import SoftModel
+from softrobots.model.soft_model import SoftModel, check_model
 
 
 def load_model(
     source: Robot | Path | str,
     *,
-    springs: Mapping[str, float | tuple[float, float]] | None = None,
+    springs: Mapping[str, float | tuple[float, float] | None] | None = None,
     motors: Sequence[str] | None = None,
     tip: str | None = None,
     muscles: str = "lengths",
@@ -42,8 +42,10 @@ def load_model(
 
     Args:
         source: A robot of this package, a path (`Path` or text), or the text of a description (starting with `<`).
-        springs: For files without springs of their own: `{joint: stiffness}` or `{joint: (stiffness, rest)}`
-            [N m/rad or N/m; rad or m]. If given, it replaces the springs of the file. `{}` for a rigid robot.
+        springs: `{joint: stiffness}` or `{joint: (stiffness, rest)}` [N m/rad or N/m; rad or m], in place of the spring that
+            the file gives that joint, if any; None takes it away, and the joint becomes a motor. A stiffness alone keeps the
+            rest of the file (0 without one). The other springs of the file stay; `SoftModel.joint_roles` says what became of
+            every joint. `{}` takes all springs away: a rigid robot.
         motors: Names of the motor joints; movable joints that are neither motor, spring nor part of a section are then locked
             at zero. By default every movable joint without a spring is a motor.
         tip: Name of the tip frame; by default the one in the file, else `tip`, else the only leaf of the tree.
@@ -72,7 +74,7 @@ def load_model(
     movable = [name for name in model.names if name != "universe"]
     in_sections = {name for section in tags.sections for name in section.joints}
     free = [name for name in movable if name not in in_sections]
-    spring_tags = _given_springs(springs, free) if springs is not None else dict(tags.springs)
+    spring_tags = dict(tags.springs) if springs is None else _given_springs(springs, free, tags.springs if springs else {})
     if springs is None and not spring_tags and not tags.sections:
         raise DescriptionError(
             f"{label} has no joint springs; give springs={{joint: stiffness}} for its movable joints "
@@ -107,17 +109,50 @@ def load_model(
         motors=motor_names,
         tip=_tip(model, tags.tip if tip is None else tip, label),
         muscle_input=muscles,
+        locked=locked,
     )
 
 
-def _given_springs(springs: Any, movable: Sequence[str]) -> dict[str, SpringTag]:
+def with_springs(model: SoftModel, springs: Mapping[str, float | tuple[float, float]]) -> SoftModel:
+    """Return a robot with other springs, equal to loading it anew, 20 times faster: neither xacro nor the URDF is read again.
+
+    Tens of microseconds for an arm of two links; a millisecond for muscles of given length along 90 hinges, whose free
+    coordinates depend on the stiffness. The two models share Pinocchio's model and workspace.
+
+    Args:
+        model: The robot; it stays as it is.
+        springs: As for `load_model`: `{joint: stiffness}`, which keeps the rest of the joint, or `{joint: (stiffness, rest)}`
+            [N m/rad or N/m; rad or m]. The other springs stay; `{}` changes nothing.
+
+    Returns:
+        The model with these springs. Its `urdf` is the text that `model` was loaded from; exports and files have its springs.
+
+    Raises:
+        NameNotFound: If there is no such joint or it has no spring; the stiffness of sections of constant strain is that of the
+            file.
+        ParameterError: If `model` is not a `SoftModel`, a stiffness is not positive, or a rest coordinate is not finite.
+        DescriptionError: If the springs of an inflated link with a largest moment would differ in stiffness.
+    """
+    structure = check_model(model).structure
+    present = {name: SpringTag(*pair) for name, pair in model.spring_table.items()}
+    return reassemble(model, _given_springs(springs, structure.spring_joints, present, removable=False))
+
+
+def _given_springs(
+    springs: Any, joints: Sequence[str], present: Mapping[str, SpringTag], *, removable: bool = True
+) -> dict[str, SpringTag]:
+    """The springs that are present, changed as the caller says; a joint without one can be given one if it is in `joints`."""
     if not isinstance(springs, Mapping):
         raise ParameterError("springs", springs, "a mapping {joint: stiffness} or {joint: (stiffness, rest)}")
-    tags = {}
+    tags = dict(present)
     for name, value in springs.items():
-        if name not in movable:
-            raise NameNotFound("movable joint", str(name), movable)
-        stiffness, rest = value if isinstance(value, tuple | list) and len(value) == 2 else (value, 0.0)
+        if name not in joints:
+            raise NameNotFound("movable joint" if removable else "joint with a spring", str(name), joints)
+        if value is None and removable:
+            tags.pop(name, None)
+            continue
+        kept = tags[name].rest if name in tags else 0.0
+        stiffness, rest = value if isinstance(value, tuple | list) and len(value) == 2 else (value, kept)
         field = f"springs[{name!r}]"
         tags[name] = SpringTag(positive_number(field, stiffness, "N m/rad or N/m"), finite_number(field, rest, "rad or m"))
     return tags
@@ -187,13 +222,18 @@ def _tip(model: Any, tip: str | None, label: str) -> str:
 
 
 def load_arguments(model: SoftModel) -> dict[str, Any]:
-    """Return the arguments with which `load_model` builds a model again from its URDF text."""
+    """Return the arguments with which `load_again` builds a model again from its URDF text."""
     motors = model.structure.motor_joints
     return {"springs": model.spring_table, "motors": motors, "tip": model.tip, "muscles": model.muscle_input}
 
 
+def load_again(urdf: str, *, springs: Mapping[str, tuple[float, float]], **arguments: Any) -> SoftModel:
+    """Return the model of URDF text and `load_arguments`: its springs are all in `springs`, those of the text do not count."""
+    return load_model(urdf, springs=dict.fromkeys(read_tags(urdf).springs) | dict(springs), **arguments)
+
+
 def _reduce(model: SoftModel) -> tuple[Any, ...]:
-    return partial(load_model, **load_arguments(model)), (model.urdf,)
+    return partial(load_again, **load_arguments(model)), (model.urdf,)
 
 
 copyreg.pickle(SoftModel, _reduce)  # as URDF text and arguments; Pinocchio's workspaces are not pickled

@@ -1,11 +1,13 @@
-"""Pinocchio's working memory for a robot, one for each thread and gravity."""
+"""Pinocchio's working memory for a robot, one for each thread and gravity, and its numbers of frames and coordinates."""
 
 from __future__ import annotations
 
 import threading
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from softrobots.core.errors import DescriptionError
 
@@ -32,6 +34,23 @@ class PinocchioData(threading.local):
         if gravity not in self._pairs:
             self._pairs[gravity] = self._pair(gravity)
         return self._pairs[gravity]
+
+    @cached_property
+    def frame_ids(self) -> dict[str, int]:
+        """Pinocchio's number of each frame by its name; a link goes before a joint of the same name."""
+        frames = [(frame.name, number, frame.type) for number, frame in enumerate(self._model.frames)]
+        links = {name: number for name, number, kind in frames if kind == pin.FrameType.BODY}
+        return {name: number for name, number, _ in frames} | links
+
+    @cached_property
+    def circles(self) -> tuple[tuple[int, int], ...]:
+        """Places in velocity and configuration of the joints that Pinocchio places on a circle, as cosine and sine."""
+        return tuple((joint.idx_v, joint.idx_q) for joint in list(self._model.joints)[1:] if joint.nq == 2)
+
+    @cached_property
+    def q_indices(self) -> Any:
+        """Place in the configuration of each place in the velocity."""
+        return np.array([joint.idx_q for joint in list(self._model.joints)[1:]], dtype=np.intp)
 
     def _pair(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         if gravity is None:

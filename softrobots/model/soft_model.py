@@ -16,7 +16,7 @@ from softrobots.core.checks import FloatArray, finite_array, instance_of, read_o
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.actuators import Actuators
-from softrobots.model.chain_reader import chain_length, read_chain
+from softrobots.model.chain_reader import read_chain
 from softrobots.model.coordinates import Coordinates
 from softrobots.model.pinocchio_data import PinocchioData
 from softrobots.model.serial_chain import SerialChain
@@ -55,6 +55,11 @@ class SoftModel:
     """The springs of the elastic coordinates, with the plateaus of inflated links that have a largest moment."""
     data: PinocchioData
     """Pinocchio's working memory."""
+    reach: float
+    """Sum of the link lengths from base to tip, and of the travel of sliding joints [m], the scale of residuals.
+
+    A slide without limits counts as 1 m.
+    """
 
     def __repr__(self) -> str:
         """Name, motors, springs and tip in one line."""
@@ -128,18 +133,14 @@ class SoftModel:
         return dict(zip(self.structure.spring_joints, pairs, strict=False))  # coordinates of sections follow
 
     @property
+    def joint_roles(self) -> dict[str, str]:
+        """By movable joint of the file: "motor", "spring" of the file, "given spring" of the caller, "section" or "locked"."""
+        return self.structure.joint_roles
+
+    @property
     def spring_groups(self) -> tuple[SpringGroup, ...]:
         """Springs of one inflated link each, with radius and pressure; empty if the file names no inflated link."""
         return self.springs.groups
-
-    @cached_property
-    def reach(self) -> float:
-        """Sum of the link lengths from base to tip, and of the travel of sliding joints [m], the scale of residuals.
-
-        A slide without limits counts as 1 m.
-        """
-        strained = {joint for row in self.structure.section_table for joint in row.joint_names}
-        return chain_length(self.pinocchio, self.frame_id(self.tip), strained)
 
     @property
     def n_motors(self) -> int:
@@ -218,22 +219,13 @@ class SoftModel:
 
     def embed(self, joints: FloatArray) -> FloatArray:
         """Pinocchio's configuration, shape (nq,), of joint positions in the order of its velocities, shape (nv,)."""
-        if not self._circles:
+        if not self.data.circles:
             return joints
         q: FloatArray = np.zeros(self.pinocchio.nq)
-        q[self._q_indices] = joints
-        for index_v, index_q in self._circles:
+        q[self.data.q_indices] = joints
+        for index_v, index_q in self.data.circles:
             q[index_q], q[index_q + 1] = np.cos(joints[index_v]), np.sin(joints[index_v])
         return q
-
-    @cached_property
-    def _circles(self) -> tuple[tuple[int, int], ...]:
-        """Places in velocity and configuration of the joints that Pinocchio places on a circle, as cosine and sine."""
-        return tuple((joint.idx_v, joint.idx_q) for joint in list(self.pinocchio.joints)[1:] if joint.nq == 2)
-
-    @cached_property
-    def _q_indices(self) -> Any:
-        return np.array([joint.idx_q for joint in list(self.pinocchio.joints)[1:]], dtype=np.intp)
 
     def frame_id(self, name: str) -> int:
         """Pinocchio's number of a frame (link or joint).
@@ -247,17 +239,11 @@ class SoftModel:
         Raises:
             NameNotFound: If there is no such frame; the error lists the links.
         """
-        number: int | None = self._frame_ids.get(name) if isinstance(name, str) else None
+        number: int | None = self.data.frame_ids.get(name) if isinstance(name, str) else None
         if number is None:
             links = [frame.name for frame in self.pinocchio.frames if frame.type == pin.FrameType.BODY]
             raise NameNotFound("frame", str(name), links)
         return number
-
-    @cached_property
-    def _frame_ids(self) -> dict[str, int]:
-        frames = [(frame.name, number, frame.type) for number, frame in enumerate(self.pinocchio.frames)]
-        links = {name: number for name, number, kind in frames if kind == pin.FrameType.BODY}
-        return {name: number for name, number, _ in frames} | links  # a link goes before a joint of the same name
 
     def workspace(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         """Pinocchio model and data of the calling thread for a gravity vector (world axes, [m/s^2]; None: weightless).

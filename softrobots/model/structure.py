@@ -10,7 +10,7 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import STRAINS, in_range
 from softrobots.core.checks import FloatArray
-from softrobots.description.urdf_tags import LineTag, MuscleTag
+from softrobots.description.urdf_tags import LineTag, MuscleTag, RobotTags, SpringTag
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.springs import Springs
 
@@ -51,10 +51,14 @@ class Structure:
     lengths constrain them.
     """
 
+    tags: RobotTags
+    """What the file says: its springs, inflated links and sections."""
     motor_joints: tuple[str, ...]
     """Motor joints, without muscles."""
     spring_joints: tuple[str, ...]
     """Joints with a spring."""
+    locked_joints: tuple[str, ...]
+    """Movable joints of the file that are locked at zero."""
     motor_indices: Any
     """Places of the motor joints in Pinocchio's velocity vector."""
     spring_indices: Any
@@ -87,6 +91,16 @@ class Structure:
     def section_joints(self) -> tuple[str, ...]:
         """Joints of the sections of constant strain."""
         return tuple(joint for row in self.section_table for joint in row.joint_names) if self.constant_strain else ()
+
+    @property
+    def joint_roles(self) -> dict[str, str]:
+        """See `SoftModel.joint_roles`."""
+        springs, of_file = self.strain_springs, self.tags.springs
+        pairs = zip(self.spring_joints, springs.stiffness.tolist(), springs.rest.tolist(), strict=False)
+        given = {name for name, *pair in pairs if of_file.get(name) != SpringTag(*pair)}
+        roles = dict.fromkeys(self.motor_joints, "motor")
+        roles |= {name: "given spring" if name in given else "spring" for name in self.spring_joints}
+        return roles | dict.fromkeys(self.section_joints, "section") | dict.fromkeys(self.locked_joints, "locked")
 
     @property
     def section_of(self) -> dict[str, SectionRow]:

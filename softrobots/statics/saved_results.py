@@ -20,7 +20,7 @@ from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import csv_text, write_text
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
-from softrobots.model.loader import load_arguments, load_model
+from softrobots.model.loader import load_again, load_arguments
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.displacement_control import DisplacementControl, Probe
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
@@ -49,12 +49,12 @@ def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
 
 def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
     arguments, load = (parse_json(text(fields, name)) for name in ("model", "load"))
-    springs = {str(name): (float(k), float(rest)) for name, (k, rest) in arguments["springs"].items()}
     urdf = text(fields, "urdf")
     if not urdf.startswith("<"):
         raise FileFormatError("its urdf is not URDF text")  # load_model would take it for a path
+    springs = {str(name): (float(k), float(rest)) for name, (k, rest) in arguments["springs"].items()}
     muscles = arguments.get("muscles", "lengths")
-    model = load_model(urdf, springs=springs, motors=arguments["motors"], tip=arguments["tip"], muscles=muscles)
+    model = load_again(urdf, springs=springs, motors=arguments["motors"], tip=arguments["tip"], muscles=muscles)
     return model, Load.of(model, wrench=load["wrenches"], gravity=load["gravity"])
 
 

@@ -46,7 +46,8 @@ def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
 def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
     """Add the options of `add_robot`, and `--spring`, `--tip` and `--muscles`, to a parser; see `model_of`."""
     add_robot(parser, optional=optional)
-    help_text = "spring of a joint of a file: stiffness K [N m/rad or N/m], relaxed at REST [rad or m] (0); once for each joint"
+    help_text = "spring of a joint: stiffness K [N m/rad or N/m], relaxed at REST [rad or m] (that of the file, or 0); once "
+    help_text += "for each joint; other joints keep the springs of the file"
     parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=help_text)
     parser.add_argument("--tip", metavar="LINK", help="link that is the tip (the one that the file names, or its only end)")
     help_text = "input of muscles: lengths [m] or tensions [N] (%(default)s)"
@@ -68,12 +69,12 @@ def assignment(word: str) -> str:
     return word
 
 
-def spring(word: str) -> tuple[str, tuple[float, float]]:
-    """Parse JOINT=K or JOINT=K,REST into the joint and its stiffness and rest."""
+def spring(word: str) -> tuple[str, float | tuple[float, float]]:
+    """Parse JOINT=K or JOINT=K,REST into the joint and its stiffness, or stiffness and rest."""
     joint, equals, numbers = word.rpartition("=")
     stiffness, _, rest = numbers.partition(",")
     try:
-        values = float(stiffness), float(rest or 0.0)
+        values = (float(stiffness), float(rest)) if rest else float(stiffness)
     except ValueError:
         equals = ""
     if not joint or not equals:
@@ -122,11 +123,11 @@ def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = 
         SoftRobotsError: Whatever `source_of` and `load_model` raise.
         ParameterError: If a joint is given two springs.
     """
-    springs: dict[str, tuple[float, float]] = {}
-    for joint, stiffness_and_rest in arguments.spring:
+    springs: dict[str, float | tuple[float, float]] = {}
+    for joint, values in arguments.spring:
         if joint in springs:
             raise ParameterError("--spring", joint, "given once for each joint")
-        springs[joint] = stiffness_and_rest
+        springs[joint] = values
     source = source_of(arguments) if source is None else source
     return load_model(source, springs=springs or None, tip=arguments.tip, muscles=arguments.muscles)
 

@@ -98,7 +98,11 @@ def wrinkling_margins(equilibrium: Equilibrium) -> list[float | None]:
 
 
 def head_lines(model: SoftModel, load: Load) -> list[str]:
-    """Return a line for the robot, one for each load, and one for gravity."""
+    """Return a line for the robot, one for springs that the caller gave, one for each load, and one for gravity."""
+    roles = model.joint_roles
+    given = [name for name, role in roles.items() if role == "given spring"]
+    kept = sum(role == "spring" for role in roles.values())
+    springs = [("springs", f"given: {', '.join(given)}; of the file: {kept or 'none'}")] if given else []
     rows = []
     for frame, wrench in load.wrenches.items():
         if wrench.any():
@@ -106,7 +110,12 @@ def head_lines(model: SoftModel, load: Load) -> list[str]:
             rows.append((f"load on {frame}", f"force {formatted(wrench[:3])} N{moment}"))
     gravity = "none" if load.gravity is None else f"{formatted(np.array(load.gravity))} m/s^2"
     return aligned(
-        [("robot", f"{model.pinocchio.name} (tip: {model.tip})"), *(rows or [("load", "none")]), ("gravity", gravity)]
+        [
+            ("robot", f"{model.pinocchio.name} (tip: {model.tip})"),
+            *springs,
+            *(rows or [("load", "none")]),
+            ("gravity", gravity),
+        ]
     )
 
 

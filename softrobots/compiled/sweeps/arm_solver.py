@@ -17,7 +17,7 @@ from softrobots.compiled.sweeps.postures import Branch, branches, within_turns
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.renaming import children
-from softrobots.model.loader import load_model
+from softrobots.model.loader import load_again
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.workspace_map import BoolArray, required_pressures
 from softrobots.version import __version__
@@ -73,7 +73,7 @@ class SweepCase:
 
     def _load(self, urdf: str) -> SoftModel:
         springs = {name: (stiffness, rest) for name, stiffness, rest in self.springs}
-        return load_model(urdf, springs=springs, motors=self.motors, tip=self.tip)
+        return load_again(urdf, springs=springs, motors=self.motors, tip=self.tip)
 
 
 class SearchResult(NamedTuple):
