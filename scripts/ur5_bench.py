@@ -134,7 +134,10 @@ def _result(row: CharacterisationRow, done: BenchRun, measured: Measurement) -> 
     bench = done.bench
     fit = fit_characterisation(measured.angle, measured.moment, pressure=row.pressure, radius=bench.radius)
     small = fit_characterisation(
-        *bench.test.small_angles(done.displacement, measured.force), pressure=row.pressure, radius=bench.radius
+        *bench.test.small_angles(done.displacement, measured.force),
+        pressure=row.pressure,
+        radius=bench.radius,
+        angle_offset=0.0,  # as the paper
     )  # fmt: skip
     return {
         "pressure_Pa": row.pressure,

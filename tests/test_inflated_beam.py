@@ -106,7 +106,7 @@ def test_fit_recovers_known_parameters_within_three_standard_errors(seed: int, s
     clean = np.sign(angle) * np.minimum(true_k * np.abs(angle), true_max)
     fit = inflated_beam.fit_characterisation(angle, clean + noise * random.normal(size=400), pressure=pressure, radius=0.055)
     below = np.abs(angle) * true_k < inflated_beam.wrinkling_moment(pressure, 0.055)
-    exact_std = noise / np.sqrt(np.sum(angle[below] ** 2))  # of a slope through the origin
+    exact_std = noise / np.sqrt(np.count_nonzero(below)) / np.std(angle[below])  # of the slope of a line
     assert fit.stiffness == pytest.approx(true_k, abs=3 * exact_std)
     assert fit.stiffness_std == pytest.approx(exact_std, rel=0.2)  # a standard deviation from 200 points: 5 % at one sigma
     assert fit.max_moment == pytest.approx(true_max, abs=3 * noise / np.sqrt(fit.n_saturated))
@@ -123,11 +123,11 @@ def test_noise_does_not_pull_the_slope(noise: float, plateau: float) -> None:
     angle, pulls = np.linspace(0.0, 0.25, 60), []
     for seed in range(100):
         moments = np.minimum(170.0 * angle, plateau) + noise * np.random.default_rng(seed).normal(size=60)
-        fit = inflated_beam.fit_characterisation(angle, moments, pressure=50e3, radius=0.055)
+        fit = inflated_beam.fit_characterisation(angle, moments, pressure=50e3, radius=0.055, angle_offset=0.0)
         pulls.append((fit.stiffness - 170.0) / fit.stiffness_std)
         assert fit.max_moment == pytest.approx(plateau, abs=5 * noise / np.sqrt(fit.n_saturated))
     assert abs(np.mean(pulls)) < 0.6
-    assert np.std(pulls) < 1.5
+    assert np.std(pulls) < 1.6  # a dozen points below the lowest plateau: Student's t, and a knee among them
 
 
 def test_fit_without_saturation_says_so() -> None:

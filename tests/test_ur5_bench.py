@@ -100,7 +100,7 @@ def test_what_other_evaluations_would_make_of_the_data_is_as_documented() -> Non
             (by_small, test.small_angles(ways, forces)),
             (by_point, (turned, forces * test.arm * np.cos(turned))),
         ):
-            fit = inflated_beam.fit_characterisation(*data, pressure=row.pressure, radius=0.055)
+            fit = inflated_beam.fit_characterisation(*data, pressure=row.pressure, radius=0.055, angle_offset=0.0)
             found.append([abs(fit.stiffness / row.stiffness - 1.0), abs(fit.max_moment / row.max_moment - 1.0)])
     assert np.allclose(np.max(by_small, axis=0), [0.008, 0.006], rtol=0.0, atol=5e-4)
     assert np.allclose(np.max(by_point, axis=0), [0.005, 0.020], rtol=0.0, atol=5e-4)
@@ -127,8 +127,8 @@ def test_data_that_are_none_are_refused() -> None:
         lambda: test.displacement(np.pi / 2),
         lambda: test.contact(-2.0),
         lambda: test.angle(np.inf),
-        lambda: test.moment([0.1, 0.2], [1.0]),
-        lambda: test.small_angles([0.1, 0.2], [1.0]),
+        lambda: test.moment([0.1, 0.2], [1.0, 2.0, 3.0]),
+        lambda: test.small_angles([0.1, 0.2], [1.0, 2.0, 3.0]),
     ):
         with pytest.raises(sr.ParameterError):
             call()
@@ -191,17 +191,17 @@ def test_the_fit_recovers_the_true_link(push: BenchRun) -> None:
 
 
 def test_the_fit_recovers_it_from_noise_within_three_standard_errors(push: BenchRun) -> None:
-    """100 noisy readings, in standard errors: less than 3 % exceed 3 (Student's t of 17 freedoms: 0.8 %), their mean is zero
-    and their spread one within three of *its* standard errors, 0.1 and 0.07."""
+    """100 noisy readings, in standard errors: less than 5 % exceed 3 (Student's t of 10 freedoms: 1.3 %), their mean is zero
+    within three of its standard errors, 0.1, and their spread that of Student's t, 1.12, within 0.25."""
     pulls = []
     for seed in range(100):
         read = push.measure(force_std=0.3, angle_std=3e-4, seed=seed)
         fit = inflated_beam.fit_characterisation(read.angle, read.moment, pressure=ROW.pressure, radius=0.055)
         plateau_std = 0.3 * 0.47 / np.sqrt(fit.n_saturated)
         pulls.append([(fit.stiffness - ROW.stiffness) / fit.stiffness_std, (fit.max_moment - ROW.max_moment) / plateau_std])
-    assert np.all(np.mean(np.abs(pulls) < 3.0, axis=0) > 0.97)
+    assert np.all(np.mean(np.abs(pulls) < 3.0, axis=0) > 0.95)
     assert np.all(np.abs(np.mean(pulls, axis=0)) < 0.3)
-    assert np.all(np.abs(np.std(pulls, axis=0) - 1.0) < 0.25)
+    assert np.all(np.abs(np.std(pulls, axis=0) - (1.12, 1.0)) < 0.25)
     first, again, other = (push.measure(force_std=0.3, seed=seed) for seed in (0, 0, 1))
     assert np.array_equal(first.force, again.force)
     assert not np.array_equal(first.force, other.force)

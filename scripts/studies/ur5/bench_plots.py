@@ -72,7 +72,7 @@ def moment_angle(pushes: Sequence[Push]) -> Any:
         )  # fmt: skip
         angles = np.linspace(0.0, max(float(measured.angle.max()), 0.0), 400)
         most = np.inf if fit.max_moment is None else fit.max_moment
-        axes.plot(angles, np.minimum(fit.stiffness * angles, most), color=colour, lw=1.2)
+        axes.plot(angles, np.minimum(fit.stiffness * (angles - fit.angle_offset), most), color=colour, lw=1.2)
         axes.axhline(fit.wrinkling_moment, color=colour, lw=1.2, ls=":")
         ends.append((fit.wrinkling_moment, colour, MARKERS[number % len(MARKERS)]))
     style = {"ms": 6, "mfc": "white", "ls": "", "transform": axes.get_yaxis_transform(), "clip_on": False, "zorder": 4}
