@@ -47,6 +47,7 @@ def parser() -> argparse.ArgumentParser:
     numbers("--deflections", test.deflections, "radius of the grasped object minus the natural inner radius of the helix [m]")
     options.add_argument("--pressure", type=float, default=10e3, help="largest gauge pressure of the grasp [Pa] (%(default)g)")
     options.add_argument("--object-radius", type=float, default=test.object_radius, help="of the object [m] (%(default)s)")
+    options.add_argument("--gap", type=float, default=test.gap, help="between the halves of the object [m] (%(default)s)")
     options.add_argument("--rise", type=float, default=test.turn_height, help="of the grasp per turn [m] (%(default)s)")
     options.add_argument("--turns", type=float, default=test.turns, help="of the grasp (%(default)s)")
     options.add_argument("--output", type=Path, metavar="FOLDER", help="new or empty folder (output/helix_atlas_<time>)")
@@ -63,8 +64,9 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.docs is not None and (arguments.output is not None or arguments.no_plots):
         raise sr.ParameterError("--docs", arguments.docs, "given without --output and --no-plots")
     angles, pressure = np.radians(arguments.angles), positive_number("pressure", arguments.pressure, "Pa")
+    deflections = tuple(arguments.deflections)
     test = helix.GraspTest(
-        arguments.object_radius, arguments.rise, arguments.turns, tuple(arguments.deflections), arguments.diameter
+        arguments.object_radius, arguments.rise, arguments.turns, deflections, arguments.diameter, arguments.gap
     )
     output = arguments.output or Path("output") / f"helix_atlas_{datetime.now():%Y%m%d_%H%M%S}"
     folder = arguments.docs or free_folder(output)

@@ -23,6 +23,7 @@ PAPER: dict[str, Any] = {
     "turns": PAPER_CYLINDER.turns,
     "diameter": PAPER_CYLINDER.diameter,
 }
+"""The paper's cylinder closed, without its gap."""
 CASES = [
     PAPER,
     PAPER | {"object_radius": 0.035, "turns": 2.25, "diameter": 0.05},
@@ -62,12 +63,15 @@ def volume(radius: float, pitch: float, turn_angle: float, diameter: float) -> f
     return (4.0 * meshed_volume(radius, pitch, turn_angle, diameter, 401, 128) - coarse) / 3.0
 
 
-def volume_at_gap(gap: float, case: dict[str, Any]) -> float:
-    """Volume when the halves are that far apart: same inner length and pitch, the radius of a circle with their perimeter."""
+def volume_at_gap(gap: float, case: dict[str, Any], tested: float = 0.0) -> float:
+    """Volume when the halves are that far apart: same inner length and pitch, the radius of a circle with their perimeter.
+
+    The turns are those around the halves at the gap `tested`.
+    """
     pitch = case["turn_height"] / (2.0 * np.pi)
-    inner_length = 2.0 * np.pi * case["turns"] * np.hypot(case["object_radius"], pitch)
-    perimeter = 2.0 * (np.pi * case["object_radius"] + gap)  # two half circles and two straight ways between them
-    radius = perimeter / (2.0 * np.pi)
+    # two half circles and two straight ways between them
+    radius, at_test = ((np.pi * case["object_radius"] + apart) / np.pi for apart in (gap, tested))
+    inner_length = 2.0 * np.pi * case["turns"] * np.hypot(at_test, pitch)
     return volume(radius, pitch, inner_length / np.hypot(radius, pitch), case["diameter"])
 
 
@@ -77,16 +81,21 @@ def volume_at_gap(gap: float, case: dict[str, Any]) -> float:
 def test_numbers_of_theory() -> None:
     grasp = grasp_force(10e3, deflection=PAPER_CYLINDER.deflections, **PAPER)
     np.testing.assert_allclose(grasp.volume, 313.9e-6, atol=0.05e-6)  # printed digits
-    assert np.array_equal(PAPER_CYLINDER.force(10e3).force, grasp.force)
-    assert PAPER_CYLINDER.force(10e3, 0.002).force == grasp.force[1]
     np.testing.assert_allclose(grasp.unwrapping, 11.17, atol=0.005)
     np.testing.assert_allclose(grasp.contact, [0.0, 11.22, 15.35], atol=0.005)
     np.testing.assert_allclose(grasp.force, [0.0, 11.17, 11.17], atol=0.005)
+    opened = grasp_force(10e3, deflection=PAPER_CYLINDER.deflections, gap=0.003, **PAPER)
+    assert np.array_equal(PAPER_CYLINDER.force(10e3).force, opened.force)
+    assert PAPER_CYLINDER.force(10e3, 0.002).force == opened.force[1]
+    np.testing.assert_allclose(opened.unwrapping, 11.19, atol=0.005)
+    np.testing.assert_allclose(opened.contact, [8.15, 13.89, 17.37], atol=0.005)
+    np.testing.assert_allclose(opened.force, [8.15, 11.19, 11.19], atol=0.005)
+    assert PAPER_CYLINDER.force(10.72e3).force.max() < 12.0 < PAPER_CYLINDER.force(10.73e3).force.max()  # the sensor's range
 
 
 def test_the_papers_cylinder() -> None:
     assert (2.0 * PAPER_CYLINDER.object_radius, PAPER_CYLINDER.turn_height, PAPER_CYLINDER.turns) == (0.040, 0.080, 1.5)
-    assert PAPER_CYLINDER.deflections == (0.0, 0.002, 0.004)
+    assert (PAPER_CYLINDER.deflections, PAPER_CYLINDER.gap) == ((0.0, 0.002, 0.004), 0.003)
 
 
 def test_volume_is_that_of_the_tube_that_an_actuator_makes() -> None:
@@ -120,6 +129,15 @@ def test_unwrapping_is_the_virtual_work_of_opening_the_cylinder(case: dict[str, 
     assert found.unwrapping == pytest.approx(max(-20e3 * slope, 0.0), rel=1e-4)
 
 
+@pytest.mark.parametrize("gap", [0.003, 0.01])
+def test_unwrapping_at_a_gap_is_the_virtual_work_of_opening_further(gap: float) -> None:
+    step = 1e-5
+    slope = (volume_at_gap(gap + step, PAPER, gap) - volume_at_gap(gap - step, PAPER, gap)) / (2.0 * step)
+    found = grasp_force(20e3, deflection=0.0, gap=gap, **PAPER)
+    assert found.volume_slope == pytest.approx(slope, rel=1e-4)  # as above
+    assert found.volume == pytest.approx(volume_at_gap(gap, PAPER, gap), rel=2e-6)
+
+
 def test_a_steep_helix_is_not_held_by_unwrapping() -> None:
     """The volume is stationary at b^2 = R (R + D/2); beyond, opening gains volume."""
     radius, diameter = PAPER["object_radius"], PAPER["diameter"]
@@ -146,6 +164,26 @@ def test_contact_is_the_pressure_on_the_flattened_strip(case: dict[str, Any], de
     found = grasp_force(15e3, deflection=deflection, **case)
     assert found.contact_width == pytest.approx(width, rel=1e-12)
     assert found.contact == pytest.approx(expected, rel=2e-3)  # the mean of 20 directions of a function with kinks: 1/20^2
+
+
+@pytest.mark.parametrize(("deflection", "share"), [(0.0, 1.0509), (0.002, 0.9870), (0.004, 0.9725)])
+def test_contact_across_a_gap_is_nearly_that_of_the_strip_on_two_half_circles(deflection: float, share: float) -> None:
+    """Each moved out by half the gap, and the wall pressed in by what that makes of it at each place.
+
+    At no deflection and next to no gap the strip is wider by `int cos^1.5 / (2 sqrt(2/pi))`, 9.5 %; then the halves are shorter
+    than the circle of their perimeter.
+    """
+    gap, radius = PAPER_CYLINDER.gap, PAPER["object_radius"]
+    rise = radius * PAPER["turn_height"] / (2.0 * np.pi * radius + 2.0 * gap)  # per angle on a half circle
+
+    def across(angle: float) -> float:
+        depth = np.hypot(0.5 * gap + radius * np.cos(angle), radius * np.sin(angle)) - (radius - deflection)
+        return 2.0 * np.sqrt(depth * (PAPER["diameter"] - depth)) * np.cos(angle) * np.hypot(radius, rise)
+
+    expected = 10e3 * PAPER["turns"] * quad(across, -np.pi / 2, np.pi / 2)[0]
+    found = PAPER_CYLINDER.force(10e3, deflection)
+    assert found.contact == pytest.approx(expected, rel=0.06)
+    assert expected / found.contact == pytest.approx(share, abs=1e-4)  # 8.57 over 8.15 N, as the module says
 
 
 # --- Laws
@@ -201,13 +239,13 @@ def test_arguments_broadcast() -> None:
 
 
 def test_the_result_keeps_what_was_asked() -> None:
-    asked = {"object_radius": [0.02, 0.03], "deflection": 0.002, "turn_height": 0.08, "turns": 2, "diameter": 0.03}
+    asked = {"object_radius": [0.02, 0.03], "deflection": 0.002, "turn_height": 0.08, "turns": 2, "diameter": 0.03, "gap": 0.001}
     grasp = grasp_force(10_000, **asked)
     for name, value in (asked | {"pressure": 10_000}).items():
         kept = getattr(grasp, name)
         assert kept.tolist() == np.broadcast_to(value, 2).tolist()
         assert kept.dtype == np.float64
-    assert {array.dtype for array in vars(GraspForce(*range(12))).values()} == {np.dtype(np.float64)}
+    assert {array.dtype for array in vars(GraspForce(*range(13))).values()} == {np.dtype(np.float64)}
 
 
 def test_one_turn_may_be_flat() -> None:
@@ -217,7 +255,12 @@ def test_one_turn_may_be_flat() -> None:
 
 @pytest.mark.parametrize(
     ("change", "told"),
-    [({"deflection": 0.0166}, "from 0 to 0.01655 m"), ({"deflection": 0.011, "object_radius": 0.01}, "from 0 to 0.01 m")],
+    [
+        ({"deflection": 0.0166}, "from 0 to 0.01655 m"),
+        ({"deflection": 0.011, "object_radius": 0.01}, "from 0 to 0.01 m"),
+        ({"deflection": -0.0011, "gap": 0.001 * np.pi}, "from -0.001 to 0.01555 m"),
+        ({"deflection": 0.0156, "gap": 0.001 * np.pi}, "from -0.001 to 0.01555 m"),
+    ],
 )
 def test_the_largest_deflection_is_told(change: dict[str, Any], told: str) -> None:
     with pytest.raises(ParameterError, match=f"{told}, the radius of the tube or that of the object"):
@@ -249,6 +292,7 @@ def test_the_result_is_frozen() -> None:
         ({"turns": 0.0}, "turns"),
         ({"turns": float("nan")}, "turns"),
         ({"diameter": 0.0}, "diameter"),
+        ({"gap": -0.001}, "gap"),
         ({"pressure": [1.0, 2.0], "deflection": [0.0, 0.001, 0.002]}, "diameter"),  # shapes do not broadcast
     ],
 )

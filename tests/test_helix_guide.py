@@ -57,6 +57,7 @@ def test_the_table_of_grasp_forces_is_current() -> None:
             turn_height=0.080,
             turns=1.5,
             diameter=DIAMETER,
+            gap=0.003,
         )
         expected = (found.unwrapping, found.contact, found.force)
         assert [float(force.removesuffix(" N")) for force in forces] == [pytest.approx(float(f), abs=0.005) for f in expected]

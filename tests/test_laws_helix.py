@@ -281,23 +281,29 @@ def test_a_table_has_a_row_for_each_helix(shares: list[float], angles: list[floa
     st.floats(1.0, 8.0),
     st.floats(0.1, 9.0),
     powers_,
+    st.one_of(st.just(0.0), st.floats(1e-6, 0.3)),
 )
 def test_grasps_are_similar_and_forces_add_up_over_the_turns(
-    pressure: float, radius: float, share: float, rise: float, turns: float, size: float
+    pressure: float, radius: float, share: float, rise: float, turns: float, size: float, gap: float
 ) -> None:
     """A force is a pressure times an area; twice as many turns grip twice as hard; unwrapping is `-P dV/dL` by differences."""
-    test = helix.GraspTest(radius, 0.03 * rise, turns, (share * min(radius, 0.015),), 0.03)
+    opening = gap * radius / math.pi  # of the radius; a gap is also a larger object that deflects as much more
+    test = helix.GraspTest(radius, 0.03 * rise, turns, (0.999 * share * min(radius, 0.015) - opening,), 0.03, gap * radius)
     found = test.force(pressure)
     assert isinstance(found, helix.GraspForce)
-    large = test._replace(object_radius=size * radius, turn_height=size * test.turn_height, diameter=size * 0.03)
+    large = test._replace(
+        object_radius=size * radius, turn_height=size * test.turn_height, diameter=size * 0.03, gap=size * test.gap
+    )
     scaled = large.force(pressure, size * np.array(test.deflections))
     for name, power in (("force", 2), ("unwrapping", 2), ("contact", 2), ("volume", 3), ("contact_width", 1)):
         assert np.array_equal(getattr(scaled, name), size**power * getattr(found, name))
     assert np.allclose(test._replace(turns=2.0 * turns).force(pressure).force, 2.0 * found.force, rtol=1e-14)
+    radius += opening
+    depth = test.deflections[0] + opening
     alone = helix.grasp_force(
-        pressure, object_radius=radius, deflection=test.deflections, turn_height=0.03 * rise, turns=turns, diameter=0.03
+        pressure, object_radius=radius, deflection=depth, turn_height=0.03 * rise, turns=turns, diameter=0.03
     )
-    assert np.array_equal(alone.force, found.force)
+    assert np.allclose(alone.force, found.force, rtol=1e-14)
     pitch, step = 0.03 * rise / TURN, 1e-5 * radius
     inner = TURN * turns * math.hypot(radius, pitch)
 

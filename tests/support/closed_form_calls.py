@@ -156,7 +156,15 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "shape_table": (_whole_table, ACTUATOR),
     "grasp_force": (
         helix.grasp_force,
-        {"pressure": 1e4, "object_radius": 0.02, "deflection": 0.002, "turn_height": 0.08, "turns": 1.5, "diameter": 0.0331},
+        {
+            "pressure": 1e4,
+            "object_radius": 0.02,
+            "deflection": 0.002,
+            "turn_height": 0.08,
+            "turns": 1.5,
+            "diameter": 0.0331,
+            "gap": 0.003,
+        },
     ),
     "GraspTest.force": (helix.PAPER_CYLINDER.force, {"pressure": 1e4, "deflection": 0.002}),
     "contraction_from_stoppers": (helix.contraction_from_stoppers, {"stopper": 0.01, "gap": 0.01}),

@@ -120,7 +120,8 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     if len(depths) > len(COLOURS):
         raise ParameterError("deflections", test.deflections, f"at most {len(COLOURS)} numbers")
     test.force(most, depths)  # raises if out of range
-    deepest = min(0.5 * test.diameter, test.object_radius, max(1.5 * float(depths.max()), 0.1 * test.diameter))
+    most_deflected = min(0.5 * test.diameter - test.gap / np.pi, test.object_radius)
+    deepest = min(most_deflected, max(1.5 * float(depths.max()), 0.1 * test.diameter))
     pressures, range_of = np.linspace(0.0, most, 9), np.linspace(0.0, deepest, 300)
     figure = new_figure((11.5, 5.4))
     left, right = figure.subplots(1, 2, sharey=True)
@@ -143,7 +144,8 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     for axes in (left, right):
         axes.set_ylim(bottom=0.0)
         grid_and_legend(axes, loc="upper left" if axes is left else "lower right")
-    case = f"object {200 * test.object_radius:.3g} cm thick, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
+    halves = f" in halves {1e3 * test.gap:.3g} mm apart" if test.gap else ""
+    case = f"object {200 * test.object_radius:.3g} cm thick{halves}, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
     figure.suptitle(f"Grasp force: our model, not data of the paper ({case}, {100 * test.turn_height:.3g} cm rise per turn)")
     return figure
 
