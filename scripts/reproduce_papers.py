@@ -1,4 +1,4 @@
-"""Compute again what the three papers print, and compare: every number, equation and curve that their text allows.
+"""Compute again what the three papers print, and compare: numbers, equations and curves, as far as their text allows.
 
 Prints a table a paper: where it stands, what it is, the paper's value, ours, the difference, a verdict and a note. What
 cannot be computed, because data are measured or not published, is listed with the reason. The last line counts; the exit

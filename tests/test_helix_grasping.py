@@ -239,7 +239,14 @@ def test_arguments_broadcast() -> None:
 
 
 def test_the_result_keeps_what_was_asked() -> None:
-    asked = {"object_radius": [0.02, 0.03], "deflection": 0.002, "turn_height": 0.08, "turns": 2, "diameter": 0.03, "gap": 0.001}
+    asked = {
+        "object_radius": [0.02, 0.03],
+        "deflection": 0.002,
+        "turn_height": 0.08,
+        "turns": 2,
+        "diameter": 0.03,
+        "gap": 0.001,
+    }
     grasp = grasp_force(10_000, **asked)
     for name, value in (asked | {"pressure": 10_000}).items():
         kept = getattr(grasp, name)

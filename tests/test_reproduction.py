@@ -28,7 +28,10 @@ from studies.papers.reproduction import PAPERS, reproduce
 from studies.papers.rows import (
     AGREES,
     ERRATUM,
+    FITTED,
+    KINDS,
     MEASURED,
+    MENDED,
     OURS,
     TAKEN,
     UNPUBLISHED,
@@ -36,6 +39,8 @@ from studies.papers.rows import (
     absent,
     equation,
     erratum,
+    fitted,
+    mended,
     own,
     rounded,
     taken,
@@ -63,8 +68,8 @@ def test_every_claim_holds(found: Found) -> None:
     assert rendering.failed(found) == []
     assert {name: len(rows) > 30 for name, rows in found.items()} == dict.fromkeys(PAPERS, True)
     verdicts = rendering.count(found)
-    assert verdicts[AGREES] > 50
-    assert set(verdicts) == {AGREES, TAKEN, ERRATUM, OURS, MEASURED, UNPUBLISHED, "unreadable"}
+    assert verdicts[AGREES] > 40
+    assert set(verdicts) == {AGREES, MENDED, FITTED, TAKEN, ERRATUM, OURS, MEASURED, UNPUBLISHED, "unreadable"}
 
 
 def test_what_ours_is_made_of_does_not_count_as_agreement(found: Found) -> None:
@@ -75,9 +80,57 @@ def test_what_ours_is_made_of_does_not_count_as_agreement(found: Found) -> None:
     assert ("(2), (7)", "torques of the springs, tau_k = k q_k") in places
     assert {quantity for place, quantity in places if place == "Figure 9"} == {
         "force linear in the pressure, our model",
-        "no force where the radius is not deflected, our model",
+        "no force without gap and deflection, our model",
     }
     assert not any("M_w" in quantity or "E from" in quantity for _, quantity in places)  # these are computed
+
+
+CONFIRM_NOTHING = {
+    TAKEN: {
+        ("(18)", "F = P dV/dL for bound (a) of our model"),
+        ("Figure 5", "force that the recursion finds, against the true one"),
+        ("Figure 5", "its estimate of the tip"),
+        ("section 4", "mean stiffness"),
+        ("section III-C", "height of the cylinder"),
+        ("section III-C", "gap between its halves"),
+        *(("Figure 6", f"growth of {name}") for name in ("outer radius", "inner radius", "pitch")),
+    },
+    FITTED: {("section 4", f"E from the mean k at {pressure} kPa") for pressure in (10, 60)},
+    MENDED: {
+        ("(8), (9), mended", "steps of the motors along a movement"),
+        ("(16), mended", "Ro and Ri from the arcs, against (12)"),
+    },
+    OURS: {
+        ("Figure 10", "largest distance of the loaded tip from our path, at most"),
+        ("section III-C", "largest force of our model at 10 kPa"),
+    },
+}
+"""Rows that look like agreement with a paper and are none, or not with its print."""
+
+
+def test_agreement_that_confirms_nothing_is_said_to_be_none(found: Found) -> None:
+    """In the rows and on the page; and the page counts as many of each kind as it shows."""
+    rows = [row for part in found.values() for row in part]
+    page = (CHECKOUT / "docs" / "reproduction.md").read_text(encoding="utf-8")
+    cells = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    shown = [(line[0], line[1], line[5]) for line in cells if len(line) > 5 and line[5] in KINDS]
+    for kind, names in CONFIRM_NOTHING.items():
+        for name in names:
+            assert {row.kind for row in rows if (row.place, row.quantity) == name} == {kind}, name
+            assert {verdict for *place, verdict in shown if tuple(place) == name} == {kind}, name
+    assert sum(verdict == FITTED for *_, verdict in shown) == 4
+    told = dict(re.findall(r"(?:rows: |; )([a-z, ]+) (\d+)", next(line for line in page.splitlines() if " rows: " in line)))
+    verdicts = [verdict for *_, verdict in shown]
+    assert told == {kind: str(verdicts.count(kind)) for kind in KINDS} | {FITTED: "1"}  # one set of assumptions
+    assert page.count(f"{len(shown)} rows: ") == 1
+
+
+def test_rows_on_one_set_of_assumptions_count_once() -> None:
+    row = rounded("section 4", "E", "140", 140.1, "MPa")
+    rows = {"inflatable_arm": (fitted(row, "one"), fitted(row, "one"), fitted(row, "another"), row)}
+    assert rendering.count(rows) == {AGREES: 1, FITTED: 2}
+    assert rendering.summary(rows) == "4 rows: agrees 1; fitted 2 (3 rows). Every claim holds."
+    assert fitted(rounded("section 4", "E", "140", 141.0, "MPa"), "one").verdict == "DISAGREES"
 
 
 def test_rows_that_claim_nothing_say_why(found: Found) -> None:
@@ -95,7 +148,7 @@ def test_the_printed_numbers_are_those_of_the_papers(found: Found) -> None:
         <= told["inflatable_arm"]
     )
     assert {"52.4", "120", "60", "2", "3"} <= told["pcc_two_segments"]
-    assert {"2.5", "2.6", "3.3", "12", "4.0", "0.958"} <= told["helical_actuation"]
+    assert {"2.5", "2.6", "3.3", "12", "4.0", "3", "8.0", "1.5", "0.3", "0.958"} <= told["helical_actuation"]
 
 
 @pytest.mark.parametrize(
@@ -109,7 +162,8 @@ def test_the_printed_numbers_are_those_of_the_papers(found: Found) -> None:
         ("helical_actuation", "Figure 3", "inner and centre", 6.03),
         ("helical_actuation", "(12)", "Ro of", 8.54078008),
         ("helical_actuation", "(12)", "b of", 2.79647090),
-        ("helical_actuation", "Figure 9", "deflected by 4 mm", 11.17),
+        ("helical_actuation", "Figure 9", "deflected by 0 mm", 8.15),
+        ("helical_actuation", "Figure 9", "deflected by 4 mm", 11.19),
         ("helical_actuation", "Figure 7", "10 degrees, simple", 0.2658),
         ("helical_actuation", "Figure 7", "2.5 degrees, turns", 0.4882),
     ],
@@ -289,6 +343,10 @@ def test_claims_hold_or_do_not() -> None:
         (lambda: own("a", "b", math.inf), "ours = inf"),
         (lambda: absent(AGREES, "a", "b"), "kind = 'agrees'"),
         (lambda: taken(own("a", "b", 1.0)), "kind = 'ours alone'"),
+        (lambda: mended(own("a", "b", 1.0)), "kind = 'ours alone'"),
+        (lambda: fitted(own("a", "b", 1.0), "set"), "kind = 'ours alone'"),
+        (lambda: fitted(equation("a", "b", 0.0), ""), "assumptions = ''"),
+        (lambda: Row(place="a", quantity="b", kind=OURS, assumptions="set"), "assumptions = 'set'"),
         (lambda: Row(place="a", quantity="b", kind="right"), "kind = 'right'"),
         (lambda: Row(place="a", quantity="b", kind=AGREES, difference=0.0), "given with a tolerance"),
     ],
@@ -308,7 +366,7 @@ def test_tables_say_the_same_in_every_form(found: Found) -> None:
     assert [float(line["ours"]) if line["ours"] else None for line in read] == [row.ours for row in rows]
     saved = json.loads(rendering.as_json(found))
     assert saved["failed"] == 0
-    assert sum(saved["count"].values()) == len(rows)
+    assert sum(saved["count"].values()) == len(rows) - 3  # four rows on one set of assumptions
     assert [line["difference"] for part in saved["papers"].values() for line in part] == [row.difference for row in rows]
     lines = rendering.text(found).splitlines()
     table = [line for line in rendering.markdown(found).splitlines() if line.startswith("| ") and "| place |" not in line]

@@ -148,7 +148,7 @@ def grasp_force(
     counts, diameters = positive_array("turns", turns, "-"), positive_array("diameter", diameter, "m")
     arrays = (pressures, radii, depths, heights, counts, diameters, non_negative_array("gap", gap, "m"))
     shape = common_shape("diameter", *(values.shape for values in arrays))
-    given = tuple(np.array(np.broadcast_to(values, shape)) for values in arrays)
+    given = [np.array(np.broadcast_to(values, shape)) for values in arrays]
     pressures, radii, depths, heights, counts, diameters, gaps = given
     wider = gaps / np.pi
     radii, depths = radii + wider, depths + wider
@@ -171,4 +171,5 @@ def grasp_force(
     width = 2.0 * np.sqrt(depths * (diameters - depths))
     unwrapping, contact = pressures * np.maximum(-slope, 0.0), 2.0 * counts * pressures * width * inner
     force = np.minimum(unwrapping, contact)
-    return GraspForce(*given, volume, slope, width, unwrapping, contact, force)
+    fields = [*given, volume, slope, width, unwrapping, contact, force]
+    return GraspForce(*fields)

@@ -18,7 +18,7 @@ from softrobots.helix import PAPER_CYLINDER
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from studies.papers import helix_equations as printed
 from studies.papers.helix_equations import Shape
-from studies.papers.rows import MEASURED, UNPUBLISHED, Row, absent, equation, erratum, largest, own, rounded, taken
+from studies.papers.rows import MEASURED, UNPUBLISHED, Row, absent, equation, erratum, largest, mended, own, rounded, taken
 
 TITLE = "Helical actuation [Blumenschein 2018]"
 """What the paper is called in tables."""
@@ -29,6 +29,10 @@ ERRORS = {"outer radius": "2.6", "pitch": "3.3"}
 """Section III-B: mean differences between measured and predicted shapes [mm]."""
 OBJECT_DIAMETER, OBJECT_HEIGHT, LARGEST_RADIUS = "4.0", "12", "4.0"
 """Section III-C: the grasped cylinder, and the radii of the helices [cm]."""
+GAP, RISE, TURNS = "3", "8.0", "1.5"
+"""Section III-C: gap between the halves of the cylinder [mm], pitch of the helices [cm], and their revolutions."""
+SENSOR_RANGE, SENSOR_RESOLUTION = "12", "0.3"
+"""Section III-C: range [N] and resolution [mN] of the sensor between the halves."""
 R_SQUARED = "0.958"
 """Section III-C: mean R^2 of force against pressure."""
 
@@ -146,9 +150,8 @@ def measuring() -> list[Row]:
     apart = largest(
         np.stack([back.outer_radius - shape.outer_radius, back.inner_radius - shape.inner_radius]) / shape.outer_radius
     )
-    rows.append(
-        equation("(16), mended", "Ro and Ri from the arcs, against (12)", apart, "", f"relative to Ro; {_RANDOM}", 1e-10)
-    )
+    note = f"relative to Ro; {_RANDOM}"
+    rows.append(mended(equation("(16), mended", "Ro and Ri from the arcs, against (12)", apart, "", note, 1e-10)))
     stopper, gap = np.random.default_rng(2).uniform(0.001, 0.02, (2, 100))
     apart = largest(helix.contraction_from_stoppers(stopper, gap) - stopper / (stopper + gap))
     note = "stopper / (stopper + gap)"
@@ -165,16 +168,8 @@ def figures_5_to_7() -> list[Row]:
     small, large = table[-2:]
     for name in ("outer_radius", "inner_radius", "pitch"):
         ratio = getattr(large, name) / getattr(small, name)
-        rows.append(
-            rounded(
-                "Figure 6",
-                f"growth of {name.replace('_', ' ')}",
-                SCALE,
-                ratio,
-                "",
-                "D larger by 2.5, to which (12) is proportional; 5 degrees, 0.66",
-            )
-        )
+        note = "D larger by 2.5, to which (12) is proportional; 5 degrees, 0.66"
+        rows.append(taken(rounded("Figure 6", f"growth of {name.replace('_', ' ')}", SCALE, ratio, "", note)))
     for name, text in ERRORS.items():
         note = "mean difference of the test helices from (12): the measured arcs are not published"
         rows.append(absent(MEASURED, "Figure 7", f"mean error of the {name}", text, "mm", note))
@@ -201,27 +196,33 @@ def grasping() -> list[Row]:
     """Section III-C: the grasped cylinder and Figure 9."""
     test = PAPER_CYLINDER
     note = "1.5 turns of 8.0 cm rise are as high as the cylinder"
-    rows = [
-        rounded(
-            "section III-C", "height of the grasped cylinder", OBJECT_HEIGHT, 100.0 * test.turns * test.turn_height, "cm", note
-        ),
-        taken(rounded("section III-C", "diameter of the cylinder", OBJECT_DIAMETER, 200.0 * test.object_radius, "cm")),
+    sizes = [
+        rounded("section III-C", "height of the cylinder", OBJECT_HEIGHT, 100.0 * test.turns * test.turn_height, "cm", note),
+        rounded("section III-C", "diameter of the cylinder", OBJECT_DIAMETER, 200.0 * test.object_radius, "cm"),
+        rounded("section III-C", "gap between its halves", GAP, 1e3 * test.gap, "mm"),
+        rounded("section III-C", "rise of the helix per turn", RISE, 100.0 * test.turn_height, "cm"),
+        rounded("section III-C", "turns around the cylinder", TURNS, test.turns),
     ]
+    rows = [taken(row) for row in sizes]
     note = "printed for radii of helices that grip a cylinder of 4.0 cm diameter: half of it must be meant"
     rows.append(erratum("section III-C", "largest inner radius", float(LARGEST_RADIUS), 100.0 * test.object_radius, "cm", note))
     pressures = np.linspace(0.0, 10e3, 6)[:, None]
     found = test.force(pressures)
     apart = float(found.unwrapping[-1, 0]) - 10e3 * _volume_lost()
-    note = "our V(L) by differences, 10 kPa; the paper gives no volume"
-    rows.append(equation("(18)", "F = P dV/dL for bound (a) of our model", abs(apart), "N", note, 1e-6))
+    note = "our V(L) by our differences, 10 kPa; the paper gives no volume"
+    rows.append(taken(equation("(18)", "F = P dV/dL for bound (a) of our model", abs(apart), "N", note, 1e-6)))
     apart = largest(found.force * pressures[-1] - found.force[-1] * pressures)
     rows.append(taken(equation("Figure 9", "force linear in the pressure, our model", apart / 10e3, "N", "0 to 10 kPa")))
-    note = "bound (b) of our model"
-    apart = largest(found.force[:, 0])
-    rows.append(taken(equation("Figure 9", "no force where the radius is not deflected, our model", apart, "N", note)))
+    note = "bound (b) of our model; the paper explains by the gap why it measures some"
+    apart = largest(test._replace(gap=0.0).force(pressures).force[:, 0])
+    rows.append(taken(equation("Figure 9", "no force without gap and deflection, our model", apart, "N", note)))
     note = "our model, not the paper's; 10 kPa, D = 3.31 cm assumed. The paper's forces are not printed, and rise up to 4 mm"
     for depth, force in zip(test.deflections, found.force[-1], strict=True):
         rows.append(own("Figure 9", f"force, deflected by {1e3 * depth:g} mm", float(force), "N", note))
+    note = "the range of its sensor: the paper measures less than this"
+    rows.append(own("section III-C", "largest force of our model at 10 kPa", float(found.force.max()), "N", note, SENSOR_RANGE))
+    note = "resolution of the sensor; the forces are not published"
+    rows.append(absent(MEASURED, "section III-C", "smallest difference of forces", SENSOR_RESOLUTION, "mN", note))
     raw = "pressures and forces of the test are not published"
     rows.append(
         absent(MEASURED, "Figure 9", "mean R^2 of force against pressure", R_SQUARED, note=f"{raw}; 1 in any model of (18)")
@@ -241,16 +242,15 @@ def grasping() -> list[Row]:
 def _volume_lost() -> float:
     """Volume that the tube around the cylinder loses per gap between its halves, by central differences [m^2].
 
-    The gap widens by `dL` as the radius would by `dL / pi`; the inner line keeps its length, so the turns become fewer.
+    The inner line keeps its length, so the turns become fewer.
     """
-    test, step = PAPER_CYLINDER, 1e-5
-    pitch = test.turn_height / (2 * np.pi)
-    radii = test.object_radius + np.array([-step, step])
-    turns = test.turns * np.hypot(test.object_radius, pitch) / np.hypot(radii, pitch)
-    volume = helix.grasp_force(
-        0.0, object_radius=radii, deflection=0.0, turn_height=test.turn_height, turns=turns, diameter=test.diameter
-    ).volume
-    return float(volume[0] - volume[1]) / (2 * np.pi * step)
+    test, step = PAPER_CYLINDER, 3e-5
+    pitch, gaps = test.turn_height / (2 * np.pi), test.gap + np.array([-step, step])
+    at_test, radii = (test.object_radius + gap / np.pi for gap in (test.gap, gaps))
+    turns = test.turns * np.hypot(at_test, pitch) / np.hypot(radii, pitch)
+    sizes = {"object_radius": test.object_radius, "turn_height": test.turn_height, "diameter": test.diameter}
+    volume = helix.grasp_force(0.0, deflection=0.0, turns=turns, gap=gaps, **sizes).volume
+    return float(volume[0] - volume[1]) / (2 * step)
 
 
 def _random() -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -18,7 +18,7 @@ from softrobots.inflated_beam import TABLE_3, BendingTest
 from softrobots.robots import InflatableArm
 from softrobots.statics.equilibrium import solve_equilibrium
 from studies.papers.arm_path import FORCE, arm
-from studies.papers.rows import MEASURED, Row, absent, equation, erratum, own, rounded, taken, within
+from studies.papers.rows import MEASURED, Row, absent, equation, erratum, fitted, own, rounded, taken, within
 
 TITLE = "Inflatable arm [Troise 2021]"
 """What the paper is called in tables."""
@@ -88,12 +88,13 @@ def deflection() -> list[Row]:
     low, high = MODULUS_RANGE
     at = {pressure: f"E from the mean k at {pressure / 1e3:g} kPa" for pressure in MODULUS_RANGE}
     note = "assumed, the paper does not say: force at the full length, theta = v/L, G = E/(2(1 + nu)), "
-    rows.append(rounded("section 4", at[low], MODULUS_RANGE[low], modulus(low, 0.3), "MPa", note + "nu = 0.3"))
+    moduli = [rounded("section 4", at[low], MODULUS_RANGE[low], modulus(low, 0.3), "MPa", note + "nu = 0.3")]
     why = "nu = 0.3; allowed: 1 MPa. Within the printed range, but 137 by rounding: cut, or another nu (next rows)"
-    rows.append(within("section 4", at[high], MODULUS_RANGE[high], modulus(high, 0.3), 1.0, "MPa", why))
+    moduli.append(within("section 4", at[high], MODULUS_RANGE[high], modulus(high, 0.3), 1.0, "MPa", why))
     for pressure, text in MODULUS_RANGE.items():
         note = "the same with nu = 0.25; any nu from 0.20 to 0.25 rounds to both prints"
-        rows.append(rounded("section 4", at[pressure], text, modulus(pressure, POISSON_RATIO), "MPa", note))
+        moduli.append(rounded("section 4", at[pressure], text, modulus(pressure, POISSON_RATIO), "MPa", note))
+    rows += [fitted(row, "E from (1), force at the full length") for row in moduli]
     twice = 1e-6 * _modulus_as_printed(stiffness, low)
     note = "with the printed sign; the paper's own 140 MPa needs the minus"
     rows.append(erratum("(1)", at[low], twice, modulus(low, 0.3), "MPa", note))
@@ -115,7 +116,7 @@ def table_3() -> list[Row]:
     ]
     stiffness = [row.stiffness for row in TABLE_3]
     note = "of the six printed k; those are measured"
-    rows.append(rounded("section 4", "mean stiffness", MEAN_STIFFNESS, float(np.mean(stiffness)), "N m/rad", note))
+    rows.append(taken(rounded("section 4", "mean stiffness", MEAN_STIFFNESS, float(np.mean(stiffness)), "N m/rad", note)))
     for name, text, value in zip(("smallest", "largest"), STIFFNESS_RANGE, (min(stiffness), max(stiffness)), strict=True):
         rows.append(taken(rounded("section 4", f"{name} stiffness", text, value, "N m/rad", note)))
     moments = {row.pressure: row.max_moment for row in TABLE_3 if row.max_moment is not None}

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from softrobots.core.files import csv_text
 from studies.papers.reproduction import PAPERS
-from studies.papers.rows import ERRATUM, KINDS, Row
+from studies.papers.rows import ERRATUM, FITTED, KINDS, Row
 
 Rows = Mapping[str, Sequence[Row]]
 """Rows by the name of their paper, as `reproduce` gives them."""
@@ -76,10 +76,13 @@ def failed(found: Rows) -> list[Row]:
 
 
 def count(found: Rows) -> dict[str, int]:
-    """How many rows there are of each verdict that occurs."""
-    verdicts = [row.verdict for rows in found.values() for row in rows]
+    """How many rows there are of each verdict that occurs; of those that were fitted, how many sets of assumptions."""
+    rows = [row for rows in found.values() for row in rows]
+    verdicts = [row.verdict for row in rows]
     order = dict.fromkeys((*KINDS, *verdicts))
-    return {verdict: verdicts.count(verdict) for verdict in order if verdict in verdicts}
+    counted = {verdict: verdicts.count(verdict) for verdict in order if verdict in verdicts}
+    sets = {row.assumptions for row in rows if row.verdict == FITTED}
+    return counted | ({FITTED: len(sets)} if sets else {})
 
 
 def legend() -> str:
@@ -92,7 +95,10 @@ def summary(found: Rows) -> str:
     """The count by verdict, in a sentence."""
     total = sum(map(len, found.values()))
     wrong = len(failed(found))
-    note = ", ".join(f"{verdict} {number}" for verdict, number in count(found).items())
+    counted = count(found)
+    rows = sum(row.verdict == FITTED for part in found.values() for row in part)
+    several = {FITTED: f" ({rows} rows)"} if rows != counted.get(FITTED, rows) else {}
+    note = "; ".join(f"{verdict} {number}{several.get(verdict, '')}" for verdict, number in counted.items())
     return f"{total} rows: {note}. " + ("Every claim holds." if wrong == 0 else f"{wrong} DO NOT HOLD.")
 
 

@@ -10,13 +10,17 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_number
 from softrobots.core.errors import ParameterError
 
-AGREES, TAKEN, ERRATUM, OURS = "agrees", "by construction", "erratum", "ours alone"
+AGREES, MENDED, FITTED, TAKEN = "agrees", "agrees, mended", "fitted", "by construction"
+ERRATUM, OURS = "erratum", "ours alone"
 MEASURED, UNPUBLISHED, UNREADABLE = "measured", "not published", "unreadable"
 KINDS = {
     AGREES: "must agree: within the rounding of the printed digits, or within the tolerance that the row states",
-    TAKEN: "the same because ours is made of it: taken from the paper, or a definition; tells only that it still is so",
+    MENDED: "must agree with the equation after its erratum is mended; not with the print",
+    FITTED: "agrees, but on assumptions that were chosen so that it does; rows on one set of assumptions are counted once",
+    TAKEN: "the same because ours is made of it: taken from the paper, a definition, or two ways through one model of ours; "
+    "tells only that it still is so",
     ERRATUM: "the print is wrong: ours must differ from it",
-    OURS: "the paper gives no number; this one is of this package",
+    OURS: "the paper gives no number, or none that can be compared; this one is of this package",
     MEASURED: "measured in the laboratory, and the raw data are not published: cannot be computed",
     UNPUBLISHED: "the paper does not give what it takes to compute this",
     UNREADABLE: "cannot be read for certain in the text at hand",
@@ -52,6 +56,8 @@ class Row:
     """How many decimals of ours and of the difference matter, two more than are printed; None: five significant digits."""
     note: str = ""
     """Assumptions and reasons."""
+    assumptions: str = ""
+    """Name of the set of assumptions of a row that was fitted."""
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -61,11 +67,13 @@ class Row:
                 object.__setattr__(self, name, finite_number(name, getattr(self, name), self.unit))
         if self.claims and (self.difference is None or self.tolerance is None):
             raise ParameterError("difference", self.difference, f"given with a tolerance in a row of the kind {self.kind!r}")
+        if bool(self.assumptions) != (self.kind == FITTED):
+            raise ParameterError("assumptions", self.assumptions, f"named in the rows of the kind {FITTED!r}, and only there")
 
     @property
     def claims(self) -> bool:
         """Whether the row can be wrong."""
-        return self.kind in (AGREES, TAKEN, ERRATUM)
+        return self.kind in (AGREES, MENDED, FITTED, TAKEN, ERRATUM)
 
     @property
     def holds(self) -> bool:
@@ -112,6 +120,33 @@ def taken(row: Row) -> Row:
     """
     choice("kind", row.kind, (AGREES,))
     return replace(row, kind=TAKEN)
+
+
+def fitted(row: Row, assumptions: str) -> Row:
+    """The same row, said to agree on assumptions that were chosen so that it does.
+
+    Args:
+        row: A row that must agree.
+        assumptions: Name of the set of assumptions.
+
+    Raises:
+        ParameterError: If the row is of another kind, or the set has no name.
+    """
+    choice("kind", row.kind, (AGREES,))
+    return replace(row, kind=FITTED, assumptions=assumptions)
+
+
+def mended(row: Row) -> Row:
+    """The same row, said to agree with an equation whose erratum is mended.
+
+    Args:
+        row: A row that must agree.
+
+    Raises:
+        ParameterError: If it is of another kind.
+    """
+    choice("kind", row.kind, (AGREES,))
+    return replace(row, kind=MENDED)
 
 
 def within(place: str, quantity: str, printed: str, ours: float, tolerance: float, unit: str = "", note: str = "") -> Row:
