@@ -75,7 +75,10 @@ class SpringGroup:
 
     @property
     def wrinkling_moment(self) -> float:
-        """Moment of the first wrinkle [N m], [Troise 2021] (3)."""
+        """Moment of the first wrinkle [N m], [Troise 2021] (3); an upper bound for a section of a helical tube.
+
+        It is that of a straight tube; the wall along an actuator is slack before any load.
+        """
         return float(inflated_beam.wrinkling_moment(self.pressure, self.radius))
 
 

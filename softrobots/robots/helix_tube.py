@@ -38,6 +38,9 @@ class HelixTube(XacroRobot):
       too stiff by up to a twelfth of the squared angle that one of them turns, 6 % by default: use hinges for sag.
     - "lumped": `hinges` pairs of orthogonal spring joints. Keeps its springs in every tool that knows joint springs.
 
+    Stiffness and wrinkling moment are those of a tube whose whole wall is under tension: upper bounds, because the wall along
+    the actuator is slack before any load. Give `bending_stiffness` as measured where that matters.
+
     The frames follow the actuator around the tube (`helix.material_twist` is the turn of the wall against them).
 
     Raises:
@@ -72,7 +75,11 @@ class HelixTube(XacroRobot):
         options=UPRIGHT,
     )
     pressure: float = parameter(
-        10e3, "Pa", "Gauge pressure; stiffens the tube in bending and sets the wrinkling moment", "assumed", at_least=0.0
+        10e3,
+        "Pa",
+        "Gauge pressure; stiffens the tube in bending and sets the wrinkling moment, that of a straight tube: an upper bound",
+        "assumed",
+        at_least=0.0,
     )
     wall_thickness: float = parameter(
         1e-4, "m", "Wall thickness, at most a tenth of the radius", "assumed (thin polyethylene)", above=0.0
@@ -90,7 +97,8 @@ class HelixTube(XacroRobot):
     bending_stiffness: float | None = parameter(
         None,
         "N m^2",
-        "Measured bending stiffness EI; without it, of the inflated wall, (E + P/S) pi r^3 t as in Troise 2021, equation 1",
+        "Measured bending stiffness EI; without it, of the whole inflated wall, (E + P/S) pi r^3 t as in Troise 2021, equation "
+        "1: an upper bound, as the wall along the actuator is slack",
         above=0.0,
     )
     torsional_stiffness: float | None = parameter(
