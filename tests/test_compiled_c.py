@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import softrobots as sr
@@ -29,8 +30,8 @@ Array = ctypes.POINTER(ctypes.c_double)
 class Controller:
     """What a control loop does with the file: an array of its own, and the places that the head of the file tells."""
 
-    def __init__(self, solver: CompiledModel, folder: Path, *, gravity: bool, name: str) -> None:
-        text = solver.c_source(gravity=gravity, prefix=name)
+    def __init__(self, solver: CompiledModel, folder: Path, *, gravity: bool, name: str, poses: bool = False) -> None:
+        text = solver.c_source(gravity=gravity, prefix=name, poses=poses)
         self.path = build_library(folder, text, name)
         self.place = {key: int(value) for key, value in re.findall(rf"^enum {{ {name}_(\w+) = (\d+) }};$", text, re.MULTILINE)}
         self._library, self._name = ctypes.CDLL(str(self.path)), name
@@ -157,6 +158,36 @@ def test_paths(controller: tuple[Controller, Any], solver: CompiledModel) -> Non
     certified = expected.certified
     assert np.max(np.abs(motors - expected.q_motors)[certified]) < 1e-8  # two answers within 1e-9 m
     assert np.max(np.sqrt(errors[certified])) <= 1e-9
+
+
+def test_poses(folder: Path, rng: np.random.Generator) -> None:
+    """An arm with a wrist: poses that equilibria have are reached, and a path of them is followed as in Python."""
+    model = sr.load_model(sr.InflatableArm(wrist=(0.08, 0.12)))
+    solver = sr.compile(model, backend="python")
+    in_c = Controller(solver, folder, gravity=True, name="wristed", poses=True)
+    pushes = directions(rng, 5) * 12.0
+    for push in pushes:
+        motors = rng.uniform(-1.2, 1.2, 6)
+        pose = sr.solve_equilibrium(model, motors, push, gravity=GRAVITY).transform_tip_to_world
+        ready(in_c, motors + rng.uniform(-0.05, 0.05, 6), push, GRAVITY)
+        in_c.put("TARGET", [*pose.translation, *pose.rotation.ravel()])
+        in_c.put("TOLERATED", [1e-9])
+        assert in_c.call("reach") == Status.CERTIFIED
+        there = sr.solve_equilibrium(model, in_c.get("MOTORS", 6), push, gravity=GRAVITY).transform_tip_to_world
+        assert np.linalg.norm(there.translation - pose.translation) < 1.1e-9
+        assert np.linalg.norm(pin.log3(there.rotation.T @ pose.rotation)) < 1.1e-9
+    line = sr.straight_line(
+        pose, sr.solve_equilibrium(model, motors + 0.2, push, gravity=GRAVITY).transform_tip_to_world, 1.0, 20
+    )
+    expected = solver.follow(line.targets, push, q_motors0=motors, gravity=GRAVITY)
+    targets = np.concatenate([line.positions, line.orientations.reshape(-1, 9)], axis=1)
+    ready(in_c, motors, push, GRAVITY)
+    in_c.put("TOLERATED", [1e-9])
+    found, springs, errors = np.zeros((21, 6)), np.zeros((21, 4)), np.zeros((21, 2))
+    arrays = [one.ctypes.data_as(Array) for one in (found, springs, np.zeros(21), errors, np.zeros(21))]
+    assert in_c.call("follow", targets.ctypes.data_as(Array), 21, *arrays) == 21
+    assert np.abs(found - expected.q_motors).max() < 1e-6  # two answers within 1e-9 rad
+    assert np.sqrt(errors).max() <= 1e-9
 
 
 def test_muscles(folder: Path, rng: np.random.Generator) -> None:

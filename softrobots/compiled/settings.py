@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from softrobots.core import checks
 from softrobots.model import springs
-from softrobots.statics import elastic_state, elastostatics, force_search
+from softrobots.statics import elastic_state, elastostatics, force_search, tip_search
 
 TOLERANCE = elastic_state.TOLERANCE
 """Largest residual of a result, relative to the size of the load."""
@@ -14,6 +14,12 @@ NEWTON_TOLERANCE = 1e-12
 
 LEAST_SIZE = elastic_state.MOMENT_FLOOR
 """Least size of a load [N m]."""
+
+ANGLE_TOLERANCE = tip_search.ANGLE_TOLERANCE
+"""Largest angle between the tip and its target orientation [rad]."""
+
+LEVER = tip_search.LEVER
+"""Weight of a radian of orientation as a distance, relative to the reach."""
 
 LARGEST_NUMBER = checks.LARGEST
 """Largest component of a force [N] or of gravity [m/s^2]."""

@@ -22,7 +22,7 @@ NEAR_SINGULAR = 0.3
 
 _ROUNDING = 1e-9  # of axes that meet and are perpendicular, relative to the reach
 _LEEWAY = 0.2  # by which a start may be beyond a limit before it is moved there: load moves the solution [rad]
-_SAME_ARM = 0.05  # motors of the arm closer than this belong to the same posture [rad]
+_SAME_ARM = 0.01  # motors of the arm closer than this belong to the same posture [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class SphericalWrist:
         if rotation is None:
             return []
         centred = replace(tip, goal=Goal(tip.goal.position + rotation @ self.centre, offset=self.centre))
-        near = 1e-3 * self.model.reach
+        near = 1e-6 * self.model.reach
         arms: list[FloatArray] = []
         found = []
         for start in starts:

@@ -19,6 +19,7 @@ SINGLES = (
     "pivot_shift",
     "rounding",
     "missing",
+    "turned",
     "unexplained",
     "observed",
     "damping",
@@ -29,8 +30,9 @@ SINGLES = (
 squared size of the load; smallest pivot in size; number of pivots that are not positive; margin of the sections to the end of
 their range; state of the case (`softrobots.compiled.program.passes`); largest energy allowed at the next point; least relative
 pivot of a step with shifted pivots, or 0; rounding of the energy [J]; squared distance from the target [m^2] or squared motor
-torque that another force would explain; squared motor torque that the force does not explain; squared smallest singular value
-of the elastostatic Jacobian [m^2]; damping of a search [m]; largest distance from a target [m]; number of steps."""
+torque that another force would explain; squared angle from the target orientation, see `motor_program` [rad^2]; squared motor
+torque that the force does not explain; squared smallest singular value of the elastostatic Jacobian [m^2]; damping of a search
+[m]; largest distance from a target [m]; number of steps."""
 
 
 def assign_places(layout: Any, first: int, **sizes: int) -> None:
@@ -48,6 +50,8 @@ class Layout:
     """Number of motor joints, whose positions come first [rad or m]."""
     unknowns: int
     """Number of unknown strains."""
+    conditions: int = 3
+    """Number of conditions of a target: 3 for a position, 6 for a pose."""
     force: int = field(init=False)
     """Force on the tip, world axes [N] (3)."""
     gravity: int = field(init=False)
@@ -69,9 +73,9 @@ class Layout:
     torques: int = field(init=False)
     """Measured load on each motor [N m or N]."""
     target: int = field(init=False)
-    """Target of the tip [m] (3)."""
+    """Target of the tip [m] (3), and of poses its orientation, row by row (9)."""
     next_target: int = field(init=False)
-    """The target after it (3)."""
+    """The target after it."""
     next_point: int = field(init=False)
     """End of a step: motors or force, then unknowns."""
     previous: int = field(init=False)
@@ -91,9 +95,14 @@ class Layout:
         point = self.varied + n
         before_tip = dict(pull=n, start=n, unknown=n, step=n, line_origin=n, line_direction=n)
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
-        searches = dict(tip=3, torques=motors, target=3, next_target=3)
+        searches = dict(tip=3, torques=motors, target=self.target_size, next_target=self.target_size)
         rest = dict(singles=len(SINGLES), prepared=0)
         assign_places(self, motors, force=3, gravity=3, **before_tip, **searches, **points, **rest)
+
+    @property
+    def target_size(self) -> int:
+        """Number of places of a target."""
+        return 3 if self.conditions == 3 else 12
 
     @property
     def varied(self) -> int:
@@ -106,7 +115,8 @@ class Layout:
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""
-        places = {name.upper(): place for name, place in vars(self).items() if name not in ("unknowns", "singles", "prepared")}
+        others = ("unknowns", "conditions", "singles", "prepared")
+        places = {name.upper(): place for name, place in vars(self).items() if name not in others}
         places |= {name.upper(): self.single(name) for name in SINGLES}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 

@@ -116,7 +116,7 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
         loads,
         beyond,
         balance,
-        tip_columns=tip is not None,
+        tip_columns=0 if tip is None else 3,
         pivot_shift=pivot_shift if tip is None else 0.0,
     )
     back.store_all(recursion.lever, [one for load in result.loads for one in load.lever])

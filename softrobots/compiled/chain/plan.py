@@ -23,13 +23,15 @@ class Plan:
     """The chain."""
     weight: bool
     """Whether there is gravity."""
+    poses: bool = False
+    """Whether targets of the tip are poses."""
     tip: TipLayout | None = None
     """Places of the response of the tip, in code of looped chains that traces it."""
 
     @cached_property
     def layout(self) -> Layout:
         """Places of the numbers of a case."""
-        return Layout(self.unknowns.chain.n_motors, len(self.unknowns.strains))
+        return Layout(self.unknowns.chain.n_motors, len(self.unknowns.strains), 6 if self.poses else 3)
 
     @cached_property
     def recursion(self) -> RecursionLayout:

@@ -110,7 +110,7 @@ def inward(
     beyond: Outboard,
     balance: Balance,
     *,
-    tip_columns: bool = False,
+    tip_columns: int = 0,
     pivot_shift: Scalar = 0.0,
 ) -> InwardPass:
     """Inward pass of an element.
@@ -121,7 +121,7 @@ def inward(
         loads: The force on the tip, and the weight if there is gravity, with levers from the element's end.
         beyond: Sums of the outboard elements.
         balance: Sums over elements, added to in place.
-        tip_columns: Whether to solve for the motion of the tip as well: three more right-hand sides.
+        tip_columns: Number of further right-hand sides, for the motion of the tip: none, 3 for its position, 6 with its turn.
         pivot_shift: See `elimination.eliminate`.
 
     Returns:
@@ -160,7 +160,7 @@ def inward(
     stiffness = -motion.curvature
     for place, own in enumerate(element.stiffness):
         stiffness[place, place] = stiffness[place, place] + own
-    sides = [gradient, *((-motion.moves[axis]).tolist() for axis in range(3))] if tip_columns else [gradient]
+    sides = [gradient, *(-np.concatenate([motion.moves, motion.twists])[:tip_columns]).tolist()]
     eliminated, handed_on = eliminate(
         beyond, twists, np.concatenate([motion.bends, incidence]), stiffness, sides, element.stiffness, pivot_shift=pivot_shift
     )

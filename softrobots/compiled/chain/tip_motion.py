@@ -6,6 +6,8 @@ a strain `k` beyond it by `-omega_m . c_k` and nearer to the base by `-omega_k .
 
 .. math:: E_m = J_m + \omega_m \cdot \sum_{k\,beyond} c_k X_k + c_m \cdot \varphi_m
 
+The same holds for the turn of the tip, with three more columns and :math:`\omega_m` in place of :math:`J_m`.
+
 Its transpose maps a change of the force on the tip to changes of the motor torques.
 """
 
@@ -27,30 +29,32 @@ class TipMotion:
     """Response of tip and motors at an evaluated point, in the axes behind the leading motors."""
 
     jacobian: Any
-    """Elastostatic Jacobian, shape (3, n_motors) [m/rad or m/m]."""
+    """Elastostatic Jacobian, shape (3 or 6, n_motors): position, then turn of the tip [m/rad or m/m; rad/rad or rad/m]."""
     motor_torques: Vector
     """Load on the motors, shape (n_motors,) [N m or N]."""
     torque_change: Vector
     """Its change by the Newton step of the unknowns, shape (n_motors,)."""
     tip_change: Vector
-    """Change of the tip by that step, shape (3,) [m]."""
+    """Change of the tip by that step, shape (3 or 6,) [m; rad]."""
 
 
 def tip_motion(unknowns: Unknowns, point: Evaluation) -> TipMotion:
     """Return the response of tip and motors at a point, an evaluation with tip columns."""
     count = unknowns.chain.n_motors
-    jacobian = constants(np.zeros((3, count)))
-    torques, changes, tip = constants(np.zeros(count)), constants(np.zeros(count)), constants(np.zeros(3))
-    beyond = [constants(np.zeros(3)) for _ in range(4)]  # sums of c x over the strains beyond, per right-hand side
+    conditions = len(point.beyond.columns) - 1
+    jacobian = constants(np.zeros((conditions, count)))
+    torques, changes, tip = constants(np.zeros(count)), constants(np.zeros(count)), constants(np.zeros(conditions))
+    beyond = [constants(np.zeros(3)) for _ in point.beyond.columns]  # sums of c x over the strains beyond, per right-hand side
     for row in reversed(range(len(point.inward_passes))):
         one, motor = point.inward_passes[row], unknowns.motor(row)
+        moves = np.concatenate([one.motion.moves, one.motion.twists])[:conditions]
         if motor is None:
             beyond = [total + one.motion.bends @ step for total, step in zip(beyond, point.steps[row], strict=True)]
-            tip = tip + one.motion.moves @ point.steps[row][0]
+            tip = tip + moves @ point.steps[row][0]
             continue
         twist, bend = one.motion.twists[:, 0], one.motion.bends[:, 0]
         follow = [twist @ total + bend @ turn[:3] for total, turn in zip(beyond, point.turns[row], strict=True)]
-        jacobian[:, motor] = one.motion.moves[:, 0] + np.array(follow[1:], dtype=object)
+        jacobian[:, motor] = moves[:, 0] + np.array(follow[1:], dtype=object)
         torques[motor] = one.motion.torque[0]
         changes[motor] = follow[0]
     return TipMotion(jacobian, torques, changes, tip)

@@ -45,6 +45,8 @@ class Evaluation:
     """Elastic energy plus potential of the loads, up to a constant [J]."""
     tip: Vector
     """The tip from the origin behind the leading motors [m]."""
+    tip_axes: Any
+    """Its axes, shape (3, 3)."""
     base_axes: Any
     """Axes of the frame behind the leading motors in the world, shape (3, 3)."""
     base: Vector
@@ -57,7 +59,7 @@ def evaluate(
     *,
     at_rest: bool = False,
     forceless: bool = False,
-    tip_columns: bool = False,
+    tip_columns: int = 0,
     shift_pivots: bool = False,
 ) -> Evaluation:
     """Trace a chain at the coordinates in the workspace.
@@ -67,7 +69,7 @@ def evaluate(
         block: Block of the expressions.
         at_rest: Whether the unknowns are at rest, instead of in the workspace.
         forceless: Whether there is no force on the tip.
-        tip_columns: Whether to solve for the motion of the tip as well.
+        tip_columns: Number of right-hand sides for the motion of the tip, see `recursion.inward`.
         shift_pivots: Whether pivots are shifted by the `pivot_shift` in the workspace.
     """
     unknowns, layout = plan.unknowns, plan.layout
@@ -83,12 +85,13 @@ def evaluate(
     for element in elements[leading:]:
         outward_passes.append(outward(element, axes))
         axes = outward_passes[-1].end
+    tip_axes = axes @ constants(chain.tip_rotation)
     levers, shares = [axes @ constants(chain.tip_translation), constants(np.zeros(3))], [1.0, 0.0]
     loads = [Load(*one) for one in zip(forces, levers, shares, strict=False)]
     pivot_shift = block.load(layout.single("pivot_shift")) if shift_pivots else 0.0
 
     outward_passes = seen_backwards(elements[:leading]) + outward_passes
-    sides = 4 if tip_columns else 1
+    sides = 1 + tip_columns
     beyond, balance = Outboard.tip(sides), Balance()
     backwards: list[InwardPass] = []
     energy: Scalar = 0.0
@@ -115,7 +118,9 @@ def evaluate(
         steps.append(own)
     gradient = unknowns.in_order([one.gradient for one in inward_passes])
     step = unknowns.in_order([own[0] for own in steps])
-    return Evaluation(unknown, inward_passes, turns, steps, gradient, step, balance, beyond, energy, tip, base_axes, base)
+    return Evaluation(
+        unknown, inward_passes, turns, steps, gradient, step, balance, beyond, energy, tip, tip_axes, base_axes, base
+    )
 
 
 def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[Scalar]]) -> list[Scalar]:

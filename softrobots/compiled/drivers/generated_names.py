@@ -22,6 +22,8 @@ N_MOTORS: int
 N_CONSTRAINTS: int
 N_MUSCLES: int
 N_VARIED: int
+TARGET_SIZE: int
+N_ERRORS: int
 LANES: int
 LANE_SIZE: int
 WORKSPACE_SIZE: int
@@ -57,6 +59,7 @@ STEP: int
 TARGET: int
 TOLERATED: int
 TORQUES: int
+TURNED: int
 UNKNOWN: int
 
 # Numbers of the robot: spring rounding [N m], reach [m], tables by unknown, motor or muscle.

@@ -20,6 +20,13 @@ def look(w: Array, varied: int) -> None:
         look_for_force(w)
 
 
+def missing_square(w: Array, varied: int) -> float:
+    """Return the squared distance or torque that a search decreases; of poses with the angle times the lever."""
+    if varied == 0:
+        return w[MISSING] + LEVER * LEVER * REACH * REACH * w[TURNED]
+    return w[MISSING]
+
+
 def squared_tolerance(w: Array, varied: int) -> float:
     """Return the squared distance or torque at which a search ends."""
     if varied == 0:
@@ -33,6 +40,13 @@ def squared_tolerance(w: Array, varied: int) -> float:
     if total > size:
         size = total
     return TOLERANCE * TOLERANCE * size
+
+
+def is_found(w: Array, varied: int) -> bool:
+    """Tell whether a search is at its end: within the tolerances."""
+    if varied == 0 and w[TURNED] > ANGLE_TOLERANCE * ANGLE_TOLERANCE:
+        return False
+    return w[MISSING] <= squared_tolerance(w, varied)
 
 
 def step_within_limits(w: Array, varied: int, count: int) -> None:
@@ -101,16 +115,16 @@ def search(w: Array, varied: int, count: int) -> int:
     for _ in range(SEARCH_STEPS):
         w[DAMPING] = damping
         look(w, varied)
-        if status > UNSTABLE or w[MISSING] <= squared_tolerance(w, varied) or damping > 1e3 * REACH:
+        if status > UNSTABLE or is_found(w, varied) or damping > 1e3 * REACH:
             break
         if w[OBSERVED] < OBSERVABLE * OBSERVABLE * REACH * REACH:
             least = OBSERVABLE * REACH
-        missing = w[MISSING]
+        missing = missing_square(w, varied)
         step_within_limits(w, varied, count)
         prepare(w)
         status = descend(w)
         look(w, varied)
-        if status == CERTIFIED and w[MISSING] < missing:
+        if status == CERTIFIED and missing_square(w, varied) < missing:
             damping *= 0.1
             if damping < 1e-7 * REACH:
                 damping = 0.0
@@ -131,7 +145,7 @@ def search(w: Array, varied: int, count: int) -> int:
         and w[MISSING] * TOLERANCE * TOLERANCE <= HIDDEN * HIDDEN * squared_tolerance(w, varied)
     ):
         return UNOBSERVABLE
-    if not w[MISSING] <= squared_tolerance(w, varied):
+    if not is_found(w, varied):
         return NOT_REACHED
     return within_limits(w, varied)
 
@@ -171,7 +185,7 @@ def reach(w: Array) -> int:
     if not is_usable(w):
         return NOT_A_NUMBER
     keep_point(w)
-    for i in range(3):
+    for i in range(TARGET_SIZE):
         w[NEXT_TARGET + i] = w[TARGET + i]
     if step_to_target(w):
         return CERTIFIED

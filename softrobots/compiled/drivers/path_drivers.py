@@ -48,9 +48,11 @@ def step_in_parts(w: Array, targets: Array, last: int, row: int) -> bool:
             w[PREDICTED + i] = w[i]
         arrived = True
         for part in range(1, parts + 1):
-            for i in range(3):
-                begin = targets[3 * last + i]
-                w[TARGET + i] = begin + (targets[3 * row + i] - begin) * part / parts
+            for i in range(
+                TARGET_SIZE
+            ):  # axes between two orientations lead to the turn halfway, though they are not of length 1
+                begin = targets[TARGET_SIZE * last + i]
+                w[TARGET + i] = begin + (targets[TARGET_SIZE * row + i] - begin) * part / parts
                 w[NEXT_TARGET + i] = w[TARGET + i]
             if not step_to_target(w) or not is_near(w, PREDICTED):
                 arrived = False
@@ -67,9 +69,9 @@ def follow(
 ) -> int:
     """Move the tip through `count` targets, each from the last; return how many it reached.
 
-    Motors and unknowns in the workspace are the start; a target is three numbers.
+    Motors and unknowns in the workspace are the start; a target is `TARGET_SIZE` numbers.
     Results of each waypoint go into the arrays: `N_MOTORS` motors, `N` unknowns,
-    the squared residual, the squared distance from the target, the status.
+    the squared residual, the squared distance from the target (and of poses TURNED), the status.
     """
     reached = 0
     last = 0
@@ -78,9 +80,9 @@ def follow(
         following = row + 1
         if following == count:
             following = row
-        for i in range(3):
-            w[TARGET + i] = targets[3 * row + i]
-            w[NEXT_TARGET + i] = targets[3 * following + i]
+        for i in range(TARGET_SIZE):
+            w[TARGET + i] = targets[TARGET_SIZE * row + i]
+            w[NEXT_TARGET + i] = targets[TARGET_SIZE * following + i]
         if row == 0:
             status = reach(w)
             target_step(w)
@@ -95,9 +97,9 @@ def follow(
                     predicted = 0
                     status = NOT_REACHED
                     go_back(w, 0, N_MOTORS)
-                for i in range(3):
-                    w[TARGET + i] = targets[3 * row + i]
-                    w[NEXT_TARGET + i] = targets[3 * following + i]
+                for i in range(TARGET_SIZE):
+                    w[TARGET + i] = targets[TARGET_SIZE * row + i]
+                    w[NEXT_TARGET + i] = targets[TARGET_SIZE * following + i]
                 w[MODE] = 0.0
                 target_step(w)
         for i in range(N_MOTORS):
@@ -105,7 +107,9 @@ def follow(
         for i in range(N):
             unknowns[N * row + i] = w[UNKNOWN + i]
         residuals[row] = w[ERROR]
-        errors[row] = w[MISSING]
+        errors[N_ERRORS * row] = w[MISSING]
+        if N_ERRORS == 2:
+            errors[N_ERRORS * row + 1] = w[TURNED]
         statuses[row] = status
         if status == CERTIFIED:
             reached += 1

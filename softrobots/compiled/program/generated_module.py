@@ -41,9 +41,9 @@ class Program:
     """Functions that solve a case, and constants that their callers need."""
 
 
-def make_program(unknowns: Unknowns, *, weight: bool) -> Program:
-    """Generate the code of a robot; `weight`: whether there is gravity."""
-    plan = Plan(unknowns, weight)
+def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False) -> Program:
+    """Generate the code of a robot; `weight`: whether there is gravity; `poses`: whether targets of the tip are poses."""
+    plan = Plan(unknowns, weight, poses)
     layout = plan.layout
     functions, lane_functions = functions_of(drivers), functions_of(lane_drivers)
     tables: dict[str, object] = {}
@@ -112,6 +112,8 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         **{status.name: status.value for status in Status},
         "REACH": float(chain.reach),
         "N_VARIED": layout.varied,
+        "TARGET_SIZE": layout.target_size,
+        "N_ERRORS": layout.conditions // 3,
         "LOWER": tuple(np.maximum(chain.limits[: layout.motors, 0], -1e300).tolist()),
         "UPPER": tuple(np.minimum(chain.limits[: layout.motors, 1], 1e300).tolist()),
         "SPRING_ROUNDING": unknowns.spring_rounding,

@@ -64,7 +64,8 @@ def _inputs(plan: Plan) -> list[Place]:
     places.append(Place("UNKNOWN", n, f"start of the search [rad or m]; {starts}{held}"))
     if searches:
         places.append(Place("TORQUES", layout.motors, "load on each motor, minus what it exerts [N m or N]; for estimate"))
-        places.append(Place("TARGET", 3, "target of the tip [m], world axes; for reach"))
+        turned = ", and its rotation matrix, row by row" if plan.poses else ""
+        places.append(Place("TARGET", layout.target_size, f"target of the tip [m]{turned}, world axes; for reach"))
         places.append(Place("TOLERATED", 1, "largest distance from a target [m], such as 1e-9; for reach and follow"))
     return places
 
@@ -85,6 +86,9 @@ def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
             Place("MOTORS", m, "the motors [rad or m]; of reach"),
             Place("MISSING", 1, "square of the distance from the target [m^2]; of reach"),
         ]
+        if plan.poses:
+            measure = "square of the sine, beyond a quarter turn one minus the cosine"
+            places.append(Place("TURNED", 1, f"angle from the target orientation: {measure} [-]; of reach"))
     if tip is not None:
         rows = "row by row; of look_at_tip"
         places += [Place("TIP_COLUMNS", 3 * n, f"derivative of the unknowns by a tip force, (3, N) {rows} [rad/N or m/N]")]

@@ -1,19 +1,19 @@
 """Straight-line functions of load estimation and inverse kinematics.
 
 Newton's method on all unknowns at once: the springs in balance, `r = 0`, and either the motor torques equal to those measured,
-with unknown force, or the tip at its target, with unknown motors. Elimination of the strains
-(`softrobots.compiled.chain.elimination`) leaves three equations with the elastostatic Jacobian
+with unknown force, or the tip at its target, a position or a pose, with unknown motors. Elimination of the strains
+(`softrobots.compiled.chain.elimination`) leaves three equations, or six, with the elastostatic Jacobian
 (`softrobots.compiled.chain.tip_motion`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Vector, constants, vector
+from softrobots.compiled.chain.elements import Vector, constants, cross, vector
 from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.small_systems import smallest_square, solve_small
@@ -23,9 +23,11 @@ from softrobots.compiled.chain.unrolled_chain import Evaluation, evaluate
 from softrobots.compiled.program.passes import go_on
 from softrobots.compiled.program.unrolled_program import numbers, store_tip
 from softrobots.compiled.settings import (
+    ANGLE_TOLERANCE,
     LARGEST_SIZE,
     LARGEST_STEP,
     LEAST_SIZE,
+    LEVER,
     NEWTON_TOLERANCE,
     POSITIVE_PIVOT,
     RANK_TOLERANCE,
@@ -40,22 +42,22 @@ def force_blocks(plan: Plan, first: int) -> tuple[list[Block], int]:
     prepare = Block("prepare_force", "Compute what depends on motors and torques only.")
     trace = prepare.trace
     force_pass = Block("force_pass", "Evaluate the point, and take a Newton step with another force.", trace=trace)
-    _force_step(plan, force_pass, evaluate(plan, force_pass, tip_columns=True))
+    _force_step(plan, force_pass, evaluate(plan, force_pass, tip_columns=3))
     look = Block("look_for_force", "Evaluate an equilibrium, and the end of a damped step of the force.", trace=trace)
-    _look_for_force(plan, look, evaluate(plan, look, tip_columns=True))
+    _look_for_force(plan, look, evaluate(plan, look, tip_columns=3))
     singles = [look.load(layout.single(one)) for one in ("mode", "damping")]
     varying = [*look.loads(layout.unknown, layout.unknowns), *look.loads(layout.force, 3), *singles]
     count = hoist([force_pass, look], prepare, varying, first)
     start = Block("first_force_pass", "Prepare, evaluate the relaxed robot without force, and take a Newton step.", trace=trace)
     start.stores = list(prepare.stores)
-    _force_step(plan, start, evaluate(plan, start, at_rest=True, forceless=True, tip_columns=True), starts=True)
+    _force_step(plan, start, evaluate(plan, start, at_rest=True, forceless=True, tip_columns=3), starts=True)
     return [prepare, start, force_pass, look], first + count
 
 
 def target_blocks(plan: Plan) -> list[Block]:
     """Trace the functions of inverse kinematics."""
     step = Block("target_step", "Evaluate the point, and the end of a step to the target, or from the target to the next one.")
-    point = evaluate(plan, step, tip_columns=True)
+    point = evaluate(plan, step, tip_columns=plan.layout.conditions)
     lane = Block("target_pass", "Evaluate the point, and take a Newton step to the target.", trace=step.trace)
     _target_step(plan, step, lane, point)
     look = Block("look_for_target", "Evaluate an equilibrium, and the end of a damped step to the target.", trace=step.trace)
@@ -119,19 +121,20 @@ def _store_torques(layout: Layout, block: Block, motion: TipMotion, left: Vector
 def _target_step(plan: Plan, step: Block, lane: Block, point: Evaluation) -> None:
     unknowns, layout = plan.unknowns, plan.layout
     motion = tip_motion(unknowns, point)
-    missing, next_missing = (_missing(step, place, point) for place in (layout.target, layout.next_target))
+    missing, next_missing = (_missing(plan, step, place, point) for place in (layout.target, layout.next_target))
     values = numbers(plan, step, point)
-    distance = missing @ missing
     tolerated = step.load(layout.single("tolerated"))
-    settled = if_less(tolerated * tolerated, distance, 0.0, _balanced(values, unknowns))
+    there = if_less(ANGLE_TOLERANCE**2, missing.turned, 0.0, _balanced(values, unknowns))
+    settled = if_less(tolerated * tolerated, missing.distance, 0.0, there)
+    weights = _weights(plan)
     for block in (step, lane):
         # The step leads to the next target once this one is reached; a lane has only one.
         wanted = (
-            missing
+            missing.way
             if block is lane
-            else vector([if_less(0.5, settled, a, b) for a, b in zip(next_missing, missing, strict=True)])
+            else vector([if_less(0.5, settled, a, b) for a, b in zip(next_missing.way, missing.way, strict=True)])
         )
-        motors = solve_small(motion.jacobian, wanted - motion.tip_change)
+        motors = solve_small(motion.jacobian * weights[:, None], wanted - motion.tip_change * weights)
         strains = step_with_motors(unknowns, point, motors)
         mode, share = _mode(plan, block, values, settled, [*strains, *motors])
         joints, unknown = vector(block.loads(0, layout.motors)), vector(point.unknown)
@@ -140,24 +143,57 @@ def _target_step(plan: Plan, step: Block, lane: Block, point: Evaluation) -> Non
             go_on(block, layout.unknown, unknown, strains, mode, share)
         else:
             _store_next(layout, block, joints + motors * share, unknown + vector(strains) * share)
-        block.store(layout.single("missing"), distance)
+        missing.store(layout, block)
         store_tip(plan, block, point)
 
 
 def _look_for_target(plan: Plan, block: Block, point: Evaluation) -> None:
     unknowns, layout = plan.unknowns, plan.layout
-    motion = tip_motion(unknowns, point)
-    missing = _missing(block, layout.target, point)
-    motors = _damped(motion.jacobian, block.load(layout.single("damping")), missing)
+    slope = tip_motion(unknowns, point).jacobian * _weights(plan)[:, None]
+    missing = _missing(plan, block, layout.target, point)
+    motors = _damped(slope, block.load(layout.single("damping")), missing.way)
     strains = vector(step_with_motors(unknowns, point, motors))
     _store_next(layout, block, vector(block.loads(0, layout.motors)) + motors, vector(point.unknown) + strains)
-    block.store(layout.single("missing"), missing @ missing)
-    block.store(layout.single("observed"), smallest_square(motion.jacobian))
+    missing.store(layout, block)
+    block.store(layout.single("observed"), smallest_square(slope))
 
 
-def _missing(block: Block, place: int, point: Evaluation) -> Vector:
-    """Return the vector from the tip to a target, in the axes behind the leading motors [m]."""
-    return point.base_axes.T @ (vector(block.loads(place, 3)) - point.base) - point.tip
+class _Missing(NamedTuple):
+    """What is missing to a target."""
+
+    way: Vector
+    """From the tip to the target in the axes behind the leading motors, rotations times the lever, shape (3 or 6,) [m]."""
+    distance: Scalar
+    """Squared distance [m^2]."""
+    turned: Scalar
+    """Squared sine of the angle [-], beyond a quarter turn one minus its cosine: it grows up to half a turn."""
+
+    def store(self, layout: Layout, block: Block) -> None:
+        """Write distance and angle."""
+        block.store(layout.single("missing"), self.distance)
+        block.store(layout.single("turned"), self.turned)
+
+
+def _missing(plan: Plan, block: Block, place: int, point: Evaluation) -> _Missing:
+    """Return what is missing to the target at a place.
+
+    With the axes `r_i` of the tip and `g_i` of the target, the sum of `r_i x g_i / 2` is the axis of the turn between them
+    times the sine of its angle: exact where it is small, and without a branch where it is zero.
+    """
+    way = point.base_axes.T @ (vector(block.loads(place, 3)) - point.base) - point.tip
+    if not plan.poses:
+        return _Missing(way, way @ way, 0.0)
+    goal = point.base_axes.T @ vector(block.loads(place + 3, 9)).reshape(3, 3)
+    sine = sum((cross(point.tip_axes[:, i], goal[:, i]) for i in range(3)), constants(np.zeros(3))) * 0.5
+    angle_cosine = ((point.tip_axes * goal).sum() - 1.0) * 0.5
+    turn = sine * (2.0 / (larger(angle_cosine, 0.0) + 1.0))
+    turned = if_less(0.0, angle_cosine, sine @ sine, 1.0 - angle_cosine)
+    return _Missing(np.concatenate([way, turn * (LEVER * float(plan.unknowns.chain.reach))]), way @ way, turned)
+
+
+def _weights(plan: Plan) -> Any:
+    """Return the weight of each condition: 1 for a position, the lever for a turn [m]."""
+    return constants([1.0] * 3 + [LEVER * float(plan.unknowns.chain.reach)] * (plan.layout.conditions - 3))
 
 
 def _damped(matrix: object, damping: Scalar, right: Vector) -> Vector:

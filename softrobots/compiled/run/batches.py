@@ -50,6 +50,31 @@ def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
     return [array if array.ndim == 2 else np.tile(array, (count, 1)) for array in rows]
 
 
+def flat_targets(targets: Any) -> tuple[Any, bool]:
+    """Return targets as rows of numbers, and whether they are poses: positions as they are, poses as position and rotation.
+
+    Raises:
+        ParameterError: If a pose, shape (4, 4), holds no rotation; names its row. NaN and infinity pass.
+    """
+    try:
+        shape = np.shape(targets)
+    except ValueError:  # rows of different length, which `batch_rows` refuses
+        return targets, False
+    if shape[-2:] != (4, 4):
+        return targets, False
+    poses = batch_rows(targets=(np.reshape(targets, (-1, 16)), 16))[0].reshape(-1, 4, 4)
+    finite = np.all(np.isfinite(poses), axis=(1, 2))
+    turns = np.where(finite[:, None, None], poses[:, :3, :3], np.eye(3))
+    gap = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    upright = np.linalg.det(turns) > 0.0
+    bad = finite & ~((gap <= 1e-9) & upright & np.all(poses[:, 3] == (0.0, 0.0, 0.0, 1.0), axis=1))
+    if np.any(bad):
+        row = int(np.flatnonzero(bad)[0])
+        raise ParameterError("targets", poses[row], f"poses: rotation and translation above a row 0 0 0 1 (row {row} is none)")
+    flat = np.concatenate([poses[:, :3, 3], poses[:, :3, :3].reshape(-1, 9)], axis=1)
+    return flat[0] if len(shape) == 2 else flat, True
+
+
 def gravity_vector(gravity: Any) -> FloatArray:
     """Return gravity, shape (3,) [m/s^2], zero if there is none, or raise ParameterError."""
     return np.zeros(3) if gravity is None else finite_array("gravity", gravity, (3,), "m/s^2")

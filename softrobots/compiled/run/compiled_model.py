@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.backends import BACKENDS, available_backend
-from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, unusable, without
+from softrobots.compiled.run.batches import batch_rows, fail, flat_targets, gravity_vector, unusable, without
 from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE, CompiledStatics
 from softrobots.compiled.run.looped_search import LoopedSearch
 from softrobots.compiled.run.results import CompiledLoadEstimate, LoadBatch, MotorBatch
 from softrobots.compiled.run.unrolled_search import UnrolledSearch
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
-from softrobots.core.checks import choice, finite_array, positive_number
+from softrobots.core.checks import choice, finite_array, positive_integer, positive_number
 from softrobots.core.errors import LoadNotFound, ParameterError, TargetUnreachable
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
 from softrobots.statics.load_estimation import check_feels
 from softrobots.statics.tip_search import POSITION_TOLERANCE
+
+_SEED = 20210312  # of the motors that searches of a batch start from
 
 
 def compile_model(model: SoftModel, *, backend: str | None = None, locked_strains: tuple[str, ...] = ()) -> CompiledModel:
@@ -152,33 +154,39 @@ class CompiledModel(CompiledStatics):
         gravity: Any = None,
         tolerance: float = POSITION_TOLERANCE,
         threads: int = 1,
+        starts: int = 1,
     ) -> MotorBatch:
         """Find motors that put the loaded tip at targets, each case from its own start.
 
-        A search from one start finds a solution near it, or none; `softrobots.solve_ik` searches from many.
+        A search from one start finds a solution near it, or none; from a far one it reaches about every third pose of an arm
+        with a wrist. `softrobots.solve_ik` chooses among the solutions from many starts.
 
         Args:
-            targets: Targets of the tip, shape (n, 3) [m], world axes.
+            targets: Targets of the tip, world axes: positions, shape (n, 3) [m], or poses, shape (n, 4, 4).
             forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes.
             q_motors0: Motors to start from, shape (n, n_motors), or (n_motors,) for all [rad or m]; at zero by default.
             q_springs0: Elastic coordinates to start from, shape (n, n_springs) [rad or m]; at rest by default.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             tolerance: Largest distance of the tip from its target [m].
             threads: Number of threads; more than one speeds up numba only.
+            starts: Number of searches of a target, until it is reached: the first from `q_motors0`, the others from motors
+                drawn within the limits, always the same ones.
 
         Returns:
             One row a target.
 
         Raises:
-            ParameterError: If a shape differs, gravity or tolerance is out of range, or the robot has no actuators.
+            ParameterError: If a shape differs, a pose has no rotation, gravity, tolerance or a count is out of range, or the
+                robot has no actuators; for poses also if it has less than six motors, sections, muscles or a long chain.
         """
         relaxed = start_motors(self._model, None)
-        run = self._run(gravity is not None)
+        goals, poses = flat_targets(targets)
+        run = self._run(gravity is not None, poses)
         positive_number("tolerance", tolerance, "m")
         begin = relaxed if q_motors0 is None else q_motors0
         springs = self._model.rest if q_springs0 is None else q_springs0
         points, loads, motors, unknowns = batch_rows(
-            targets=(targets, 3),
+            targets=(goals, run.layout.target_size),
             forces=(forces, 3),
             q_motors0=(begin, self._motors),
             q_springs0=(springs, self._model.n_springs),
@@ -187,11 +195,21 @@ class CompiledModel(CompiledStatics):
         bad = unusable(points, loads, motors, unknowns) | self._actuation.unsuited(motors)
         points, loads, motors = without(points, bad), without(loads, bad), without(motors, bad, relaxed)
         unknowns = self._actuation.of_elastic(motors, without(unknowns, bad))
-        statuses, motors, unknowns, residuals, errors = self._search(run).reach_batch(
-            points, loads, down, motors, unknowns, tolerance, threads
-        )
-        fail(statuses, bad, [residuals, errors], [unknowns, motors])
-        return MotorBatch(self._actuation.elastic(unknowns), statuses, residuals, motors, errors)
+        search, random = self._search(run), np.random.default_rng(_SEED)
+        found = search.reach_batch(points, loads, down, motors, unknowns, tolerance, threads)
+        for _ in range(positive_integer("starts", starts, 10_000) - 1):
+            left = np.flatnonzero((found[0] != Status.CERTIFIED) & ~bad)
+            drawn = [self._model.actuators.draw(random) for _ in left]
+            begins = np.array([relaxed if one is None else one for one in drawn]).reshape(-1, self._motors)
+            rest = self._actuation.of_elastic(begins, np.tile(self._model.rest, (len(left), 1)))
+            again = search.reach_batch(points[left], loads[left], down, begins, rest, tolerance, threads)
+            reached = again[0] == Status.CERTIFIED
+            for kept, new in zip(found, again, strict=True):
+                kept[left[reached]] = new[reached]
+        statuses, motors, unknowns, residuals, errors, angles = found
+        fail(statuses, bad, [residuals, errors, angles], [unknowns, motors])
+        springs = self._actuation.elastic(unknowns)
+        return MotorBatch(springs, statuses, residuals, motors, errors, angles if poses else None)
 
     def follow(
         self,
@@ -205,7 +223,7 @@ class CompiledModel(CompiledStatics):
         """Move the loaded tip through targets, each step from the last; one row a waypoint.
 
         Args:
-            targets: Target positions, shape (n, 3) [m], world axes.
+            targets: Target positions, shape (n, 3) [m], or poses, shape (n, 4, 4), world axes.
             force: Force on the tip, shape (3,) [N], constant over the path, world axes.
             q_motors0: Motors near the first waypoint, shape (n_motors,) [rad or m]; by default those of `softrobots.solve_ik`,
                 which takes some milliseconds.
@@ -216,12 +234,14 @@ class CompiledModel(CompiledStatics):
             Motors, elastic coordinates and errors of the waypoints; see the status of each.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators.
+            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators, or cannot have poses; see
+                `inverse_kinematics`.
             TargetUnreachable: If the first waypoint cannot be reached; from `solve_ik` if no start is given.
         """
         start_motors(self._model, None)
-        run = self._run(gravity is not None)
-        (points,) = batch_rows(targets=(targets, 3))
+        goals, poses = flat_targets(targets)
+        run = self._run(gravity is not None, poses)
+        (points,) = batch_rows(targets=(goals, run.layout.target_size))
         if np.any(unusable(points)):
             raise ParameterError("targets", targets, "finite positions [m]")
         load = finite_array("force", force, (3,), "N")
@@ -229,7 +249,9 @@ class CompiledModel(CompiledStatics):
         if len(points) == 0:
             raise ParameterError("targets", targets, "at least one target position [m]")
         if q_motors0 is None:
-            motors = solve_ik(self._model, points[0], load, gravity=gravity, tolerance=tolerance).q_motors
+            turned = points[0, 3:].reshape(3, 3) if poses else None
+            options: Any = {"orientation": turned, "gravity": gravity, "tolerance": tolerance}
+            motors = solve_ik(self._model, points[0, :3], load, **options).q_motors
         else:
             motors = self._actuation.checked(q_motors0, "q_motors0")
         batch, iterations = self._search(run).follow(points, load, gravity_vector(gravity), motors, tolerance)

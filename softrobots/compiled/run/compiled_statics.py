@@ -37,7 +37,7 @@ class CompiledStatics:
         self._chain = model.chain()
         self._unknowns = Unknowns(self._chain, locked_strains)
         self._actuation = Actuation(model, self._unknowns)
-        self._runs: dict[bool, Any] = {}
+        self._runs: dict[tuple[bool, bool], Any] = {}
         self._shape = (model.n_motors,)
         self._motors = model.n_motors
         run = self._run(False)
@@ -73,7 +73,7 @@ class CompiledStatics:
         program = self._run(gravity).program
         return str(program.text + ("\n\n" + program.lane_text if lanes else ""))
 
-    def c_source(self, *, gravity: bool = False, prefix: str = "softrobots") -> str:
+    def c_source(self, *, gravity: bool = False, prefix: str = "softrobots", poses: bool = False) -> str:
         """Return the generated code as freestanding C99: one file without libraries, allocation or state, for a control loop.
 
         Every function works on an array of doubles that the caller owns. The comment at the head of the file lists inputs and
@@ -83,15 +83,16 @@ class CompiledStatics:
         Args:
             gravity: Return the code for robots with weight.
             prefix: Beginning of every name, before an underscore.
+            poses: Return the code whose targets are poses.
 
         Raises:
-            ParameterError: If the prefix is not an identifier of C.
+            ParameterError: If the prefix is not an identifier of C, or the robot cannot have poses as targets.
         """
         from softrobots.compiled.c.source import to_c
 
         if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
             raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
-        program = self._run(gravity).program
+        program = self._run(gravity, poses).program
         return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
 
     def equilibrium(
@@ -180,9 +181,18 @@ class CompiledStatics:
         fail(statuses, bad, [residuals], [unknowns, tips])
         return EquilibriumBatch(self._actuation.elastic(unknowns), statuses, residuals, tips)
 
-    def _run(self, weight: bool) -> Any:
-        """Return the code with or without gravity, generated on first use."""
-        run = self._runs.get(weight)
+    def _run(self, weight: bool, poses: bool = False) -> Any:
+        """Return the code with or without gravity, for positions or poses as targets, generated on first use.
+
+        Raises:
+            ParameterError: If the robot cannot have poses as targets.
+        """
+        run = self._runs.get((weight, poses))
         if run is None:
-            run = self._runs[weight] = make_run(make_program(self._unknowns, weight=weight), self._backend)
+            if poses and not (self._unknowns.is_unrolled and self._chain.n_motors >= 6):
+                kind = f"{self._chain.n_motors} motors and {len(self._chain.elements)} joints and sections"
+                requirement = f"positions for this robot, it has {kind}; poses need six motors and a chain that is unrolled"
+                raise ParameterError("targets", "poses", f"{requirement} (softrobots.solve_ik takes poses of every robot)")
+            program = make_program(self._unknowns, weight=weight, poses=poses)
+            run = self._runs[weight, poses] = make_run(program, self._backend)
         return run

@@ -168,11 +168,11 @@ class LoopedSearch:
         unknowns: FloatArray,
         tolerance: float,
         threads: int,
-    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray]:
+    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Put the tips at their targets, one after the other; see `reach` and `estimate_batch`.
 
         Returns:
-            Status, actuators, unknowns, residual and distance from the target of each case.
+            Status, actuators, unknowns, residual, distance from the target and angle (here of positions, zero) of each case.
         """
         positive_integer("threads", threads)
         statuses, motors, unknowns = np.zeros(len(motors), dtype=np.uint8), motors.copy(), unknowns.copy()
@@ -182,7 +182,7 @@ class LoopedSearch:
             statuses[row], found = self.reach(targets[row], forces[row], gravity, motors[row], start, tolerance)
             motors[row], unknowns[row] = found.q_motors, self.unknowns(found.state.w)
             norms[:, row] = self.residual(found.state.w), found.error
-        return statuses, motors, unknowns, norms[0], norms[1]
+        return statuses, motors, unknowns, norms[0], norms[1], np.zeros(len(motors))
 
     def _arrived(self, found: LocalSolution[ChainState], tolerance: float) -> Status:
         if not found.arrived(tolerance):

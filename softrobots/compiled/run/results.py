@@ -101,7 +101,8 @@ class Batch:
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
         for array in vars(self).values():
-            array.setflags(write=False)
+            if array is not None:
+                array.setflags(write=False)
 
     @property
     def certified(self) -> Any:
@@ -142,3 +143,5 @@ class MotorBatch(Batch):
     """Motor positions, shape (n, n_motors) [rad or m]."""
     tip_error: FloatArray
     """Distance of the loaded tip from its target, shape (n,) [m]."""
+    orientation_error: FloatArray | None = None
+    """Angle between the loaded tip and its target orientation, shape (n,) [rad]; None for positions."""

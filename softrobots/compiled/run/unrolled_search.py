@@ -48,7 +48,7 @@ class UnrolledSearch:
         unknowns: FloatArray,
         tolerance: float,
         threads: int,
-    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray]:
+    ) -> tuple[Any, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Put the tips at their targets; see `LoopedSearch.reach_batch`."""
         run, layout = self._run, self._run.layout
         inputs = [
@@ -59,27 +59,37 @@ class UnrolledSearch:
             (layout.target, targets),
             (layout.single("tolerated"), np.full((1, 1), float(tolerance))),
         ]
-        squares = [(layout.single(name), 1) for name in ("error", "missing")]
+        squares = [(layout.single(name), 1) for name in ("error", "missing", "turned")]
         results = [(0, layout.motors), (layout.unknown, layout.unknowns), *squares]
-        (motors, unknowns, error, missing), statuses = solve_batch(run.reach_batch, inputs, results, len(motors), threads)
-        return statuses, motors, unknowns, root(error), root(missing)
+        found, statuses = solve_batch(run.reach_batch, inputs, results, len(motors), threads)
+        motors, unknowns, error, missing, turned = found
+        return statuses, motors, unknowns, root(error), root(missing), _angles(turned[:, 0])
 
     def follow(
         self, targets: FloatArray, force: FloatArray, gravity: FloatArray, q_motors: FloatArray, tolerance: float
     ) -> tuple[MotorBatch, int]:
-        """Move the tip through targets, shape (n, 3) [m], each step from the last; see `LoopedSearch.follow`."""
+        """Move the tip through targets, shape (n, 3 or 12) [m], each step from the last; see `LoopedSearch.follow`."""
         run, layout, count = self._run, self._run.layout, len(targets)
         start = self._actuation.unknowns(q_motors, self._model.rest)
         w = self._actuation.workspace(run, q_motors, force=force, gravity=gravity, unknown=start)
         w[layout.single("tolerated")] = float(tolerance)
         motors, unknowns = run.array(count * len(q_motors)), run.array(count * layout.unknowns)
-        residuals, errors, statuses = run.array(count), run.array(count), run.array(count)
+        kinds = layout.conditions // 3
+        residuals, errors, statuses = run.array(count), run.array(count * kinds), run.array(count)
         run.follow(w, run.flat(targets), count, motors, unknowns, residuals, errors, statuses)
+        missing = np.reshape(errors, (count, kinds))
         batch = MotorBatch(
             self._actuation.elastic(np.reshape(unknowns, (count, layout.unknowns))),
             np.asarray(statuses, dtype=np.uint8),
             np.sqrt(residuals),
             np.reshape(motors, (count, len(q_motors))),
-            np.sqrt(errors),
+            np.sqrt(missing[:, 0]),
+            _angles(missing[:, 1]) if kinds == 2 else None,
         )
         return batch, int(w[layout.single("iterations")])
+
+
+def _angles(turned: FloatArray) -> FloatArray:
+    """Return the angles, shape (n,) [rad], of the measure that generated code has of them; see `motor_program`."""
+    small = np.arcsin(np.sqrt(np.clip(turned, 0.0, 1.0)))
+    return np.asarray(np.where(turned < 1.0, small, np.arccos(np.clip(1.0 - turned, -1.0, 1.0))))
