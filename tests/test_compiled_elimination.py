@@ -456,7 +456,7 @@ def test_a_matrix_without_full_rank_has_no_smallest_singular_value(shape: tuple[
 def traced_at(model: SoftModel, gravity: bool) -> tuple[Unknowns, Block, Evaluation]:
     unknowns = Unknowns(model.chain())
     block = Block("compute", "Compute.")
-    return unknowns, block, evaluate(Plan(unknowns, gravity), block, tip_columns=True)
+    return unknowns, block, evaluate(Plan(unknowns, gravity), block, tip_columns=3)
 
 
 def workspace(model: SoftModel, motors: np.ndarray, springs: np.ndarray, force: np.ndarray, gravity: Any) -> list[float]:

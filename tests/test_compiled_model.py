@@ -64,7 +64,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def parts(batch: Any) -> dict[str, np.ndarray]:
-    return {name: np.asarray(value) for name, value in vars(batch).items()}
+    return {name: np.asarray(value) for name, value in vars(batch).items() if value is not None}
 
 
 def assert_same_rows(one: Any, other: Any, rows: Any, others: Any) -> None:
