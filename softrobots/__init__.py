@@ -30,6 +30,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup
 from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
 from softrobots.robots.growth import grown_coordinates
+from softrobots.statics.critical_load import critical_load
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
@@ -39,7 +40,7 @@ from softrobots.statics.loads import EARTH_GRAVITY, distributed_force
 from softrobots.statics.post_buckling import post_buckling_branches
 from softrobots.statics.saved_results import save_csv
 from softrobots.statics.sensitivity import compliance, elastostatic_jacobian
-from softrobots.statics.stability import critical_load
+from softrobots.statics.stability import Stability
 from softrobots.statics.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
 from softrobots.statics.trajectory import Trajectory, follow_trajectory
 from softrobots.statics.workspace import Workspace, sample_workspace
@@ -78,6 +79,7 @@ __all__ = [
     "SoftModel",
     "SoftRobotsError",
     "SpringGroup",
+    "Stability",
     "StraightTube",
     "TargetUnreachable",
     "Trajectory",

@@ -17,7 +17,6 @@ from softrobots.statics.elastic_state import (
     ElasticProblem,
     ElasticState,
     elastic_state,
-    is_stable,
     largest_residual,
     norm,
     positive,
@@ -25,6 +24,7 @@ from softrobots.statics.elastic_state import (
 )
 from softrobots.statics.elastostatics import LARGEST_STEP, _descend, _escape, _stiff_step, balanced_state, newton, solve_springs
 from softrobots.statics.loads import Load
+from softrobots.statics.stability import is_positive
 from tests.support.oracles import arm_energy, central_difference, flexible_jacobian
 
 MOTORS = np.array([0.3, 0.6, -0.8])
@@ -169,12 +169,12 @@ def test_no_solver_spends_more_than_it_may_and_none_less_than_it_needs(arm: sr.S
     force, wrench = CASES[name]
     load = Load.of(arm, force, wrench=wrench)
     full, needed, stable = solve_springs(arm, MOTORS, load, REST)
-    assert stable
+    assert stable == (name != "moment")  # with the moment it flutters
     assert 1 < needed < 60
     assert full.error <= largest_residual(arm, full.scale, 1e-10)
     again, spent, stable = solve_springs(arm, MOTORS, load, REST, max_iterations=needed)
     assert np.array_equal(again.q_springs, full.q_springs)
-    assert (spent, stable) == (needed, True)
+    assert (spent, stable) == (needed, name != "moment")
     for most in range(1, needed):
         less, spent, _ = solve_springs(arm, MOTORS, load, REST, max_iterations=most)
         assert spent <= most
@@ -553,35 +553,11 @@ def test_pivots_and_norms(arm: sr.SoftModel) -> None:
     assert np.array_equal(scaled(np.array([[8.0, 6.0], [6.0, 36.0]]), np.array([4.0, 9.0])), [[2.0, 1.0], [1.0, 4.0]])
 
 
-def test_a_tangent_that_is_not_symmetric_is_stable_where_its_eigenvalues_are(arm: sr.SoftModel) -> None:
-    """Its symmetric part may be indefinite: a shear of 3 on eigenvalues 1; and the other way round it is never."""
-    k = arm.stiffness
-    root = np.sqrt(k)
-    sheared = np.eye(4)
-    sheared[0, 1] = 3.0
-    assert np.linalg.eigvalsh(0.5 * (sheared + sheared.T))[0] < -0.4
-    assert is_stable(arm, root[:, None] * sheared * root, symmetric=False)
-    for least in (-1e-3, 0.0, 0.9e-9):
-        sheared[2, 2] = least
-        assert not is_stable(arm, root[:, None] * sheared * root, symmetric=False)
-    sheared[2, 2] = 1.2e-9
-    assert is_stable(arm, root[:, None] * sheared * root, symmetric=False)
-    # Its symmetric part positive, but not by more than rounding.
-    sheared[0, 1], sheared[2, 2] = 0.3, 0.6e-9
-    assert not is_stable(arm, root[:, None] * sheared * root, symmetric=False)
-    # One triangle alone looks stable: eigenvalues 1 +- sqrt(0.1 40).
-    for upper, lower in ((40.0, 0.1), (0.1, 40.0)):
-        sheared = np.eye(4)
-        sheared[0, 1], sheared[1, 0] = upper, lower
-        assert not is_stable(arm, root[:, None] * sheared * root, symmetric=False)
-
-
 def test_a_symmetric_tangent_is_stable_above_rounding(arm: sr.SoftModel) -> None:
     root = np.sqrt(arm.stiffness)
     turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(4, 4)))
     for least, stable in ((-1.2e-9, False), (0.0, False), (0.8e-9, False), (1.2e-9, True), (1.0, True)):
         tangent = root[:, None] * (turn * np.array([2.0, 1.0, 0.5, least]) @ turn.T) * root
-        assert is_stable(arm, 0.5 * (tangent + tangent.T), symmetric=True) == stable
+        assert is_positive(arm, 0.5 * (tangent + tangent.T)) == stable
     for lost in (math.nan, math.inf):
-        for symmetric in (True, False):
-            assert not is_stable(arm, np.diag([lost, 1.0, 1.0, 1.0]), symmetric=symmetric)
+        assert not is_positive(arm, np.diag([lost, 1.0, 1.0, 1.0]))

@@ -19,7 +19,8 @@ import softrobots as sr
 from softrobots.compiled import Status
 from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.settings import LARGEST_POSITION
-from studies.soak import jobs, verdicts
+from softrobots.statics.stability import mass_matrix
+from studies.soak import jobs, plain_stability, verdicts
 from studies.soak.families import FAMILIES, Family, draw_cases
 from studies.soak.jobs import STABLE, Answer, Hang, limited
 from studies.soak.plain_sections import section_joints, section_slopes
@@ -48,7 +49,7 @@ def check(model: sr.SoftModel, case: Case, springs: np.ndarray, *, stable: bool 
     tolerance = max(1e-10 * max(float(balance.size[0]), 1e-3), model.rounding) + float(balance.rounding[0])
     assert np.linalg.norm(balance.residual[0]) <= tolerance
     assert balance.held[0] <= 1e-12
-    min_pivot, error = plain.least_eigenvalue(case, springs)
+    min_pivot, error = plain_stability.least_eigenvalue(plain, case, springs)
     if stable is not None:
         assert (min_pivot > -error) if stable else (min_pivot < error)
 
@@ -110,8 +111,10 @@ def test_the_solvers_see_the_same_residual_and_tangent(kind: str, rng: np.random
         count = len(robot.structure.motor_joints)
         assert state.load.motors[:count] == pytest.approx(balance.motor_torques[row], abs=1e-12 * balance.size[row])
     # Central differences with steps of 1e-5: 1e-10 of the third derivative; a knee in the way would be worse.
-    tangent = plain.tangent(case.row(2), springs[2])
+    tangent = plain_stability.tangent(plain, case.row(2), springs[2])
     assert np.abs(tangent - state.tangent).max() <= 1e-7 * np.abs(state.tangent).max()
+    mass = plain_stability.mass_matrix(plain, case.row(2), springs[2])
+    assert np.abs(mass - mass_matrix(robot, state.point, state.q)).max() <= 1e-7 * np.abs(mass).max()
 
 
 def test_rounding_is_of_the_spring_loads_also_where_they_are_in_balance() -> None:
@@ -189,6 +192,22 @@ def test_a_soak_sees_a_saddle_that_is_called_stable() -> None:
     assert [law for _, law in tally.broken] == ["reported as stable, least eigenvalue -0.315 within 8e-09"]
     verdicts._check(tally, family, 0, PlainStatics(arm), case, [Answer(0, "not stable", springs=np.zeros(4))])
     assert len(tally.broken) == 1
+
+
+def test_a_soak_sees_a_wrong_verdict_under_a_moment() -> None:
+    """The default arm at a large moment diverges, at one of 20 N m it flutters, at a small one it is stable."""
+    arm, family = model("arm"), replace(family_of("arm"), tangents=1)
+    kinds = set()
+    for moment in ((2, 1, 0.5), (5, 20, -15), (60, -40, 20)):
+        case = one((0.3, 0.6, -0.8), (3, 10, -15))._replace(moments=np.array([moment], dtype=float))
+        found = sr.solve_equilibrium(arm, case.motors[0], wrench=[*case.forces[0], *moment])
+        said = STABLE if found.stable else "not stable"
+        for outcome in (STABLE, "not stable"):
+            tally = Tally()
+            verdicts._check(tally, family, 0, PlainStatics(arm), case, [Answer(0, outcome, springs=found.q_springs)])
+            assert [law.startswith(f"reported as {outcome}, vib") for _, law in tally.broken] == [True] * (outcome != said)
+        kinds.add(found.stability.kind)
+    assert len(kinds) > 1
 
 
 def test_a_soak_sees_muscles_that_are_not_as_long_as_they_are_given(monkeypatch: pytest.MonkeyPatch) -> None:

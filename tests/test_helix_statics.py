@@ -62,7 +62,7 @@ def rod(robot: HelixTube) -> HelixRod:
 
 def misses(found: sr.Equilibrium, position: np.ndarray, rotation: np.ndarray) -> tuple[float, float]:
     """Distance [m] and angle [rad] of the tip."""
-    assert found.stable
+    assert found.stability.kind in ("stable", "flutter")  # not divergent
     turn = pin.log3(rotation.T @ found.transform_tip_to_world.rotation)
     return float(np.linalg.norm(found.tip_position - position)), float(np.linalg.norm(turn))
 
@@ -132,7 +132,7 @@ def test_a_wrench_along_its_axis_bends_a_chain_of_sections_into_the_exact_helix(
     whole, q = stretch * rod(robot).length, found.q
     exact = helix_frames(curvature / stretch, torsion / stretch, whole * np.arange(1, 7) / 6)
     frames = [frame_placement(arm, q, f"section_1_{j}").homogeneous for j in range(1, 7)]
-    assert found.stable
+    assert found.stability.kind in ("stable", "flutter")
     assert np.linalg.norm(exact[-1, :3, 3] - rod(robot).frames([rod(robot).length])[0, :3, 3]) > 5e-3
     assert np.allclose(frames, exact, atol=1e-10, rtol=0)
     assert np.allclose(found.strains, [0.0, curvature, torsion, stretch], atol=1e-8)

@@ -47,3 +47,40 @@ def test_turning_a_bent_arm_about_its_axis_changes_no_energy_and_turns_the_resid
     one, other = under_weight(model, y), under_weight(model, turned(y, angle))
     assert abs(other.energy - one.energy) <= 1e-12 * abs(one.energy)
     assert np.allclose(other.residual, turned(one.residual, angle), rtol=0, atol=1e-12 * np.abs(one.residual).max())
+
+
+BOWED = {"two segments": {}, "pulled": {"motors": -5.0}, "pushed": {"force": (0, 0, -6.0)}, "light": {"force": (0, 0, -33.0)}}
+"""What bows a PCC arm with given muscle forces: its weight, and more [N]."""
+
+
+def ring(case: str, *, start: np.ndarray | None = None) -> sr.Equilibrium:
+    model = rod(case if case in ROUND else "two segments")
+    load = {"motors": 0.0, "force": None} | BOWED[case]
+    motors = np.full(model.n_motors, load["motors"])
+    return sr.solve_equilibrium(model, motors, load["force"], gravity=(0, 0, -9.81), q_springs0=start)
+
+
+@pytest.mark.parametrize("case", BOWED)
+def test_a_bow_that_can_turn_is_neutral_and_every_place_of_its_ring_solves(case: str, rng: np.random.Generator) -> None:
+    """Also places a little beside the ring: they settle on it, nearby. Nothing in the solvers knows of the ring."""
+    found = ring(case)
+    assert np.abs(found.q_springs).max() > 0.01
+    assert (found.stability.kind, found.stable) == ("neutral", False)
+    for angle in rng.uniform(-np.pi, np.pi, 6):
+        there = turned(found.q_springs, angle)
+        again = ring(case, start=there)
+        assert again.stability.kind == "neutral"
+        assert np.abs(again.q_springs - there).max() < 1e-8
+        beside = ring(case, start=there + 1e-3 * rng.normal(size=len(there)) * (np.arange(len(there)) % 4 < 3))
+        assert beside.stability.kind == "neutral"
+        assert abs(beside.tip_position[2] - found.tip_position[2]) < 1e-8
+        assert np.abs(beside.q_springs - there).max() < 0.05
+
+
+def test_what_cannot_turn_is_not_neutral() -> None:
+    """The same arm with a side force; and the inflatable arm, whose universal joints are not round."""
+    model = rod("two segments")
+    held = sr.solve_equilibrium(model, np.zeros(model.n_motors), (0.1, 0, 0), gravity=(0, 0, -9.81))
+    assert held.stability.kind == "stable"
+    arm = sr.load_model(sr.InflatableArm())
+    assert sr.solve_equilibrium(arm, (0, 0, 0), (-130.0, 0, 0)).stability.kind == "stable"

@@ -36,10 +36,11 @@ PUBLIC = """
 EARTH_GRAVITY ROBOTS ClusterError DescriptionError Equilibrium EquilibriumBranch EquilibriumNotFound FileFormatError HelixTube
 IkSolution ImposedDisplacement InflatableArm LoadEstimate LoadNotFound MissingDependency NameNotFound NeutralEquilibrium
 NoCriticalLoad NotConverged OutputError OutputExists ParameterError Path3D PccArm SelfIntersection SoftModel SoftRobotsError
-SpringGroup StraightTube TargetUnreachable Trajectory Viewer ViewerError Workspace __version__ compliance constant_curvature
-critical_load distributed_force elastostatic_jacobian estimate_load export follow_trajectory grown_coordinates helix
-inflated_beam load_model load_result mount post_buckling_branches quintic read_waypoints sample_workspace save_csv save_result
-solve_equilibrium solve_ik solve_imposed_displacement straight_line view waypoints with_springs
+SpringGroup Stability StraightTube TargetUnreachable Trajectory Viewer ViewerError Workspace __version__ compliance
+constant_curvature critical_load distributed_force elastostatic_jacobian estimate_load export follow_trajectory
+grown_coordinates helix inflated_beam load_model load_result mount post_buckling_branches quintic read_waypoints
+sample_workspace save_csv save_result solve_equilibrium solve_ik solve_imposed_displacement straight_line view waypoints
+with_springs
 """
 """What users import from `softrobots`: a name is added here on purpose, and none disappears unnoticed."""
 
@@ -98,7 +99,7 @@ ROOMS = {
 """Every folder of the package, and the rooms that it may import."""
 TO_CODE = ("trace", "chain", "drivers", "program", "c", "run", "sweeps")
 """Folders of `compiled/` in the order in which a robot becomes code; each imports only those before it."""
-SOLVERS = "trajectory load_estimation imposed_displacement stability workspace post_buckling sensitivity"
+SOLVERS = "trajectory load_estimation imposed_displacement critical_load stability workspace post_buckling sensitivity"
 LOADING = "softrobots.model.loader softrobots.description.tag_reader softrobots.description.sources"
 SEPARATE = {
     " ".join(f"softrobots.statics.{name}" for name in SOLVERS.split()): LOADING,

@@ -605,7 +605,7 @@ def test_a_steel_rod_of_50_links_is_right_to_a_tenth_of_a_millimetre() -> None:
         errors = []
         for (tip, middle), position in zip(pairs, exact, strict=True):
             found = sr.solve_equilibrium(arm, (), wrench={"segment_1": middle, "tip": tip})
-            assert found.stable
+            assert found.stability.kind in ("stable", "flutter")
             errors.append(np.linalg.norm(found.tip_position - position))
         assert np.mean(errors) <= 1e-4
         assert np.max(errors) < 3e-4
@@ -672,7 +672,7 @@ def test_turning_the_load_by_the_symmetry_of_the_muscles_turns_the_answer(
         one = sr.solve_equilibrium(arm, motors, wrench={"segment_1": mid, "tip": tip}, **options)
         other = sr.solve_equilibrium(arm, motors[after], wrench={"segment_1": both @ mid, "tip": both @ tip}, **options)
         pose, turned = one.transform_tip_to_world, other.transform_tip_to_world
-        assert one.stable
+        assert one.stability.kind in ("stable", "flutter")
         assert np.abs(turned.translation - turning @ pose.translation).max() < allowed
         assert np.abs(turned.rotation - turning @ pose.rotation @ turning.T).max() < allowed
         assert np.abs(other.muscle_forces - one.muscle_forces[after]).max() < 100 * allowed  # about 100 N/m

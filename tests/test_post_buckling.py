@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots.statics import force_path, post_buckling
+from softrobots.statics.critical_load import CriticalPoint, critical_point
 from softrobots.statics.equilibrium_branch import FUNDAMENTAL, RING
-from softrobots.statics.stability import CriticalPoint, critical_point
 from softrobots.view.figures import equilibria
 from tests.support.laws import law
 from tests.support.oracles import arm_balance

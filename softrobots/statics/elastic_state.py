@@ -1,9 +1,9 @@
-r"""Elastic coordinates of a robot under a load: residual, tangent stiffness, energy and stability.
+r"""Elastic coordinates of a robot under a load: residual, tangent stiffness and energy.
 
 The elastic coordinates `y` (springs, sections) are in equilibrium when the residual `r(y) = tau_spring(y) - J_k^T w + g_k`
 vanishes; actuators are constrained exactly. Where joints follow sections, `J_k` is Pinocchio's Jacobian times `dm/dz`
-(`softrobots.model.coordinates`). The equilibrium is stable if the tangent stiffness `K_t = dr/dy` is positive definite
-([Troise 2021] (5-7) give the weightless, first-order form of this).
+(`softrobots.model.coordinates`). The tangent stiffness is `K_t = dr/dy` ([Troise 2021] (5-7) give the weightless, first-order
+form of this).
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from eigenpy import LDLT, ComputationInfo
+from eigenpy import ComputationInfo
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.model.coordinates import Point, ReducedLoad
 from softrobots.model.soft_model import SoftModel
-from softrobots.model.springs import POSITIVE
 from softrobots.statics.loads import AppliedLoad, Load
 
 TOLERANCE = 1e-10
@@ -84,10 +83,6 @@ class ElasticProblem:
         """Whether the residual meets the tolerance."""
         return state.error <= largest_residual(self.model, state.scale, self.tolerance)
 
-    def stable(self, state: ElasticState, factors: Any = None) -> bool:
-        """Whether the tangent stiffness is positive; see `is_stable`."""
-        return is_stable(self.model, state.tangent, symmetric=self.load.conservative, factors=factors)
-
     def too_high(self, trial: ElasticState, state: ElasticState, change: float) -> bool:
         """Whether the energy of a trial is above that of a state by more than a change and rounding."""
         highest = state.energy + change
@@ -123,33 +118,6 @@ def largest_residual(model: SoftModel, scale: float, tolerance: float) -> float:
     with rest angles only.
     """
     return max(tolerance * max(scale, MOMENT_FLOOR), model.rounding)
-
-
-def is_stable(model: SoftModel, tangent: FloatArray, *, symmetric: bool, factors: Any = None) -> bool:
-    """Whether every eigenvalue of a tangent stiffness has a real part above rounding.
-
-    Eigenvalues are taken in coordinates scaled by the springs' own stiffness, independent of units and of the ratio of stiff to
-    soft springs; rounding is 1e-9 there. Positive pivots of the symmetric part are the certificate (no eigenvalue has a real
-    part below its smallest); for a tangent that is not symmetric and lacks it, the eigenvalues decide.
-
-    The factorisation `L D L^T` is Eigen's: for four rows it takes a ninth of the time of NumPy's Cholesky, and one thread.
-
-    Args:
-        model: The robot.
-        tangent: Tangent stiffness; one that is not finite is not stable.
-        symmetric: Whether it is symmetric.
-        factors: An `eigenpy.LDLT` of its size to reuse; None: a new one.
-    """
-    part = tangent if symmetric else 0.5 * (tangent + tangent.T)
-    if not math.isfinite(np.vdot(part, part)):  # Eigen takes a NaN for positive
-        return False
-    factors = LDLT(len(part)) if factors is None else factors
-    if positive(factors, part - model.springs.least_tangent):
-        return True
-    if symmetric:
-        return False
-    with one_blas_thread(len(tangent)):
-        return bool(np.all(np.linalg.eigvals(scaled(tangent, model.stiffness)).real > POSITIVE))
 
 
 def positive(factors: Any, matrix: FloatArray) -> bool:

@@ -22,6 +22,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import TOLERANCE, ElasticProblem, ElasticState, largest_residual, norm, positive, scaled
 from softrobots.statics.loads import Load
+from softrobots.statics.stability import is_positive, is_stable
 
 METHODS = ("newton", "fixed_point")
 """The solvers of `solve_equilibrium`."""
@@ -32,6 +33,7 @@ LARGEST_STEP = 0.5
 ARMIJO = 1e-4
 """Share of the predicted decrease of the energy that a step must reach."""
 
+_CLEARLY = 1e3  # times `POSITIVE`: the sign of an eigenvalue beyond does not depend on the residual that is left
 _SHORTEST = 1e-12  # share of a Newton step below which it is not halved again
 
 
@@ -49,7 +51,7 @@ def solve_springs(
 
     Returns:
         The last state, whether or not it meets the tolerance (see `largest_residual`); the evaluations spent; and whether that
-        state is stable (see `elastic_state.is_stable`).
+        state is stable (see `softrobots.statics.stability`).
     """
     problem = ElasticProblem(model, q_motors, load, tolerance)
     solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
@@ -78,19 +80,28 @@ def _fixed_point(problem: ElasticProblem, start: FloatArray, most: int) -> tuple
     state = best = problem.state(start)
     for iteration in range(most):
         if problem.balanced(state):
-            return state, iteration, problem.stable(state)
+            return state, iteration, is_stable(problem.model, problem.load, state)
         state = problem.state(model.rest + state.load.elastic / model.stiffness)
         best = state if state.error < best.error else best
-    return best, most, problem.stable(best)
+    return best, most, is_stable(problem.model, problem.load, best)
 
 
 def _descend(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[ElasticState, int, bool]:
     """Newton descent on the energy; it leaves unstable equilibria."""
-    stiffness, factors = problem.model.stiffness, LDLT(len(start))
+    model, stiffness, factors = problem.model, problem.model.stiffness, LDLT(len(start))
     state, spent, stalled = problem.state(start), 0, False
     while spent < most:
         balanced = problem.balanced(state)
-        if balanced and problem.stable(state, factors):
+        if balanced and is_positive(model, state.tangent, factors, times=_CLEARLY):
+            return state, spent, True
+        if balanced and state.error > 0.0 and is_positive(model, state.tangent, factors, times=-_CLEARLY):
+            # Nearly neutral: the least eigenvalue is as far from its value as the residual from zero.
+            finer = problem.state(state.q_springs + _stiff_step(state, stiffness))
+            spent += 1
+            if finer.error < 0.5 * state.error:
+                state = finer
+                continue
+        if balanced and is_positive(model, state.tangent, factors):
             return state, spent, True
         step = _escape(state, stiffness) if balanced or stalled else _newton_step(state, stiffness, factors)
         if step is None:  # neutral equilibrium: neither stable nor unstable
@@ -101,7 +112,7 @@ def _descend(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Ela
         spent += 1
         while problem.too_high(trial, state, ARMIJO * scale * slope) and scale > _SHORTEST:
             if spent >= most:  # within a step: the last state is the best
-                return state, spent, problem.stable(state)
+                return state, spent, is_positive(model, state.tangent)
             scale *= 0.5
             trial = problem.state(state.q_springs + scale * step)
             spent += 1
@@ -109,7 +120,7 @@ def _descend(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Ela
             break
         # Below rounding the energy says nothing; there the residual must shrink.
         if not balanced and not stalled and trial.error >= state.error and -slope < problem.rounding(state):
-            if not problem.stable(state, factors):
+            if not is_positive(model, state.tangent, factors):
                 stalled = True  # beside a saddle, where Newton's step leads away from equilibrium: leave it downhill
                 continue
             trial = problem.state(state.q_springs + _stiff_step(state, stiffness))
@@ -117,7 +128,7 @@ def _descend(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Ela
             if trial.error >= state.error:
                 break
         state, stalled = trial, False
-    return state, spent, problem.stable(state)
+    return state, spent, is_positive(model, state.tangent)
 
 
 def _newton_step(state: ElasticState, stiffness: FloatArray, factors: Any) -> FloatArray:
@@ -179,7 +190,7 @@ def _grow_load(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[E
             found, _, used = _grown(problem, whole.with_moments, state.q_springs, most - spent)
             spent += used
     last = problem.state(furthest) if found is None else found
-    return last, spent, problem.stable(last)
+    return last, spent, is_stable(problem.model, problem.load, last)
 
 
 def _grown(

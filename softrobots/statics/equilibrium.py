@@ -15,10 +15,11 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastic_state import TOLERANCE, ElasticState, is_stable, largest_residual
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual
 from softrobots.statics.elastostatics import METHODS, solve_springs
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
+from softrobots.statics.stability import Stability, is_stable, stability
 
 _NEAR_PLATEAU, _NEAR_COLLAPSE = 0.99, 0.95  # shares of the largest moment at which a link explains why there is no equilibrium
 _LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are computed from the shape
@@ -58,7 +59,13 @@ class Equilibrium:
     iterations: int
     """Evaluations of the residual, or steps of the search or estimation that ended here."""
     stable: bool
-    """Certified: every eigenvalue of the tangent stiffness has a positive real part."""
+    """Certified: a small disturbance stays small, see `stability`."""
+
+    @cached_property
+    def stability(self) -> Stability:
+        """Stable, neutral, divergent or flutter, with the eigenvalues that say so."""
+        point = self.model.coordinates.at(self.q_motors, self.q_springs)
+        return stability(self.model, point, self.q, self.tangent_stiffness)
 
     @property
     def conservative(self) -> bool:
@@ -166,8 +173,8 @@ def solve_equilibrium(
 
     It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
     has no energy, the one reached by Newton from there, or while the load grows from zero, or while the moments grow from the
-    equilibrium without them. A descent ends in a stable equilibrium, or in a neutral one (a symmetric robot that has buckled
-    can turn its bow about its axis), which is not certified stable.
+    equilibrium without them. A descent ends in a stable equilibrium, or in a neutral one (a round robot that has buckled can
+    turn its bow about its axis); `Equilibrium.stability` tells which.
 
     Args:
         model: The robot.
@@ -266,7 +273,7 @@ def equilibrium_from_state(
         residual=state.error,
         tolerance=largest_residual(model, state.scale, tolerance),
         iterations=iterations,
-        stable=is_stable(model, state.tangent, symmetric=load.conservative) if stable is None else stable,
+        stable=is_stable(model, load, state) if stable is None else stable,
     )
 
 

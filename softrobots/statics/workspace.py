@@ -15,11 +15,12 @@ from softrobots.core.errors import NeutralEquilibrium, ParameterError
 from softrobots.core.npz_file import LARGEST
 from softrobots.core.progress import with_progress
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastic_state import elastic_state, is_stable, largest_residual
+from softrobots.statics.elastic_state import elastic_state, largest_residual
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import tip_motion
+from softrobots.statics.stability import is_stable
 from softrobots.version import __version__
 
 _BLOCK = 250  # samples in one block of a checkpoint
@@ -171,7 +172,7 @@ def _arrays(model: SoftModel, count: int) -> dict[str, tuple[type, tuple[int, ..
 def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
     """Motors, springs, tip and manipulability of a sample; None without a stable equilibrium."""
     state = balanced_state(model, motors, load, model.rest)
-    if state is None or not is_stable(model, state.tangent, symmetric=load.conservative):
+    if state is None or not is_stable(model, load, state):
         return None
     by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, model.tip)[:3])
     try:

@@ -22,8 +22,6 @@ from softrobots.description.tag_reader import read_tags
 from softrobots.model.soft_model import SoftModel
 from studies.soak.plain_sections import section_joints, section_slopes
 
-_STEP = 1e-5  # of central differences, [rad or m]; leaves 1e-10 of the load
-
 
 class Case(NamedTuple):
     """Cases of one robot, one row each."""
@@ -79,6 +77,8 @@ class PlainStatics:
         self._rotations = [np.array(placement.rotation) for placement in rigid.jointPlacements]
         self._translations = [np.array(placement.translation) for placement in rigid.jointPlacements]
         self._axes = [(False, np.zeros(3)), *(_axis(rigid, number) for number in range(1, self._count))]
+        self.inertias = [(float(body.mass), np.array(body.inertia)) for body in rigid.inertias]
+        """Mass [kg] and inertia [kg m^2] of each body about its centre of mass, in its own axes."""
         self._masses = [(float(body.mass), np.array(body.lever)) for body in rigid.inertias]
         tip = rigid.frames[model.frame_id(model.tip)]
         self._tip_parent, self._tip = int(tip.parentJoint), np.array(tip.placement.translation)
@@ -93,8 +93,8 @@ class PlainStatics:
         self._lengths = np.array([tag.length for tag in sections])
         rest = [[*(strain * tag.length for strain in tag.rest[:3]), (tag.rest[3] - 1.0) * tag.length] for tag in sections]
         self._rest_sections = np.array(rest).reshape(-1, 4)
-        stiffness = [[tag.bending_stiffness] * 2 + [tag.torsional_stiffness, tag.axial_stiffness] for tag in sections]
-        by_section = np.array(stiffness).reshape(-1, 4) / self._lengths[:, None]
+        by_tag = [[tag.bending_stiffness] * 2 + [tag.torsional_stiffness, tag.axial_stiffness] for tag in sections]
+        by_section = np.array(by_tag).reshape(-1, 4) / self._lengths[:, None]
         self._stiffness = np.concatenate([[table[name][0] for name in springs], by_section.ravel()])
         self._rest = np.concatenate([[table[name][1] for name in springs], self._rest_sections.ravel()])
         names = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in ("bend_x", "bend_y", "twist", "stretch"))]
@@ -110,6 +110,8 @@ class PlainStatics:
         origin = np.array(model.structure.strains(motors, zero))
         units = np.eye(model.n_springs)
         self._free = np.array([model.structure.strains(motors, unit) - origin for unit in units]).reshape(-1, len(names))
+        self.stiffness = np.einsum("is,s,is->i", self._free, self._stiffness, self._free)
+        """Stiffness of the elastic coordinates at rest, shape (n_springs,) [N m/rad or N/m]."""
         self._left_free = _null_space(self._muscles) if self._lengths_given else np.eye(len(names))
 
     def _names(self, group: Any) -> list[str]:
@@ -166,33 +168,6 @@ class PlainStatics:
         imbalance = np.linalg.norm(rows @ self._left_free.T, axis=1)
         return Balance(rows @ self._free.T, imbalance, size, torques[:, self._motor_columns], tip, rounding, held)
 
-    def tangent(self, case: Case, springs: FloatArray) -> FloatArray:
-        """Tangent stiffness of one case by central differences, shape (n_springs, n_springs).
-
-        Args:
-            case: A batch of one.
-            springs: Elastic coordinates, shape (n_springs,).
-        """
-        count = len(springs)
-        steps = _STEP * np.eye(count)
-        around = np.concatenate([springs + steps, springs - steps])
-        residual = self.balance(case.repeated(2 * count), around).residual
-        return np.asarray((residual[:count] - residual[count:]).T / (2.0 * _STEP))
-
-    def least_eigenvalue(self, case: Case, springs: FloatArray) -> tuple[float, float]:
-        """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, and how exact it is.
-
-        Args:
-            case: A batch of one.
-            springs: Elastic coordinates, shape (n_springs,).
-        """
-        stiffness = np.einsum("is,s,is->i", self._free, self._stiffness, self._free)
-        softness = 1.0 / np.sqrt(stiffness)
-        scaled = softness[:, None] * self.tangent(case, springs) * softness
-        size = float(self.balance(case, springs[None]).size[0])
-        error = 1e-9 * (1.0 + size / float(stiffness.min())) * len(springs)
-        return float(np.linalg.eigvals(scaled).real.min()), error
-
     def _strains(self, motors: FloatArray, springs: FloatArray) -> FloatArray:
         if not self._lengths_given:
             return springs
@@ -207,7 +182,29 @@ class PlainStatics:
 
     def _torques(self, case: Case, strains: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Load on every joint, shape (n, nv); the size of the load; and the tip."""
-        joints = self._joints(case.motors, strains)
+        n = len(strains)
+        turns, points = self._bodies(case.motors, strains)
+        tip = points[self._tip_parent] + turns[self._tip_parent] @ self._tip
+        pulled = self._carried(turns, points, tip, case.forces, case.moments, None)
+        weighed = self._carried(turns, points, tip, np.zeros((n, 3)), np.zeros((n, 3)), case.gravity)
+        norm = np.linalg.norm
+        size = norm(case.forces, axis=1) * self.model.reach + norm(case.moments, axis=1) + norm(weighed, axis=1)
+        return pulled + weighed, size, tip
+
+    def bodies(self, motors: FloatArray, springs: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rotation, shape (n, b, 3, 3), and position of the centre of mass, shape (n, b, 3) [m], of every body.
+
+        Args:
+            motors: Actuators, n rows.
+            springs: Elastic coordinates, shape (n, n_springs).
+        """
+        turns, points = self._bodies(motors, self._strains(motors, springs))
+        centres = [point + turn @ lever for point, turn, (_, lever) in zip(points, turns, self._masses, strict=True)]
+        return np.stack(turns, axis=1), np.stack(centres, axis=1)
+
+    def _bodies(self, motors: FloatArray, strains: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Rotation and origin of every body in the world, shapes (n, 3, 3) and (n, 3)."""
+        joints = self._joints(motors, strains)
         n = len(joints)
         turns: list[FloatArray] = [np.tile(np.eye(3), (n, 1, 1))]
         points: list[FloatArray] = [np.zeros((n, 3))]
@@ -223,12 +220,7 @@ class PlainStatics:
                 turn = turn @ _turns(axis, coordinate)
             turns.append(turn)
             points.append(point)
-        tip = points[self._tip_parent] + turns[self._tip_parent] @ self._tip
-        pulled = self._carried(turns, points, tip, case.forces, case.moments, None)
-        weighed = self._carried(turns, points, tip, np.zeros((n, 3)), np.zeros((n, 3)), case.gravity)
-        norm = np.linalg.norm
-        size = norm(case.forces, axis=1) * self.model.reach + norm(case.moments, axis=1) + norm(weighed, axis=1)
-        return pulled + weighed, size, tip
+        return turns, points
 
     def _carried(
         self,

@@ -14,6 +14,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import MOMENT_FLOOR, TOLERANCE
 from studies.soak.families import Family, draw_cases
 from studies.soak.jobs import JOBS, STABLE, Answer
+from studies.soak.plain_stability import CLOSE, growth, least_eigenvalue
 from studies.soak.plain_statics import Case, PlainStatics
 
 MOST_ITERATIONS = 200
@@ -128,10 +129,20 @@ def _check(tally: Tally, family: Family, chunk: int, statics: PlainStatics, case
                 broken.append(f"the {name.replace('_', ' ')} is off by {error:.3g}")
         if answer.row % family.tangents == 0 and springs.shape[1] <= LARGEST_TANGENT and residual[place] < WORST:
             tally.tangents += 1
-            eigenvalue, error = statics.least_eigenvalue(answered.row(place), springs[place])
-            if (eigenvalue < -error) if answer.outcome == STABLE else (eigenvalue > error):
-                broken.append(f"reported as {answer.outcome}, least eigenvalue {eigenvalue:.3g} within {error:.1g}")
+            broken += _wrong_verdict(statics, answered.row(place), answer)
         tally.broken += [(family.chunk * chunk + answer.row, law) for law in broken]
+
+
+def _wrong_verdict(statics: PlainStatics, case: Case, answer: Answer) -> list[str]:
+    """What is wrong with what an answer says of its stability."""
+    springs = np.asarray(answer.springs)
+    if case.moments.any():
+        rate = growth(statics, case, springs)
+        wrong = rate is not None and (rate > CLOSE if answer.outcome == STABLE else rate == 0.0)
+        return [f"reported as {answer.outcome}, vibrations grow by {rate:.3g} of their frequency"] if wrong else []
+    eigenvalue, error = least_eigenvalue(statics, case, springs)
+    wrong = (eigenvalue < -error) if answer.outcome == STABLE else (eigenvalue > error)
+    return [f"reported as {answer.outcome}, least eigenvalue {eigenvalue:.3g} within {error:.1g}"] if wrong else []
 
 
 def case_text(model: SoftModel, case: Case, answers: Sequence[Answer]) -> str:

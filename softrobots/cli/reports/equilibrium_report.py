@@ -12,6 +12,7 @@ from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
+from softrobots.statics.stability import DIVERGENT, FLUTTER, NEUTRAL, STABLE, UNKNOWN
 
 _LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
 """Unit of the load on a coordinate, by the unit of the coordinate; the load on a given tension is the tension."""
@@ -35,6 +36,8 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
         Fact("muscle_lengths", equilibrium.muscle_lengths, "m"),
         Fact("muscle_forces", equilibrium.muscle_forces, "N"),
         Fact("stable", equilibrium.stable),
+        Fact("stability", equilibrium.stability.kind),
+        Fact("growth_rate", equilibrium.stability.growth_rate, "1/s"),
         Fact("conservative", equilibrium.conservative),
         Fact("within_limits", equilibrium.within_limits),
         Fact("residual", equilibrium.residual, "N m"),
@@ -77,13 +80,25 @@ def summary_lines(equilibrium: Equilibrium) -> list[str]:
     rows = [
         ("tip position", f"{formatted(equilibrium.tip_position)} m"),
         ("tip roll, pitch, yaw", f"{formatted(np.where(abs(rpy) < 1e-15, 0.0, rpy))} rad"),
-        ("stable", "yes, certified" if equilibrium.stable else "NO: not certified"),
+        ("stable", stability_words(equilibrium)),
         ("within limits", "yes" if equilibrium.within_limits else "NO: a motor, a muscle or a spring is beyond its limits"),
         *links,
         ("conservative", "yes" if equilibrium.conservative else "no: a world-fixed moment has no potential"),
         ("residual", f"{equilibrium.residual:.2g} N m ({equilibrium.tolerance:.2g} N m allowed), {steps}"),
     ]
     return aligned(rows)
+
+
+def stability_words(equilibrium: Equilibrium) -> str:
+    """Whether an equilibrium is stable, and if not, what happens to it."""
+    words = {
+        STABLE: "yes, certified",
+        NEUTRAL: "NO: neutral, it can be moved aside without a force",
+        DIVERGENT: f"NO: divergent, a disturbance grows by {equilibrium.stability.growth_rate:.3g} 1/s",
+        FLUTTER: f"NO: flutter, vibrations grow by {equilibrium.stability.growth_rate:.3g} 1/s without damping",
+        UNKNOWN: "NO: not known, a moment acts and the description has no masses",
+    }
+    return words[equilibrium.stability.kind]
 
 
 def wrinkling_moments(model: SoftModel) -> list[float]:
