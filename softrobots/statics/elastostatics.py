@@ -27,6 +27,9 @@ from softrobots.statics.stability import is_positive, is_stable
 METHODS = ("newton", "fixed_point")
 """The solvers of `solve_equilibrium`."""
 
+MOST_ITERATIONS = {"newton": 200, "fixed_point": 1000}
+"""Default limit of evaluations of each solver."""
+
 LARGEST_STEP = 0.5
 """Norm of the largest Newton step [rad]; the linear model of a revolute chain is inaccurate beyond."""
 
@@ -45,9 +48,9 @@ def solve_springs(
     *,
     method: str = "newton",
     tolerance: float = TOLERANCE,
-    max_iterations: int = 200,
+    max_iterations: int | None = None,
 ) -> tuple[ElasticState, int, bool]:
-    """Solve for the elastic coordinates; arguments are not checked.
+    """Solve for the elastic coordinates; arguments are not checked, and `MOST_ITERATIONS` is the default limit of evaluations.
 
     Returns:
         The last state, whether or not it meets the tolerance (see `largest_residual`); the evaluations spent; and whether that
@@ -56,7 +59,7 @@ def solve_springs(
     problem = ElasticProblem(model, q_motors, load, tolerance)
     solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
     with one_blas_thread(model.n_springs):
-        return solve(problem, start, max_iterations)
+        return solve(problem, start, MOST_ITERATIONS[method] if max_iterations is None else max_iterations)
 
 
 def balanced_state(
@@ -69,8 +72,7 @@ def balanced_state(
     tolerance: float = TOLERANCE,
 ) -> ElasticState | None:
     """Solve for the elastic coordinates; None where the residual stays above `TOLERANCE`."""
-    most = 200 if method == "newton" else 1000
-    state, _, _ = solve_springs(model, q_motors, load, start, method=method, tolerance=tolerance, max_iterations=most)
+    state, _, _ = solve_springs(model, q_motors, load, start, method=method, tolerance=tolerance)
     return state if state.error <= largest_residual(model, state.scale, max(tolerance, TOLERANCE)) else None
 
 

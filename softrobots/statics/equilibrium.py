@@ -204,9 +204,7 @@ def solve_equilibrium(
     if q_springs0 is not None and not model.coordinates.at(motors, start).valid:
         raise ParameterError("q_springs0", start, "within the range of every section (see strain_chain.in_range)")
     positive_number("tolerance", tolerance)
-    most = (
-        (200 if method == "newton" else 1000) if max_iterations is None else positive_integer("max_iterations", max_iterations)
-    )
+    most = None if max_iterations is None else positive_integer("max_iterations", max_iterations)
     state, iterations, stable = solve_springs(
         model, motors, load, start, method=method, tolerance=tolerance, max_iterations=most
     )
