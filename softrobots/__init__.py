@@ -28,7 +28,7 @@ from softrobots.description.composition import mount
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup
-from softrobots.robots import ROBOTS, HelixTube, InflatableArm, PccArm
+from softrobots.robots import ROBOTS, AssumedStiffnessWarning, HelixTube, InflatableArm, PccArm
 from softrobots.robots.growth import grown_coordinates
 from softrobots.statics.critical_load import critical_load
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 __all__ = [
     "EARTH_GRAVITY",
     "ROBOTS",
+    "AssumedStiffnessWarning",
     "ClusterError",
     "DescriptionError",
     "Equilibrium",

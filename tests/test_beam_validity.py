@@ -13,7 +13,6 @@ import pytest
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.description.composition import fix_joints
 from studies.beam_validity import arm as arm_study
 from studies.beam_validity.arm import arm_rod, cases_of, solved
 from studies.beam_validity.link import link_at, lumped, reached
@@ -132,23 +131,21 @@ def test_one_rod_is_the_same_as_two_halves_and_turns_with_its_load() -> None:
 # --- Pseudo-rigid links
 
 
-def two_hinges(links: int) -> sr.SoftModel:
-    """Links of two hinges by their formula, with the motor in the middle of each held at 0."""
-    apart = np.sqrt(0.6**2 / 12.0 + ROD.bending / ROD.shear)
-    offsets = (0.3 - apart, apart) * links
-    robot = sr.InflatableArm(link_lengths=(0.3,) * 2 * links, hinge_offset=offsets, stiffness=2.0 * ROD.bending / 0.6)
-    return sr.load_model(fix_joints(robot, {f"motor_{2 * number + 3}": 0.0 for number in range(links)}))
+def two_hinges(links: int, **options: Any) -> sr.SoftModel:
+    lengths = (0.6,) * links
+    return sr.load_model(sr.InflatableArm(link_lengths=lengths, link_model="two_hinges", young_modulus=MODULUS, **options))
 
 
 def test_two_hinges_have_the_compliance_of_the_beam() -> None:
-    """Deflection and rotation under a force and under a moment at the tip: L^3/3B + L/A, L^2/2B, L/B."""
-    model = two_hinges(1)
+    """Deflection and rotation under a force and under a moment at the tip: L^3/3B + L/A, L^2/2B, L/B; and twist: L/C."""
+    model = two_hinges(1, torsion=True)
     compliance = sr.compliance(model, sr.solve_equilibrium(model, (0, 0)))
     deflection, rotation, bent = 0.6**3 / (3.0 * ROD.bending) + 0.6 / ROD.shear, 0.6**2 / (2.0 * ROD.bending), 0.6 / ROD.bending
     assert compliance[np.ix_([1, 5], [1, 5])] == pytest.approx(np.array([[deflection, rotation], [rotation, bent]]), rel=1e-12)
     assert compliance[np.ix_([2, 4], [2, 4])] == pytest.approx(
         np.array([[deflection, -rotation], [-rotation, bent]]), rel=1e-12
     )
+    assert compliance[3, 3] == pytest.approx(0.6 / ROD.twisting, rel=1e-12)
 
 
 def test_the_straight_arm_of_the_paper_sags_by_what_its_hinges_say() -> None:
@@ -200,7 +197,7 @@ def test_the_record_is_what_a_fresh_run_says() -> None:
     rod = arm_rod(inflated_rods)
     drawn = list(cases_of(inflated_rods, rod, 2, arm["seed"]))
     first = arm["first"]["also twist and stretch"]
-    for name in ("as in the paper", "two hinges by (1)"):
+    for name in ("as in the paper", "two hinges by (1)", "two hinges that twist"):
         model = sr.load_model(lumped(rod)[name].robot(2))
         for (case, found), recorded in zip(drawn, first[name], strict=False):
             (tip,) = solved(model, [case])
@@ -246,6 +243,9 @@ def test_what_the_guide_says_is_what_was_recorded() -> None:
     assert "The paper's link deflects 8 to 11 % less" in text
     assert -11.5 < min(at_wrinkling["as in the paper"]) < max(at_wrinkling["as in the paper"]) < -7.5
     assert two["error_m"][2] < 0.1 * paper["error_m"][2]
+    assert record["arm"]["cases"] == 400
+    assert two["share"][0] <= 0.005
+    assert twisting["two hinges that twist"]["share"][0] <= 0.01
 
 
 def test_a_small_run_writes_tables_numbers_and_pictures(

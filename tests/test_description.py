@@ -23,7 +23,7 @@ from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube, PccArm
-from softrobots.robots.fields import default_text, facts_of
+from softrobots.robots.fields import argument_text, default_text, facts_of
 from tests.conftest import CHECKOUT
 from tests.support.laws import law
 from tests.support.oracles import tube_points
@@ -139,17 +139,17 @@ def test_the_table_of_the_guide_has_the_defaults_of_the_arm() -> None:
     facts, scales = facts_of(sr.InflatableArm), {"mm": (1e-3, "m"), "kPa": (1e3, "Pa")}
     defaults = {field.name: field.default for field in dataclasses.fields(sr.InflatableArm)}
     checked = []
-    for names, cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]*) \|", page, flags=re.MULTILINE)[:9]:
-        values = re.findall(r"(\([\d., ]+\)|[\d.]+|pi|none) ?([^,:]*)", cell)
+    for names, cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]*) \|", page, flags=re.MULTILINE)[:11]:
+        values = re.findall(r"(\([\d., ]+\)|[\d.]+|pi|none|paper|false) ?([^,:]*)", cell)
         for name, (number, unit) in zip(re.findall(r"\w+", names), itertools.cycle(values), strict=False):
             scale, unit = scales.get(unit, (1.0, unit))
-            if number == "none":
-                assert defaults[name] is None
+            if number in ("none", "paper", "false"):
+                assert argument_text(defaults[name]) == number.replace("none", "")
             else:
                 assert np.allclose(scale * np.array(eval(number, {"pi": math.pi})), defaults[name], rtol=1e-15), name
                 assert unit == facts[name].unit, name
             checked.append(name)
-    assert len(checked) == 13
+    assert len(checked) == 17
 
 
 def test_mass_centre_and_inertia_are_those_of_two_capped_tubes() -> None:

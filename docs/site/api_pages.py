@@ -46,6 +46,7 @@ PAGES = {
         "Parameters of a robot, what is loaded of it, and one robot on another.",
         (
             *_top("InflatableArm", "PccArm", "HelixTube", "ROBOTS", "robots.Robot", "robots.fields.XacroRobot"),
+            *_top("robots.inflated_links.InflatedLinks", "AssumedStiffnessWarning"),
             *(f"softrobots.robots.fields.{name}" for name in ("parameter", "per_part", "check_parameters", "Facts")),
             *_top("load_model", "with_springs", "SoftModel", "SpringGroup", "grown_coordinates"),
             *(f"softrobots.robots.parameter_file.{name}" for name in ("read_robot", "read_parameters", "write_parameters")),

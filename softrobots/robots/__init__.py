@@ -9,6 +9,7 @@ from softrobots.description.sources import Robot
 from softrobots.robots.fields import XacroRobot
 from softrobots.robots.helix_tube import HelixTube
 from softrobots.robots.inflatable_arm import InflatableArm
+from softrobots.robots.inflated_links import AssumedStiffnessWarning
 from softrobots.robots.pcc_arm import PccArm
 
 ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
@@ -30,4 +31,4 @@ def robot_class(name: str) -> tuple[Any, Mapping[str, Any]]:
     return (constructor.func, constructor.keywords) if isinstance(constructor, partial) else (constructor, {})
 
 
-__all__ = ["ROBOTS", "HelixTube", "InflatableArm", "PccArm", "Robot", "XacroRobot", "robot_class"]
+__all__ = ["ROBOTS", "AssumedStiffnessWarning", "HelixTube", "InflatableArm", "PccArm", "Robot", "XacroRobot", "robot_class"]

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from softrobots.core.errors import ParameterError
 from softrobots.robots.fields import PerPart, numbers, parameter, per_part
@@ -60,6 +63,12 @@ class InflatableArm(InflatedLinks):
         above=0.0,
         form="special",
     )
+    payload: float | Sequence[float] | None = parameter(
+        None,
+        "kg, m",
+        "Load on the tip: its mass, or mass, x, y, z with its place in the frame of the tip; a ball of 2700 kg/m^3",
+        form="special",
+    )
 
     XACRO = "inflatable_arm.urdf.xacro"
 
@@ -76,8 +85,19 @@ class InflatableArm(InflatedLinks):
         if min(limits) <= 0.0:
             raise ParameterError("wrist_limits", self.wrist_limits, "above 0 [rad]")
         object.__setattr__(self, "wrist_limits", limits)
+        if self.payload is not None:
+            object.__setattr__(self, "payload", self._checked_payload(self.payload))
 
     @property
     def n_joints(self) -> int:
         """Number of movable joints of the chain."""
         return (1 + self.springs_per_link) * self.n_links + (1 if self.wrist is None else 4)
+
+    def _checked_payload(self, value: Any) -> tuple[float, ...]:
+        single = not isinstance(value, str) and np.ndim(value) == 0
+        payload = (*numbers("payload", value, 1, "kg"), 0.0, 0.0, 0.0) if single else numbers("payload", value, None, "kg, m")
+        if len(payload) != 4 or payload[0] <= 1e-6:
+            raise ParameterError(
+                "payload", value, "a mass above 1e-6, or mass, x, y, z of it in the frame of the tip [kg, m]; or None"
+            )
+        return payload

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,10 @@ LINK_MODELS = ("paper", "two_hinges")
 """Where an inflated link bends."""
 PAPER_LINK = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005, "pressure": 50e3}
 """The link whose stiffness the paper gives [m, Pa]."""
+
+
+class AssumedStiffnessWarning(UserWarning):
+    """Links of other size or pressure than the paper's have its stiffness, because neither stiffness nor modulus is given."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,3 +279,16 @@ class InflatedLinks(XacroRobot):
         for offset, length in zip(self._each("hinge_offset"), lengths, strict=True):
             if offset >= length:
                 raise ParameterError("hinge_offset", self.hinge_offset, f"below the link lengths {lengths} m")
+        if self.stiffness is None and self.young_modulus is None:
+            self._tell_assumed_stiffness()
+
+    def _tell_assumed_stiffness(self) -> None:
+        paper = {"link_lengths" if name == "length" else name: value for name, value in PAPER_LINK.items()}
+        others = [f"{name} = {self._each(name)}" for name, value in paper.items() if set(self._each(name)) != {value}]
+        if others:
+            text = (
+                f"{', '.join(others)}: the springs are still those of the paper's link, {inflated_beam.MEAN_STIFFNESS} N m/rad "
+                "(length 0.6 m, radius 0.055 m, wall 0.0005 m, mean of 10 to 60 kPa); give stiffness, or young_modulus (its "
+                "wall has 1.374e8 Pa)"
+            )
+            warnings.warn(text, AssumedStiffnessWarning, stacklevel=6)

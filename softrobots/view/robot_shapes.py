@@ -111,8 +111,8 @@ class RobotShapes:
     def _inflated_links(self) -> list[int | None]:
         """Number of the inflated link of every shape, or None.
 
-        An inflated link is the URDF link on its last spring and the cylinder of the same radius before its first spring. Other
-        links that are fixed to it do not belong to it.
+        An inflated link is the URDF links from its first spring to its last one and the cylinder of the same radius before its
+        first spring. Other links that are fixed to it do not belong to it.
         """
         pin_model, objects = self._model.pinocchio, self._geometry.geometryObjects
         links: list[int | None] = [None] * len(objects)
@@ -129,11 +129,13 @@ class RobotShapes:
                         links[place] = number
                 continue
             first, last = (pin_model.getJointId(names[place]) for place in (0, -1))
+            supports = pin_model.supports[last].tolist()
+            between = supports[supports.index(first) :] if first in supports else [last]
             for place, shape in enumerate(objects):
                 tube = isinstance(shape.geometry, coal.Cylinder) and math.isclose(shape.geometry.radius, group.radius)
                 of_another = moved[place] and shape.parentJoint in ends
                 before = tube and shape.parentJoint == pin_model.parents[first] and not of_another
-                if (shape.parentJoint == last and moved[place]) or before:
+                if (shape.parentJoint in between and moved[place]) or before:
                     links[place] = number
         return links
 

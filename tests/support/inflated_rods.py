@@ -51,12 +51,12 @@ class InflatedRod:
         young_modulus: float,
         poisson_ratio: float = 0.3,
     ) -> InflatedRod:
-        """A thin inflated tube as [Troise 2021] (1) has it: B = (E + P/S) I, A = P + G S / 2. C = 2 G I and D = E S are those
-        of the wall alone."""
+        """A thin inflated tube as [Troise 2021] (1) has it: B = (E + P/S) I, A = P + G S / 2. D = E S, C = 2 (G + P/S) I: the
+        tension of the wall pulls twisted fibres straight."""
         cap, wall = pressure * np.pi * radius**2, 2.0 * np.pi * radius * wall_thickness
         second, shear = np.pi * radius**3 * wall_thickness, young_modulus / (2.0 * (1.0 + poisson_ratio))
         bending = (young_modulus + cap / wall) * second
-        return cls(length, bending, cap + 0.5 * shear * wall, 2.0 * shear * second, young_modulus * wall)
+        return cls(length, bending, cap + 0.5 * shear * wall, 2.0 * (shear + cap / wall) * second, young_modulus * wall)
 
     def planar(self) -> InflatedRod:
         """The same rod with what (1) has, bending and shear: it neither twists nor stretches."""

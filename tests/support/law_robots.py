@@ -17,6 +17,7 @@ PUSHES = {
     "arm": 100.0,
     "limp": 30.0,
     "three_links": 60.0,
+    "two_hinges": 60.0,
     "pcc": 2.0,
     "pulled": 2.0,
     "pcc_lumped": 2.0,
@@ -44,6 +45,7 @@ def model(kind: str) -> sr.SoftModel:
         "three_links": lambda: sr.InflatableArm(
             link_lengths=(0.5, 0.4, 0.3), stiffness=(250.0, 120.0, 80.0), rest_side=(0.05, -0.02, 0.0), rest_up=-0.1
         ),
+        "two_hinges": lambda: sr.InflatableArm(link_model="two_hinges", torsion=True, shear_modulus=3e7, rest_up=0.1),
         "pcc": lambda: sr.PccArm(elastic_sections=2),
         "pulled": lambda: sr.PccArm(elastic_sections=2),
         "pcc_lumped": lambda: sr.PccArm(chain="lumped", hinges=3, offset=np.pi),  # its hinges have two planes of symmetry

@@ -49,6 +49,7 @@ def uneven() -> SoftModel:
 
 ROBOTS: dict[str, Callable[[], SoftModel]] = {
     "arm": lambda: sr.load_model(sr.InflatableArm()),
+    "two_hinges": lambda: sr.load_model(sr.InflatableArm(link_model="two_hinges", torsion=True)),
     "pcc": lambda: pcc(elastic_sections=2),
     "pcc_forces": lambda: pcc(elastic_sections=2, muscles="forces"),
     "pcc_lumped": lambda: pcc(chain="lumped", hinges=2),

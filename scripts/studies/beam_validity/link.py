@@ -12,7 +12,6 @@ from tqdm import tqdm
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.description.composition import fix_joints
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 
 TUBE = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005}
@@ -21,6 +20,8 @@ LENGTH, HINGE = TUBE["length"], 0.03
 """Length of a link and the paper's distance of its hinge from the clamp [m]."""
 SHOWN = 50e3
 """Pressure of the arm and of the curves over the load [Pa]."""
+TWISTING = "two hinges that twist"
+"""The only lumped link that twists."""
 LIMITS = (1.0, 5.0)
 """Differences whose lines are drawn [%]."""
 
@@ -32,16 +33,24 @@ class Hinges(NamedTuple):
     """Distances from the clamp [m]."""
     stiffness: float
     """Of each spring [N m/rad]."""
+    twist: float | None = None
+    """Of the spring that twists the link [N m/rad]."""
+    pressure: float = SHOWN
+    """Of the link [Pa]; two hinges stand where it has them."""
 
-    def robot(self, links: int) -> Any:
-        """An arm of such links. A link of two hinges is two links of half the length, the motor between them fixed at 0."""
-        half = LENGTH / len(self.places)
-        offsets = [place - half * number for number, place in enumerate(self.places)] * links
-        robot = sr.InflatableArm(
-            link_lengths=(half,) * len(offsets), hinge_offset=tuple(offsets), stiffness=self.stiffness, pressure=SHOWN
+    def robot(self, links: int) -> sr.InflatableArm:
+        """An arm of such links."""
+        lengths = (LENGTH,) * links
+        if len(self.places) == 1:
+            (place,) = self.places
+            return sr.InflatableArm(link_lengths=lengths, hinge_offset=place, stiffness=self.stiffness, pressure=self.pressure)
+        return sr.InflatableArm(
+            link_lengths=lengths,
+            link_model="two_hinges",
+            torsion=self.twist is not None,
+            stiffness=self.stiffness,
+            pressure=self.pressure,
         )
-        within = [f"motor_{number + 2}" for number in range(1, len(offsets)) if number % len(self.places)]
-        return fix_joints(robot, dict.fromkeys(within, 0.0)) if within else robot
 
 
 def modulus() -> float:
@@ -50,21 +59,25 @@ def modulus() -> float:
     return float(np.mean(found))
 
 
-def lumped(rod: Any) -> dict[str, Hinges]:
+def lumped(rod: Any, pressure: float = SHOWN) -> dict[str, Hinges]:
     """Ways to lump a beam that bends with B and shears with A; under a small tip force F it deflects v F and turns t F.
 
     - as in the paper: hinge at l1, mean stiffness;
     - its hinge, k by (1): `l2^2 / v`, so that the deflection is right;
     - one hinge: at `L - v / t`, `k = v / t^2`, so that deflection and rotation under a force are right;
-    - two hinges: at `L/2 -+ sqrt(L^2/12 + B/A)`, `k = 2 B / L` each, so that both are right under a force and a moment.
+    - two hinges: at `L/2 -+ sqrt(L^2/12 + B/A)`, `k = 2 B / L` each, so that both are right under a force and a moment;
+    - two hinges that twist, with `C / L`, if the beam twists.
     """
     deflection, rotation = LENGTH**3 / (3.0 * rod.bending) + LENGTH / rod.shear, LENGTH**2 / (2.0 * rod.bending)
     lever, apart = deflection / rotation, math.sqrt(LENGTH**2 / 12.0 + rod.bending / rod.shear)
+    two = Hinges((LENGTH / 2.0 - apart, LENGTH / 2.0 + apart), 2.0 * rod.bending / LENGTH, pressure=pressure)
+    twisting = {} if rod.twisting is None else {TWISTING: two._replace(twist=rod.twisting / LENGTH)}
     return {
         "as in the paper": Hinges((HINGE,), MEAN_STIFFNESS),
         "its hinge, k by (1)": Hinges((HINGE,), (LENGTH - HINGE) ** 2 / deflection),
         "one hinge by (1)": Hinges((LENGTH - lever,), lever / rotation),
-        "two hinges by (1)": Hinges((LENGTH / 2.0 - apart, LENGTH / 2.0 + apart), 2.0 * rod.bending / LENGTH),
+        "two hinges by (1)": two,
+        **twisting,
     }
 
 
@@ -92,7 +105,7 @@ def link_at(rods: ModuleType, pressure: float, loads: Sequence[float]) -> dict[s
     rod = rods.InflatedRod.tube(pressure=pressure, young_modulus=modulus(), **TUBE).planar()
     exact = exact_link(rods, rod, loads)
     found = {"(1)": linear_link(rod, pressure, loads)}
-    found |= {name: lumped_link(hinges, loads) for name, hinges in lumped(rod).items()}
+    found |= {name: lumped_link(hinges, loads) for name, hinges in lumped(rod, pressure).items()}
     moment = inflated_beam.wrinkling_moment(pressure, TUBE["radius"])
     return {
         "pressure_Pa": float(pressure),

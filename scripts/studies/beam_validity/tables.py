@@ -96,7 +96,8 @@ def arm_tables(arm: Mapping[str, Any]) -> list[str]:
         for name, row in rows.items():
             hinges = arm["hinges"].get(name)
             places = " and ".join(f"{1e3 * place:.0f}" for place in hinges["places_m"]) if hinges else ""
-            cells = [name, places, f"{hinges['stiffness_Nm']:.1f}" if hinges else ""]
+            twist = f", twist {hinges['twist_Nm']:.1f}" if hinges and hinges["twist_Nm"] else ""
+            cells = [name, places, f"{hinges['stiffness_Nm']:.1f}{twist}" if hinges else ""]
             for key, unit, digits in (("error_m", 1e3, 1), ("share", 1e2, 1), ("error_rad", 180.0 / math.pi, 2)):
                 cells.append(
                     "" if name == RIGID and key == "share" else " / ".join(f"{unit * value:.{digits}f}" for value in row[key])

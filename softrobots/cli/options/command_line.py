@@ -8,6 +8,7 @@ import io
 import os
 import re
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -64,7 +65,7 @@ def address_lines(url: str, tunnel: str) -> tuple[str, str]:
 
 
 def exit_status(run: Callable[[], object]) -> int:
-    """Run a command or script and return its exit status; print an error as one line on stderr.
+    """Run a command or script and return its exit status; print an error, and each warning once, as one line on stderr.
 
     Args:
         run: The whole job. It returns False if a check found something wrong; other results mean success.
@@ -91,8 +92,17 @@ def exit_status(run: Callable[[], object]) -> int:
 
 
 def _status(run: Callable[[], object]) -> int:
+    told: set[str] = set()
+
+    def tell(message: Any, *_: Any, **__: Any) -> None:
+        if str(message) not in told:
+            told.add(str(message))
+            _print_error(f"warning: {message}")
+
     try:
-        return 1 if run() is False else 0
+        with warnings.catch_warnings():
+            warnings.showwarning = tell
+            return 1 if run() is False else 0
     except SoftRobotsError as error:
         _print_error(f"error: {error}")
         return 1 if isinstance(error, NotConverged) else 2
