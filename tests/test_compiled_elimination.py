@@ -165,7 +165,7 @@ def test_a_zero_pivot_is_guarded() -> None:
     part = Part(np.zeros((3, 1)), np.zeros((3, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.full(1, 5.0))
     (one,), beyond = go_back([part], pivot_shift=FLOOR)
     assert one.inverse_pivots == [1.0 / (5.0 * FLOOR)]
-    assert (beyond.min_pivot, beyond.n_negative_pivots) == (0.0, 1.0)
+    assert (beyond.min_pivot, beyond.n_negative_pivots) == (0.0, 0.0)
 
 
 def with_multipliers(beyond: Outboard, count: int) -> Outboard:

@@ -119,15 +119,15 @@ def test_pushed_straight(name: str) -> None:
         force = np.array([0.0, 0.0, -push])
         found = solver.equilibria(model.relaxed_motors, force[None])
         checked = sr.solve_equilibrium(model, model.relaxed_motors, force, q_springs0=found.q_springs[0], tolerance=1e-9)
-        assert checked.iterations == 0
+        assert checked.iterations <= 3  # none, but to refine what is nearly neutral
         assert np.allclose(checked.tip_position, found.tip_positions[0], rtol=0.0, atol=1e-12)
-        assert found.status[0] == (Status.CERTIFIED if checked.stable else Status.UNSTABLE)
+        assert found.status[0] == {"stable": Status.CERTIFIED, "neutral": Status.NEUTRAL}[checked.stability.kind]
         # A bow of an arm that is equally soft in all directions can turn freely: neutral, so not certified.
         bowed = name == "sections_forces" and push > 5.0
-        assert (found.status[0] == Status.UNSTABLE) == bowed
+        assert (found.status[0] == Status.NEUTRAL) == bowed
         assert (np.linalg.norm(found.tip_positions[0, :2]) > 0.1) == bowed
         if bowed:
-            with pytest.raises(sr.EquilibriumNotFound, match="in balance, but not stable") as caught:
+            with pytest.raises(sr.EquilibriumNotFound, match="in balance, but neutral") as caught:
                 solver.equilibrium(model.relaxed_motors, force)
             assert np.all(np.isfinite(caught.value.best.q_springs))
             assert caught.value.residual == caught.value.best.residual

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.compiled import Status
 from softrobots.statics.elastic_state import ElasticState, elastic_state
 from softrobots.statics.loads import Load
 
@@ -84,3 +85,18 @@ def test_what_cannot_turn_is_not_neutral() -> None:
     assert held.stability.kind == "stable"
     arm = sr.load_model(sr.InflatableArm())
     assert sr.solve_equilibrium(arm, (0, 0, 0), (-130.0, 0, 0)).stability.kind == "stable"
+
+
+def test_the_compiled_solvers_name_the_ring(rng: np.random.Generator) -> None:
+    """From rest, and from each place of the ring; a side force makes it stable again."""
+    model = rod("two segments")
+    solver = sr.compile(model, backend="python")
+    motors, start = np.zeros(model.n_motors), ring("two segments").q_springs
+    for angle in (None, *rng.uniform(-np.pi, np.pi, 2)):
+        options = {} if angle is None else {"q_springs0": turned(start, angle)}
+        with pytest.raises(sr.EquilibriumNotFound, match="in balance, but neutral") as caught:
+            solver.equilibrium(motors, gravity=(0, 0, -9.81), **options)
+        if angle is not None:
+            assert np.abs(caught.value.best.q_springs - turned(start, angle)).max() < 1e-8
+    batch = solver.equilibria(motors, [(0, 0, 0), (0.1, 0, 0)], gravity=(0, 0, -9.81))
+    assert batch.status.tolist() == [Status.NEUTRAL, Status.CERTIFIED]

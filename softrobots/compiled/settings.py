@@ -33,6 +33,9 @@ LARGEST_SIZE = 1e31
 POSITIVE_PIVOT = springs.POSITIVE
 """Smallest pivot that counts as positive, relative to the springs' own stiffness."""
 
+CLEARLY_POSITIVE_PIVOT = elastostatics.CLEARLY * POSITIVE_PIVOT
+"""Pivot beyond which the sign does not depend on the residual that is left."""
+
 SMALL_PIVOT_SHIFT = 1e-3
 """Least pivot of a step with shifted pivots, relative to the spring's own stiffness; used by turns with the larger one."""
 

@@ -11,7 +11,7 @@ class Status(IntEnum):
     CERTIFIED = 0
     """In balance to 1e-10 of the load, and certified stable."""
     UNSTABLE = 1
-    """In balance, but not stable: neutral, or a saddle that the descent did not leave."""
+    """In balance at a saddle that the descent did not leave: not stable."""
     UNSETTLED = 2
     """Not in balance after the largest number of steps; also where a load presses a section to the end of its range."""
     OUT_OF_RANGE = 3
@@ -24,6 +24,8 @@ class Status(IntEnum):
     """No force was found that explains the motor torques; or the tip does not reach its target, or only by a jump."""
     BEYOND_LIMITS = 7
     """The tip reaches its target only with a motor beyond its limits."""
+    NEUTRAL = 8
+    """In balance, and neutral: the robot can be moved aside without a force, as a round rod that has buckled."""
 
     @property
     def explanation(self) -> str:
@@ -40,4 +42,5 @@ _WORDS = {
     Status.UNOBSERVABLE: "the motors do not feel every direction of the force",
     Status.NOT_REACHED: "no force explains the torques, or the target is not reached",
     Status.BEYOND_LIMITS: "the target is reached only with a motor beyond its limits",
+    Status.NEUTRAL: "in balance, but neutral: it can be moved aside without a force",
 }

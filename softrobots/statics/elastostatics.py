@@ -36,7 +36,9 @@ LARGEST_STEP = 0.5
 ARMIJO = 1e-4
 """Share of the predicted decrease of the energy that a step must reach."""
 
-_CLEARLY = 1e3  # times `POSITIVE`: the sign of an eigenvalue beyond does not depend on the residual that is left
+CLEARLY = 1e3
+"""Times `POSITIVE`: the sign of an eigenvalue beyond does not depend on the residual that is left."""
+
 _SHORTEST = 1e-12  # share of a Newton step below which it is not halved again
 
 
@@ -94,9 +96,9 @@ def _descend(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Ela
     state, spent, stalled = problem.state(start), 0, False
     while spent < most:
         balanced = problem.balanced(state)
-        if balanced and is_positive(model, state.tangent, factors, times=_CLEARLY):
+        if balanced and is_positive(model, state.tangent, factors, times=CLEARLY):
             return state, spent, True
-        if balanced and state.error > 0.0 and is_positive(model, state.tangent, factors, times=-_CLEARLY):
+        if balanced and state.error > 0.0 and is_positive(model, state.tangent, factors, times=-CLEARLY):
             # Nearly neutral: the least eigenvalue is as far from its value as the residual from zero.
             finer = problem.state(state.q_springs + _stiff_step(state, stiffness))
             spent += 1

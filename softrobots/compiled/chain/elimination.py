@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.chain.elements import constants, vector
+from softrobots.compiled.settings import POSITIVE_PIVOT
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, smaller
 
 
@@ -38,7 +39,7 @@ class Outboard:
     min_pivot: Scalar
     """Smallest pivot in size, relative to the springs' own stiffness."""
     n_negative_pivots: Scalar
-    """Number of pivots that are not positive."""
+    """Number of pivots that are negative, by more than rounding."""
 
     @classmethod
     def tip(cls, right_hand_sides: int) -> Outboard:
@@ -121,7 +122,7 @@ def eliminate(
         pivot = block[j, j]
         relative = pivot / scales[j]
         min_pivot = smaller(absolute(relative), min_pivot)
-        n_negative_pivots = n_negative_pivots + if_less(0.0, relative, 0.0, 1.0)
+        n_negative_pivots = n_negative_pivots + if_less(relative, -POSITIVE_PIVOT, 1.0, 0.0)
         if not multipliers:
             pivot = if_less(0.0, pivot_shift, larger(absolute(pivot), pivot_shift * scales[j]), pivot)
         inverse.append(1.0 / pivot)

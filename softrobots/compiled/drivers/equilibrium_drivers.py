@@ -29,13 +29,19 @@ def is_settled(w: Array, tolerance: float) -> bool:
     return w[ERROR] <= tolerance * tolerance * w[SIZE] or w[ERROR] <= SPRING_ROUNDING * SPRING_ROUNDING
 
 
+def is_above(w: Array, least: float) -> bool:
+    """Tell whether all pivots of springs are larger than the least, and those of the constraints are negative."""
+    return w[MIN_PIVOT] > least and w[N_NEGATIVE_PIVOTS] - N_CONSTRAINTS < 0.5 and N_CONSTRAINTS - w[N_NEGATIVE_PIVOTS] < 0.5
+
+
 def is_stable(w: Array) -> bool:
-    """Tell whether all pivots of springs are clearly positive, and those of the constraints negative."""
-    return (
-        w[MIN_PIVOT] > POSITIVE_PIVOT
-        and w[N_NEGATIVE_PIVOTS] - N_CONSTRAINTS < 0.5
-        and N_CONSTRAINTS - w[N_NEGATIVE_PIVOTS] < 0.5
-    )
+    """Tell whether all pivots of springs are positive."""
+    return is_above(w, POSITIVE_PIVOT)
+
+
+def is_neutral(w: Array) -> bool:
+    """Tell whether a pivot of a spring is zero, and none is negative."""
+    return w[MIN_PIVOT] <= POSITIVE_PIVOT and is_above(w, -1.0)
 
 
 def move(w: Array, share: float) -> None:
@@ -77,6 +83,8 @@ def outcome(w: Array) -> int:
         return OUT_OF_RANGE
     if not is_settled(w, TOLERANCE):
         return UNSETTLED
+    if is_neutral(w):
+        return NEUTRAL
     if not is_stable(w):
         return UNSTABLE
     return CERTIFIED
@@ -143,10 +151,12 @@ def descend(w: Array) -> int:
     Pivots that are not positive are shifted: by turns to a small value, which is fast near a neutral equilibrium, and to
     several times the springs' own stiffness, since pivots behind a tiny one are huge. A step that does not lower the energy
     is halved; a short step with shifted pivots is doubled while that lowers the energy, since it hardly leaves a saddle. A
-    point that is not stable and makes no progress is left like a saddle. The descent ends in a stable equilibrium unless
-    there is none, a section comes to the end of its range, or the largest number of steps is reached.
+    point that is not stable and makes no progress is left like a saddle. The descent ends in a stable or neutral equilibrium
+    unless there is none, a section comes to the end of its range, or the largest number of steps is reached. Where it is
+    nearly neutral the residual is made as small as it can be: the least pivot is as far from its value as that from zero.
     """
     saddles = 0
+    refined = 0
     strong = 0
     w[PIVOT_SHIFT] = 0.0
     w[ITERATIONS] = 0.0
@@ -155,11 +165,16 @@ def descend(w: Array) -> int:
         w[ITERATIONS] += 1.0
         stable = is_stable(w)
         if is_settled(w, NEWTON_TOLERANCE):
-            if stable or saddles == 3:
+            if is_above(w, CLEARLY_POSITIVE_PIVOT) or saddles == 3:
                 break
-            saddles += 1
-            leave_saddle(w)
-            evaluate(w)
+            if refined < 3 and w[MIN_PIVOT] <= CLEARLY_POSITIVE_PIVOT and cross_valley(w):
+                refined += 1
+            elif stable or is_neutral(w):
+                break
+            else:
+                saddles += 1
+                leave_saddle(w)
+                evaluate(w)
         else:
             longest = 0.0
             if not stable:

@@ -15,6 +15,7 @@ NOT_A_NUMBER: int
 UNOBSERVABLE: int
 NOT_REACHED: int
 BEYOND_LIMITS: int
+NEUTRAL: int
 
 # Counts of the robot, and sizes of workspaces.
 N: int

@@ -8,11 +8,11 @@ from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance
 from softrobots.compiled.settings import (
     ARMIJO,
+    CLEARLY_POSITIVE_PIVOT,
     ENERGY_ROUNDING,
     LARGEST_STEP,
     LEAST_SIZE,
     NEWTON_TOLERANCE,
-    POSITIVE_PIVOT,
 )
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, square_root
@@ -78,7 +78,7 @@ def decide(plan: Plan, block: Block, point: dict[str, Scalar], *, starts: bool =
     settled_to = larger(point["size"] * NEWTON_TOLERANCE**2, unknowns.spring_rounding**2)
     all_signs = if_less(absolute(point["n_negative_pivots"] - float(len(unknowns.chain.constrained))), 0.5, 1.0, 0.0)
     sound = if_less(point["size"], 1e300, if_less(point["range_margin"], 0.0, 0.0, all_signs), 0.0)
-    stable = if_less(POSITIVE_PIVOT, point["min_pivot"], sound, 0.0)
+    stable = if_less(CLEARLY_POSITIVE_PIVOT, point["min_pivot"], sound, 0.0)
     going = if_less(energy, bound, 2.0 - 2.0 * stable, 2.0)
     new_mode = if_less(1.5, mode, 2.0, if_less(error, settled_to, 2.0 - stable, going))
     share = LARGEST_STEP / square_root(larger(length, LARGEST_STEP**2))
