@@ -17,6 +17,7 @@ PAGES = {
     "helix_growth": "helix_growth",
     "pcc_arm": "pcc_arm",
     "inflatable_arm": "wrinkling_arm",
+    "wrist": "wrist",
     "ur5_bench": "ur5_bench",
 }
 """Name of each page, and its exhibit."""

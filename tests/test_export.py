@@ -63,6 +63,9 @@ def _pcc(**options: Any) -> sr.SoftModel:
 
 CASES: Mapping[str, Callable[[], Case]] = {
     "arm": lambda: Case(sr.load_model(sr.InflatableArm()), (0.3, 0.6, -0.8), (0, 10, -15), sr.EARTH_GRAVITY),
+    "wrist": lambda: Case(
+        sr.load_model(sr.InflatableArm(wrist=(0.08, 0.12))), (0.3, 0.6, -0.8, 0.4, 0.5, 0.6), (0, 10, -15), sr.EARTH_GRAVITY
+    ),
     "rest angles": lambda: Case(
         sr.load_model(sr.InflatableArm(rest_side=(0.2, -0.1), rest_up=(-0.3, 0.05))), (1.0, -0.4, 0.9), (4, -6, 9), None
     ),

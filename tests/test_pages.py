@@ -31,7 +31,7 @@ from tests.support.tables import each_row
 pytestmark = pytest.mark.study
 
 FOLDER = CHECKOUT / "docs" / "pages"
-LIMITS = {"helix_growth": 3e6, "pcc_arm": 2e6, "inflatable_arm": 0.5e6, "ur5_bench": 2e6}
+LIMITS = {"helix_growth": 3e6, "pcc_arm": 2e6, "inflatable_arm": 0.5e6, "wrist": 0.5e6, "ur5_bench": 2e6}
 """Pages, and how many bytes each may have: they are committed."""
 BODIES = {"helix_growth": (2.0, 10.0), "pcc_arm": (0.3, 3.0)}
 """Pages that draw one body after the other, and how much more of it there may be at the end than at a quarter of the time."""
@@ -65,6 +65,7 @@ def coloured(picture: np.ndarray, name: str) -> np.ndarray:
         "helix_growth": (blue - red > 30) & (green < 150) | (red - blue > 25),  # actuator, and the wall
         "pcc_arm": np.abs(blue - red) > 80,  # muscles that pull, and that push
         "inflatable_arm": warm_or_purple,
+        "wrist": warm_or_purple,
         "ur5_bench": warm_or_purple | (picture.max(axis=2) < 60),  # the link, and the UR5's joints
     }[name]
 
@@ -167,7 +168,8 @@ def drawn_shapes(name: str) -> set[str]:
 
 def test_the_pages_show_the_robots_of_today() -> None:
     """What is drawn there are the shapes that the descriptions have now."""
-    for name, robot in (("inflatable_arm", sr.InflatableArm()), ("pcc_arm", sr.PccArm())):
+    wristed = sr.InflatableArm(wrist=(0.08, 0.12))
+    for name, robot in (("inflatable_arm", sr.InflatableArm()), ("wrist", wristed), ("pcc_arm", sr.PccArm())):
         assert drawn_shapes(name) == {shape.name for shape in RobotShapes(sr.load_model(robot)).shapes}
     assert {"forearm_link_0", "wrist_3_link_0"} <= drawn_shapes("ur5_bench")
     tube = HelixTube(length=2.0, elastic_sections=32, upright="axis")

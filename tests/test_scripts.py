@@ -39,6 +39,28 @@ def test_ik_trajectory_with_every_method(method: str, tmp_path: Path, capsys: py
     assert "60/60" in err  # a progress bar
 
 
+def test_ik_trajectory_turns_a_hand_on_a_wrist(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Poses, compensated to 1e-9 m and 1e-9 rad, also of equilibria solved anew (to 1e-10 themselves); and from a file."""
+    folder = tmp_path / "out"
+    assert run_script("ik_trajectory", ["--wrist", "--output", str(folder), "--steps", "40", "--gravity"]) == 0
+    names = {path.name for path in folder.iterdir()}
+    drawn = {"poses.png", "motor_angles.png", "tip_errors.png", "orientation_errors.png", "link_moments.png"}
+    results = {"trajectory.npz", "rigid.npz", "uncompensated.npz", "trajectory.csv", "summary.json", "scene.html"}
+    assert names == results | drawn
+    saved, summary = sr.load_result(folder / "trajectory.npz"), json.loads((folder / "summary.json").read_text())
+    assert saved.model.n_motors == 6
+    assert saved.orientations.shape == (41, 3, 3)
+    assert summary["verified_tip_error_m"] < 1.1e-9
+    assert summary["verified_orientation_error_rad"] < 1.1e-9
+    assert summary["orientation_error_uncompensated_rad"] > 0.05
+    assert "largest angle, rigid IK on the flexible arm" in capsys.readouterr().out
+    again = ["--wrist", "0", "0.2", "--csv", str(folder / "trajectory.csv"), "--gravity", "--no-plots"]
+    assert run_script("ik_trajectory", [*again, "--output", str(tmp_path / "again")]) == 0
+    assert sr.load_result(tmp_path / "again" / "trajectory.npz").orientation_error.max() < 1e-9
+    with pytest.raises(SystemExit):
+        run_script("ik_trajectory", ["--wrist", "a"])
+
+
 def test_ik_trajectory_reads_waypoints_gravity_and_parameters(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     waypoints = tmp_path / "path.csv"
     waypoints.write_text("t,x,y,z\n0,0.8,0,0.2\n1,0.8,0.1,0.2\n2,0.8,0.2,0.3\n", encoding="utf-8")
@@ -80,6 +102,9 @@ def test_ik_trajectory_serves_until_interrupted(tmp_path: Path, monkeypatch: pyt
         (["--gravity", "1", "2"], 2, "gravity"),
         (["--gain", "0"], 2, "gain"),
         (["--csv", "missing.csv"], 2, "missing.csv"),
+        (["--wrist", "0.1"], 2, "wrist"),
+        (["--end-rpy", "0", "1", "0"], 2, "given with --wrist"),
+        (["--wrist", "--method", "paper"], 2, "method"),
     ],
 )
 def test_ik_trajectory_refuses_bad_input_and_leaves_nothing(

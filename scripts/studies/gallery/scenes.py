@@ -59,6 +59,37 @@ def circling_arm(force: float, duration: float = 6.0) -> Viewer:
     return viewer
 
 
+def pointing_wrist(duration: float = 6.0, steps: int = 90) -> Viewer:
+    """The inflatable arm with a wrist under its weight and a force: the tip goes round, and the hand points at the middle.
+
+    Poses of the tip on a circle whose middle is beyond it, so that the hand leans inwards; sag and tilt are compensated.
+
+    Args:
+        duration: Time of a turn [s].
+        steps: Intervals between the waypoints.
+
+    Returns:
+        The viewer.
+
+    Raises:
+        ViewerError: If its server does not start.
+    """
+    middle = np.array([1.15, 0.0, 0.25])
+    poses = np.tile(np.eye(4), (steps + 1, 1, 1))
+    for pose, angle in zip(poses, 2.0 * np.pi * np.arange(steps + 1) / steps, strict=True):
+        pose[:3, 3] = (0.85, 0.3 * np.cos(angle), 0.25 + 0.3 * np.sin(angle))
+        forward = (middle - pose[:3, 3]) / np.linalg.norm(middle - pose[:3, 3])
+        left = np.cross((0.0, 0.0, 1.0), forward)
+        left /= np.linalg.norm(left)
+        pose[:3, :3] = np.column_stack([forward, left, np.cross(forward, left)])
+    model, times = load_model(InflatableArm(wrist=(0.08, 0.12))), np.linspace(0.0, duration, steps + 1)
+    push = (0.0, 0.0, -5.0)
+    path = follow_trajectory(model, poses, push, gravity=EARTH_GRAVITY, times=times, elbow="up", progress="poses")
+    viewer = view(model, path)
+    viewer.look_from((0.2, -1.1, 0.55), (0.45, 0.0, 0.2))
+    return viewer
+
+
 def moving_pcc_arm(duration: float = 6.0, frames: int = 90) -> Viewer:
     """The arm of pneumatic muscles under its weight and a force, led through muscle lengths that bend it all around.
 
@@ -124,6 +155,9 @@ EXHIBITS = {
     "inflatable_arm": Exhibit(lambda: circling_arm(18.0), "Inflatable arm, 18 N on the tip, sag compensated", 0.04),
     "wrinkling_arm": Exhibit(
         lambda: circling_arm(24.0), "Inflatable arm, 24 N on the tip: stretched out, link 1 wrinkles", 0.04
+    ),
+    "wrist": Exhibit(
+        pointing_wrist, "Inflatable arm with a wrist: poses of the hand under weight and 5 N, tilt compensated", 0.3
     ),
     "pcc_arm": Exhibit(moving_pcc_arm, "PCC arm led through muscle lengths, own weight and 4.7 N on the tip", 0.8),
     "helix_tube": Exhibit(sagging_helix_tube, "Helical tube under its own weight"),

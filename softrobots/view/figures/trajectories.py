@@ -29,6 +29,8 @@ from softrobots.view.figures.canvas import (
 def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
     """Backbone of the arm at some waypoints, deformed and rigid, with the path: after [Troise 2021] Figure 10.
 
+    Where the targets are poses, the axes of the tip are drawn, too.
+
     Args:
         trajectory: The trajectory.
         shown: How many poses, evenly spaced.
@@ -56,6 +58,12 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
         label = "loaded arm, later is darker" if first else None
         axes.plot(*loaded.T, color=(shade, shade, shade), lw=2.5, marker="o", ms=3.5, label=label)
         everything.append(loaded)
+        if trajectory.orientations is not None:
+            pose = equilibrium.transform_tip_to_world
+            for name, shape, axis in zip("xyz", ((0, "-"), (3, "--"), (4, ":")), pose.rotation.T, strict=True):
+                line = np.array([pose.translation, pose.translation + 0.07 * model.reach * axis])
+                label = f"{name} axis of the tip" if first else None
+                axes.plot(*line.T, color=COLOURS[shape[0]], lw=2.0, ls=shape[1], label=label)
     axes.plot(*trajectory.tip_positions.T, color=COLOURS[1], lw=2.0, ls="--", label="path of the tip")
     everything.append(force_arrow(axes, trajectory.equilibria[-1]))
     equal_box(axes, np.vstack(everything))
@@ -107,13 +115,33 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
         ParameterError: If shapes differ or a number is not finite.
         MissingDependency: If matplotlib is not installed.
     """
+    return _errors(errors, times, "tip error [mm]", "Distance of the loaded tip from its target", 1e3)
+
+
+def orientation_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
+    """Angle between the tip and its target orientation over time, one line a method, logarithmic.
+
+    Args:
+        errors: Angle by label, each shape (n,) [rad].
+        times: Times, shape (n,) [s].
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If shapes differ or a number is not finite.
+        MissingDependency: If matplotlib is not installed.
+    """
+    return _errors(errors, times, "angle [mrad]", "Angle between the loaded tip and its target orientation", 1e3)
+
+
+def _errors(errors: dict[str, FloatArray], times: FloatArray, ylabel: str, title: str, scale: float) -> Any:
     moments = finite_array("times", times, (None,), "s")
-    lines = {label: finite_array(f"errors[{label!r}]", error, moments.shape, "m") for label, error in errors.items()}
-    title = "Distance of the loaded tip from its target"
-    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel="tip error [mm]", title=title)
+    lines = {label: finite_array(f"errors[{label!r}]", error, moments.shape) for label, error in errors.items()}
+    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel=ylabel, title=title)
     every = max(len(moments) // 10, 1)
     for number, (label, error) in enumerate(lines.items()):
-        axes.semilogy(moments, np.maximum(error, 1e-16) * 1e3, markevery=every, label=label, **line_style(number))
+        axes.semilogy(moments, np.maximum(error, 1e-16) * scale, markevery=every, label=label, **line_style(number))
     axes.legend(fontsize=9)
     return figure
 
