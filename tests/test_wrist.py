@@ -141,6 +141,16 @@ def test_poses_of_random_motors_are_reached_under_load(wristed: sr.SoftModel) ->
     check_reached(wristed, 6, 5)
 
 
+@pytest.mark.parametrize(
+    "fields", [{"link_model": "two_hinges", "torsion": True}, {"payload": (0.4, 0.02, 0.0, 0.03)}, {"max_moment": 15.0}]
+)
+def test_other_arms_with_a_wrist_hold_poses_too(fields: dict) -> None:
+    robot = sr.InflatableArm(wrist=WRIST, **fields)
+    model = sr.load_model(robot)
+    assert model.pinocchio.nv == robot.n_joints
+    check_reached(model, 1, 6)
+
+
 @pytest.mark.study
 def test_poses_of_random_motors_are_reached_under_load_all(wristed: sr.SoftModel) -> None:
     check_reached(wristed, 250, 11)
