@@ -18,10 +18,12 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import softrobots as sr
 from softrobots.export import to_pinocchio, to_pybullet
+from softrobots.export.prepared import prepare
 from softrobots.export.snippets import MOST_JOINTS
 from softrobots.statics.kinematics import frame_placement
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
@@ -210,6 +212,20 @@ PENDULUM = (
     '<link name="tool"><visual><geometry><mesh filename="package://nowhere/tool.stl"/></geometry></visual></link></robot>'
 )
 """A hinge with narrow limits; at its end a link without mass whose mesh is nowhere."""
+
+
+@pytest.mark.parametrize(("side_joint", "tip", "body"), [("finger", "finger", "finger"), ("gripper", "slider", "finger")])
+def test_a_tip_is_a_link_or_else_the_link_of_a_joint(side_joint: str, tip: str, body: str) -> None:
+    """In all formats, also where a joint elsewhere has the name of the link; and it is the one whose pose is told."""
+    text = BRANCHED.replace('"gripper"', f'"{side_joint}"')
+    model = sr.load_model(text, springs=SPRINGS, tip=tip, motors=["shoulder", "elbow", side_joint])
+    for written in (to_pinocchio(model), to_pybullet(model)):
+        assert f'TIP = "{body}"' in written.replace("'", '"')
+    assert prepare(model).tip == body
+    found = sr.solve_equilibrium(model, (0.3, 0.2, 0.1), (3.0, 5.0, -10.0))
+    number = model.pinocchio.getFrameId(body, pin.FrameType.BODY)
+    pin.framesForwardKinematics(model.pinocchio, data := model.pinocchio.createData(), found.q)
+    assert np.allclose(found.tip_position, data.oMf[number].translation, rtol=0.0, atol=1e-14)
 
 
 def test_limits_and_links_without_mass(bullet: ModuleType) -> None:

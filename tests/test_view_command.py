@@ -7,6 +7,7 @@ import json
 import os
 import pty
 import queue
+import re
 import signal
 import socket
 import subprocess
@@ -23,6 +24,7 @@ import softrobots as sr
 from softrobots.cli.main import main
 from softrobots.view import animation_frames, slider_page
 from softrobots.view.browser import show_share
+from softrobots.view.live.loop import state_line
 from tests.support.pictures import coloured, listening, pixels
 from tests.support.tables import each_row
 
@@ -373,6 +375,32 @@ def test_results_that_cannot_be_shown_or_moved(arm: sr.SoftModel, tmp_path: Path
     for option in (["--live", "keyboard"], ["--sliders"]):
         assert main(["view", "--result", str(tmp_path / "path.npz"), *option]) == 2
         assert "no trajectory with" in capsys.readouterr().err
+
+
+def test_a_branch_is_shown_at_its_last_stable_point(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """One link that buckles: the fundamental path is stable below the critical force, a bow to its end."""
+    model = sr.load_model(sr.InflatableArm(link_lengths=(0.6,), stiffness=100.0))
+    table = {"spring_1_up": 60.0}
+    model = sr.with_springs(model, table)
+    found = {one.label: one for one in sr.post_buckling_branches(model, (0, 0), (-1, 0, 0), largest_step=0.2)}
+    file, page = tmp_path / "branches.npz", tmp_path / "page.html"
+    sr.save_result(tuple(found.values()), file)
+    for label, place in (("fundamental", np.flatnonzero(found["fundamental"].stable)[-1]), ("+spring_1_up", -1)):
+        words = ["view", "--result", str(file), f"--branch={label}", "--html", str(page), "--overwrite"]
+        assert main(words) == 0
+        shown = state_line(found[label].equilibria[place])
+        assert capsys.readouterr().out.splitlines()[0] == shown
+    for words, told in (
+        ([], r"--branch = '\(nothing\)'.*one of .*fundamental.*, as --branch=LABEL"),
+        (["--branch=side"], "--branch = 'side'.*fundamental"),
+    ):
+        assert main(["view", "--result", str(file), *words, "--html", str(tmp_path / "other.html")]) == 2
+        assert re.search(told, capsys.readouterr().err)
+    sr.save_result(found["fundamental"].equilibria[0], tmp_path / "one.npz")
+    assert main(["view", "--result", str(tmp_path / "one.npz"), "--branch=side"]) == 2
+    assert "the result has no branches" in capsys.readouterr().err
+    assert main(["view", "inflatable_arm", "--branch=side"]) == 2
+    assert "given together with --result" in capsys.readouterr().err
 
 
 def test_no_answer_ends_with_status_one(capsys: pytest.CaptureFixture) -> None:

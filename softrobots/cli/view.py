@@ -7,6 +7,7 @@ import contextlib
 import sys
 import tempfile
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from softrobots.core.result_file import load_result
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate
@@ -39,6 +41,7 @@ _EXAMPLES = """examples:
   softrobots view pcc_arm --sliders
   softrobots view helix_tube --growth --html growth.html
   softrobots view --result trajectory.npz --picture end.png --at 1
+  softrobots view --result branches.npz --branch=+spring_1_up
 """
 
 _NOT_WITH = {
@@ -49,8 +52,8 @@ _NOT_WITH = {
     "--sliders": ("--live",),
     "--live": ("--json",),
 }
-_SWITCHES = "motors target result growth live sliders html picture at overwrite open port json"
-_ONLY_WITH = {"--overwrite": ("--html", "--picture"), "--at": ("--picture",)}
+_SWITCHES = "motors target result branch growth live sliders html picture at overwrite open port json"
+_ONLY_WITH = {"--branch": ("--result",), "--overwrite": ("--html", "--picture"), "--at": ("--picture",)}
 
 
 def add_parser(subparsers: Any) -> None:
@@ -69,6 +72,8 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--target", "X Y Z", "move the loaded tip to this position by inverse kinematics [m] (no target)")
     help_text = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
     parser.add_argument("--result", type=Path, metavar="FILE.npz", help=help_text)
+    help_text = "the branch of a --result of `softrobots branches`, as --branch=LABEL: its last stable point (its only one)"
+    parser.add_argument("--branch", metavar="LABEL", help=help_text)
     parser.add_argument("--growth", action="store_true", help="show how a helical tube grows, without load")
     help_text = (
         "follow commands (none): `keyboard`, single keys of a terminal or lines of a pipe (? lists them), or a watched file"
@@ -131,14 +136,28 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Traject
             return solve_equilibrium(model, motors, **load)
         return solve_ik(model, arguments.target, q_motors0=None if arguments.motors is None else motors, **load)
     result = load_result(arguments.result)
+    if isinstance(result, tuple) and isinstance(result[0], EquilibriumBranch):
+        return _point_of(result, arguments.branch)
+    if arguments.branch is not None:
+        raise ParameterError("--branch", arguments.branch, "left out: the result has no branches")
     if isinstance(result, ImposedDisplacement | LoadEstimate):
         return result.equilibrium
     if isinstance(result, Equilibrium | IkSolution | Trajectory):
         return result
     kind = type(result).__name__
     raise ParameterError(
-        "--result", str(arguments.result), f"an equilibrium, a solution, an estimate or a trajectory, not a {kind}"
+        "--result", str(arguments.result), f"an equilibrium, a solution, an estimate, branches or a trajectory, not a {kind}"
     )
+
+
+def _point_of(branches: Sequence[EquilibriumBranch], label: str | None) -> Equilibrium:
+    """The last stable equilibrium of a branch, or its last one if none is."""
+    by_label = {branch.label: branch for branch in branches}
+    if label not in by_label and (label is not None or len(by_label) > 1):
+        raise ParameterError("--branch", label or "(nothing)", f"one of {', '.join(by_label)}, as --branch=LABEL")
+    branch = by_label[label] if label is not None else branches[0]
+    stable = [one for one, certified in zip(branch.equilibria, branch.stable, strict=True) if certified]
+    return (stable or branch.equilibria)[-1]
 
 
 def _grow(arguments: argparse.Namespace) -> None:

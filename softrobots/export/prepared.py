@@ -76,7 +76,7 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
     frequency = lowest_frequency(checked, mass) if damping == "critical" and springs else None
     return PreparedRobot(
         tree=replace(damped(tree, springs, frequency), springs=springs),
-        tip=_tip(tree, checked.tip),
+        tip=tip_body(tree, checked.tip),
         motors=() if welded else motors_of(checked, tree.joints, positions, mass),
         muscles=() if welded else muscles_of(checked, values[len(positions) :], mass),
         home=_home(checked, tree, values),
@@ -139,8 +139,8 @@ def _refuse_massless(tree: RigidTree) -> None:
         )
 
 
-def _tip(tree: RigidTree, name: str) -> str:
-    """Return the body at a frame, which is named by a link or by the joint of that link."""
+def tip_body(tree: RigidTree, name: str) -> str:
+    """Return the body at a frame, which is named by a link or by the joint of that link; a link goes before a joint."""
     links = (body.name for body in tree.bodies if body.name == name)
     return next(links, next((joint.child for joint in tree.joints if joint.name == name), name))
 

@@ -21,7 +21,7 @@ from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_
 from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.export.damping import lowest_frequency, mass_matrix, rule_text
 from softrobots.export.held import HeldRobot, hold
-from softrobots.export.prepared import checked_gravity, prepare
+from softrobots.export.prepared import checked_gravity, prepare, tip_body
 from softrobots.export.python_text import assignment, block, filled, table
 from softrobots.model.soft_model import SoftModel
 
@@ -124,10 +124,9 @@ def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None)
             length, or springs that are not linear.
     """
     held = _held(model, q_motors)
-    tips = [joint.child for joint in read_rigid_tree(model.urdf).joints if joint.name == model.tip]
     data = [
         assignment("ZERO", (0.0, 0.0, 0.0)),
-        assignment("TIP", (tips or [model.tip])[0]),
+        assignment("TIP", tip_body(read_rigid_tree(model.urdf), model.tip)),
         assignment("GRAVITY", checked_gravity(gravity), "[m/s^2], of main()"),
         table("SPRINGS", model.spring_table, "joint: stiffness [N m/rad or N/m], rest [rad or m]"),
         assignment("MOTORS", list(held.motors), "joints"),

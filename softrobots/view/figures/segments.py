@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.constant_curvature import AZIMUTHS, Arc, chain_transforms, transform
+from softrobots.constant_curvature import AZIMUTHS, Arc, transform
 from softrobots.constant_curvature.arcs import stack_arcs
 from softrobots.constant_curvature.poses import chain_frames
 from softrobots.core.checks import finite_array, positive_array
@@ -46,7 +46,7 @@ def arm(
     if apart.shape not in ((), (1,), stacked.shape):
         raise ParameterError("distance", distance, f"one number, or one for each of {stacked.shape[0]} segments")
     directions = finite_array("azimuths", azimuths, (None,), "rad")
-    starts, ends = chain_frames(stacked, offsets, frame)[0], chain_transforms(stacked, offsets, frame)
+    starts, ends = chain_frames(stacked, offsets, frame)
     figure, axes = new_space((7.0, 7.0), f"Constant curvature in closed form, {frame.replace('_', '-')} frames")
     share, drawn = np.linspace(0.0, 1.0, _POINTS), []
     for segment, reach in enumerate(np.broadcast_to(apart, stacked.shape)):
