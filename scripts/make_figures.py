@@ -43,6 +43,34 @@ def link_pressure() -> Any:
     return inflated_link.pressure_effects(TABLE_3, young_modulus=modulus, **LINK)
 
 
+def link_laws() -> Any:
+    """The laws of the moment of a link at 50 kPa, with the limits of its wall and what the paper measured."""
+    row, radius = TABLE_3[4], LINK["radius"]
+    limits = inflated_beam.moment_limits(row.pressure, radius)
+    angles = np.linspace(0.0, 0.5, 501)
+    slack = inflated_beam.slack_wall_moment(angles, stiffness=row.stiffness, slack_moment=limits.slack)
+    laws = {
+        "linear": row.stiffness * angles,
+        "plateau, as the paper": inflated_beam.moment(angles, stiffness=row.stiffness, max_moment=row.max_moment),
+        "slack wall, membrane theory": slack.moment,
+    }
+    title = f"Moment of a link at {row.pressure / 1e3:g} kPa, k = {row.stiffness:g} N m/rad"
+    figure, axes = canvas.new_plot((8.0, 5.0), xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
+    for number, (label, moments) in enumerate(laws.items()):
+        style = canvas.line_style(number) | {"marker": None}
+        axes.plot(angles, moments, lw=2.0, label=label, **style)
+    names = {"slack": "first fibre slack", "wrinkling": "half slack: wrinkling moment (3)", "collapse": "collapse"}
+    for name, words in names.items():
+        limit = float(getattr(limits, name))
+        axes.axhline(limit, color="0.45", lw=0.8)
+        axes.annotate(
+            f"{words}, {limit:.2f} N m", (0.5, limit), (-4, -4), textcoords="offset points", ha="right", va="top", fontsize=9
+        )
+    axes.set(xlim=(0.0, 0.5), ylim=(0.0, 30.0))
+    axes.legend(fontsize=9, loc="lower right")
+    return figure
+
+
 def arm_buckling() -> Any:
     """The straight arm pushed along its axis, exactly and a little beside."""
     arm = sr.load_model(sr.InflatableArm())
@@ -134,7 +162,7 @@ def three_fingers() -> sr.Viewer:
 
 FIGURES: dict[str, Callable[[], Any]] = {
     function.__name__: function
-    for function in (link_deflection, link_pressure, link_reaction, arm_buckling, arm_branches, finger_grip)
+    for function in (link_deflection, link_pressure, link_laws, link_reaction, arm_buckling, arm_branches, finger_grip)
 }
 """Plots by the name of their file."""
 SCENES: dict[str, tuple[Callable[[], sr.Viewer], str]] = {

@@ -25,6 +25,7 @@ from softrobots.core.errors import (
 )
 from softrobots.core.result_file import load_result, save_result
 from softrobots.description.composition import mount
+from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup
@@ -64,6 +65,7 @@ __all__ = [
     "IkSolution",
     "ImposedDisplacement",
     "InflatableArm",
+    "LinkLimits",
     "LoadEstimate",
     "LoadNotFound",
     "MissingDependency",

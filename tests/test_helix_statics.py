@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots.robots import HelixTube
@@ -161,14 +162,27 @@ def test_a_wrench_along_its_axis_bends_lumped_chains_into_the_helix_in_second_or
     assert errors[-1][0] < 1e-4
 
 
-@pytest.mark.parametrize(("share", "wrinkled"), [(-0.999, False), (-1.001, True), (0.999, False), (1.001, True)])
-def test_it_wrinkles_where_the_moment_is_the_wrinkling_moment(share: float, wrinkled: bool) -> None:
-    """pi^2/4 p r^3 at 10 kPa is 0.1118 N m; along a helix of Love's it is the same in every section."""
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(("share", "wrinkled"), [(0.999, False), (1.001, True)])
+def test_it_wrinkles_where_the_moment_is_the_wrinkling_moment(sign: float, share: float, wrinkled: bool) -> None:
+    """pi/4 (P + N) r with P = 8.605 N at 10 kPa and the tension N = EA (stretch - 1) of the rod, the same in every section."""
     robot, arm = tube(3, bending_stiffness=0.3), model(3, bending_stiffness=0.3)
-    limit, one = np.pi**2 / 4 * 1e4 * 0.01655**3, rod(robot)
-    love = axial_wrench(one, one.curvature + share * limit / 0.3, one.torsion)
-    found = sr.solve_equilibrium(arm, (), wrench=love.wrench)
-    assert found.link_moments == pytest.approx([abs(share) * 0.11185] * 3, rel=1e-4)
+    radius, one = 0.01655, rod(robot)
+
+    def loaded(moment: float) -> Any:
+        return axial_wrench(one, one.curvature + moment / 0.3, one.torsion)
+
+    def tension(moment: float) -> float:
+        return one.axial_stiffness * (loaded(moment).strains[2] - 1.0)
+
+    limit = brentq(
+        lambda moment: moment - np.pi / 4 * (1e4 * np.pi * radius**2 + tension(sign * moment)) * radius, 0.05, 0.2, xtol=1e-14
+    )
+    assert limit == pytest.approx(0.1118, rel=0.05)
+    found = sr.solve_equilibrium(arm, (), wrench=loaded(sign * share * limit).wrench)
+    assert found.link_limits.axial_forces == pytest.approx([tension(sign * share * limit)] * 3, rel=1e-6)
+    assert found.link_limits.wrinkling_moments == pytest.approx([limit] * 3, rel=1e-3)
+    assert found.link_moments == pytest.approx([share * limit] * 3, rel=1e-4)
     assert found.wrinkled == wrinkled
 
 

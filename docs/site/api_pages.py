@@ -57,7 +57,7 @@ PAGES = {
         "Statics",
         "Equilibria under loads, how the robot gives way, when it buckles, and which load it feels.",
         (
-            *_top("solve_equilibrium", "Equilibrium", "Stability", "distributed_force", "EARTH_GRAVITY"),
+            *_top("solve_equilibrium", "Equilibrium", "LinkLimits", "Stability", "distributed_force", "EARTH_GRAVITY"),
             *_top("compliance", "elastostatic_jacobian", "critical_load", "estimate_load", "LoadEstimate"),
             *_top("post_buckling_branches", "EquilibriumBranch"),
             *_top("solve_imposed_displacement", "ImposedDisplacement"),

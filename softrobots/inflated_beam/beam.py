@@ -41,12 +41,15 @@ def wrinkling_moment(pressure: Any, radius: Any) -> Any:
     return math.pi**2 / 4.0 * pressures * radii**3
 
 
-def required_pressure(moment: Any, radius: Any) -> Any:
-    """Return the gauge pressure whose wrinkling moment is `moment`: the inverse of [Troise 2021] (3).
+def required_pressure(moment: Any, radius: Any, axial_force: Any = 0.0) -> Any:
+    r"""Return the gauge pressure whose wrinkling moment is `moment`: the inverse of [Troise 2021] (3).
+
+    With an axial force `N` it is less by :math:`N / \pi r^2`, but not below zero: the inverse of `moment_limits`.
 
     Args:
         moment: Bending moment [N m], zero or positive.
         radius: Tube radius [m], positive.
+        axial_force: Axial force, positive in tension [N].
 
     Returns:
         The pressure [Pa], the common shape.
@@ -55,8 +58,9 @@ def required_pressure(moment: Any, radius: Any) -> Any:
         ParameterError: If an argument is out of range or the shapes do not broadcast.
     """
     moments, of_one_pascal = non_negative_array("moment", moment, "N m"), wrinkling_moment(1.0, radius)
-    common_shape("radius", moments.shape, of_one_pascal.shape)
-    return moments / of_one_pascal
+    forces = finite_array("axial_force", axial_force, None, "N")
+    common_shape("axial_force", common_shape("radius", moments.shape, of_one_pascal.shape), forces.shape)
+    return np.maximum(moments / of_one_pascal - forces / (math.pi * np.asarray(radius, dtype=np.float64) ** 2), 0.0)
 
 
 class _Section(NamedTuple):

@@ -53,7 +53,7 @@ def moment_limits(pressure: Any, radius: Any, axial_force: Any = 0.0) -> MomentL
 
     The wall of a straight tube carries the cap force :math:`P = p \pi r^2` and the axial force `N` together, so all three are
     proportional to `P + N`: :math:`(P + N) r` times 1/2, :math:`\pi/4` and 1. They are zero where the push exceeds the cap
-    force.
+    force, and without pressure, which keeps the tube round.
 
     Args:
         pressure: Gauge pressure [Pa], zero or positive.
@@ -66,7 +66,7 @@ def moment_limits(pressure: Any, radius: Any, axial_force: Any = 0.0) -> MomentL
     pressures, radii = non_negative_array("pressure", pressure, "Pa"), positive_array("radius", radius, "m")
     forces = finite_array("axial_force", axial_force, None, "N")
     common_shape("axial_force", common_shape("radius", pressures.shape, radii.shape), forces.shape)
-    collapse = np.maximum(pressures * math.pi * radii**2 + forces, 0.0) * radii
+    collapse = np.where(pressures > 0.0, np.maximum(pressures * math.pi * radii**2 + forces, 0.0) * radii, 0.0)[()]
     return MomentLimits(0.5 * collapse, 0.25 * math.pi * collapse, collapse)
 
 

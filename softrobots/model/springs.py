@@ -52,16 +52,15 @@ class SpringGroup:
         return tuple(self.springs[first : first + each] for first in range(0, len(self.springs), each))
 
     def moments(self, torques: FloatArray) -> FloatArray:
-        """Return the moment of the link: of the hinge that carries most, the Euclidean norm over its springs.
+        """Return the moment at each hinge, the Euclidean norm over its springs.
 
         Args:
             torques: Load carried by each spring of the robot, shape (..., n_springs) [N m].
 
         Returns:
-            Moments, shape (...) [N m].
+            Moments, shape (..., n_hinges) [N m].
         """
-        by_hinge = [np.linalg.norm(torques[..., list(hinge)], axis=-1) for hinge in self.hinges]
-        return np.asarray(np.max(by_hinge, axis=0))
+        return np.stack([np.linalg.norm(torques[..., list(hinge)], axis=-1) for hinge in self.hinges], axis=-1)
 
     @cached_property
     def slack_moment(self) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.model.link_limits import LinkLimits, link_limits, link_moments
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual
 from softrobots.statics.elastostatics import METHODS, solve_springs
@@ -95,12 +96,13 @@ class Equilibrium:
         section carry the moment at its middle; its entry is the largest along it, with the moment linear between the middles
         of the sections of a segment, and beyond them.
         """
-        groups = self.model.spring_groups
-        moments = np.array([group.moments(self.spring_torques) for group in groups])
-        for segment in {group.segment for group in groups} - {None}:
-            rows = [row for row, group in enumerate(groups) if group.segment == segment]
-            moments[rows] = _largest_along(moments[rows])
-        return read_only(moments)
+        return read_only(np.array([moments.max() for moments in link_moments(self.model, self.spring_torques)]))
+
+    @cached_property
+    def link_limits(self) -> LinkLimits:
+        """What each inflated link has left until its wall goes slack and until it wrinkles, with its axial force."""
+        parts = {"q": self.q, "torques": self.spring_torques, "tensions": self.muscle_forces}
+        return link_limits(self.model, self.load.wrenches, self.load.gravity, **parts)
 
     @cached_property
     def muscle_lengths(self) -> FloatArray:
@@ -129,9 +131,11 @@ class Equilibrium:
 
     @property
     def wrinkled(self) -> bool:
-        """Whether a link carries its wrinkling moment or more, or is on its plateau: linear springs are no longer valid."""
-        moments = zip(self.link_moments, self.model.spring_groups, strict=True)
-        return any(moment >= group.wrinkling_moment for moment, group in moments) or any(self.saturated)
+        """Whether a link carries its wrinkling moment (3) or more, with its axial force, or is on its plateau.
+
+        Linear springs are no longer valid there; a slack wall has softened from `link_limits.slack_margins` of zero on.
+        """
+        return bool(np.any(self.link_limits.wrinkling_margins <= 0.0)) or any(self.saturated)
 
     @property
     def within_limits(self) -> bool:
@@ -285,15 +289,6 @@ def check_same_model(model: SoftModel, equilibrium: Any) -> None:
     instance_of("equilibrium", equilibrium, Equilibrium, "an Equilibrium of the model")
     if equilibrium.model != model:
         raise ParameterError("equilibrium", equilibrium.model, f"an equilibrium of the model given, {model!r}")
-
-
-def _largest_along(moments: FloatArray) -> FloatArray:
-    """Largest moment along each section of a segment, shape (n,), from the moments in their middles, base to tip."""
-    if len(moments) < 2:
-        return moments
-    between = 0.5 * (moments[1:] + moments[:-1])
-    ends = np.concatenate([[1.5 * moments[0] - 0.5 * moments[1]], between, [1.5 * moments[-1] - 0.5 * moments[-2]]])
-    return np.asarray(np.maximum(np.maximum(ends[1:], ends[:-1]), moments))
 
 
 def _within(values: FloatArray, limits: FloatArray) -> bool:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
@@ -88,27 +87,28 @@ class Trajectory:
 
     @property
     def required_pressure(self) -> float | None:
-        """Smallest gauge pressure at which no link wrinkles on the path [Pa], [Troise 2021] (3); None without links."""
+        """Smallest gauge pressure at which no link wrinkles on the path [Pa], [Troise 2021] (3); None without links.
+
+        With the axial forces; see `LinkLimits.required_pressures`.
+        """
         if self.link_moments is None:
             return None
-        largest = zip(self.link_moments.max(axis=0), self.model.spring_groups, strict=True)
-        return max(float(inflated_beam.required_pressure(moment, group.radius)) for moment, group in largest)
+        return max(float(equilibrium.link_limits.required_pressures.max()) for equilibrium in self.equilibria)
 
     @property
     def wrinkling_margin(self) -> float | None:
         """Remaining share of the wrinkling moment at the worst waypoint and link [-]; negative: a link wrinkles.
 
-        None without inflated links.
+        With the axial forces; None without inflated links.
 
         Raises:
             ParameterError: If a link has no pressure, and so no wrinkling moment.
         """
         if self.link_moments is None:
             return None
-        limits = np.array([group.wrinkling_moment for group in self.model.spring_groups])
-        if np.any(limits == 0.0):
+        if any(group.pressure == 0.0 for group in self.model.spring_groups):
             raise ParameterError("pressure", 0.0, "positive in every link, for a wrinkling margin to exist")
-        return float(1.0 - (self.link_moments / limits).max())
+        return min(float(equilibrium.link_limits.wrinkling_margins.min()) for equilibrium in self.equilibria)
 
 
 def follow_trajectory(

@@ -168,11 +168,10 @@ class SceneBuilder:
 
 def wrinkling_level(equilibrium: Equilibrium, link: int) -> int:
     """Return the place in `WRINKLING_COLOURS` of an inflated link, numbered from 0; the last one means wrinkled."""
-    limit = equilibrium.model.spring_groups[link].wrinkling_moment
-    moment = float(equilibrium.link_moments[link])
-    if moment >= limit or equilibrium.saturated[link]:
+    left = float(equilibrium.link_limits.wrinkling_margins[link])
+    if left <= 0.0 or equilibrium.saturated[link]:
         return len(WRINKLING_COLOURS) - 1
-    return next(level for level, (least, _) in enumerate(WRINKLING_COLOURS) if 1.0 - moment / limit >= least)
+    return next(level for level, (least, _) in enumerate(WRINKLING_COLOURS) if left >= least)
 
 
 def _arrows(equilibrium: Equilibrium, q: FloatArray) -> dict[str, Arrow]:

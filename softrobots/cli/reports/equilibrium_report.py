@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
+from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
@@ -20,7 +22,7 @@ _LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
 
 def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     """Everything about an equilibrium by the names of its attributes, with `units`."""
-    model = equilibrium.model
+    model, limits = equilibrium.model, equilibrium.link_limits
     facts = [
         Fact("q_motors", equilibrium.q_motors, joined_units(model.actuators.units)),
         Fact("motor_torques", equilibrium.motor_torques, joined_units(load_units(model.actuators.units))),
@@ -29,8 +31,11 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
         Fact("tip_position", equilibrium.tip_position, "m"),
         Fact("transform_tip_to_world", equilibrium.transform_tip_to_world.homogeneous, "m"),
         Fact("link_moments", equilibrium.link_moments, "N m"),
-        Fact("wrinkling_moments", wrinkling_moments(model), "N m"),
-        Fact("wrinkling_margins", wrinkling_margins(equilibrium), "-"),
+        Fact("axial_forces", limits.axial_forces, "N"),
+        Fact("slack_moments", limits.slack_moments, "N m"),
+        Fact("slack_margins", known_margins(limits.slack_margins), "-"),
+        Fact("wrinkling_moments", limits.wrinkling_moments, "N m"),
+        Fact("wrinkling_margins", known_margins(limits.wrinkling_margins), "-"),
         Fact("wrinkled", equilibrium.wrinkled),
         Fact("saturated", list(equilibrium.saturated)),
         Fact("muscle_lengths", equilibrium.muscle_lengths, "m"),
@@ -71,10 +76,6 @@ def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
 
 def summary_lines(equilibrium: Equilibrium) -> list[str]:
     """Return lines with the pose of the tip and the certificates."""
-    margins = wrinkling_margins(equilibrium)
-    known = [margin for margin in margins if margin is not None]
-    least = f", at least {100.0 * min(known):.1f} % of the wrinkling moment is left" if known else ""
-    links = [("wrinkled", "YES: linear springs no longer hold" if equilibrium.wrinkled else f"no{least}")] if margins else []
     steps = f"{equilibrium.iterations} iteration{'s' * (equilibrium.iterations != 1)} by {equilibrium.method}"
     rpy = pin.rpy.matrixToRpy(equilibrium.transform_tip_to_world.rotation)
     rows = [
@@ -82,7 +83,7 @@ def summary_lines(equilibrium: Equilibrium) -> list[str]:
         ("tip roll, pitch, yaw", f"{formatted(np.where(abs(rpy) < 1e-15, 0.0, rpy))} rad"),
         ("stable", stability_words(equilibrium)),
         ("within limits", "yes" if equilibrium.within_limits else "NO: a motor, a muscle or a spring is beyond its limits"),
-        *links,
+        *_walls(equilibrium),
         ("conservative", "yes" if equilibrium.conservative else "no: a world-fixed moment has no potential"),
         ("residual", f"{equilibrium.residual:.2g} N m ({equilibrium.tolerance:.2g} N m allowed), {steps}"),
     ]
@@ -101,15 +102,21 @@ def stability_words(equilibrium: Equilibrium) -> str:
     return words[equilibrium.stability.kind]
 
 
-def wrinkling_moments(model: SoftModel) -> list[float]:
-    """Wrinkling moment of each inflated link [N m]."""
-    return [group.wrinkling_moment for group in model.spring_groups]
+def known_margins(margins: FloatArray) -> list[float | None]:
+    """Margins of inflated links as a list [-]; None for a link whose wall has no tension."""
+    return [margin if math.isfinite(margin) else None for margin in margins.tolist()]
 
 
-def wrinkling_margins(equilibrium: Equilibrium) -> list[float | None]:
-    """Share of the wrinkling moment that is left in each inflated link [-]; None for a link without pressure."""
-    pairs = zip(equilibrium.link_moments.tolist(), wrinkling_moments(equilibrium.model), strict=True)
-    return [1.0 - moment / limit if limit > 0.0 else None for moment, limit in pairs]
+def _walls(equilibrium: Equilibrium) -> list[tuple[str, str]]:
+    """Whether a link is wrinkled, whether its wall is slack, and what is left to both; nothing without inflated links."""
+    if not equilibrium.model.spring_groups:
+        return []
+    limits, soft = equilibrium.link_limits, all(group.slack_wall for group in equilibrium.model.spring_groups)
+    least = [100.0 * float(margins.min()) for margins in (limits.wrinkling_margins, limits.slack_margins)]
+    wrinkled = "YES: half of a wall is slack" if soft else "YES: linear springs no longer hold"
+    slack = f"no, at least {least[1]:.1f} % of its moment is left" if least[1] > 0.0 else "YES: by membrane theory"
+    left = f"no, at least {least[0]:.1f} % of the wrinkling moment is left"
+    return [("wrinkled", wrinkled if equilibrium.wrinkled else left), ("first slack fibre", slack)]
 
 
 def head_lines(model: SoftModel, load: Load) -> list[str]:
@@ -158,15 +165,17 @@ def _table(what: str, names: tuple[str, ...], values: Any, units: tuple[str, ...
 
 
 def _links(equilibrium: Equilibrium) -> list[str]:
-    limits, margins = wrinkling_moments(equilibrium.model), wrinkling_margins(equilibrium)
-    if not limits:
+    limits = equilibrium.link_limits
+    if not equilibrium.model.spring_groups:
         return []
-    rows = [("inflated link", "moment", "wrinkles at", "left")]
-    for number, (moment, limit, margin) in enumerate(zip(equilibrium.link_moments, limits, margins, strict=True), start=1):
-        plateau = "  on its plateau" if equilibrium.saturated[number - 1] else ""
-        left = ("-" if margin is None else f"{100.0 * margin:.1f} %") + plateau
-        rows.append((str(number), f"{_fixed(moment)} N m", f"{_fixed(limit)} N m", left))
-    return aligned(rows, right=(1, 2, 3))
+    rows = [("link", "moment", "axial", "slack from", "left", "wrinkles", "left", "")]
+    left = [known_margins(margins) for margins in (limits.slack_margins, limits.wrinkling_margins)]
+    for number, (values, *margins) in enumerate(zip(zip(*limits[:4], strict=True), *left, strict=True), start=1):
+        moment, force, slack, wrinkling = (f"{value:#.4g}" for value in values)
+        shares = ["-" if margin is None else f"{100.0 * margin:.1f} %" for margin in margins]
+        cells = (f"{moment} N m", f"{force} N", f"{slack} N m", shares[0], f"{wrinkling} N m", shares[1])
+        rows.append((str(number), *cells, "plateau" if equilibrium.saturated[number - 1] else ""))
+    return [line.rstrip() for line in aligned(rows, right=(1, 2, 3, 4, 5, 6))]
 
 
 def _fixed(value: float) -> str:

@@ -15,8 +15,6 @@ from softrobots.cli.reports.equilibrium_report import (
     load_units,
     model_answer,
     spring_units,
-    wrinkling_margins,
-    wrinkling_moments,
 )
 from softrobots.core.checks import FloatArray
 from softrobots.statics.inverse_kinematics import IkSolution
@@ -64,7 +62,7 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         Fact("motor_torques", _motor_torques(trajectory), joined_units(load_units(model.actuators.units))),
         Fact("q_springs", trajectory.q_springs, joined_units(spring_units(model))),
         Fact("link_moments", trajectory.link_moments, "N m"),
-        Fact("wrinkling_moments", wrinkling_moments(model), "N m"),
+        Fact("wrinkling_moments", [equilibrium.link_limits.wrinkling_moments for equilibrium in equilibria], "N m"),
         Fact("wrinkling_margin", _margin(trajectory), "-"),
         Fact("required_pressure", trajectory.required_pressure, "Pa"),
         Fact("wrinkled", [equilibrium.wrinkled for equilibrium in equilibria]),
@@ -113,9 +111,9 @@ def _motor_torques(trajectory: Trajectory) -> FloatArray:
 
 def _margin(trajectory: Trajectory) -> float | None:
     """Least share of the wrinkling moment that is left at any waypoint and link; None without pressure or links."""
-    margins = [margin for equilibrium in trajectory.equilibria for margin in wrinkling_margins(equilibrium)]
-    known = [margin for margin in margins if margin is not None]
-    return min(known) if known and len(known) == len(margins) else None
+    if trajectory.link_moments is None or any(group.pressure == 0.0 for group in trajectory.model.spring_groups):
+        return None
+    return trajectory.wrinkling_margin
 
 
 def _everywhere(truths: list[bool]) -> str:

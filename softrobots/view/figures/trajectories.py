@@ -147,7 +147,7 @@ def _errors(errors: dict[str, FloatArray], times: FloatArray, ylabel: str, title
 
 
 def link_moments(trajectory: Trajectory) -> Any:
-    """Moment at each inflated link over time, with the wrinkling moment at the pressure of the arm.
+    """Moment at each inflated link over time, with its wrinkling moment at its pressure and axial force.
 
     Args:
         trajectory: A trajectory of a robot with inflated links.
@@ -168,11 +168,10 @@ def link_moments(trajectory: Trajectory) -> Any:
     every = max(len(trajectory.times) // 10, 1)
     for number, moment in enumerate(moments.T):
         axes.plot(trajectory.times, moment, markevery=every, label=f"link {number + 1}", **line_style(number))
-    limits = {(group.wrinkling_moment, group.pressure) for group in trajectory.model.spring_groups}
-    for limit, pressure in sorted(limits):
-        axes.axhline(limit, color="black", lw=1.0)
-        place = {"xy": (trajectory.times[0], limit), "xytext": (4, 4), "textcoords": "offset points"}
-        axes.annotate(f"wrinkling moment at {pressure / 1e3:g} kPa", **place, fontsize=9)
-    axes.set_ylim(0.0, 1.12 * max(float(moments.max()), *(limit for limit, _ in limits)))
+    limits = np.array([equilibrium.link_limits.wrinkling_moments for equilibrium in trajectory.equilibria])
+    for number, (limit, group) in enumerate(zip(limits.T, trajectory.model.spring_groups, strict=True)):
+        label = f"link {number + 1} wrinkles, at {group.pressure / 1e3:g} kPa and its axial force"
+        axes.plot(trajectory.times, limit, label=label, color=line_style(number)["color"], ls=":", lw=1.5)
+    axes.set_ylim(0.0, 1.12 * max(float(moments.max()), float(limits.max())))
     axes.legend(fontsize=9)
     return figure

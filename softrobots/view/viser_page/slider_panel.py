@@ -165,7 +165,7 @@ def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:
     for name in ("stable", "conservative", "within_limits"):
         facts.append((name.replace("_", " "), "yes" if getattr(equilibrium, name) else "no"))
     groups = equilibrium.model.spring_groups
-    left = [1.0 - moment / group.wrinkling_moment for moment, group in zip(equilibrium.link_moments, groups, strict=True)]
+    left = equilibrium.link_limits.wrinkling_margins.tolist()
     links = [
         f"{'link' if group.segment is None else 'section'} {number}: "
         + ("wrinkled" if share <= 0.0 or flat else f"{100.0 * share:.0f} %")
