@@ -47,7 +47,7 @@ def estimation_rate(model: sr.SoftModel, load: float, method: str, count: int, s
     for motors, force in tqdm(cases, total=count, desc=f"load estimation, {method}, {load:g} N", leave=False):
         torques = sr.solve_equilibrium(model, motors, force, tolerance=1e-13).motor_torques
         try:
-            estimate = sr.estimate_load(model, motors, torques, method=method)
+            estimate = sr.estimate_load(model, motors, torques, method=method, restart=False)
         except sr.LoadNotFound:
             continue
         found += float(np.linalg.norm(estimate.force - force)) <= 1e-6 * load

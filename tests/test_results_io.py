@@ -190,6 +190,36 @@ def test_damaged_files_are_refused_or_harmless(results: dict, kind: str, tmp_pat
     assert "pickle" not in str(caught.value)  # NumPy's advice for such a file
 
 
+def test_an_estimate_comes_back_with_its_errors_and_its_alternatives(tmp_path: Path) -> None:
+    """The second force, too; one that is none is refused. A file from before without both loads."""
+    limp, motors = sr.load_model(sr.InflatableArm(max_moment=12.0)), (0.3, 0.9, -1.4)
+    torques = sr.solve_equilibrium(limp, motors, (2, 8, -12), gravity=sr.EARTH_GRAVITY).motor_torques
+    errors = {"torque_std": 0.1, "stiffness_std": 0.03, "motor_angle_std": (0.01, 0.02, 0.01)}
+    found = sr.estimate_load(limp, motors, torques, gravity=sr.EARTH_GRAVITY, **errors)
+    assert len(found.alternatives) >= 1
+    file = sr.save_result(found, tmp_path / "a.npz")
+    again = sr.load_result(file)
+    assert np.array_equal(again.covariance, found.covariance)
+    assert [one.force.tolist() for one in again.alternatives] == [one.force.tolist() for one in found.alternatives]
+    assert np.array_equal(again.alternatives[0].equilibrium.q_springs, found.alternatives[0].equilibrium.q_springs)
+    others = np.array([one.force for one in found.alternatives])
+    for changes, message in (
+        ({"other_forces": others + 1.0}, "other_forces"),
+        ({"other_forces": others[:, :2]}, "other_forces"),
+        ({"other_springs": np.zeros((7, 4))}, "other_springs"),
+        ({"stiffness_std": np.zeros(4)}, "stiffness_std must be positive"),
+    ):
+        with pytest.raises(sr.FileFormatError, match=message):
+            sr.load_result(altered(file, tmp_path / "b.npz", **changes))
+    fields = dict(np.load(file))
+    for name in ("other_forces", "other_springs", "stiffness_std", "motor_angle_std"):
+        del fields[name]
+    np.savez(tmp_path / "old.npz", **fields)
+    old = sr.load_result(tmp_path / "old.npz")
+    assert (old.alternatives, old.stiffness_std, set(old.covariance_parts)) == ((), None, {"torques"})
+    assert np.array_equal(old.covariance, found.covariance_parts["torques"])
+
+
 def test_an_estimate_whose_force_was_changed_is_refused(results: dict, tmp_path: Path) -> None:
     file = sr.save_result(results["load_estimate"], tmp_path / "a.npz")
     with pytest.raises(sr.FileFormatError, match="force"):

@@ -139,7 +139,9 @@ def prepare_jobs(model: SoftModel, compiled: CompiledModel, count: int) -> Mappi
     return {
         "equilibrium": Job(count, each(compiled.equilibrium, forces), each(on_pinocchio, forces)),
         "gravity": Job(count, each(compiled.equilibrium, forces, **heavy), each(on_pinocchio, forces, **heavy)),
-        "estimation": Job(count, each(compiled.estimate_load, torques), each(functools.partial(estimate_load, model), torques)),
+        "estimation": Job(
+            count, each(compiled.estimate_load, torques), each(functools.partial(estimate_load, model, restart=False), torques)
+        ),
         "trajectory": Job(
             count,
             lambda: compiled.follow(targets, force, q_motors0=start),

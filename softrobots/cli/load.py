@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feel
 _EXAMPLES = """examples:
   softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 10.193 -16.605 -7.675
   softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 10.193 -16.605 -7.675 --torque-std 0.05 --json
+  softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 10.2 -16.6 -7.7 --stiffness-std 0.0325 --motor-angle-std 0.009
   softrobots load inflatable_arm --motors 0 0 0 --torques 11.9 -17.8 -8.8 --torque-std 0.1    a straight elbow feels less
 """
 
@@ -37,6 +39,13 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--torques", "TAU", help_text, nargs="+", required=True)
     help_text = "standard deviation of the torques, one for all or one for each [N m or N], for that of the force (unknown)"
     add_numbers(parser, "--torque-std", "S", help_text, nargs="+")
+    help_text = "standard deviation of the stiffness as a share of it, one for all springs or one for each [-] (unknown)"
+    add_numbers(parser, "--stiffness-std", "S", help_text, nargs="+")
+    help_text = "standard deviation of the motor coordinates, one for all or one for each [rad or m] (unknown)"
+    add_numbers(parser, "--motor-angle-std", "S", help_text, nargs="+")
+    parser.add_argument(
+        "--no-restart", action="store_true", help="search from no force only: ten times as fast, without other explanations"
+    )
     parser.add_argument("--frame", metavar="LINK", help="where the force acts (the tip)")
     add_gravity(parser)
     parser.add_argument(
@@ -55,10 +64,15 @@ def run(arguments: argparse.Namespace) -> None:
     model = statics_model_of(arguments)
     check_feels(model)
     motors = motors_of(model, arguments.motors)
-    units, noise = load_units(model.actuators.units), arguments.torque_std
+    units = load_units(model.actuators.units)
     check_one_each("--torques", arguments.torques, model.motor_joints, units)
-    if noise is not None and len(noise) > 1:
-        check_one_each("--torque-std", noise, model.motor_joints, units)
+    deviations = {
+        "torque_std": _one_or_each("--torque-std", arguments.torque_std, model.motor_joints, units),
+        "stiffness_std": _one_or_each("--stiffness-std", arguments.stiffness_std, model.springs.names, ["-"] * model.n_springs),
+        "motor_angle_std": _one_or_each(
+            "--motor-angle-std", arguments.motor_angle_std, model.motor_joints, model.actuators.units
+        ),
+    }
     estimate = estimate_load(
         model,
         motors,
@@ -66,12 +80,21 @@ def run(arguments: argparse.Namespace) -> None:
         method=arguments.method,
         frame=arguments.frame,
         gravity=gravity_of(arguments),
-        torque_std=noise[0] if noise is not None and len(noise) == 1 else noise,
+        restart=not arguments.no_restart,
+        **deviations,
         max_iterations=arguments.max_iterations,
     )
     files = save(arguments, estimate)
     lines = [*equilibrium_lines(estimate.equilibrium), "", *_lines(estimate)]
     print_answer(arguments, _answer(estimate), lines, files)
+
+
+def _one_or_each(option: str, values: Any, names: Sequence[str], units: Sequence[str]) -> Any:
+    """A number for all or numbers for each of some joints, as the library takes them; None if not given."""
+    if values is None or len(values) == 1:
+        return None if values is None else values[0]
+    check_one_each(option, values, names, units)
+    return values
 
 
 def _answer(estimate: LoadEstimate) -> dict[str, Any]:
@@ -80,17 +103,24 @@ def _answer(estimate: LoadEstimate) -> dict[str, Any]:
         Fact("force", estimate.force, "N"),
         Fact("force_std", _deviations(estimate), "N"),
         Fact("covariance", estimate.covariance, "N^2"),
+        Fact("covariance_parts", dict(estimate.covariance_parts), "N^2"),
         Fact("singular_values", estimate.singular_values, "m"),
         Fact("condition_number", estimate.condition_number, "-"),
         Fact("unobservable_directions", estimate.unobservable_directions, "-"),
         Fact("measured_torques", estimate.measured_torques, units),
         Fact("torque_std", estimate.torque_std, units),
+        Fact("stiffness_std", estimate.stiffness_std, "-"),
+        Fact("motor_angle_std", estimate.motor_angle_std, joined_units(estimate.equilibrium.model.actuators.units)),
         Fact("residual", estimate.residual, units),
         Fact("iterations", estimate.iterations, "-"),
         Fact("frame", estimate.frame),
         Fact("method", estimate.method),
     ]
-    return {**answer_of(facts), "equilibrium": equilibrium_answer(estimate.equilibrium)}
+    others = [
+        answer_of([Fact("force", other.force, "N")]) | {"equilibrium": equilibrium_answer(other.equilibrium)}
+        for other in estimate.alternatives
+    ]
+    return {**answer_of(facts), "equilibrium": equilibrium_answer(estimate.equilibrium), "alternatives": others}
 
 
 def _deviations(estimate: LoadEstimate) -> Any:
@@ -103,6 +133,10 @@ def _lines(estimate: LoadEstimate) -> list[str]:
     rows = [(f"force on {estimate.frame}", f"{formatted(estimate.force)} N")]
     if deviations is not None:
         rows.append(("  standard deviation", f"{formatted(deviations)} N"))
+    if len(estimate.covariance_parts) > 1:
+        for name, part in estimate.covariance_parts.items():
+            rows.append((f"    by {name.replace('_', ' ')}", f"{formatted(np.sqrt(np.diag(part)))} N"))
+    rows += [("  explained as well by", f"{formatted(other.force)} N") for other in estimate.alternatives]
     rows += [("singular values", f"{formatted(estimate.singular_values)} m (condition number {estimate.condition_number:.3g})")]
     directions = [("NOT FELT along", formatted(direction)) for direction in estimate.unobservable_directions]
     rows += directions or [("not felt along", "no direction")]

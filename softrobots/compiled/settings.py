@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from softrobots.core import checks
 from softrobots.model import springs
-from softrobots.statics import elastic_state, elastostatics, force_search, tip_search
+from softrobots.statics import elastic_state, elastostatics, tip_search
+from softrobots.statics.tip_force import force_search
 
 TOLERANCE = elastic_state.TOLERANCE
 """Largest residual of a result, relative to the size of the load."""

@@ -98,6 +98,11 @@ class DirectPoint(NamedTuple):
         rows, n = load.derivative(c.entries), len(c.motor_indices)
         return ReducedLoad(torque[c.motor_indices], torque[c.elastic_indices], rows[:, n:], rows[:, :n], 0.0, 0.0)
 
+    def motor_derivative(self, load: JointLoad) -> FloatArray:
+        """Derivative of the load on each motor with respect to the motors, shape (n_motors, n_motors)."""
+        c = self.coordinates
+        return load.derivative(Entries.of(c.motor_indices, c.motor_indices, len(self.joints)))
+
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Select the columns of actuators and of elastic coordinates."""
         c = self.coordinates
@@ -165,13 +170,25 @@ class SectionPoint:
         self.joints[coordinates.section_indices] = self._chain.positions - coordinates.rest_joints
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
-        """Transform a joint load by the chain rule.
+        """Transform a joint load by the chain rule."""
+        c, derivative = self._c, self._derivative(load)
+        at_sections = load.torque[c.section_indices]
+        elastic = np.concatenate([load.torque[c.spring_indices], (at_sections[:, None, :] @ self._chain.first).ravel()])
+        n = len(c.motor_indices)
+        return ReducedLoad(load.torque[c.motor_indices], elastic, derivative[n:, n:], derivative[n:, :n], 0.0, 0.0)
 
-        Between two sections the derivative is a product of combined columns, within one it goes joint by joint.
+    def motor_derivative(self, load: JointLoad) -> FloatArray:
+        """Derivative of the load on each motor with respect to the motors, shape (n_motors, n_motors)."""
+        n = len(self._c.motor_indices)
+        return self._derivative(load)[:n, :n]
+
+    def _derivative(self, load: JointLoad) -> FloatArray:
+        """Derivative of a load on motors, springs and sections with respect to them, shape (n, n).
+
+        Between two sections it is a product of combined columns, within one it goes joint by joint.
         """
         c, chain = self._c, self._chain
         at_sections = load.torque[c.section_indices]
-        elastic = np.concatenate([load.torque[c.spring_indices], (at_sections[:, None, :] @ chain.first).ravel()])
         angular, by_force = self._combine(load.angular), self._combine(load.by_force)
         derivative = (angular.T @ by_force) * c.before
         derivative += derivative.T
@@ -183,8 +200,7 @@ class SectionPoint:
         derivative[c.places[:, :, None], c.places[:, None, :]] += within + chain.curvature(at_sections)
         if load.gravity_derivative is not None:
             derivative += self._combine(self._combine(load.gravity_derivative).T).T
-        n = len(c.motor_indices)
-        return ReducedLoad(load.torque[c.motor_indices], elastic, derivative[n:, n:], derivative[n:, :n], 0.0, 0.0)
+        return np.asarray(derivative)
 
     def _combine(self, matrix: FloatArray) -> FloatArray:
         """Columns per motor, spring and section coordinate of a matrix with columns per joint."""

@@ -8,27 +8,25 @@ the axis of the first motor); the result names such directions.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
+from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, read_only
 from softrobots.core.errors import LoadNotFound, ParameterError
+from softrobots.core.result_file import text
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
-from softrobots.statics.elastostatics import balanced_state
+from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
-from softrobots.statics.force_search import HIDDEN, OBSERVABLE, Directions, search_force, torque_tolerance
-from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
-from softrobots.statics.sensitivity import motor_torque_slope
+from softrobots.statics.tip_force.load_errors import MeasurementErrors, covariance_parts
+from softrobots.statics.tip_force.measured_torques import SOLVERS, Explanation, MeasuredTorques
 
-METHODS = ("newton", "alternation")
+METHODS = tuple(SOLVERS)
 """The solvers of `estimate_load`; "alternation" is that of [Troise 2021]."""
-
-_INNER = 1e-12  # tolerance of the equilibria during the search
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +43,10 @@ class LoadEstimate:
     """The measured motor torques, shape (n_motors,) [N m]."""
     torque_std: FloatArray | None
     """Their standard deviation, shape (n_motors,) [N m]; None if none was given."""
+    stiffness_std: FloatArray | None
+    """Standard deviation of the stiffness of each spring, as a share of it, shape (n_springs,) [-]; None if none was given."""
+    motor_angle_std: FloatArray | None
+    """Standard deviation of the motor coordinates, shape (n_motors,) [rad or m]; None if none was given."""
     method: str
     """The solver."""
     singular_values: FloatArray
@@ -52,13 +54,17 @@ class LoadEstimate:
     unobservable_directions: FloatArray
     """Unit directions whose singular value is below `OBSERVABLE` times the reach, shape (k, 3); k may be 0."""
     covariance: FloatArray | None
-    """Covariance of the force for the given torque noise, shape (3, 3) [N^2], over the observable directions; None without
-    `torque_std`."""
+    """Covariance of the force for the given errors of measurement, the sum of `covariance_parts`, shape (3, 3) [N^2], over the
+    observable directions; None without any."""
+    covariance_parts: Mapping[str, FloatArray]
+    """Its parts by the source of the error, "torques", "stiffness" and "motor_angles", for those that were given."""
     residual: float
     """Norm of the motor torques that the force does not explain [N m]: rounding, unless a direction is unobservable or more
     than three motors are fitted."""
     iterations: int
     """Steps of the solver."""
+    alternatives: tuple[LoadEstimate, ...] = ()
+    """Other forces that were found to explain the torques as well, smallest first."""
 
     @property
     def condition_number(self) -> float:
@@ -81,6 +87,9 @@ def estimate_load(
     frame: str | None = None,
     gravity: Any = None,
     torque_std: Any = None,
+    stiffness_std: Any = None,
+    motor_angle_std: Any = None,
+    restart: bool = True,
     max_iterations: int | None = None,
 ) -> LoadEstimate:
     r"""Find the force at the tip from motor coordinates and torques.
@@ -91,8 +100,9 @@ def estimate_load(
     With more than three motors the fit is least squares; with fewer the force is the one that the damped search finds from
     zero, close to the smallest.
 
-    Where a link has a largest moment, several forces may give the same torques, with the link on its plateau or not;
-    "newton" returns the one that it reaches from zero, or fails at the plateau.
+    Several forces may give the same torques: a large one that bends the arm far, or one with a link on its plateau. "newton"
+    starts from no force; where that leaves torques unexplained it starts again from eight forces around the robot and keeps
+    the least residual. From there it looks for others along the direction that the motors feel least: `alternatives`.
 
     Args:
         model: The robot, with at least one motor.
@@ -104,13 +114,19 @@ def estimate_load(
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         torque_std: Standard deviation of the torque noise, one number or shape (n_motors,) [N m], for the covariance; five
             times it may then stay unexplained.
-        max_iterations: Most steps; 100 for "newton", 1000 for "alternation" by default.
+        stiffness_std: Standard deviation of the stiffness of the springs, as a share of it, one number or shape (n_springs,)
+            [-], for the covariance; the springs that bend one link have one error. [Troise 2021] Table 3: 0.008 to 0.036.
+        motor_angle_std: Standard deviation of the motor coordinates, one number or shape (n_motors,) [rad or m], for the
+            covariance.
+        restart: Whether "newton" starts again from other forces; it takes some ten times as long.
+        max_iterations: Most steps of a search; 100 for "newton", 1000 for "alternation" by default.
 
     Returns:
-        The force with conditioning, unobservable directions and covariance.
+        The force with conditioning, unobservable directions, covariance and alternatives.
 
     Raises:
-        ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has no motors.
+        ParameterError: If an argument has the wrong shape, is not finite or out of range, the robot has no motors, or it has
+            muscles and `stiffness_std` or `motor_angle_std` is given.
         NameNotFound: If the frame does not exist.
         LoadNotFound: If no force explains the torques; carries the best estimate.
         NeutralEquilibrium: If the search meets a load at which the tangent stiffness is singular.
@@ -120,21 +136,21 @@ def estimate_load(
     check_feels(model)
     motors = model.checked_motors(q_motors)
     torques = finite_array("motor_torques", motor_torques, (model.n_motors,), "N m")
-    noise = None if torque_std is None else _noise(torque_std, model.n_motors)
+    errors = MeasurementErrors.of(model, torque_std, stiffness_std, motor_angle_std)
     at = model.tip if frame is None else frame
     base = Load.of(model, frame=at, gravity=gravity)
-    solve, most = (_newton, 100) if method == "newton" else (_alternation, 1000)
+    most = 100 if method == "newton" else 1000
     most = most if max_iterations is None else positive_integer("max_iterations", max_iterations)
-    problem = _Problem(model, motors, torques, base, at)
-    force, state, iterations = solve(problem, most)
-    result = _estimate(problem, force, state, method, iterations, noise)
-    if not (_explained(problem, state, noise) and result.equilibrium.converged):
+    problem = MeasuredTorques(model, motors, torques, base, at, errors)
+    best, *others = SOLVERS[method](problem, most, restart=restart)
+    result = _estimate(problem, best, method, others)
+    if not (problem.explained(best) and result.equilibrium.converged):
         raise LoadNotFound(
-            f"no force explains the motor torques {torques.tolist()} N m by {method!r} in {iterations} iterations: "
+            f"no force explains the motor torques {torques.tolist()} N m by {method!r} in {result.iterations} iterations: "
             f"{result.residual:.3g} N m remain",
             best=result,
             residual=result.residual,
-            iterations=iterations,
+            iterations=result.iterations,
         )
     return result
 
@@ -151,138 +167,68 @@ def check_feels(model: SoftModel) -> None:
         raise ParameterError("model", model, "a robot whose muscle lengths are given: given forces feel no load")
 
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """Measured torques and the known part of the load; a `force_search.Measurement`."""
-
-    model: SoftModel
-    motors: FloatArray
-    torques: FloatArray
-    base: Load
-    frame: str
-
-    @cached_property
-    def tolerance(self) -> float:
-        return torque_tolerance(self.torques)
-
-    def load(self, force: FloatArray) -> Load:
-        return self.base.plus(self.frame, np.concatenate([force, np.zeros(3)]))
-
-    def equilibrium(self, force: FloatArray, near: ElasticState) -> ElasticState | None:
-        """Solve for the equilibrium under a force, from a nearby state; None if it does not converge."""
-        return balanced_state(self.model, self.motors, self.load(force), near.q_springs, tolerance=_INNER)
-
-    def unexplained(self, state: ElasticState) -> FloatArray:
-        """Return the measured torques minus those of a state."""
-        return np.asarray(self.torques - state.load.motors)
-
-    def directions(self, state: ElasticState) -> Directions:
-        """Decompose the derivative of the torques with respect to the force."""
-        motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
-        return Directions.of(motor_torque_slope(motors, springs, state.tangent, state.load.coupling), self.model.reach)
-
-
-def _explained(problem: _Problem, state: ElasticState, noise: FloatArray | None) -> bool:
-    """Whether the unexplained torques are rounding, noise, or from unobservable directions.
-
-    Where every direction is observable only rounding or noise may be left; in a singular pose also `HIDDEN` of the torques and
-    `OBSERVABLE` of the stiffest spring. With more than three motors the residual of the least-squares fit may have any size
-    if the noise is unknown.
-    """
-    left, values, _, keep = problem.directions(state)
-    missing = left.T @ problem.unexplained(state)
-    scatter = 0.0 if noise is None else 5.0 * float(np.linalg.norm(noise))
-    hidden = HIDDEN * float(np.linalg.norm(problem.torques)) + OBSERVABLE * problem.model.stiffest
-    seen, surplus = missing[: len(values)], missing[len(values) :]
-    allowed = max(problem.tolerance, scatter) if keep.all() else hidden + scatter
-    return bool(np.linalg.norm(seen) <= allowed and (noise is None or np.linalg.norm(surplus) <= max(allowed, scatter)))
-
-
-def _newton(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
-    """Damped Newton, see `softrobots.statics.force_search`."""
-    no_force = np.zeros(3)
-    relaxed = elastic_state(problem.model, problem.motors, problem.model.rest, problem.load(no_force))
-    start = problem.equilibrium(no_force, relaxed) or relaxed
-    return search_force(problem, start, most, reach=problem.model.reach, tolerance=problem.tolerance)
-
-
-def _alternation(problem: _Problem, most: int) -> tuple[FloatArray, ElasticState, int]:
-    """Recursion of [Troise 2021] Figure 5, until springs and motors are in equilibrium."""
-    model = problem.model
-    force, springs = np.zeros(3), np.array(model.rest)
-    state = elastic_state(model, problem.motors, springs, problem.base)
-    for iteration in range(1, most + 1):
-        by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, problem.frame)[:3])
-        unloaded = elastic_state(model, problem.motors, springs, problem.base).load
-        estimate = np.asarray(np.linalg.lstsq(by_motors.T, problem.torques - unloaded.motors, rcond=None)[0], dtype=np.float64)
-        springs = model.rest + (unloaded.elastic + by_springs.T @ estimate) / model.stiffness
-        trial = elastic_state(model, problem.motors, springs, problem.load(estimate))
-        if not trial.point.valid:  # a section beyond its range: the recursion diverges
-            return force, state, iteration
-        force, state = estimate, trial
-        balanced = state.error <= largest_residual(model, state.scale, TOLERANCE)
-        if balanced and float(np.linalg.norm(problem.unexplained(state))) <= problem.tolerance:
-            return force, state, iteration
-    return force, state, most
-
-
-def _estimate(
-    problem: _Problem, force: FloatArray, state: ElasticState, method: str, iterations: int, noise: FloatArray | None
-) -> LoadEstimate:
+def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others: list[Explanation]) -> LoadEstimate:
+    force, state, iterations = found
     left, values, right, keep = problem.directions(state)
     observable = right[: len(values)][keep]
     singular_values = np.zeros(3)
     singular_values[: len(values)] = values
-    covariance = None
-    if noise is not None:
-        inverse = observable.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
-        covariance = read_only(inverse @ np.diag(noise**2) @ inverse.T)
+    inverse = observable.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
+    load = problem.load(force)
+    parts = covariance_parts(inverse, problem.errors.as_torques(problem.model, load, state))
     unobservable = np.concatenate([right[: len(values)][~keep], right[len(values) :]])
-    equilibrium = equilibrium_from_state(
-        problem.model, problem.motors, problem.load(force), state, method=method, iterations=iterations
-    )
     return LoadEstimate(
         force=read_only(force),
-        equilibrium=equilibrium,
+        equilibrium=equilibrium_from_state(problem.model, problem.motors, load, state, method=method, iterations=iterations),
         frame=problem.frame,
         measured_torques=read_only(problem.torques),
-        torque_std=None if noise is None else read_only(noise),
         method=method,
         singular_values=read_only(singular_values),
         unobservable_directions=read_only(unobservable),
-        covariance=covariance,
-        residual=float(np.linalg.norm(problem.unexplained(state))),
+        covariance=read_only(np.sum(list(parts.values()), axis=0)) if parts else None,
+        covariance_parts=MappingProxyType(parts),
+        residual=problem.residual(state),
         iterations=iterations,
+        alternatives=tuple(_estimate(problem, other, method, []) for other in others),
+        **problem.errors._asdict(),
     )
 
 
-def estimate_at(
-    equilibrium: Equilibrium,
-    *,
-    frame: str,
-    motor_torques: FloatArray,
-    force: FloatArray,
-    torque_std: FloatArray | None,
-    method: str,
-) -> LoadEstimate:
-    """Compute a load estimate, as saved in a file, from the equilibrium under the force and the measured torques.
+def packed_estimate(estimate: LoadEstimate) -> dict[str, Any]:
+    """Return the named arrays of an estimate for a result file, without its equilibrium."""
+    names = ("force", "frame", "measured_torques", *MeasurementErrors._fields)
+    others = [(other.force, other.equilibrium.q_springs) for other in estimate.alternatives]
+    forces, springs = zip(*others, strict=True) if others else (None, None)
+    fields = {name: getattr(estimate, name) for name in names}
+    return fields | {"estimation": estimate.method, "other_forces": forces, "other_springs": springs}
+
+
+def estimate_at(equilibrium: Equilibrium, fields: Mapping[str, Any]) -> LoadEstimate:
+    """Compute a load estimate from the equilibrium under the force and the named arrays of `packed_estimate`.
 
     Raises:
-        ParameterError: If the force is not the one in the equilibrium's load.
+        ParameterError: If an array is not as it must be, the force is not that of the equilibrium's load, or another force does
+            not explain the torques.
+        FileFormatError: If a name is not a text.
     """
+    model, motors, frame = equilibrium.model, equilibrium.q_motors, text(fields, "frame")
+    torques = finite_array("measured_torques", fields["measured_torques"], (model.n_motors,), "N m")
+    force = finite_array("force", fields["force"], (3,), "N")
     wrench = equilibrium.load.wrenches.get(frame, np.zeros(6))
     if not np.allclose(wrench[:3], force, rtol=1e-12, atol=0.0):
         raise ParameterError("force", force, f"that of the load, {wrench[:3].tolist()} N")
+    others = finite_array("other_forces", fields.get("other_forces", np.zeros((0, 3))), (None, 3), "N")
+    given_springs = fields.get("other_springs", np.zeros((0, model.n_springs)))
+    other_springs = finite_array("other_springs", given_springs, (len(others), model.n_springs), "rad")
     base = equilibrium.load.plus(frame, np.concatenate([-force, np.zeros(3)]))
-    problem = _Problem(equilibrium.model, equilibrium.q_motors, motor_torques, base, frame)
-    state = elastic_state(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, equilibrium.load)
-    return _estimate(problem, force, state, method, equilibrium.iterations, torque_std)
-
-
-def _noise(torque_std: Any, n_motors: int) -> FloatArray:
-    if isinstance(torque_std, int | float | np.number):
-        return np.full(n_motors, positive_number("torque_std", torque_std, "N m"))
-    noise = finite_array("torque_std", torque_std, (n_motors,), "N m")
-    if np.any(noise <= 0.0):
-        raise ParameterError("torque_std", torque_std, "positive [N m]")
-    return noise
+    errors = MeasurementErrors.of(model, *(fields.get(name) for name in MeasurementErrors._fields))
+    problem = MeasuredTorques(model, motors, torques, base, frame, errors)
+    best, *rest = (
+        Explanation(one, elastic_state(model, motors, springs, problem.load(one)), equilibrium.iterations)
+        for one, springs in ((force, equilibrium.q_springs), *zip(others, other_springs, strict=True))
+    )
+    result = _estimate(problem, best, choice("estimation", text(fields, "estimation"), METHODS), rest)
+    for one, other in zip(rest, result.alternatives, strict=True):
+        if not (problem.fitted(one) and other.equilibrium.converged):
+            raise ParameterError("other_forces", one.force, "one that explains the torques")
+    return result

@@ -30,7 +30,7 @@ from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_result
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
-from softrobots.statics.load_estimation import LoadEstimate, estimate_at
+from softrobots.statics.load_estimation import LoadEstimate, estimate_at, packed_estimate
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal, checked_orientation
 from softrobots.statics.trajectory import Trajectory
@@ -147,24 +147,6 @@ def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
     return replace(result, equilibrium=replace(result.equilibrium, tolerance=float(fields["tolerance"][0])))
 
 
-def _pack_estimate(estimate: LoadEstimate) -> dict[str, Any]:
-    fields = {name: getattr(estimate, name) for name in ("force", "frame", "measured_torques", "torque_std")}
-    return _pack_rows((estimate.equilibrium,)) | fields | {"estimation": estimate.method}
-
-
-def _unpack_estimate(fields: Mapping[str, Any]) -> LoadEstimate:
-    (equilibrium,) = _unpack_rows(fields)
-    motors = (equilibrium.model.n_motors,)
-    return estimate_at(
-        equilibrium,
-        frame=text(fields, "frame"),
-        motor_torques=finite_array("measured_torques", fields["measured_torques"], motors, "N m"),
-        force=finite_array("force", fields["force"], (3,), "N"),
-        torque_std=finite_array("torque_std", fields["torque_std"], motors, "N m") if "torque_std" in fields else None,
-        method=choice("estimation", text(fields, "estimation"), ESTIMATIONS),
-    )
-
-
 def _pack_trajectory(trajectory: Trajectory) -> dict[str, Any]:
     rows = _pack_rows(trajectory.equilibria)
     targets = {"targets": trajectory.targets, "orientations": trajectory.orientations}
@@ -248,7 +230,11 @@ KINDS.update(
     equilibrium=Kind(Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
     ik_solution=Kind(IkSolution, _pack_solution, _unpack_solution),
     imposed_displacement=Kind(ImposedDisplacement, _pack_imposed, _unpack_imposed),
-    load_estimate=Kind(LoadEstimate, _pack_estimate, _unpack_estimate),
+    load_estimate=Kind(
+        LoadEstimate,
+        lambda result: _pack_rows((result.equilibrium,)) | packed_estimate(result),
+        lambda fields: estimate_at(_unpack_rows(fields)[0], fields),
+    ),
     trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True),
     workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True),
     workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True),

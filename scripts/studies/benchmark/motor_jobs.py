@@ -37,7 +37,7 @@ def load_estimation(settings: Settings) -> Outcome:
     few = LoadCases(motors[: settings.singles], torques[: settings.singles])
     many = LoadCases(*(np.resize(array, (settings.batch, 3)) for array in (motors, torques)))
     checked: dict[str, Any] = {"expected": forces[: min(CHECKED, settings.singles)], "tolerance": _SAME_FORCE, "unit": "N"}
-    one_by_one("estimate_load", partial(estimate_load, arm()), few, read=_force, **checked)
+    one_by_one("estimate_load", partial(estimate_load, arm(), restart=False), few, read=_force, **checked)
 
     def batch() -> Workload:
         solve = compiled(arm(), "numba").estimate_loads

@@ -149,7 +149,7 @@ def estimate(family: Family, statics: PlainStatics, case: Case, rows: Sequence[i
         torques = solve_equilibrium(statics.model, motors, case.forces[row], gravity=gravity, tolerance=1e-13).motor_torques
         if row % _ODD == 0:
             torques = torques + np.random.default_rng(row).normal(size=len(torques)) * 10.0
-        found = estimate_load(statics.model, motors, torques, gravity=gravity)
+        found = estimate_load(statics.model, motors, torques, gravity=gravity, restart=False)
         size = 1e-10 * max(float(np.linalg.norm(torques)), 1e-3)
         hidden = len(found.unobservable_directions) > 0
         fields = _fields(found.equilibrium, found.iterations)

@@ -1,7 +1,7 @@
 """Load estimation and inverse kinematics of looped chains.
 
-The searches of `softrobots.statics.force_search` and `softrobots.statics.tip_search`, as in the solvers on Pinocchio, with
-equilibria and Jacobians of generated code (`softrobots.compiled.chain.looped_tip`). A step costs some tens of microseconds.
+The searches of `statics.tip_force.force_search` and `statics.tip_search`, as in the solvers on Pinocchio, with equilibria and
+Jacobians of generated code (`softrobots.compiled.chain.looped_tip`). A step costs some tens of microseconds.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from softrobots.compiled.settings import HIDDEN, LEAST_SIZE, SEARCH_STEPS
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.force_search import Directions, search_force, torque_tolerance
+from softrobots.statics.tip_force.force_search import Directions, search_force, torque_tolerance
 from softrobots.statics.tip_search import LocalSolution, advance, search
 
 _ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -60,21 +61,29 @@ def torque_tolerance(torques: FloatArray) -> float:
 
 
 def search_force(
-    problem: Measurement[State], state: State, most: int, *, reach: float, tolerance: float
+    problem: Measurement[State],
+    state: State,
+    most: int,
+    *,
+    reach: float,
+    tolerance: float,
+    start: FloatArray | None = None,
 ) -> tuple[FloatArray, State, int]:
     """Levenberg-Marquardt on the torque equation, in the observable directions of each step.
 
     Args:
         problem: The measurement.
-        state: The robot without the force.
+        state: The robot where the search begins.
         most: Most steps.
         reach: Scale of lengths [m].
         tolerance: Largest part of the torques that may stay unexplained [N m].
+        start: Force where the search begins, shape (3,) [N]; none by default.
 
     Returns:
         The force, shape (3,) [N], the robot under it, and the number of steps.
     """
-    force, damping, spent = np.zeros(3), _FIRST_DAMPING * reach, 0
+    force = np.zeros(3) if start is None else start
+    damping, spent = _FIRST_DAMPING * reach, 0
     while spent < most:
         left, values, right, keep = problem.directions(state)
         missing = left[:, : len(values)].T @ problem.unexplained(state)
@@ -92,3 +101,11 @@ def search_force(
                 continue
         damping = max(10.0 * damping, 10.0 * _LAST_DAMPING * reach)
     return force, state, spent
+
+
+def sphere(count: int) -> FloatArray:
+    """Return unit directions spread evenly over a sphere (Fibonacci's lattice), shape (count, 3)."""
+    place = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * place / count, np.pi * (1.0 + math.sqrt(5.0)) * place
+    width = np.sqrt(1.0 - height**2)
+    return np.stack([width * np.cos(turn), width * np.sin(turn), height], axis=1)

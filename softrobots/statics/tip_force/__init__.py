@@ -1,0 +1,1 @@
+"""The force at the tip from motor torques: search, measured torques, errors of measurement."""

@@ -1,0 +1,195 @@
+"""Measured motor torques, and the searches for the tip forces that explain them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
+from softrobots.statics.elastostatics import balanced_state
+from softrobots.statics.kinematics import frame_jacobian
+from softrobots.statics.loads import Load
+from softrobots.statics.sensitivity import motor_torque_slope
+from softrobots.statics.tip_force.force_search import HIDDEN, OBSERVABLE, Directions, search_force, sphere, torque_tolerance
+from softrobots.statics.tip_force.load_errors import FIVE, MeasurementErrors
+
+_INNER = 1e-12  # tolerance of the equilibria during the search
+_STARTS = 8  # directions of forces from which a search that has failed begins again
+_STEPS = (1.0, -1.0, 2.0, -2.0, 3.0, -3.0)  # from a force that was found to where another is looked for, in elastic forces
+_SAME = 1e-4  # relative difference of forces that count as one
+
+
+class Explanation(NamedTuple):
+    """A force, and the robot under it."""
+
+    force: FloatArray
+    """The force, shape (3,) [N]."""
+    state: ElasticState
+    """The robot."""
+    iterations: int
+    """Steps of the search."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTorques:
+    """Measured torques and the known part of the load; a `force_search.Measurement`."""
+
+    model: SoftModel
+    """The robot."""
+    motors: FloatArray
+    """Motor coordinates, shape (n_motors,)."""
+    torques: FloatArray
+    """Torques, shape (n_motors,) [N m]."""
+    base: Load
+    """The load without the force."""
+    frame: str
+    """Where the force acts."""
+    errors: MeasurementErrors
+    """Errors of measurement."""
+
+    @cached_property
+    def tolerance(self) -> float:
+        """Norm of the torques that may stay unexplained without errors [N m]."""
+        return torque_tolerance(self.torques)
+
+    def load(self, force: FloatArray) -> Load:
+        """Return the load with a force."""
+        return self.base.plus(self.frame, np.concatenate([force, np.zeros(3)]))
+
+    def equilibrium(self, force: FloatArray, near: ElasticState) -> ElasticState | None:
+        """Solve for the equilibrium under a force, from a nearby state; None if it does not converge."""
+        return balanced_state(self.model, self.motors, self.load(force), near.q_springs, tolerance=_INNER)
+
+    def unexplained(self, state: ElasticState) -> FloatArray:
+        """Return the measured torques minus those of a state."""
+        return np.asarray(self.torques - state.load.motors)
+
+    def residual(self, state: ElasticState) -> float:
+        """Return the norm of the torques that a state does not explain [N m]."""
+        return float(np.linalg.norm(self.unexplained(state)))
+
+    def directions(self, state: ElasticState) -> Directions:
+        """Decompose the derivative of the torques with respect to the force."""
+        motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
+        return Directions.of(motor_torque_slope(motors, springs, state.tangent, state.load.coupling), self.model.reach)
+
+    def scatter(self, force: FloatArray, state: ElasticState) -> float:
+        """Return the norm of the torques that errors of measurement may leave unexplained [N m]; 0 if none are known."""
+        parts = self.errors.as_torques(self.model, self.load(force), state).values()
+        return FIVE * float(np.sqrt(sum(float(np.sum(part**2)) for part in parts)))
+
+    def explained(self, found: Explanation) -> bool:
+        """Whether the unexplained torques are rounding, errors of measurement, or from unobservable directions.
+
+        Where every direction is observable only rounding or errors may be left; in a singular pose also `HIDDEN` of the torques
+        and `OBSERVABLE` of the stiffest spring. With more than three motors the residual of the least-squares fit may have any
+        size if the noise is unknown.
+        """
+        left, values, _, keep = self.directions(found.state)
+        missing = left.T @ self.unexplained(found.state)
+        scatter = self.scatter(found.force, found.state)
+        hidden = HIDDEN * float(np.linalg.norm(self.torques)) + OBSERVABLE * self.model.stiffest
+        seen, surplus = missing[: len(values)], missing[len(values) :]
+        allowed = max(self.tolerance, scatter) if keep.all() else hidden + scatter
+        known = self.errors.torque_std is not None
+        return bool(np.linalg.norm(seen) <= allowed and (not known or np.linalg.norm(surplus) <= max(allowed, scatter)))
+
+    def fitted(self, found: Explanation) -> bool:
+        """Whether a force leaves no more than rounding or errors of measurement, by directions that the motors all feel."""
+        directions = self.directions(found.state)
+        felt = len(directions.values) == 3 and bool(directions.observable.all())
+        return felt and self.residual(found.state) <= max(self.tolerance, self.scatter(found.force, found.state))
+
+    @property
+    def elastic_force(self) -> float:
+        """Force across the robot's reach that bends it by about a radian [N]; that of the torques if no spring turns."""
+        soft = float(np.sum(1.0 / self.model.stiffness[self.model.springs.turning]))
+        return 2.0 / (soft * self.model.reach) if soft > 0.0 else float(np.linalg.norm(self.torques)) / self.model.reach
+
+
+def newton(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explanation]:
+    """Damped Newton from no force, see `softrobots.statics.tip_force.force_search`, and again from other forces.
+
+    A search that leaves torques unexplained is repeated from forces all around, until one is explained; the least residual
+    is kept. Other explanations are looked for along the direction that the motors feel least.
+
+    Args:
+        problem: The measurement.
+        most: Most steps of one search.
+        restart: Whether to search again.
+
+    Returns:
+        The explanation that is kept, then others that explain the torques as well, smallest force first.
+    """
+    model = problem.model
+    no_force = np.zeros(3)
+    relaxed = elastic_state(model, problem.motors, model.rest, problem.load(no_force))
+    start = problem.equilibrium(no_force, relaxed) or relaxed
+    best = _search(problem, no_force, start, most)
+    if not restart:
+        return [best]
+    size, others = problem.elastic_force, list[Explanation]()
+    if not problem.explained(best) or (problem.residual(best.state) > problem.tolerance and _felt(problem, best)):
+        for direction in sphere(_STARTS):
+            again = _search_from(problem, 2.0 * size * direction, start, most)
+            if again is not None and problem.residual(again.state) < problem.residual(best.state):
+                best = again
+                if problem.fitted(best):
+                    break
+    if problem.fitted(best):
+        along = problem.directions(best.state).right[2]
+        for step in _STEPS:
+            other = _search_from(problem, best.force + step * size * along, best.state, most)
+            if other is not None and problem.fitted(other) and not any(_same(other, one) for one in (best, *others)):
+                others.append(other)
+    return [best, *sorted(others, key=lambda one: float(np.linalg.norm(one.force)))]
+
+
+def alternation(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explanation]:
+    """Recursion of [Troise 2021] Figure 5, until springs and motors are in equilibrium; it has no other start."""
+    model = problem.model
+    force, springs = np.zeros(3), np.array(model.rest)
+    state = elastic_state(model, problem.motors, springs, problem.base)
+    for iteration in range(1, most + 1):
+        by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, problem.frame)[:3])
+        unloaded = elastic_state(model, problem.motors, springs, problem.base).load
+        estimate = np.asarray(np.linalg.lstsq(by_motors.T, problem.torques - unloaded.motors, rcond=None)[0], dtype=np.float64)
+        springs = model.rest + (unloaded.elastic + by_springs.T @ estimate) / model.stiffness
+        trial = elastic_state(model, problem.motors, springs, problem.load(estimate))
+        if not trial.point.valid:  # a section beyond its range: the recursion diverges
+            return [Explanation(force, state, iteration)]
+        force, state = estimate, trial
+        balanced = state.error <= largest_residual(model, state.scale, TOLERANCE)
+        if balanced and problem.residual(state) <= problem.tolerance:
+            return [Explanation(force, state, iteration)]
+    return [Explanation(force, state, most)]
+
+
+SOLVERS: dict[str, Callable[..., list[Explanation]]] = {"newton": newton, "alternation": alternation}
+"""The searches by name."""
+
+
+def _search(problem: MeasuredTorques, force: FloatArray, state: ElasticState, most: int) -> Explanation:
+    scales = {"reach": problem.model.reach, "tolerance": problem.tolerance}
+    return Explanation(*search_force(problem, state, most, **scales, start=force))
+
+
+def _search_from(problem: MeasuredTorques, force: FloatArray, near: ElasticState, most: int) -> Explanation | None:
+    """Search from the equilibrium under a force; None if there is none."""
+    start = problem.equilibrium(force, near)
+    return None if start is None else _search(problem, force, start, most)
+
+
+def _felt(problem: MeasuredTorques, found: Explanation) -> bool:
+    return bool(problem.directions(found.state).observable.all())
+
+
+def _same(one: Explanation, other: Explanation) -> bool:
+    distance, size = (float(np.linalg.norm(force)) for force in (one.force - other.force, other.force))
+    return distance <= _SAME * max(size, 1.0)
