@@ -136,7 +136,9 @@ def test_a_model_that_was_sent_elsewhere_gives_the_same_bytes(kind: str, case: C
 
 
 @law("with_springs")
-@pytest.mark.parametrize("kind", ["arm", "limp", "three_links", "pcc_lumped", "helix_lumped", "mounted", "foreign"])
+@pytest.mark.parametrize(
+    "kind", ["arm", "limp", "three_links", "two_hinges", "pcc_lumped", "helix_lumped", "mounted", "foreign"]
+)
 @given(case=cases(), factor=st.floats(0.5, 2.0), rests=st.lists(st.floats(-0.2, 0.2), min_size=3, max_size=3))
 @settings(max_examples=2)
 def test_a_model_with_other_springs_is_the_one_loaded_anew(kind: str, case: Case, factor: float, rests: list[float]) -> None:

@@ -69,6 +69,19 @@ def test_springs_said_by_the_caller_come_back(tmp_path: Path) -> None:
     same(state, sr.load_result(sr.save_result(state, tmp_path / "a.npz")))
 
 
+def test_springs_taken_away_by_the_caller_stay_away(tmp_path: Path) -> None:
+    """The text that is saved still has them; also in files of before, which hold the springs that there are, too."""
+    model = sr.load_model(
+        sr.InflatableArm(), springs={"spring_1_side": None, "spring_2_up": 90.0}, motors=["motor_1", "motor_2"]
+    )
+    state = sr.solve_equilibrium(model, (0.3, 0.2), (0, 1, -2))
+    again = sr.load_result(sr.save_result(state, tmp_path / "a.npz"))
+    same(state, again)
+    assert again.model == model
+    assert again.model.joint_roles == model.joint_roles
+    assert again.model.joint_roles["spring_1_side"] == again.model.joint_roles["motor_3"] == "locked"
+
+
 def test_branches_that_are_not_what_they_claim_are_refused(results: dict, tmp_path: Path) -> None:
     fields = dict(np.load(sr.save_result(results["branches"], tmp_path / "a.npz")))
     assert len(fields["labels"]) > 1
