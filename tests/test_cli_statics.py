@@ -403,6 +403,17 @@ def test_solve_says_which_springs_are_given(told: Told) -> None:
     assert "given:" not in told("solve", "inflatable_arm")[1]
 
 
+def test_solve_says_that_the_limits_of_a_helix_are_upper_bounds(told: Told) -> None:
+    bounds = "limits of the wall    upper bounds, of a straight tube: the wall along the actuator is slack before any load"
+    for tube in (["--set", "elastic_sections=4", "length=0.3"], ["--set", "chain=lumped", "hinges=4", "length=0.3"]):
+        out = told("solve", "helix_tube", *tube, "--gravity")[1]
+        assert bounds in out
+        assert re.search(r"^wrinkled +no, at most \d+\.\d % ", out, re.M)
+    out = told("solve", "inflatable_arm", "--gravity")[1]
+    assert "upper bounds" not in out
+    assert re.search(r"^wrinkled +no, at least \d+\.\d % ", out, re.M)
+
+
 def test_ik_turns_the_tip(answer) -> None:
     """The direction of the tip of a robot that has the freedom."""
     found = answer("ik", "pcc_arm", "--target", "0.3", "-0.2", "0.9", "--orientation", "0.5", "0", "1", "--gravity")

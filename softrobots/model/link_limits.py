@@ -20,7 +20,10 @@ from softrobots.model.soft_model import SoftModel
 
 
 class LinkLimits(NamedTuple):
-    """Inflated links and the limits of their walls, each at the hinge that is nearest to them; arrays of shape (n_links,)."""
+    """Inflated links and the limits of their walls, each at the hinge that is nearest to them; arrays of shape (n_links,).
+
+    The limits of a helical tube are upper bounds: the wall along its actuator is slack before any load.
+    """
 
     moments: FloatArray
     """Moment [N m]."""

@@ -109,14 +109,19 @@ def known_margins(margins: FloatArray) -> list[float | None]:
 
 def _walls(equilibrium: Equilibrium) -> list[tuple[str, str]]:
     """Whether a link is wrinkled, whether its wall is slack, and what is left to both; nothing without inflated links."""
-    if not equilibrium.model.spring_groups:
+    groups = equilibrium.model.spring_groups
+    if not groups:
         return []
-    limits, soft = equilibrium.link_limits, all(group.slack_wall for group in equilibrium.model.spring_groups)
+    limits, soft = equilibrium.link_limits, all(group.slack_wall for group in groups)
+    actuated = bool(equilibrium.model.structure.lines) and any(group.segment is not None for group in groups)
+    share = "at most" if actuated else "at least"
     least = [100.0 * float(margins.min()) for margins in (limits.wrinkling_margins, limits.slack_margins)]
     wrinkled = "YES: half of a wall is slack" if soft else "YES: linear springs no longer hold"
-    slack = f"no, at least {least[1]:.1f} % of its moment is left" if least[1] > 0.0 else "YES: by membrane theory"
-    left = f"no, at least {least[0]:.1f} % of the wrinkling moment is left"
-    return [("wrinkled", wrinkled if equilibrium.wrinkled else left), ("first slack fibre", slack)]
+    slack = f"no, {share} {least[1]:.1f} % of its moment is left" if least[1] > 0.0 else "YES: by membrane theory"
+    left = f"no, {share} {least[0]:.1f} % of the wrinkling moment is left"
+    rows = [("wrinkled", wrinkled if equilibrium.wrinkled else left), ("first slack fibre", slack)]
+    bounds = "upper bounds, of a straight tube: the wall along the actuator is slack before any load"
+    return [*rows, ("limits of the wall", bounds)] if actuated else rows
 
 
 def head_lines(model: SoftModel, load: Load) -> list[str]:
