@@ -244,7 +244,7 @@ def _figures(
     turns = {}
     if trajectory.orientation_error is not None and uncompensated.orientation_error is not None:
         angles = dict(zip(errors, (trajectory.orientation_error, uncompensated.orientation_error), strict=True))
-        turns["orientation_errors"] = trajectories.orientation_errors(angles, trajectory.times)
+        turns["orientation_errors"] = trajectories.tip_errors(angles, trajectory.times, angles=True)
     return turns | {
         "poses": trajectories.poses(trajectory),
         "motor_angles": trajectories.motor_angles(trajectory, rigid),

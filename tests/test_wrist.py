@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
+from softrobots.cli.main import main
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.spherical_wrist import spherical_wrist
 
@@ -334,3 +336,36 @@ def test_a_path_through_a_singular_wrist_passes_and_one_beside_it_is_named(wrist
 def wristed_pose(model: sr.SoftModel, motors: np.ndarray) -> pin.SE3:
     """The pose of the loaded tip."""
     return sr.solve_equilibrium(model, motors, PUSH).transform_tip_to_world
+
+
+# --- The command
+
+
+def test_the_command_finds_poses_and_follows_files_of_them(
+    wristed: sr.SoftModel, path: sr.Path3D, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """Roll, pitch and yaw as in URDF: yaw first. Angles of five digits are met to their own rounding."""
+    arm, load = ["ik", "inflatable_arm", "--set", "wrist=[0.08,0.12]"], ["--force", "0", "10", "-15"]
+    target = ["--target", "0.8", "0.3", "0.1", "--rpy", "0.2", "1.1", "-0.4"]
+    assert main([*arm, *target, *load, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    pose = wristed_pose(wristed, np.array(found["q_motors"]))
+    wanted = turn("z", -0.4) @ turn("-y", -1.1) @ turn("x", 0.2)
+    assert max(apart(pose, pin.SE3(wanted, np.array([0.8, 0.3, 0.1])))) < 1.1e-9
+    assert found["wrist_singularity"] is None
+    rows = [
+        [*position, *pin.rpy.matrixToRpy(rotation)]
+        for position, rotation in zip(path.positions, path.orientations, strict=True)
+    ]
+    lines = ["x,y,z,roll,pitch,yaw", *(",".join(map(repr, map(float, row))) for row in rows[::10])]
+    file = tmp_path / "poses.csv"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    assert main([*arm, "--waypoints", str(file), *load, "--json"]) == 0
+    followed = json.loads(capsys.readouterr().out)
+    assert np.allclose(followed["orientations"], path.orientations[::10], atol=1e-12)
+    assert max(followed["orientation_error"]) < 1e-9
+    assert main([*arm, "--waypoints", str(file), *load]) == 0
+    assert "largest angle" in capsys.readouterr().out
+    file.write_text("x,y,z,roll\n1,2,3,0\n1,2,3,1\n", encoding="utf-8")
+    assert main([*arm, "--waypoints", str(file)]) == 2
+    assert "all three or none are required" in capsys.readouterr().err

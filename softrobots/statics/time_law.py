@@ -78,26 +78,17 @@ def straight_line(start: Any, end: Any, duration: float, steps: int = 200) -> Pa
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or not positive, or there are too many steps.
     """
-    a, b = (_position_or_pose(name, value) for name, value in (("start", start), ("end", end)))
-    if a.shape != b.shape:
+    a, b = Goal.of(start, name="start"), Goal.of(end, name="end")
+    if a.rows != b.rows:
         raise ParameterError("end", end, "of the same kind as start: two positions, or two poses")
     duration, steps = positive_number("duration", duration, "s"), positive_integer("steps", steps, _MOST_STEPS)
     s = np.linspace(0.0, 1.0, steps + 1)
     times, share = read_only(s * duration), quintic(s)
-    if a.shape == (3,):
-        return Path3D(times, read_only(a + share[:, None] * (b - a)))
-    turn = pin.log3(a[:3, :3].T @ b[:3, :3])
-    rotations = np.array([a[:3, :3] @ pin.exp3(one * turn) for one in share])
-    return Path3D(times, read_only(a[:3, 3] + share[:, None] * (b[:3, 3] - a[:3, 3])), read_only(rotations))
-
-
-def _position_or_pose(name: str, value: Any) -> FloatArray:
-    """Return a position, shape (3,), or a pose, shape (4, 4)."""
-    given = value.homogeneous if isinstance(value, pin.SE3) else value
-    if np.shape(given) != (4, 4):
-        return finite_array(name, given, (3,), "m")
-    goal = Goal.of(given)
-    return np.block([[np.asarray(goal.rotation), goal.position[:, None]], [np.eye(4)[3]]])
+    positions = read_only(a.position + share[:, None] * (b.position - a.position))
+    if a.rotation is None or b.rotation is None:
+        return Path3D(times, positions)
+    turn = pin.log3(a.rotation.T @ b.rotation)
+    return Path3D(times, positions, read_only(np.array([a.rotation @ pin.exp3(one * turn) for one in share])))
 
 
 def waypoints(positions: Any, times: Any) -> Path3D:

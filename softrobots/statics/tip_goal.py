@@ -30,25 +30,26 @@ class Goal(NamedTuple):
     """The point that shall be at the position, in the axes of the tip, from its origin, shape (3,) [m]; None: the origin."""
 
     @classmethod
-    def of(cls, target: Any, orientation: Any = None) -> Goal:
+    def of(cls, target: Any, orientation: Any = None, name: str = "target") -> Goal:
         """Return the goal of a target: a position, shape (3,) [m], or a pose, `pinocchio.SE3` or shape (4, 4), in world axes.
 
         Args:
             target: The target.
             orientation: For a position only: a rotation matrix, shape (3, 3), the direction of the tip's z axis, shape (3,), or
                 None for any.
+            name: What the target is called in errors.
 
         Raises:
             ParameterError: If one of them is something else.
         """
         given = target.homogeneous if isinstance(target, pin.SE3) else target
         if np.shape(given) != (4, 4):
-            return cls(finite_array("target", given, (3,), "m"), checked_orientation(orientation))
+            return cls(finite_array(name, given, (3,), "m"), checked_orientation(orientation))
         if orientation is not None:
             raise ParameterError("orientation", orientation, "None where the target is a pose, which has one")
-        pose = finite_array("target", given, (4, 4))
+        pose = finite_array(name, given, (4, 4))
         if not np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0)) or not _is_rotation(pose[:3, :3]):
-            raise ParameterError("target", target, "a pose: rotation and translation above a last row (0, 0, 0, 1)")
+            raise ParameterError(name, target, "a pose: rotation and translation above a last row (0, 0, 0, 1)")
         return cls(pose[:3, 3], checked_orientation(pose[:3, :3]))
 
     @classmethod

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 import softrobots as sr
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace
@@ -199,14 +200,16 @@ def results() -> dict[str, Any]:
     """A result of every kind, of a small arm."""
     model = sr.load_model(sr.InflatableArm())
     held = sr.solve_equilibrium(model, (0.3, 0.6, -0.8), (0.0, 10.0, -15.0))
-    path = sr.straight_line((0.7, 0.1, 0.3), (0.9, 0.0, 0.3), 1.0, 2)
+    wristed, down = sr.load_model(sr.InflatableArm(wrist=(0.08, 0.12))), pin.rpy.rpyToMatrix(0.1, 1.2, 0.2)
+    poses = [pin.SE3(down, np.array(position)) for position in ((0.7, 0.1, 0.3), (0.9, 0.0, 0.3))]
+    path = sr.straight_line(*poses, 1.0, 2)
     grid = TargetGrid((0.6, 0.8), (0.0,), (0.3,))
     return {
         "equilibrium": held,
         "ik_solution": sr.solve_ik(model, (0.9, 0.3, 0.2), (0, 0, -5)),
         "imposed_displacement": sr.solve_imposed_displacement(model, (0.3, 0.6, -0.8), 0.01, direction=(0, 0, -1)),
         "load_estimate": sr.estimate_load(model, held.q_motors, held.motor_torques, torque_std=0.1),
-        "trajectory": sr.follow_trajectory(model, path.positions, (0, 0, -5), times=path.times),
+        "trajectory": sr.follow_trajectory(wristed, path.targets, (0, 0, -5), times=path.times),
         "workspace": sr.sample_workspace(model, 5, force=(0, 0, -5)),
         "workspace_map": map_workspace(model, grid, (0.0, 5.0), backend="python"),
         "branches": sr.post_buckling_branches(model, (0, 0, 0), (-1, 0, 0), max_force=115.0, largest_step=0.5)[:2],

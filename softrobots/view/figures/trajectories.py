@@ -101,12 +101,13 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
     return figure
 
 
-def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
-    """Distance of the tip from its target over time, one line a method, logarithmic.
+def tip_errors(errors: dict[str, FloatArray], times: FloatArray, *, angles: bool = False) -> Any:
+    """Distance of the tip from its target over time, or the angle between them, one line a method, logarithmic.
 
     Args:
-        errors: Distance by label, each shape (n,) [m].
+        errors: Distance or angle by label, each shape (n,) [m or rad].
         times: Times, shape (n,) [s].
+        angles: Whether they are angles.
 
     Returns:
         The figure.
@@ -115,33 +116,13 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
         ParameterError: If shapes differ or a number is not finite.
         MissingDependency: If matplotlib is not installed.
     """
-    return _errors(errors, times, "tip error [mm]", "Distance of the loaded tip from its target", 1e3)
-
-
-def orientation_errors(errors: dict[str, FloatArray], times: FloatArray) -> Any:
-    """Angle between the tip and its target orientation over time, one line a method, logarithmic.
-
-    Args:
-        errors: Angle by label, each shape (n,) [rad].
-        times: Times, shape (n,) [s].
-
-    Returns:
-        The figure.
-
-    Raises:
-        ParameterError: If shapes differ or a number is not finite.
-        MissingDependency: If matplotlib is not installed.
-    """
-    return _errors(errors, times, "angle [mrad]", "Angle between the loaded tip and its target orientation", 1e3)
-
-
-def _errors(errors: dict[str, FloatArray], times: FloatArray, ylabel: str, title: str, scale: float) -> Any:
     moments = finite_array("times", times, (None,), "s")
     lines = {label: finite_array(f"errors[{label!r}]", error, moments.shape) for label, error in errors.items()}
-    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel=ylabel, title=title)
+    title = f"{'Angle' if angles else 'Distance'} of the loaded tip from its target"
+    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel=f"tip error [{'mrad' if angles else 'mm'}]", title=title)
     every = max(len(moments) // 10, 1)
     for number, (label, error) in enumerate(lines.items()):
-        axes.semilogy(moments, np.maximum(error, 1e-16) * scale, markevery=every, label=label, **line_style(number))
+        axes.semilogy(moments, np.maximum(error, 1e-16) * 1e3, markevery=every, label=label, **line_style(number))
     axes.legend(fontsize=9)
     return figure
 
