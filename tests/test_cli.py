@@ -10,6 +10,7 @@ import re
 import shlex
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -254,6 +255,34 @@ def test_listed_defaults_are_those_of_the_robot(name: str) -> None:
     """Typed back, every default gives the same robot."""
     listed = robot_parameters(name)
     assert make_robot(name, [f"{parameter.name}={parameter.default}" for parameter in listed]) == sr.ROBOTS[name]()
+
+
+def test_a_warning_is_one_line_that_comes_once(told) -> None:
+    """On stderr, without path and source: of an arm whose springs are the paper's and whose links are not."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        status, out, err = told("solve", "inflatable_arm", "--set", "pressure=3e4", "radius=[0.05,0.04]", "--json")
+    assert status == 0
+    assert json.loads(out)["stable"]
+    assert err.startswith(
+        "warning: radius = (0.05, 0.04), pressure = (30000.0, 30000.0): the springs are still those of the paper's"
+    )
+    assert err.count("\n") == 1
+    assert told("solve", "inflatable_arm", "--set", "pressure=3e4", "young_modulus=1.4e8", "--json")[2] == ""
+
+
+def test_words_and_truth_values_are_parameters(told) -> None:
+    """Listed with their defaults; given as words; refused by name with what is allowed."""
+    status, out, _ = told("urdf", "inflatable_arm", "--list")
+    assert status == 0
+    assert "link_model=paper\n    Where a link bends: paper (at one hinge" in out
+    assert "torsion=false\n    Whether a link twists" in out
+    same = sr.InflatableArm(link_model="two_hinges", torsion=True, payload=(0.2, 0.0, 0.0, 0.1)).urdf()
+    words = ("link_model=two_hinges", "torsion=true", "payload=[0.2,0,0,0.1]")
+    assert told("urdf", "inflatable_arm", "--set", *words) == (0, same, "")
+    assert told("urdf", "inflatable_arm_two_hinges", "--set", *words[1:]) == (0, same, "")
+    assert "link_model must be one of 'paper', 'two_hinges'" in told("urdf", "inflatable_arm", "--set", "link_model=three")[2]
+    assert "torsion must be True or False" in told("urdf", "inflatable_arm", "--set", "torsion=2")[2]
 
 
 def test_urdf_expands_any_xacro_file(told, tmp_path: Path) -> None:

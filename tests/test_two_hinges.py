@@ -26,6 +26,8 @@ from softrobots.description.tag_reader import read_tags
 from softrobots.export import to_mjcf, to_sdf
 from softrobots.robots.inflated_links import LINK_MODELS, InflatedLinks
 from softrobots.view.robot_shapes import RobotShapes
+from studies.interop.cases import FORCES, EquilibriumCase
+from studies.interop.simulators import compare_equilibrium
 from tests.support.inflated_rods import InflatedRod, product, solve_inflated_chain, turned
 from tests.support.laws import law
 from tests.support.oracles import tube_points
@@ -304,29 +306,30 @@ def test_the_pushed_arm_buckles_as_a_column_that_shears() -> None:
 
 
 def test_a_link_carries_the_larger_moment_of_its_hinges() -> None:
-    """By hand: the moment of the force about both axes of each hinge."""
+    """By hand: the moment of the force about both axes of each hinge, and the pull halfway between before and behind it."""
     model = arm()
     found = sr.solve_equilibrium(model, POSTURE, LOAD)
     assert len(model.spring_groups) == len(found.link_moments) == 2
     data = model.pinocchio.createData()
     pin.forwardKinematics(model.pinocchio, data, found.q)
+    pressures = []
     for number, group in enumerate(model.spring_groups, start=1):
         moments = []
         for hinge in ("a", "b"):
-            about = []
-            for way in ("side", "up"):
-                joint = model.pinocchio.getJointId(f"spring_{number}_{hinge}_{way}")
-                axis = data.oMi[joint].rotation[:, {"side": 2, "up": 1}[way]]
-                about.append(float(axis @ np.cross(found.tip_position - data.oMi[joint].translation, LOAD)))
-            moments.append(math.hypot(*about))
+            joints = [model.pinocchio.getJointId(f"spring_{number}_{hinge}_{way}") for way in ("side", "up")]
+            side, down = (data.oMi[joint].rotation[:, column] for joint, column in zip(joints, (2, 1), strict=True))
+            moment = np.cross(found.tip_position - data.oMi[joints[0]].translation, LOAD)
+            moments.append(math.hypot(side @ moment, down @ moment))
+            before, behind = (data.oMi[joint].rotation[:, 0] for joint in (min(joints) - 1, max(joints)))
+            pull = (before + behind) @ LOAD / np.linalg.norm(before + behind)
+            pressures.append(4.0 * moments[-1] / (math.pi**2 * 0.055**3) - pull / (math.pi * 0.055**2))  # (3) with 1 + N / P
         assert found.link_moments[number - 1] == pytest.approx(max(moments), rel=1e-9)
         assert group.hinges == (group.springs[:2], group.springs[2:])
+    path = sr.follow_trajectory(model, [found.tip_position], LOAD, q_motors0=POSTURE)
+    assert path.required_pressure == pytest.approx(max(pressures), rel=1e-9)
     heavy = sr.solve_equilibrium(model, (0, 0, 0), (0, 0, -25))
     assert heavy.wrinkled
     assert max(heavy.link_moments) > sr.inflated_beam.wrinkling_moment(50e3, 0.055)
-    path = sr.follow_trajectory(model, [found.tip_position], LOAD, q_motors0=POSTURE)
-    needed = max(sr.inflated_beam.required_pressure(found.link_moments, 0.055))
-    assert path.required_pressure == pytest.approx(needed, rel=1e-9)
 
 
 def test_each_hinge_has_the_plateau_of_its_link() -> None:
@@ -365,30 +368,25 @@ def test_the_solvers_take_it() -> None:
     assert compiled.estimate_load(POSTURE, found.motor_torques).force == pytest.approx(LOAD, abs=1e-7)
 
 
-def test_mujoco_rests_where_we_say(tool: Callable[[str], ModuleType]) -> None:
-    """The exported file alone, under the force on the tip: its own forces vanish at our springs (1e-9 N m), not elsewhere."""
-    mujoco = tool("mujoco")
+@pytest.mark.parametrize(
+    ("name", "module"),
+    [
+        ("MuJoCo", "mujoco"),
+        pytest.param("Drake", "pydrake", marks=pytest.mark.study),
+        pytest.param("PyBullet", "pybullet", marks=pytest.mark.study),
+    ],
+)
+def test_simulators_that_get_the_exported_file_rest_where_we_say(
+    tool: Callable[[str], ModuleType], name: str, module: str
+) -> None:
+    """MJCF, SDF, Python file, with a payload: their own forces balance there (1e-9), and 60 s of simulation end there."""
+    tool(module)
     model = arm(torsion=True, payload=(0.3, 0.0, 0.02, 0.0))
-    found = sr.solve_equilibrium(model, POSTURE, LOAD, gravity=sr.EARTH_GRAVITY, tolerance=1e-13)
-    there = mujoco.MjModel.from_xml_string(to_mjcf(model))
-    there.opt.gravity[:] = sr.EARTH_GRAVITY
-    there.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
-    state = mujoco.MjData(there)
-    place = {there.joint(number).name: there.joint(number).qposadr[0] for number in range(there.njnt)}
-    for name, value in (
-        *zip(model.motor_joints, POSTURE, strict=True),
-        *zip(model.spring_joints, found.q_springs, strict=True),
-    ):
-        state.qpos[place[name]] = value
-    tip = there.body("tip").id
-    mujoco.mj_forward(there, state)
-    assert state.xpos[tip] == pytest.approx(found.tip_position, abs=1e-12)
-    applied = np.zeros(there.nv)
-    mujoco.mj_applyFT(there, state, np.array(LOAD), np.zeros(3), state.xpos[tip], tip, applied)
-    left = state.qfrc_passive + applied - state.qfrc_bias
-    springs = [there.joint(name).dofadr[0] for name in model.spring_joints]
-    assert np.abs(left[springs]).max() < 1e-9
-    assert np.abs(applied[springs]).max() > 1.0
+    found = sr.solve_equilibrium(model, POSTURE, FORCES["inflatable_arm"], gravity=sr.EARTH_GRAVITY, tolerance=1e-13)
+    row = compare_equilibrium(EquilibriumCase("inflatable_arm", "two hinges", found), name)
+    assert np.abs(found.q_springs).max() > 0.03
+    assert row.contacts == 0
+    assert row.agrees
 
 
 def test_the_map_of_an_arm_that_twists() -> None:

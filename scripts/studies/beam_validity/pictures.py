@@ -92,10 +92,11 @@ def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Ma
     for axes, (kind, column, unit, label) in zip(
         others, (*looks, ("also twist and stretch", 0, 1e3, "tip error [mm]")), strict=True
     ):
-        rows = {name: found for name, found in errors[kind].items() if name != RIGID}
-        for number, (name, found) in enumerate(rows.items()):
-            sizes = unit * np.sort(found[:, column])
-            axes.plot(sizes, np.linspace(0.0, 100.0, len(sizes)), markevery=0.2, label=name, **canvas.line_style(number))
+        looks_of = {name: canvas.line_style(number) for number, name in enumerate(arm["hinges"])}
+        for name, found in errors[kind].items():
+            sizes, look = unit * np.sort(found[:, column]), looks_of.get(name, {"color": "0.55", "lw": 3.5, "zorder": 1})
+            if name != RIGID:
+                axes.plot(sizes, np.linspace(0.0, 100.0, len(sizes)), markevery=0.2, label=name, **look)
         axes.set(xlabel=label, ylabel="share of the cases [%]", title=f"Against beams that {kind}")
         axes.set_xlim(0.0, None)
     for axes in panels.ravel():

@@ -176,7 +176,7 @@ def _described(robot: InflatableArm | PccArm) -> str:
 
 def _odd_arm(random: Random) -> SoftModel:
     """One to four links with springs of any stiffness, relaxed or not."""
-    text = _described(InflatableArm(link_lengths=_ARMS[random.integers(len(_ARMS))]))
+    text = _described(InflatableArm(link_lengths=_ARMS[random.integers(len(_ARMS))], stiffness=172.71))
     rest = random.uniform(0.0, 1.5) * random.integers(2)
     names = re.findall(r'<joint name="(spring_[^"]*)"', text)
     return load_model(text, springs={name: (172.71 * _ratio(random), rest * random.uniform(-1.0, 1.0)) for name in names})
