@@ -228,7 +228,11 @@ def test_a_round_rod_buckles_into_a_ring_and_is_said_to_be_neutral(rod: sr.SoftM
     assert set(found) == {FUNDAMENTAL, RING}
     ring = found[RING]
     assert ring.neutral.all()
-    heavy = by_label(sr.post_buckling_branches(rod, (), (0, 0, -1), gravity=sr.EARTH_GRAVITY))  # not round to 1e-9
+    heavy = by_label(sr.post_buckling_branches(rod, (), (0, 0, -1), gravity=sr.EARTH_GRAVITY))
+    assert set(heavy) == {FUNDAMENTAL, RING}
+    assert heavy[RING].neutral.all()
+    assert not heavy[RING].stable.any()
+    assert {one.stability.kind for one in ring.equilibria} == {"neutral"}
     assert all(one.converged for branch in (*found.values(), *heavy.values()) for one in branch.equilibria)
     assert not ring.stable.any()
     assert ring.amplitude[-1] > 0.5

@@ -103,15 +103,15 @@ def test_frequencies_of_the_loaded_arm() -> None:
 
 
 def test_a_straight_rod_of_sections_vibrates_as_a_clamped_beam() -> None:
-    """(1.8751, 4.6941)^2 sqrt(EI / (rho A L^4)); the mass on chords errs in second order (1.8: room), 2 % at 16."""
+    """(1.8751, 4.6941)^2 sqrt(EI / (rho A L^4)); the mass on chords errs in second order (1.8: room), 8 % at 8."""
     missed = []
-    for count in (8, 16):
+    for count in (4, 8):
         rod = sr.PccArm(segment_lengths=(0.6,), elastic_sections=count, radius=1e-3, muscle_azimuths=())
         found = sr.solve_equilibrium(sr.load_model(rod), ()).stability.eigenvalues.real[:4]
         ratio = rod.bending_stiffness[0] / (rod.linear_density[0] * 0.6**4)
         expected = np.array([1.8751041, 1.8751041, 4.6940911, 4.6940911]) ** 4 * ratio
         missed.append(np.abs(found / expected - 1.0).max())
-    assert missed[1] < 0.03
+    assert missed[1] < 0.1
     assert missed[0] / missed[1] > 2**1.8
 
 
