@@ -113,7 +113,8 @@ def test_the_race_is_one() -> None:
     alone = [solver_mix.as_bytes(job) for job in jobs]
     assert in_threads(jobs) == alone
     pair = model.workspace(None)
-    object.__setattr__(model, "data", SimpleNamespace(at=lambda _: pair))  # of all threads
+    numbers = {name: getattr(model.data, name) for name in ("frame_ids", "circles", "q_indices")}
+    object.__setattr__(model, "data", SimpleNamespace(at=lambda _: pair, **numbers))  # of all threads
     assert any(in_threads(jobs) != alone for _ in range(50))  # threads meet by chance: nearly every time
 
 

@@ -351,10 +351,15 @@ def test_what_does_not_bear_on_the_statics_passes(tool: Tool) -> None:
     assert (model.motor_joints, model.spring_joints) == (("s",), ("j",))
 
 
-def test_springs_and_motors_of_the_caller_replace_those_of_the_file(tool: Tool) -> None:
+def test_springs_and_motors_of_the_caller_go_before_those_of_the_file(tool: Tool) -> None:
     tool("mujoco")
-    model = sr.load_model(ARM, springs={"yaw": (7.0, 0.1)}, motors=["pitch"], tip="hand")
-    assert (model.spring_table, model.motor_joints, model.tip) == ({"yaw": (7.0, 0.1)}, ("pitch",), "hand")
+    of_file = sr.load_model(ARM).spring_table
+    model = sr.load_model(ARM, springs={"yaw": (7.0, 0.1), "pitch": None}, motors=["pitch"], tip="hand")
+    kept = {name: spring for name, spring in of_file.items() if name != "pitch"}
+    assert (model.spring_table, model.motor_joints, model.tip) == ({"yaw": (7.0, 0.1), **kept}, ("pitch",), "hand")
+    assert model.joint_roles == {"pitch": "motor", "yaw": "given spring"} | dict.fromkeys(kept, "spring")
+    alone = sr.load_model(ARM, springs=dict.fromkeys(of_file) | {"yaw": (7.0, 0.1)}, motors=["pitch"], tip="hand")
+    assert (alone.spring_table, alone.motor_joints) == ({"yaw": (7.0, 0.1)}, ("pitch",))
 
 
 def test_the_tip_is_the_one_moving_end(tool: Tool) -> None:
