@@ -153,6 +153,20 @@ def test_other_arms_with_a_wrist_hold_poses_too(fields: dict) -> None:
     check_reached(model, 1, 6)
 
 
+@pytest.mark.filterwarnings("ignore::softrobots.AssumedStiffnessWarning")
+def test_a_wrist_behind_muscles_holds_poses() -> None:
+    """The muscles stand behind the motors of the wrist in `q_motors`."""
+    soft = sr.mount(
+        sr.PccArm(segment_lengths=(0.4,), elastic_sections=1), "tip", sr.InflatableArm(link_lengths=(0.4,), wrist=WRIST)
+    )
+    model = sr.load_model(soft)
+    assert spherical_wrist(model).joints == tuple(f"soft_motor_{i}" for i in (3, 4, 5))
+    motors = model.relaxed_motors + (0.3, 0.5, -0.4, 0.6, 0.2, -0.01, 0.005, 0.0)
+    pose = sr.solve_equilibrium(model, motors, (0, 1, -2)).transform_tip_to_world
+    found = sr.solve_ik(model, pose, (0, 1, -2), starts=2)
+    assert max(apart(sr.solve_equilibrium(model, found.q_motors, (0, 1, -2)).transform_tip_to_world, pose)) < 1.1e-9
+
+
 @pytest.mark.study
 def test_poses_of_random_motors_are_reached_under_load_all(wristed: sr.SoftModel) -> None:
     check_reached(wristed, 250, 11)

@@ -83,9 +83,10 @@ class SphericalWrist:
         Returns:
             Up to two for each posture of the arm, those within the limits; none if the arm does not get there.
         """
-        low, high = self.model.motor_limits.T
-        home = starts[0][-3:]
-        rotation = tip.goal.rotation
+        last = len(self.model.structure.motor_joints)  # muscles stand behind
+        place = slice(last - 3, last)
+        low, high = self.model.motor_limits[place].T
+        home, rotation = starts[0][place], tip.goal.rotation
         if rotation is None:
             return []
         centred = replace(tip, goal=Goal(tip.goal.position + rotation @ self.centre, offset=self.centre))
@@ -93,7 +94,8 @@ class SphericalWrist:
         arms: list[FloatArray] = []
         found = []
         for start in starts:
-            begin = np.concatenate([start[:-3], home])
+            begin = start.copy()
+            begin[place] = home
             local = search(centred, begin, self.model.rest, tolerance=near, max_iterations=30)
             if local is None or not local.arrived(near):
                 continue
@@ -101,12 +103,12 @@ class SphericalWrist:
                 continue
             arms.append(local.q_motors)
             for change in self.angles(local.state.q, rotation):
-                wrist = local.q_motors[-3:] + change
+                wrist = local.q_motors[place] + change
                 wrist -= 2.0 * np.pi * np.rint((wrist - home) / (2.0 * np.pi))
-                wrist += 2.0 * np.pi * ((wrist < low[-3:]).astype(float) - (wrist > high[-3:]))
-                motors = np.concatenate([local.q_motors[:-3], wrist])
-                if np.all((motors >= low - _LEEWAY) & (motors <= high + _LEEWAY)):
-                    found.append(np.clip(motors, low, high))
+                wrist += 2.0 * np.pi * ((wrist < low).astype(float) - (wrist > high))
+                if np.all((wrist >= low - _LEEWAY) & (wrist <= high + _LEEWAY)):
+                    found.append(local.q_motors.copy())
+                    found[-1][place] = np.clip(wrist, low, high)
         return found
 
 
