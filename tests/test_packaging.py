@@ -91,7 +91,7 @@ ROOMS = {
     "robots": "core inflated_beam constant_curvature helix description",
     "model": "core inflated_beam constant_curvature description",
     "statics": "core inflated_beam model",
-    "compiled": "core constant_curvature description model statics",
+    "compiled": "core inflated_beam constant_curvature description model statics",
     "export": "core inflated_beam constant_curvature description robots model",
     "view": "core inflated_beam constant_curvature helix description robots model statics",
     "cli": "core inflated_beam constant_curvature helix description robots model statics compiled export view",

@@ -342,6 +342,64 @@ def test_each_hinge_of_a_link_with_two_goes_slack_by_itself() -> None:
     assert found.link_moments == pytest.approx(moments[:1], rel=1e-12)
 
 
+@pytest.fixture(scope="module", params=["paper", "two_hinges"])
+def compiled(request: pytest.FixtureRequest) -> tuple[sr.SoftModel, object]:
+    """An arm whose walls go slack, bent at rest, and its compiled solvers."""
+    arm = sr.load_model(sr.InflatableArm(moment_law="slack_wall", rest_up=(0.05, -0.1), link_model=request.param))
+    return arm, sr.compile(arm, backend="python")
+
+
+def test_compiled_solvers_find_the_same_equilibria(compiled: tuple) -> None:
+    """Taut, slack and near collapse, with weight; 1e-9: both are in balance to 1e-10 of the load, the springs may be soft."""
+    arm, fast = compiled
+    random = np.random.default_rng(7)
+    motors, sizes = random.uniform(-2.0, 2.0, (24, 3)), np.geomspace(0.5, 80.0, 24)
+    forces = random.normal(size=(24, 3)) * sizes[:, None] / np.sqrt(3.0)
+    many = fast.equilibria(motors, forces, gravity=sr.EARTH_GRAVITY)
+    moments = []
+    for case in range(24):
+        one = sr.solve_equilibrium(arm, motors[case], forces[case], gravity=sr.EARTH_GRAVITY, q_springs0=many.q_springs[case])
+        assert many.status[case] == 0
+        assert many.q_springs[case] == pytest.approx(one.q_springs, abs=1e-9)
+        assert many.tip_positions[case] == pytest.approx(one.tip_position, abs=1e-9)
+        assert one.stable
+        moments.append(one.link_moments.max())
+    assert min(moments) < SLACK < 1.8 * SLACK < max(moments)
+
+
+def test_compiled_searches_go_through_slack_walls(compiled: tuple) -> None:
+    """The Newton steps of both searches have the coupling of the springs in them: load and motors are found to rounding."""
+    arm, fast = compiled
+    motors, force = np.array([0.4, 0.9, -1.3]), np.array([4.0, 14.0, -24.0])
+    held = sr.solve_equilibrium(arm, motors, force)
+    assert held.link_moments[0] > 1.3 * SLACK
+    estimate = fast.estimate_load(motors, held.motor_torques)
+    assert estimate.force == pytest.approx(force, abs=1e-8)
+    reached = fast.inverse_kinematics(held.tip_position[None], force[None], q_motors0=motors[None] + 0.03)
+    assert reached.q_motors[0] == pytest.approx(motors, abs=1e-9)
+
+
+def test_compiled_solvers_refuse_by_name_what_they_cannot_have() -> None:
+    with pytest.raises(sr.ParameterError, match="at most 16 joints, without muscles, to be compiled with slack walls"):
+        sr.compile(sr.load_model(sr.InflatableArm(link_lengths=(0.3,) * 6, moment_law="slack_wall", stiffness=170.0)))
+    one = sr.load_model(sr.InflatableArm(link_lengths=(0.6,), moment_law="slack_wall"))
+    text = one.urdf.replace('springs="spring_1_side spring_1_up"', 'springs="spring_1_side"')
+    with pytest.raises(sr.DescriptionError, match="slack_wall and 1 springs a hinge; compiled solvers need two"):
+        sr.compile(sr.load_model(text))
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20)
+def test_torques_of_many_states_are_those_of_each(seed: int) -> None:
+    """Linear, on a plateau and slack, at rest too."""
+    random = np.random.default_rng(seed)
+    groups = (SpringGroup((0, 1), RADIUS, PRESSURE, slack_wall=True), SpringGroup((2, 3), RADIUS, PRESSURE, max_moment=15.0))
+    springs = Springs(tuple("abcde"), np.full(5, K), random.normal(0.0, 0.1, 5), np.ones(5, dtype=bool), groups)
+    states = np.concatenate([springs.rest[None], springs.rest + random.normal(0.0, 0.2, (4, 5))])
+    each = [springs.at(state)[1] for state in states]
+    assert springs.torques(states) == pytest.approx(np.array(each), rel=1e-12, abs=1e-12)
+
+
 def test_tools_without_such_a_law_refuse_it_by_name(one_link: sr.SoftModel) -> None:
     for write in (sr.export.to_mjcf, sr.export.to_sdf):
         with pytest.raises(sr.ParameterError, match="moment_law slack_wall"):

@@ -91,7 +91,7 @@ def slack_wall_moment(angle: Any, *, stiffness: Any, slack_moment: Any) -> Slack
     common_shape("slack_moment", common_shape("stiffness", angles.shape, stiff.shape), first.shape)
     ratio = stiff * np.abs(angles) / first
     beyond = np.maximum(ratio, 1.0)
-    size, slope, energy, taut = softening(beyond, beyond ** (-1.0 / 3.0))
+    size, slope, energy, taut = softening(beyond, *softening_start(beyond))
     linear = ratio <= 1.0
     return SlackWallMoment(
         np.sign(angles) * first * np.where(linear, ratio, size),
@@ -101,7 +101,13 @@ def slack_wall_moment(angle: Any, *, stiffness: Any, slack_moment: Any) -> Slack
     )
 
 
-def softening(ratio: Any, inverse_cube_root: Any) -> tuple[Any, Any, Any, Any]:
+def softening_start(ratio: Any) -> tuple[Any, Any]:
+    """Return the start of `softening` for a float or an array: `s`, the power -1/3 of the ratio, and the root of `1 - s`."""
+    start = ratio ** (-1.0 / 3.0)
+    return start, (1.0 - start) ** 0.5
+
+
+def softening(ratio: Any, start: Any, root: Any) -> tuple[Any, Any, Any, Any]:
     r"""Return the law beyond the first slack fibre, in units of `M_1` and :math:`\theta_1`; arguments are not checked.
 
     Plain arithmetic, for floats, arrays and the traced expressions of compiled solvers alike. `D(u)` is solved for `u` by two
@@ -111,16 +117,16 @@ def softening(ratio: Any, inverse_cube_root: Any) -> tuple[Any, Any, Any, Any]:
 
     Args:
         ratio: Angle over that of the first slack fibre, at least 1.
-        inverse_cube_root: Its power of -1/3, at most 1; to 1e-6, because it is only a start.
+        start: Its power of -1/3, at most 1; to 1e-6, because Newton's method begins there.
+        root: Square root of 1 less that.
 
     Returns:
         Moment, tangent, energy and the taut half angle `u` [rad].
     """
-    root = (1.0 - inverse_cube_root) ** 0.5
     share = 0.0
     for coefficient in reversed(_START):
         share = share * root + coefficient
-    taut = math.pi * inverse_cube_root * (1.0 - root * share)
+    taut = math.pi * start * (1.0 - root * share)
     for _ in range(2):
         square = taut * taut
         c2, c3, _, _ = _stumpff(square)

@@ -7,7 +7,7 @@ x, y or z, `A` is a signed permutation, so that zeros stay exact.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,20 +17,30 @@ from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
 from softrobots.core.checks import LARGEST, FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain
+from softrobots.model.springs import SpringGroup
 from softrobots.model.structure import Structure
 
 _ROUNDING = 4e-16  # of sines and cosines of quarter turns, as URDF's roll, pitch and yaw give them
 
 
-def read_chain(pinocchio_model: Any, structure: Structure, tip_frame: int, *, limits: FloatArray, reach: float) -> SerialChain:
+def read_chain(
+    pinocchio_model: Any,
+    structure: Structure,
+    tip_frame: int,
+    *,
+    limits: FloatArray,
+    reach: float,
+    groups: Sequence[SpringGroup] = (),
+) -> SerialChain:
     """Read a robot as a serial chain from base to tip.
 
     Pinocchio's workspace is not allocated, so the chain may have any length. `load_model` has checked that the six joints of a
     section are the chain of `strain_chain`, one behind the other with the rest shape in their origins. Limits of the actuators,
-    shape (n_motors, 2) [rad, m or N], and reach [m] are copied.
+    shape (n_motors, 2) [rad, m or N], and reach [m] are copied; `groups` are the springs of the inflated links.
 
     Raises:
-        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides.
+        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, or the springs of a slack
+            wall are not two that turn, one behind the other.
     """
     tip = pinocchio_model.frames[tip_frame]
     elements, axes = _elements(pinocchio_model, _path(pinocchio_model, tip.parentJoint, str(tip.name)), structure)
@@ -55,6 +65,7 @@ def read_chain(pinocchio_model: Any, structure: Structure, tip_frame: int, *, li
         elastic=read_only(np.eye(count)) if given is None else given.elastic,
         spread=read_only(np.zeros((count, muscles))) if given is None else given.spread,
         free=read_only(np.eye(count)) if given is None else given.free,
+        slack_hinges=_slack_hinges(str(pinocchio_model.name), elements, groups),
     )
 
 
@@ -72,6 +83,22 @@ def chain_length(pinocchio_model: Any, tip_frame: int, strained: Collection[str]
             low, high = pinocchio_model.lowerPositionLimit[joint.idx_q], pinocchio_model.upperPositionLimit[joint.idx_q]
             length += float(high - low) if high - low < LARGEST else 1.0
     return max(length, 1e-6)
+
+
+def _slack_hinges(name: str, elements: Sequence[Element], groups: Sequence[SpringGroup]) -> tuple[tuple[int, int, float], ...]:
+    """The hinges of walls that go slack, see `SerialChain.slack_hinges`."""
+    turning = [element.strain if isinstance(element, ChainJoint) and not element.slides else None for element in elements]
+    found = []
+    for group in groups:
+        for hinge in group.hinges if group.slack_wall else ():
+            row = turning.index(min(hinge)) if min(hinge) in turning else -1
+            if row < 0 or len(hinge) != 2 or turning[row + 1 : row + 2] != [max(hinge)]:
+                raise DescriptionError(
+                    f"{name} has a link with moment_law slack_wall and {len(hinge)} springs a hinge; compiled solvers need two "
+                    "that turn, one behind the other"
+                )
+            found.append((min(hinge), max(hinge), group.slack_moment))
+    return tuple(found)
 
 
 def _path(model: Any, last: int, tip: str) -> list[int]:

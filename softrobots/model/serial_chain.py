@@ -107,3 +107,5 @@ class SerialChain:
     """Part of the strains that muscle lengths prescribe, by their change from rest, shape (n_strains, n_muscles)."""
     free: FloatArray
     """Part of the strains by elastic coordinates, shape (n_strains, n_springs)."""
+    slack_hinges: tuple[tuple[int, int, float], ...] = ()
+    """The two strains, base to tip, of each hinge of an inflated link whose wall goes slack, and the moment of that [N m]."""

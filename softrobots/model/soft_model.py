@@ -259,19 +259,22 @@ class SoftModel:
         """The robot as a serial chain from base to tip, for compiled solvers; read on first use, without Pinocchio's workspace.
 
         Raises:
-            DescriptionError: If a joint is not between base and tip, or neither turns nor slides, or if the moment of a link is
-                moment.
+            DescriptionError: If a joint is not between base and tip, or neither turns nor slides, or if an inflated link has a
+                plateau, or a slack wall with other springs than two that turn, one behind the other.
         """
         return self._chain
 
     @cached_property
     def _chain(self) -> SerialChain:
-        if not self.springs.linear:
+        if any(group.max_moment is not None for group in self.spring_groups):
             raise DescriptionError(
-                f"an inflated link of {self.pinocchio.name} has max_moment or moment_law slack_wall; compiled solvers need "
-                "linear springs (solve_equilibrium accepts the others, too)"
+                f"an inflated link of {self.pinocchio.name} has max_moment; compiled solvers need springs that are linear, or "
+                "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
             )
-        return read_chain(self.pinocchio, self.structure, self.frame_id(self.tip), limits=self.motor_limits, reach=self.reach)
+        tip = self.frame_id(self.tip)
+        return read_chain(
+            self.pinocchio, self.structure, tip, limits=self.motor_limits, reach=self.reach, groups=self.spring_groups
+        )
 
 
 def check_model(model: Any) -> SoftModel:

@@ -14,7 +14,7 @@ from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.description.urdf_tags import InflatedLinkTag
-from softrobots.inflated_beam.membrane_tube import softening
+from softrobots.inflated_beam.membrane_tube import softening, softening_start
 
 POSITIVE = 1e-9
 """Smallest eigenvalue of a tangent stiffness that counts as positive, relative to the springs' own stiffness."""
@@ -156,6 +156,22 @@ class Springs:
         """Return the places of the springs whose hinge is on its plateau at coordinates `y`, shape (n,)."""
         return frozenset(place for hinge in self._softened(y) if hinge.tangent == 0.0 for place in hinge.places)
 
+    def torques(self, y: FloatArray) -> FloatArray:
+        """Return the load that the springs carry at many coordinates `y`, shape (..., n) [N m or N]."""
+        stretch = y - self.rest
+        torques: FloatArray = self.stiffness * stretch
+        for group in self.groups:
+            for hinge in group.hinges if group.largest_moment is not None else ():
+                places, stiffness = list(hinge), float(self.stiffness[hinge[0]])
+                bend = np.linalg.norm(stretch[..., places], axis=-1)
+                if group.slack_wall:
+                    moment = inflated_beam.slack_wall_moment(bend, stiffness=stiffness, slack_moment=group.slack_moment).moment
+                else:
+                    moment = inflated_beam.moment(bend, stiffness=stiffness, max_moment=group.max_moment)
+                share = np.where(bend > 0.0, moment / np.where(bend > 0.0, stiffness * bend, 1.0), 1.0)
+                torques[..., places] *= share[..., None]
+        return torques
+
     @cached_property
     def least_tangent(self) -> FloatArray:
         """`stiffness` times `POSITIVE` as a diagonal matrix, shape (n, n), read-only: what a stable tangent exceeds."""
@@ -181,7 +197,7 @@ class Springs:
                 law = first, 0.0, 0.5 * stiffness * (bend - first / stiffness) ** 2  # a plateau
                 if group.slack_wall:
                     ratio = stiffness * bend / first
-                    moment, tangent, energy, _ = softening(ratio, ratio ** (-1.0 / 3.0))
+                    moment, tangent, energy, _ = softening(ratio, *softening_start(ratio))
                     law = first * moment, stiffness * tangent, first**2 / stiffness * (0.5 * ratio**2 - energy)
                 softened.append(_Softened(hinge, stiffness, angles, bend, *law))
         return softened

@@ -173,10 +173,10 @@ class WorkspaceMap:
 def required_pressures(model: SoftModel, q_springs: FloatArray) -> FloatArray:
     """Gauge pressure at which each link just wrinkles, from its `SpringGroup.moments`: [Troise 2021] (3).
 
-    Axial forces are neglected (`LinkLimits.required_pressures` has them). Linear springs at coordinates of shape (n, n_springs)
-    [rad] give pressures of shape (n, n_links) [Pa].
+    Axial forces are neglected (`LinkLimits.required_pressures` has them). Springs at coordinates of shape (n, n_springs) [rad]
+    give pressures of shape (n, n_links) [Pa].
     """
-    torques = model.stiffness * (q_springs - model.rest)
+    torques = model.springs.torques(q_springs)
     moments = [group.moments(torques).max(axis=-1) for group in model.spring_groups]
     return np.asarray(required_pressure(np.stack(moments, axis=1), [group.radius for group in model.spring_groups]))
 

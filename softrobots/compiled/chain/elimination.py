@@ -18,7 +18,7 @@ eliminated at the base of their segment, with a pivot that must be negative.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,12 @@ class Outboard:
     """Smallest pivot in size, relative to the springs' own stiffness."""
     n_negative_pivots: Scalar
     """Number of pivots that are negative, by more than rounding."""
+
+    def resized(self, n: int) -> Outboard:
+        """Return the sums with the first `n` components, new ones zero."""
+        rows = np.array([resized(row, n) for row in self.matrix], dtype=object)
+        matrix = np.array([resized(column, n) for column in rows.T], dtype=object).T
+        return Outboard(matrix, [resized(one, n) for one in self.columns], self.min_pivot, self.n_negative_pivots)
 
     @classmethod
     def tip(cls, right_hand_sides: int) -> Outboard:
@@ -142,6 +148,11 @@ def eliminate(
     return Eliminated(lower, inverse, coupling, columns), Outboard(matrix, sums, min_pivot, n_negative_pivots)
 
 
+def resized(values: Any, n: int) -> Any:
+    """Return the first `n` components of a vector, new ones zero."""
+    return np.concatenate([values[:n], constants(np.zeros(max(n - len(values), 0)))])
+
+
 def _symmetric_outer(one: Any, scaled: Any) -> Any:
     """Return the outer product of a vector with a multiple of itself; computed once above the diagonal."""
     n = len(one)
@@ -169,5 +180,4 @@ def eliminate_multipliers(beyond: Outboard, gaps: Sequence[Scalar], scales: Sequ
     zeros = constants(np.zeros((n + count, count)))
     values: list[Sequence[Scalar]] = [gaps, *([0.0] * count for _ in beyond.columns[1:])]
     eliminated, rest = eliminate(beyond, unit, zeros, constants(np.zeros((count, count))), values, scales, multipliers=True)
-    rest = Outboard(rest.matrix[:n, :n], [one[:n] for one in rest.columns], rest.min_pivot, rest.n_negative_pivots)
-    return Eliminated(eliminated.lower, eliminated.inverse_pivots, eliminated.coupling[:, :n], eliminated.columns), rest
+    return replace(eliminated, coupling=eliminated.coupling[:, :n]), rest.resized(n)

@@ -8,15 +8,28 @@ chains (`softrobots.compiled.chain.unrolled_chain`) trace them for all elements,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint
-from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate
+from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate, resized
 from softrobots.compiled.trace.expressions import Scalar, if_less, smaller
 from softrobots.compiled.trace.stumpff_series import LARGEST
+
+
+class SpringLaw(NamedTuple):
+    """A spring of a hinge with two, one behind the other, whose torque depends on both angles; at given angles."""
+
+    torque: Scalar
+    """Load that it carries [N m]."""
+    stiffness: Scalar
+    """Its derivative with respect to the angle of the spring [N m/rad]."""
+    energy: Scalar
+    """Energy; the outer spring counts that of both [J]."""
+    coupling: Scalar | None
+    """Derivative of the torque with respect to the angle of the inner spring [N m/rad]; None for the inner one."""
 
 
 @dataclass
@@ -47,6 +60,8 @@ class TracedElement:
     """Number of the multiplier of the segment that constrains each unknown coordinate, or None."""
     length: Scalar = 0.0
     """Rest length of a section [m]."""
+    law: SpringLaw | None = None
+    """Law of its spring if that is not linear by itself."""
 
 
 @dataclass
@@ -91,6 +106,12 @@ class InwardPass:
     """Sums including it."""
     twists: Any = None
     """Turn per unknown coordinate, with zeros for multipliers, shape (n, k)."""
+    inner: bool = False
+    """Whether its angle is a component of the turn of the next element, which has a spring with the same law."""
+
+    def turned(self, nearer: Any, step: Any) -> Any:
+        """Return the turn of all elements beyond from that of all nearer to the base and the step of its coordinates."""
+        return (resized(nearer, len(self.twists)) + self.twists @ step)[: 4 if self.inner else 3]
 
 
 def outward(element: TracedElement, axes: Any) -> OutwardPass:
@@ -131,7 +152,8 @@ def inward(
     moving = list(element.moving)
     for place, row in enumerate(moving):
         stretch = element.coordinates[row] - element.rest[place]
-        balance.energy = balance.energy + stretch * stretch * (0.5 * element.stiffness[place])
+        stored = stretch * stretch * (0.5 * element.stiffness[place]) if element.law is None else element.law.energy
+        balance.energy = balance.energy + stored
         balance.energy = balance.energy - element.pull[place] * element.coordinates[row]
         if len(loads) > 1:
             balance.weight = balance.weight + motion.weight[row] * motion.weight[row]
@@ -148,23 +170,33 @@ def inward(
         [motion.weight[row] for row in moving],
         motion.curvature[np.ix_(moving, moving)],
     )
-    gradient = [
-        (element.coordinates[row] - element.rest[place]) * element.stiffness[place] - motion.torque[place] - element.pull[place]
-        for place, row in enumerate(moving)
-    ]
+    law = element.law
+    carried = [(element.coordinates[row] - element.rest[place]) * element.stiffness[place] for place, row in enumerate(moving)]
+    if law is not None:
+        carried = [law.torque]
+        if law.coupling is not None:  # the inner spring follows: its angle is one more component of the turn
+            beyond = beyond.resized(len(beyond.matrix) + 1)
+    gradient = [torque - motion.torque[place] - element.pull[place] for place, torque in enumerate(carried)]
     incidence = constants(np.zeros((len(beyond.matrix) - 3, len(moving))))
     for place, multiplier in enumerate(element.constraints):
         if multiplier is not None:
             incidence[multiplier, place] = -1.0
     twists = np.concatenate([motion.twists, incidence * 0.0])
+    if law is not None and law.coupling is not None:
+        incidence[-1, 0] = -law.coupling
+    elif law is not None:
+        twists[-1, 0] = 1.0
     stiffness = -motion.curvature
     for place, own in enumerate(element.stiffness):
-        stiffness[place, place] = stiffness[place, place] + own
+        stiffness[place, place] = stiffness[place, place] + (own if law is None else law.stiffness)
     sides = [gradient, *(-np.concatenate([motion.moves, motion.twists])[:tip_columns]).tolist()]
     eliminated, handed_on = eliminate(
         beyond, twists, np.concatenate([motion.bends, incidence]), stiffness, sides, element.stiffness, pivot_shift=pivot_shift
     )
-    return InwardPass(motion, gradient, eliminated, shifted, handed_on, twists)
+    if law is not None and law.coupling is None:
+        n = len(handed_on.matrix) - 1
+        eliminated, handed_on = replace(eliminated, coupling=eliminated.coupling[:, :n]), handed_on.resized(n)
+    return InwardPass(motion, gradient, eliminated, shifted, handed_on, twists, inner=law is not None and law.coupling is None)
 
 
 def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:

@@ -59,6 +59,9 @@ class Unknowns:
                 self.chain.name,
                 f"a robot with rest positions of springs within +-{LARGEST_POSITION:g} rad or m, to be compiled",
             )
+        if self.chain.slack_hinges and not self.is_unrolled:
+            requirement = f"a chain of at most {MAX_UNROLLED_JOINTS} joints, without muscles, to be compiled with slack walls"
+            raise ParameterError("model", self.chain.name, requirement)
         if self.locked and not self._locked_strains:
             raise ParameterError("locked_strains", self.locked, "empty for a robot without sections of constant strain")
 
@@ -97,6 +100,12 @@ class Unknowns:
         """By constrained strain: the number of its multiplier in its segment."""
         numbered = [(number, group) for segment in self.segments for number, group in enumerate(segment.groups)]
         return {strain: number for number, group in numbered for strain in self.chain.constrained[group]}
+
+    @cached_property
+    def slack_hinges(self) -> tuple[tuple[int, int, float], ...]:
+        """Elements of the inner and the outer spring of each hinge whose wall goes slack, and the moment of that [N m]."""
+        rows = {strains_of(element)[0]: row for row, element in enumerate(self.chain.elements) if strains_of(element)}
+        return tuple((rows[inner], rows[outer], moment) for inner, outer, moment in self.chain.slack_hinges)
 
     @cached_property
     def masses_beyond(self) -> tuple[float, ...]:

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Vector, constants, turned, vector
-from softrobots.compiled.chain.elimination import Outboard
+from softrobots.compiled.chain.elimination import Outboard, resized
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, OutwardPass, TracedElement, inward, outward
+from softrobots.compiled.chain.slack_hinges import with_slack_hinges
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
@@ -76,6 +77,7 @@ def evaluate(
     chain = unknowns.chain
     unknown: Sequence[Scalar] = unknowns.rest if at_rest else block.loads(layout.unknown, layout.unknowns)
     elements = [unknowns.traced(row, block.load, lambda place: unknown[place]) for row in range(len(chain.elements))]
+    elements = with_slack_hinges(unknowns, elements)
     leading = unknowns.leading_motors
     base_axes, base = place_base(elements[:leading])
     force = constants(np.zeros(3)) if forceless else base_axes.T @ vector(block.loads(layout.force, 3))
@@ -114,7 +116,7 @@ def evaluate(
         own: list[Vector] = [constants(np.zeros(0))] * sides
         if one.eliminated is not None:
             own = [one.eliminated.steps(side, nearer) for side, nearer in enumerate(turn)]
-            turn = [nearer + one.twists @ step for nearer, step in zip(turn, own, strict=True)]
+            turn = [one.turned(nearer, step) for nearer, step in zip(turn, own, strict=True)]
         steps.append(own)
     gradient = unknowns.in_order([one.gradient for one in inward_passes])
     step = unknowns.in_order([own[0] for own in steps])
@@ -130,15 +132,16 @@ def solve_again(unknowns: Unknowns, point: Evaluation, sides: Sequence[Sequence[
         one = point.inward_passes[row]
         if one.eliminated is not None:
             eliminated = one.eliminated
+            total = resized(total, len(one.twists))
             column = eliminated.reduced([value + one.twists[:, j] @ total for j, value in enumerate(sides[row])])
             for coupling, pivot, value in zip(eliminated.coupling, eliminated.inverse_pivots, column, strict=True):
-                total = total + coupling * (pivot * value)
+                total = resized(total, len(coupling)) + coupling * (pivot * value)
             columns[row] = replace(eliminated, columns=[column])
     turn: Vector = constants(np.zeros(3))
     steps: list[Sequence[Scalar]] = [[] for _ in sides]
     for row, eliminated in sorted(columns.items()):
         steps[row] = eliminated.steps(0, turn)
-        turn = turn + point.inward_passes[row].twists @ steps[row]
+        turn = point.inward_passes[row].turned(turn, steps[row])
     return unknowns.in_order(steps)
 
 

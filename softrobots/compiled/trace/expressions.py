@@ -143,6 +143,22 @@ def square_root(value: Scalar) -> Scalar:
     return value.trace.make("sqrt", value) if isinstance(value, Expression) else math.sqrt(value)
 
 
+def inverse_cube_root(value: Scalar) -> Scalar:
+    """Return the power -1/3 of a number from 1 to 1e12, to 1e-6 of itself.
+
+    Square roots give 1/4 + 1/16 + 1/64 + 1/256 of the exponent, and two Newton steps the rest.
+    """
+    inverse = 1.0 / value
+    root: Scalar = 1.0
+    quarter = inverse
+    for _ in range(4):
+        quarter = square_root(square_root(quarter))
+        root = root * quarter
+    for _ in range(2):
+        root = (root * 2.0 + inverse / (root * root)) * (1.0 / 3.0)
+    return root
+
+
 def absolute(value: Scalar) -> Scalar:
     """Return the absolute value."""
     return value.trace.make("fabs", value) if isinstance(value, Expression) else abs(value)

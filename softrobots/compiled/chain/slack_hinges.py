@@ -1,0 +1,39 @@
+"""Hinges of inflated links whose wall goes slack, traced: two springs, one behind the other, with one law of their moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from softrobots.compiled.chain.recursion import SpringLaw, TracedElement
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.trace.expressions import Scalar, if_less, inverse_cube_root, larger, square_root
+from softrobots.inflated_beam.membrane_tube import softening
+
+
+def with_slack_hinges(unknowns: Unknowns, elements: Sequence[TracedElement]) -> list[TracedElement]:
+    """Return the elements with the laws of the springs of slack hinges."""
+    traced = list(elements)
+    for inner, outer, slack_moment in unknowns.slack_hinges:
+        angles = [traced[row].coordinates[0] - traced[row].rest[0] for row in (inner, outer)]
+        laws = _laws(angles[0], angles[1], float(traced[inner].stiffness[0]), slack_moment)  # type: ignore[arg-type]
+        for row, law in zip((inner, outer), laws, strict=True):
+            traced[row] = replace(traced[row], law=law)
+    return traced
+
+
+def _laws(inner: Scalar, outer: Scalar, stiffness: float, slack_moment: float) -> tuple[SpringLaw, SpringLaw]:
+    """Laws of both springs at their angles from rest [rad]; linear to the last digit up to the first slack fibre."""
+    first = slack_moment / stiffness
+    square = larger(inner * inner + outer * outer, first * first)
+    ratio = square_root(square) * (1.0 / first)
+    start = inverse_cube_root(ratio)
+    moment, tangent, energy, _ = softening(ratio, start, square_root(larger(1.0 - start, 0.0)))
+    taut = (inner * inner + outer * outer) * (0.5 * stiffness)
+    secant = if_less(1.0, ratio, moment / ratio * stiffness, stiffness)
+    bending = if_less(1.0, ratio, (tangent * stiffness - secant) / square, 0.0)
+    stored = if_less(1.0, ratio, energy * (slack_moment * first), taut)
+    return (
+        SpringLaw(secant * inner, secant + bending * inner * inner, 0.0, None),
+        SpringLaw(secant * outer, secant + bending * outer * outer, stored, bending * inner * outer),
+    )
