@@ -25,6 +25,7 @@ from softrobots.compiled.trace.expressions import (
     gradient,
     if_less,
     in_order,
+    inverse_cube_root,
     larger,
     operands,
     sine,
@@ -378,3 +379,12 @@ def test_hoisting_takes_nothing_where_all_varies(lanes: bool) -> None:
     assert hoist([block], before, [a, b], 3) == 0
     assert before.stores == []
     assert block.text(lanes=lanes) == text
+
+
+@given(st.floats(0.0, 12.0))
+def test_cube_roots_by_square_roots_are_a_start(exponent: float) -> None:
+    """To 2e-6 up to 1e12; what is left of one near one keeps its share, which the start of `softening` needs."""
+    value = 1.0 + 10.0 ** (exponent - 9.0) if exponent < 9.0 else 10.0**exponent
+    root = inverse_cube_root(value)
+    assert root == pytest.approx(value ** (-1.0 / 3.0), rel=2e-6)
+    assert 1.0 - root == pytest.approx(1.0 - value ** (-1.0 / 3.0), rel=1e-5, abs=1e-15)

@@ -144,7 +144,7 @@ def square_root(value: Scalar) -> Scalar:
 
 
 def inverse_cube_root(value: Scalar) -> Scalar:
-    """Return the power -1/3 of a number from 1 to 1e12, to 1e-6 of itself.
+    """Return the power -1/3 of a number from 1 to 1e12, to 2e-6 of itself.
 
     Square roots give 1/4 + 1/16 + 1/64 + 1/256 of the exponent, and two Newton steps the rest.
     """
