@@ -23,6 +23,7 @@ from softrobots.compiled.sweeps import TargetGrid, map_workspace
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 from softrobots.description.tag_reader import read_tags
+from softrobots.description.urdf_rules import check_rules
 from softrobots.export import to_mjcf, to_sdf
 from softrobots.robots.inflated_links import LINK_MODELS, InflatedLinks
 from softrobots.view.robot_shapes import RobotShapes
@@ -112,6 +113,7 @@ def test_the_springs_are_those_of_the_wall(links: list[dict[str, float]], isotro
             for way in ("side", "up"):
                 expected[f"spring_{number}_{way}"], places[f"spring_{number}_{way}"] = length**2 / under_a_newton, 0.03
     assert isinstance(robot, InflatedLinks)
+    assert [finding.problems for finding in check_rules(robot.urdf()) if not finding.ok] == []
     assert springs_of(robot) == pytest.approx(expected, rel=1e-12)
     assert places_of(robot) == pytest.approx(places, rel=1e-12, abs=1e-12)
     assert robot.spring_stiffness == pytest.approx([expected[name] for name in expected if name.endswith("up")][:: 1 + two])
