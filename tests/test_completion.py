@@ -81,8 +81,8 @@ def test_bash_completes_commands(offered: dict[str, set[str]]) -> None:
 
 def test_bash_completes_robots_and_files(offered: dict[str, set[str]]) -> None:
     assert offered["robots and files"] == {*sr.ROBOTS, "some path.csv", "some.urdf", "sub"}
-    assert offered["a robot"] == {"inflatable_arm"}
-    assert offered["a robot behind an option"] == {"inflatable_arm"}
+    assert offered["a robot"] == {"inflatable_arm", "inflatable_arm_two_hinges"}
+    assert offered["a robot behind an option"] == {"inflatable_arm", "inflatable_arm_two_hinges"}
     assert offered["a robot that may be left out"] == {"helix_tube_lumped"}
     assert offered["a file in the place of a robot"] == {"some path.csv", "some.urdf"}
     assert offered["a file in a folder"] == {"sub/inner.urdf"}
