@@ -217,7 +217,8 @@ def _batch_answers(
         errors = ("residual", "unexplained", "tip_error")  # infinite if there is no answer
         for place, row in enumerate(part.tolist()):
             certified = bool(batch.certified[place])
-            numbers = [np.asarray(getattr(batch, name))[place] for name in vars(batch) if certified or name not in errors]
+            columns = [column for name, column in vars(batch).items() if certified or name not in errors]
+            numbers = [np.asarray(column)[place] for column in columns if column is not None]  # None: nothing was asked of it
             fine = all(np.isfinite(one).all() for one in numbers)
             found = {"springs": batch.q_springs[place], **fields(batch, place)} if certified else {}
             outcome = STABLE if certified else Status(int(batch.status[place])).name
