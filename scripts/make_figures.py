@@ -43,6 +43,14 @@ def link_pressure() -> Any:
     return inflated_link.pressure_effects(TABLE_3, young_modulus=modulus, **LINK)
 
 
+def bending_test() -> Any:
+    """The noisy bending test of docs/inflatable_arm.md, its fit and the limits of the moment."""
+    angle, tube = np.linspace(0.005, 0.2, 40), {"pressure": 50e3, "radius": LINK["radius"]}
+    exact = inflated_beam.moment(angle, stiffness=169.44, max_moment=21.76)
+    data = inflated_beam.BendingData(angle, exact + np.random.default_rng(3).normal(0.0, 0.3, 40))
+    return inflated_link.characterisation(data, inflated_beam.fit_characterisation(*data, **tube), **tube)
+
+
 def link_laws() -> Any:
     """The laws of the moment of a link at 50 kPa, with the limits of its wall and what the paper measured."""
     row, radius = TABLE_3[4], LINK["radius"]
@@ -162,7 +170,16 @@ def three_fingers() -> sr.Viewer:
 
 FIGURES: dict[str, Callable[[], Any]] = {
     function.__name__: function
-    for function in (link_deflection, link_pressure, link_laws, link_reaction, arm_buckling, arm_branches, finger_grip)
+    for function in (
+        link_deflection,
+        link_pressure,
+        bending_test,
+        link_laws,
+        link_reaction,
+        arm_buckling,
+        arm_branches,
+        finger_grip,
+    )
 }
 """Plots by the name of their file."""
 SCENES: dict[str, tuple[Callable[[], sr.Viewer], str]] = {

@@ -24,6 +24,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots import inflated_beam
 from softrobots.core import csv_table, npz_file, result_file
 from softrobots.core.result_file import KINDS
 from softrobots.helix import ActuatorTable, HelixDesign
@@ -46,6 +47,7 @@ MEMORY = 20e6
 
 PATH = "t,x,y,z\n0,1,2,3\n1,1,2,4\n"
 TABLE = "pressure_Pa,contraction\n0,0.5\n1,0.6\n"
+BENDING = "angle [rad],moment [N m]\n0.01,1.7\n0.02,3.4\n0.03,5.1\n"
 DEEP = 100_000
 """How many brackets are inside each other; Python's own readers recurse."""
 
@@ -119,7 +121,7 @@ def loop(path: Path) -> Path:
 
 
 @each_row("place", PLACES)
-@each_row("read", [sr.read_waypoints, sr.load_result, HelixDesign.load, read_parameters])
+@each_row("read", [sr.read_waypoints, sr.load_result, HelixDesign.load, read_parameters, inflated_beam.read_characterisation])
 def test_what_is_no_file_is_refused_at_once(read: Callable[[Path], object], place: str, tmp_path: Path) -> None:
     refused(read, PLACES[place](tmp_path), "^cannot read |are read|the most that is read|it names nothing")
 
@@ -130,6 +132,7 @@ def test_what_is_no_file_is_refused_at_once(read: Callable[[Path], object], plac
     [
         (sr.read_waypoints, "a.csv", PATH),
         (ActuatorTable.read_csv, "a.csv", TABLE),
+        (inflated_beam.read_characterisation, "a.csv", BENDING),
         (read_parameters, "a.yaml", "radius: 0.05\n"),
         (read_parameters, "a.json", '{"radius": 0.05}'),
     ],
@@ -499,6 +502,10 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("equilibrium", {"solver": np.array(["magic"])}, "solver must be one of"),
         ("equilibrium", {"residual": np.array([np.nan])}, "finite"),
         ("load_estimate", {"estimation": np.array("magic")}, "estimation must be one of"),
+        ("characterisation", {"stiffness": np.array(-1.0)}, "not those of a fit"),
+        ("characterisation", {"stiffness_interval": np.array([300.0, 400.0])}, "not those of a fit"),
+        ("characterisation", {"n_saturated": np.array(0)}, "not those of a fit"),
+        ("characterisation", {"angle_offset": np.array(np.nan)}, "finite"),
         ("trajectory", {"following": np.array("x" * 81)}, "following must be 1 to 80 printable"),
         ("workspace", {"refused": np.array(-1)}, "must be an array of non-negative integers"),
         ("workspace_map", {"grid_x": np.array([0.8, 0.6])}, "increasing"),
@@ -717,6 +724,7 @@ DOORWAYS = {
     "description.collada_check": ("DAE",),
     "statics.time_law": ("waypoints CSV",),
     "helix.actuators": ("actuator CSV",),
+    "inflated_beam.characterisation_data": ("characterisation CSV",),
     "helix.design": ("design JSON",),
     "core.result_file": ("results NPZ",),
     "core.checkpoint": ("checkpoint JSON", "checkpoint NPZ"),

@@ -73,7 +73,7 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()
                 lines.append(reader.line_num)
         except csv.Error as error:
             raise FileFormatError(f"{path}, line {reader.line_num}: {error}") from error
-    table = np.array(numbers, dtype=np.float64).reshape(-1, len(columns))
+    table = np.array(numbers, dtype=np.float64).reshape(len(lines), len(columns))
     return Table(columns, table, lines)
 
 
@@ -95,10 +95,9 @@ def _columns(path: Path, names: Sequence[str], required: Sequence[str], optional
     """Names of the columns present, checked to occur as often as they must."""
     if any(names.count(name) != 1 for name in required) or any(names.count(name) > 1 for name in optional):
         named = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
-        allowed = f", and {', '.join(optional)} at most once" if optional else ""
-        raise FileFormatError(
-            f"{path}, line 1: it names {named[:500] or 'nothing'}; {', '.join(required)} are required, each once{allowed}"
-        )
+        allowed = [f"{', '.join(required)} are required, each once"] if required else []
+        allowed += [f"{', '.join(optional)} at most once"] if optional else []
+        raise FileFormatError(f"{path}, line 1: it names {named[:500] or 'nothing'}; {', and '.join(allowed)}")
     return (*(name for name in optional if name in names), *required)
 
 

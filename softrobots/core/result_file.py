@@ -65,8 +65,8 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
     The file appears complete or not at all: it is written under another name and renamed.
 
     Args:
-        result: An equilibrium, imposed displacement, load estimate, IK solution, trajectory, workspace, workspace map, or
-            the branches that `post_buckling_branches` returns.
+        result: A characterisation, equilibrium, imposed displacement, load estimate, IK solution, trajectory, workspace,
+            workspace map, or the branches that `post_buckling_branches` returns.
         path: File to write; `.npz` is added if it has no suffix.
         overwrite: Replace an existing file.
 

@@ -16,6 +16,7 @@ from softrobots.inflated_beam.characterisation import (
     moment,
     required_tabulated_pressure,
 )
+from softrobots.inflated_beam.characterisation_data import BendingData, read_characterisation
 from softrobots.inflated_beam.characterisation_fit import Characterisation, fit_characterisation
 from softrobots.inflated_beam.inflation import tank_pressure, tank_volume, volume
 from softrobots.inflated_beam.membrane_tube import MomentLimits, SlackWallMoment, moment_limits, slack_wall_moment
@@ -27,6 +28,7 @@ __all__ = [
     "SHEAR_COEFFICIENT",
     "TABLE_3",
     "BeamStiffness",
+    "BendingData",
     "BendingTest",
     "Characterisation",
     "CharacterisationRow",
@@ -38,6 +40,7 @@ __all__ = [
     "fit_characterisation",
     "moment",
     "moment_limits",
+    "read_characterisation",
     "required_pressure",
     "required_tabulated_pressure",
     "slack_wall_moment",

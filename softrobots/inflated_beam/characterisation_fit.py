@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, finite_number, positive_number
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.result_file import KINDS, Kind, counts
 from softrobots.inflated_beam.beam import wrinkling_moment
 from softrobots.inflated_beam.fitted_line import FittedLine, student_quantile
 
@@ -193,3 +195,22 @@ def _is_plateau(theta: FloatArray, tau: FloatArray, rising: FittedLine) -> bool:
         return lacking > 0.0
     freedoms = total**2 / (expected_variance**2 / rising.freedoms + variance**2 / (n - 1))
     return lacking > student_quantile(_BELOW, freedoms) * math.sqrt(total)
+
+
+def _unpack(fields: Mapping[str, Any]) -> Characterisation:
+    """Result of named arrays; one that no fit has is refused."""
+    names = ["stiffness", "stiffness_std", "angle_offset", "angle_offset_std", "max_moment", "mean_moment_above_wrinkling"]
+    names.append("wrinkling_moment")
+    low, high = finite_array("stiffness_interval", fields["stiffness_interval"], (2,), "N m/rad").tolist()
+    numbers = {name: finite_number(name, fields[name]) if name in fields else None for name in names}
+    n_linear, n_saturated = (counts(fields, name)[0] for name in ("n_linear", "n_saturated"))
+    found = Characterisation(**numbers, stiffness_interval=(low, high), n_linear=n_linear, n_saturated=n_saturated)  # type: ignore[arg-type]
+    positive = min(found.stiffness, found.wrinkling_moment) > 0.0 and min(found.stiffness_std, found.angle_offset_std) >= 0.0
+    if not (
+        positive and low <= found.stiffness <= high and n_linear >= 3 and (n_saturated > 0) == (found.max_moment is not None)
+    ):
+        raise FileFormatError("its numbers are not those of a fit")
+    return found
+
+
+KINDS.update(characterisation=Kind(Characterisation, asdict, _unpack))

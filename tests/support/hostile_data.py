@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 import softrobots as sr
+from softrobots import inflated_beam
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace
 from softrobots.core.checkpoint import CASE, Checkpoint
 from softrobots.helix import ActuatorTable, HelixDesign, design_grasp
@@ -51,6 +52,23 @@ def read_path(file: Path) -> None:
     finite(path.times, path.positions)
     if not np.all(np.diff(path.times) > 0.0) or path.positions.shape != (len(path.times), 3):
         raise ArithmeticError("a path that is none")
+
+
+def bending_corpus() -> list[bytes]:
+    """Angles and moments, ways and forces, both."""
+    return [
+        b"angle [deg],moment [N m]\n1,2.9\n2,5.8\n3,8.9\n4,12\n",
+        b"note,displacement_mm,force_N\na,5.1,3.5\nb,-10.2,-7.1\nc,15,10.4\n",
+        b"angle_mrad,moment_Nmm,displacement [m],force [N]\n10,1.7e3,0,0\n20,3.4e3,0,0\n30,5.1e3,0,0\n",
+    ]
+
+
+def read_bending(file: Path) -> None:
+    """Points of a bending test."""
+    points = inflated_beam.read_characterisation(file)
+    finite(*points)
+    if points.angle.shape != points.moment.shape or np.any(np.abs(points.angle) >= 0.5 * np.pi):
+        raise ArithmeticError("points that are none")
 
 
 def table_corpus() -> list[bytes]:
@@ -204,7 +222,11 @@ def results() -> dict[str, Any]:
     poses = [pin.SE3(down, np.array(position)) for position in ((0.7, 0.1, 0.3), (0.9, 0.0, 0.3))]
     path = sr.straight_line(*poses, 1.0, 2)
     grid = TargetGrid((0.6, 0.8), (0.0,), (0.3,))
+    angle = np.linspace(0.01, 0.2, 20)
     return {
+        "characterisation": inflated_beam.fit_characterisation(
+            angle, np.minimum(170.0 * angle, 20.0), pressure=5e4, radius=0.055
+        ),
         "equilibrium": held,
         "ik_solution": sr.solve_ik(model, (0.9, 0.3, 0.2), (0, 0, -5)),
         "imposed_displacement": sr.solve_imposed_displacement(model, (0.3, 0.6, -0.8), 0.01, direction=(0, 0, -1)),
@@ -226,6 +248,9 @@ def result_corpus() -> list[bytes]:
 def read_result(file: Path) -> None:
     """A saved result."""
     result: Any = sr.load_result(file)
+    if isinstance(result, inflated_beam.Characterisation):
+        finite(result.stiffness, result.stiffness_std, result.stiffness_interval, result.angle_offset, result.wrinkling_moment)
+        return
     if isinstance(result, WorkspaceMap):
         finite(result.payload, result.q_motors, result.q_springs)
         return
@@ -302,6 +327,7 @@ _CHANGES: tuple[Any, ...] = (
 READERS: dict[str, tuple[Callable[[], list[bytes]], Damage, Callable[[Path], object], str]] = {
     "waypoints CSV": (waypoint_corpus, damaged_bytes, read_path, ".csv"),
     "actuator CSV": (table_corpus, damaged_bytes, read_table, ".csv"),
+    "characterisation CSV": (bending_corpus, damaged_bytes, read_bending, ".csv"),
     "results NPZ": (result_corpus, damaged_archive, read_result, ".npz"),
     "design JSON": (design_corpus, damaged_bytes, read_design, ".json"),
     "benchmark JSON": (bench_corpus, damaged_bytes, read_bench, ".json"),

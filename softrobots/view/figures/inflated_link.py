@@ -11,7 +11,7 @@ import numpy as np
 from softrobots import inflated_beam
 from softrobots.core.checks import finite_number, instance_of, positive_number
 from softrobots.core.errors import ParameterError
-from softrobots.inflated_beam import CharacterisationRow
+from softrobots.inflated_beam import BendingData, Characterisation, CharacterisationRow
 from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, grid_and_legend, line_style, new_figure, new_plot
 
 _FAINT = "#7f7f7f"
@@ -111,6 +111,52 @@ def moment_angle_laws(rows: Sequence[CharacterisationRow], radius: float) -> Any
     axes.plot([], [], color="0.6", marker="o", mec="black", ms=7, ls="", label="wrinkling moment (3)")
     axes.set(xlim=(0.0, 1.02 * last), ylim=(0.0, 1.1 * max(tops)))
     axes.legend(fontsize=9, loc="upper left")
+    return figure
+
+
+def characterisation(data: BendingData, fit: Characterisation, *, pressure: float, radius: float) -> Any:
+    """Measured moments over the hinge angle, the fitted law, and the limits of the moment.
+
+    Points in the fit of the slope are filled. The band of the line is that of the 95 % interval of its slope.
+
+    Args:
+        data: The measured points.
+        fit: The law that `inflated_beam.fit_characterisation` finds in them.
+        pressure: Gauge pressure of the test [Pa].
+        radius: Radius of the link [m].
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If pressure or radius are out of range.
+        MissingDependency: If matplotlib is not installed.
+    """
+    limits = inflated_beam.moment_limits(pressure, radius)
+    title = f"Bending test of a link at {pressure / 1e3:g} kPa"
+    figure, axes = new_plot((8.0, 5.2), xlabel="measured hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
+    sides = np.where(data.angle < fit.angle_offset, -1.0, 1.0)
+    bent, moments = sides * (data.angle - fit.angle_offset), sides * data.moment
+    knee = math.inf if fit.max_moment is None else fit.max_moment
+    used = fit.stiffness * bent < min(fit.wrinkling_moment, knee)
+    for chosen, face, label in ((used, COLOURS[0], "measured, on the slope"), (~used, "white", "measured, beyond")):
+        if chosen.any():
+            style = {"color": COLOURS[0], "mfc": face, "ms": 5}
+            axes.plot(fit.angle_offset + bent[chosen], moments[chosen], "o", label=label, **style)
+    angles = np.linspace(0.0, 1.03 * float(bent.max()), 301)
+    low, high = (np.minimum(slope * angles, knee) for slope in fit.stiffness_interval)
+    axes.fill_between(fit.angle_offset + angles, low, high, color=COLOURS[1], alpha=0.2, lw=0)
+    low_k, high_k = fit.stiffness_interval
+    label = f"k = {fit.stiffness:.1f} ({low_k:.1f} to {high_k:.1f}) N m/rad"
+    label += "" if fit.max_moment is None else f", $M_{{max}}$ = {fit.max_moment:.2f} N m"
+    axes.plot(fit.angle_offset + angles, np.minimum(fit.stiffness * angles, knee), color=COLOURS[1], lw=1.8, label=label)
+    top = max(1.12 * float(moments.max()), 1.05 * limits.wrinkling)
+    named = (limits.slack, "first slack fibre"), (limits.wrinkling, "wrinkling (3)"), (limits.collapse, "collapse")
+    for number, (limit, name) in enumerate(named):
+        if limit < top:
+            axes.axhline(limit, color=_FAINT, ls=LINES[number + 1], lw=1.2, label=f"{name}, {limit:.2f} N m")
+    axes.set(xlim=(min(0.0, fit.angle_offset), None), ylim=(min(0.0, float(moments.min())), top))
+    axes.legend(fontsize=9, loc="lower right")
     return figure
 
 
