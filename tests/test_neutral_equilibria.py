@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,17 @@ def test_what_cannot_turn_is_not_neutral() -> None:
     assert held.stability.kind == "stable"
     arm = sr.load_model(sr.InflatableArm())
     assert sr.solve_equilibrium(arm, (0, 0, 0), (-130.0, 0, 0)).stability.kind == "stable"
+
+
+def test_a_saved_result_tells_the_stability(tmp_path: Path) -> None:
+    """A neutral equilibrium, and one that flutters under a moment."""
+    arm = sr.load_model(sr.InflatableArm())
+    fluttering = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), wrench=(3, 10, -15, 60, -40, 20))
+    for number, (found, kind) in enumerate(((ring("two segments"), "neutral"), (fluttering, "flutter"))):
+        again = sr.load_result(sr.save_result(found, tmp_path / f"{number}.npz"))
+        assert found.stability.kind == again.stability.kind == kind
+        assert again.stable is False
+        assert again.stability.eigenvalues == pytest.approx(found.stability.eigenvalues, rel=1e-9, abs=1e-6)
 
 
 def test_the_compiled_solvers_name_the_ring(rng: np.random.Generator) -> None:

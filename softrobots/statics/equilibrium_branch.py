@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium
-from softrobots.statics.force_path import NEUTRAL
 
 FUNDAMENTAL = "fundamental"
 """Label of the path from zero force."""
@@ -52,7 +52,7 @@ class EquilibriumBranch:
     @cached_property
     def neutral(self) -> Any:
         """Which are neutral, shape (n,), truth values: all of a ring, and the critical point itself."""
-        return np.abs(self.softest) <= NEUTRAL
+        return np.abs(self.softest) <= POSITIVE
 
     @classmethod
     def of(

@@ -62,7 +62,9 @@ class Stability:
 
     @property
     def growth_rate(self) -> float:
-        """Rate at which the fastest growing motion grows, without damping [1/s]; 0 if none grows."""
+        """Rate at which the fastest growing motion grows, without damping [1/s]; 0 if none grows exponentially."""
+        if self.kind in (STABLE, NEUTRAL):
+            return 0.0
         return float(np.sqrt(-self.eigenvalues).real.max(initial=0.0))
 
 

@@ -127,7 +127,7 @@ def state_line(equilibrium: Equilibrium) -> str:
     words = [f"tip {_spelled(equilibrium.tip_position)} m"]
     if len(equilibrium.q_motors):
         words.append(f"motors {_spelled(equilibrium.q_motors)}" + ("" if equilibrium.within_limits else " (beyond limits)"))
-    words.append(equilibrium.stability.kind)
+    words.append("stable" if equilibrium.stable else equilibrium.stability.kind)
     if equilibrium.model.spring_groups:
         words.append("wrinkled" if equilibrium.wrinkled else "not wrinkled")
     return ", ".join((*words, f"residual {equilibrium.residual:.1e} N m"))

@@ -162,7 +162,8 @@ def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:
     """Name and value of each fact of an equilibrium."""
     x, y, z = equilibrium.tip_position.tolist()
     facts = [("tip [m]", f"{x:.4f}  {y:.4f}  {z:.4f}")]
-    for name in ("stable", "conservative", "within_limits"):
+    facts.append(("stability", "stable" if equilibrium.stable else equilibrium.stability.kind))
+    for name in ("conservative", "within_limits"):
         facts.append((name.replace("_", " "), "yes" if getattr(equilibrium, name) else "no"))
     groups = equilibrium.model.spring_groups
     left = equilibrium.link_limits.wrinkling_margins.tolist()
