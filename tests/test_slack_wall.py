@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 import softrobots as sr
 from softrobots import inflated_beam
@@ -307,6 +307,32 @@ def test_buckling_is_that_of_the_taut_arm(two_links: sr.SoftModel) -> None:
     straight = (sr.load_model(sr.InflatableArm(moment_law=name)) for name in (None, "slack_wall"))
     taut, slack = (sr.critical_load(model, (0, 0, 0), (-1, 0, 0)) for model in straight)
     assert slack == pytest.approx(taut, rel=1e-12)
+
+
+@each_row("rest", [0.02, 0.05, 0.1])
+def test_a_bent_link_gives_way_where_its_wall_has_softened(rest: float) -> None:
+    """`F = M(a - rest) / (L sin a)` has a largest value, by quadrature; a linear link has none and never buckles."""
+    tension = PRESSURE * math.pi * RADIUS**2
+    moment = lambda a: hinge_moment(a - rest, K, RADIUS, tension)  # noqa: E731
+    force = minimize_scalar(lambda a: -moment(a) / (LEVER * math.sin(a)), (rest + 0.03, rest + 0.09, rest + 0.3), tol=1e-9)
+    model = sr.load_model(sr.InflatableArm(link_lengths=(0.6,), rest_up=rest, moment_law="slack_wall"))
+    assert sr.critical_load(model, (0.0, 0.0), (-1.0, 0.0, 0.0)) == pytest.approx(-force.fun, rel=1e-7)
+    linear = sr.load_model(sr.InflatableArm(link_lengths=(0.6,), rest_up=rest))
+    with pytest.raises(sr.NoCriticalLoad):
+        sr.critical_load(linear, (0.0, 0.0), (-1.0, 0.0, 0.0))
+
+
+def test_branches_fall_as_the_wall_softens(one_link: sr.SoftModel) -> None:
+    """Beyond buckling `F = M(a) / (L sin a)` by quadrature: it falls, and rises when folded."""
+    tension = PRESSURE * math.pi * RADIUS**2
+    _, *bent = sr.post_buckling_branches(one_link, (0.0, 0.0), (-1.0, 0.0, 0.0), max_force=320.0)
+    upright = [one for one in bent if max(abs(state.q_springs[0]) for state in one.equilibria) < 1e-6]
+    assert len(upright) == 2  # upwards and downwards, in the plane of the outer spring
+    for branch in upright:
+        angles = np.array([abs(state.q_springs[1]) for state in branch.equilibria])
+        expected = [hinge_moment(a, K, RADIUS, tension) / (LEVER * math.sin(a)) for a in angles[angles > 1e-3]]
+        assert branch.forces[angles > 1e-3] == pytest.approx(np.array(expected), rel=1e-7)
+        assert branch.forces.min() < 45.0
 
 
 def test_motors_and_loads_are_found_again(two_links: sr.SoftModel) -> None:

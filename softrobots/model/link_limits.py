@@ -9,6 +9,7 @@ of the pieces before and behind it. In a section of constant strain `N` is what 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,15 +87,20 @@ def link_limits(
         torques: Load carried by each spring, shape (n_springs,) [N m].
         tensions: Tension of each muscle, shape (n_muscles,) [N].
     """
-    rows = []
-    down = np.array(gravity or (0.0, 0.0, 0.0))
-    axial = _axial_forces(model, wrenches, down, q, torques, tensions)
-    for group, moments, forces in zip(model.spring_groups, link_moments(model, torques), axial, strict=True):
-        slack, wrinkling, _ = inflated_beam.moment_limits(group.pressure, group.radius, forces)
-        worst = int(np.argmin(_left(moments, wrinkling)))
-        pressure = inflated_beam.required_pressure(moments, group.radius, forces).max()
-        rows.append((moments[worst], forces[worst], slack[worst], wrinkling[worst], pressure))
-    return LinkLimits(*(read_only(column) for column in np.array(rows).reshape(-1, 5).T.copy()))
+    groups = model.spring_groups
+    if not groups:
+        return LinkLimits(*[read_only(np.zeros(0))] * 5)
+    counts = [group.n_hinges for group in groups]
+    firsts = [0, *accumulate(counts[:-1])]
+    pressures, radii = (np.repeat([getattr(group, name) for group in groups], counts) for name in ("pressure", "radius"))
+    moments = np.concatenate(link_moments(model, torques))
+    forces = _axial_forces(model, wrenches, np.array(gravity or (0.0, 0.0, 0.0)), q, torques, tensions)
+    slack, wrinkling, _ = inflated_beam.moment_limits(pressures, radii, forces)
+    left = _left(moments, wrinkling)
+    worst = [first + int(np.argmin(left[first : first + count])) for first, count in zip(firsts, counts, strict=True)]
+    needed = np.maximum.reduceat(inflated_beam.required_pressure(moments, radii, forces), firsts)
+    moments, forces, slack, wrinkling = (read_only(each[worst]) for each in (moments, forces, slack, wrinkling))
+    return LinkLimits(moments, forces, slack, wrinkling, read_only(needed))
 
 
 def _left(moments: FloatArray, limits: FloatArray) -> FloatArray:
@@ -109,10 +115,8 @@ def _axial_forces(
     q: FloatArray,
     torques: FloatArray,
     tensions: FloatArray,
-) -> list[FloatArray]:
-    """Axial force at each hinge of each inflated link [N]."""
-    if not model.spring_groups:
-        return []
+) -> FloatArray:
+    """Axial force at each hinge, link after link [N]."""
     rigid, data = model.workspace(None)
     jacobian = pin.computeJointJacobians(rigid, data, q)
     pin.computeSubtreeMasses(rigid, data)
@@ -121,21 +125,20 @@ def _axial_forces(
         for frame, wrench in wrenches.items()
     ]
     stretches = dict(zip(model.spring_joints, torques.tolist(), strict=True))
+    sections = model.structure.section_of if model.structure.constant_strain else {}
     axial = []
     for group in model.spring_groups:
-        section = model.structure.section_of.get(model.spring_joints[group.springs[0]])
-        if section is not None and model.structure.constant_strain:
-            axial.append(np.array([stretches[f"{section.name}_stretch"]]))
+        section = sections.get(model.spring_joints[group.springs[0]])
+        if section is not None:
+            axial.append(stretches[f"{section.name}_stretch"])
             continue
         muscles = zip(model.muscles, tensions.tolist(), strict=True)
         pull = sum(tension for muscle, tension in muscles if muscle.segment == group.segment)
-        at_hinges = []
         for hinge in group.hinges:
             joint, axis = _axis(rigid, data, jacobian, [rigid.getJointId(model.spring_joints[place]) for place in hinge])
             beyond = data.mass[joint] * gravity + sum((force for inside, force in forces if joint in inside), np.zeros(3))
-            at_hinges.append(float(axis @ beyond) - pull)
-        axial.append(np.array(at_hinges))
-    return axial
+            axial.append(float(axis @ beyond) - pull)
+    return np.array(axial)
 
 
 def _axis(rigid: Any, data: Any, jacobian: FloatArray, joints: list[int]) -> tuple[int, FloatArray]:

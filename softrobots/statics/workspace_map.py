@@ -134,7 +134,7 @@ class WorkspaceMap:
     required_pressure: FloatArray
     """Smallest gauge pressure at which no link wrinkles, in the best posture found, shape (..., n_loads) [Pa].
 
-    [Troise 2021] (3). Infinite where the target is not reached.
+    [Troise 2021] (3), axial forces neglected. Infinite where the target is not reached.
     """
     payload: FloatArray
     """Largest load up to which the target is reached and no link wrinkles at its own pressure, shape (...) [N].
