@@ -134,10 +134,6 @@ class LoadedTip:
         """Return a copy with another goal."""
         return replace(self, goal=target)
 
-    def halfway(self, one: Goal, other: Goal) -> Goal:
-        """Return the goal between two."""
-        return one.halfway(other)
-
     def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ElasticState] | None:
         """Solve for the elastic coordinates from a start, shape (n_springs,); None if they do not converge."""
         if not self.model.actuators.admit(q_motors):

@@ -85,10 +85,7 @@ class SoughtTip(Protocol[State]):
         """Number of conditions: 3 for a position, up to 6 with an orientation."""
 
     def towards(self, target: Any) -> SoughtTip[State]:
-        """Return a copy with another target, of the kind that the robot's solver takes."""
-
-    def halfway(self, one: Any, other: Any) -> Any:
-        """Return the target in the middle between two."""
+        """Return a copy with another target, a `tip_goal.Goal`."""
 
     def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[State] | None:
         """Solve for the elastic coordinates from a start, shape (n_springs,); None if they do not converge."""
@@ -190,7 +187,7 @@ def advance(
 
     Args:
         tip: The robot; its goal is ignored.
-        last: The previous waypoint, a target of `SoughtTip.towards`.
+        last: The previous waypoint, a `tip_goal.Goal`.
         target: The waypoint.
         here: The robot at the previous waypoint.
         tolerance: Distance at which a search ends [m].
@@ -214,7 +211,7 @@ def advance(
             return found
     if halvings == 0:
         return None
-    middle = tip.halfway(last, target)
+    middle = last.halfway(target)
     half = advance(tip, last, middle, here, tolerance, halvings - 1)
     return None if half is None else advance(tip, middle, target, half, tolerance, halvings - 1)
 

@@ -1,4 +1,4 @@
-"""Solutions of small systems, traced: in closed form with up to three equations or unknowns, by elimination with more."""
+"""Closed-form solutions of systems with up to six equations or unknowns, traced."""
 
 from __future__ import annotations
 
@@ -13,48 +13,27 @@ _ROOT_STEPS = 5
 
 
 def solve_small(matrix: Any, right: Vector) -> Vector:
-    """Solve a system: least squares with more rows than columns, minimum norm with more columns."""
+    """Solve a system of up to six rows or columns: least squares with more rows, minimum norm with more columns."""
     rows, columns = matrix.shape
-    if min(rows, columns) > 3:
-        return matrix.T @ solve_positive(matrix @ matrix.T, right)
     if rows > columns:
         return inverse_small(matrix.T @ matrix) @ (matrix.T @ right)
-    if rows < columns:
+    if rows < columns or rows > 3:
         return matrix.T @ (inverse_small(matrix @ matrix.T) @ right)
     return inverse_small(matrix) @ right
 
 
-def solve_positive(matrix: Any, right: Vector) -> Vector:
-    """Solve a system with a positive definite matrix, shape (n, n): huge but finite numbers for a singular one."""
-    lower, inverse_pivots = _factors(matrix)
-    n = len(inverse_pivots)
-    solution = list(right)
-    for i in range(n):
-        for j in range(i):
-            solution[i] = solution[i] - lower[i, j] * solution[j]
-    solution = [value * pivot for value, pivot in zip(solution, inverse_pivots, strict=True)]
-    for i in reversed(range(n)):
-        for j in range(i + 1, n):
-            solution[i] = solution[i] - lower[j, i] * solution[j]
-    return vector(solution)
-
-
-def _factors(matrix: Any) -> tuple[Any, list[Scalar]]:
-    """Return `L`, unit lower triangular, and `1 / D` of a positive definite matrix `L D L^T`."""
-    rest, n = matrix.copy(), len(matrix)
-    lower, inverse_pivots = constants(np.eye(n)), []
-    for j in range(n):
-        inverse_pivots.append(_reciprocal(rest[j, j]))
-        for i in range(j + 1, n):
-            lower[i, j] = rest[i, j] * inverse_pivots[j]
-            for k in range(j + 1, i + 1):
-                rest[i, k] = rest[i, k] - lower[i, j] * rest[k, j]
-    return lower, inverse_pivots
-
-
 def inverse_small(matrix: Any) -> Any:
-    """Return the inverse by cofactors, shape (n, n) with n up to three; huge but finite for singular matrices."""
+    """Return the inverse by cofactors, shape (n, n) with n up to three, or of a symmetric matrix with n up to six by blocks.
+
+    Huge but finite for singular matrices.
+    """
     n = len(matrix)
+    if n > 3:
+        first = inverse_small(matrix[:3, :3])
+        coupling = first @ matrix[:3, 3:]
+        last = inverse_small(matrix[3:, 3:] - matrix[3:, :3] @ coupling)
+        corner = -coupling @ last
+        return np.block([[first - corner @ coupling.T, corner], [corner.T, last]])
     if n == 1:
         return np.array([[_reciprocal(matrix[0, 0])]], dtype=object)
     if n == 2:
@@ -78,7 +57,7 @@ def smallest_square(matrix: Any) -> Scalar:
     product = matrix @ matrix.T if matrix.shape[0] <= matrix.shape[1] else matrix.T @ matrix
     n = len(product)
     if n > 3:
-        return _reciprocal(sum(solve_positive(product, unit)[i] for i, unit in enumerate(constants(np.eye(n)))))
+        return _reciprocal(np.trace(inverse_small(product)))
     if n == 1:
         return product[0, 0]  # type: ignore[no-any-return]
     trace = sum((product[i, i] for i in range(1, n)), product[0, 0])

@@ -19,6 +19,7 @@ from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.tip_force.force_search import Directions, search_force, torque_tolerance
+from softrobots.statics.tip_goal import Goal
 from softrobots.statics.tip_search import LocalSolution, advance, search
 
 _ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]
@@ -120,7 +121,7 @@ class LoopedSearch:
         tip, last, first = _SoughtTip(self.model, self, force, gravity, targets[0]), targets[0], here
         poses, statuses = [here], [status]
         for target in targets[1:] if status == Status.CERTIFIED else ():
-            there = advance(tip, last, target, here, tolerance)
+            there = advance(tip, Goal(last), Goal(target), here, tolerance)
             if there is None:
                 distance = float(np.linalg.norm(target - self.tip(here.state.w)))
                 poses.append(replace(here, error=distance))
@@ -233,11 +234,8 @@ class _SoughtTip:
     def rows(self) -> int:
         return 3
 
-    def towards(self, target: FloatArray) -> _SoughtTip:
-        return replace(self, target=target)
-
-    def halfway(self, one: FloatArray, other: FloatArray) -> FloatArray:
-        return 0.5 * (one + other)
+    def towards(self, target: Goal) -> _SoughtTip:
+        return replace(self, target=target.position)
 
     def solve(self, q_motors: FloatArray, start: FloatArray) -> LocalSolution[ChainState] | None:
         if not self.model.actuators.admit(q_motors):
