@@ -41,6 +41,14 @@ ODD = {
     "wrist": (0.08, 0.12),
     "wrist_limits": (1.5, 1.2, 3.0),
 }
+ODD_WALLS = {
+    "link_model": "two_hinges",
+    "torsion": True,
+    "young_modulus": (1.2e8, 1.4e8),
+    "shear_modulus": 3e7,
+    "pressure": (5e4, 4e4),
+    "payload": (0.3, 0.0, 0.02, -0.01),
+}
 ODD_PCC = {
     "segment_lengths": (0.5, 0.4, 0.3),
     "offset": (0.1, -1.0, 2.0),
@@ -85,6 +93,7 @@ def test_committed_urdf_is_what_xacro_generates(name: str) -> None:
     [
         (sr.InflatableArm, {}),
         (sr.InflatableArm, ODD),
+        (sr.InflatableArm, ODD_WALLS),
         (PccArm, {}),
         (PccArm, ODD_PCC),
         (PccArm, ODD_LUMPED),
@@ -139,7 +148,7 @@ def test_the_table_of_the_guide_has_the_defaults_of_the_arm() -> None:
     facts, scales = facts_of(sr.InflatableArm), {"mm": (1e-3, "m"), "kPa": (1e3, "Pa")}
     defaults = {field.name: field.default for field in dataclasses.fields(sr.InflatableArm)}
     checked = []
-    for names, cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]*) \|", page, flags=re.MULTILINE)[:11]:
+    for names, cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]*) \|", page, flags=re.MULTILINE)[:12]:
         values = re.findall(r"(\([\d., ]+\)|[\d.]+|pi|none|paper|false) ?([^,:]*)", cell)
         for name, (number, unit) in zip(re.findall(r"\w+", names), itertools.cycle(values), strict=False):
             scale, unit = scales.get(unit, (1.0, unit))
