@@ -310,6 +310,27 @@ def test_load_finds_the_force_that_the_motors_feel(answer, told: Told, arm: sr.S
     assert "standard deviation" not in told("load", *words)[1]
 
 
+def test_load_tells_the_parts_of_the_error_and_other_forces(answer, told: Told) -> None:
+    """One number for all, or one for each; without starting again there is one force."""
+    limp = sr.load_model(sr.InflatableArm(max_moment=12.0))
+    torques = sr.solve_equilibrium(limp, (0.3, 0.9, -1.4), (2, 8, -12), gravity=sr.EARTH_GRAVITY).motor_torques
+    words = ("inflatable_arm", "--set", "max_moment=12", "--motors", "0.3", "0.9", "-1.4", "--gravity")
+    words += ("--torques", *map(repr, torques.tolist()))
+    deviations = ("--stiffness-std", "0.03", "0.03", "0.04", "0.04", "--motor-angle-std", "0.01")
+    found = answer("load", *words, *deviations)
+    options = {"stiffness_std": (0.03, 0.03, 0.04, 0.04), "motor_angle_std": 0.01, "gravity": sr.EARTH_GRAVITY}
+    estimate = sr.estimate_load(limp, (0.3, 0.9, -1.4), torques, **options)
+    for name, part in estimate.covariance_parts.items():
+        assert found["covariance_parts"][name] == part.tolist()
+    assert found["motor_angle_std"] == [0.01] * 3
+    assert [one["force"] for one in found["alternatives"]] == [one.force.tolist() for one in estimate.alternatives] != []
+    same(found["alternatives"][0]["equilibrium"], estimate.alternatives[0].equilibrium)
+    _, out, _ = told("load", *words, *deviations)
+    assert re.search(r"^ +by motor angles +\S+  \S+  \S+ N$", out, re.M)
+    assert re.search(r"^ +explained as well by +2  8  -12 N$", out, re.M)
+    assert answer("load", *words, "--no-restart")["alternatives"] == []
+
+
 def test_load_names_the_direction_that_is_not_felt(answer, told: Told) -> None:
     """A straight arm does not feel a pull along itself."""
     words = ("inflatable_arm", "--motors", "0", "0", "0", "--torques", "0", "0", "0")
@@ -559,6 +580,9 @@ REFUSED = [
     ),
     (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "1", "2"), "--torque-std must be 3 numbers"),
     (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "-1"), "--torque-std must be positive"),
+    (("load", "inflatable_arm", "--torques", *"123", "--stiffness-std", "1", "2"), "spring_1_side [-], spring_1_up [-]"),
+    (("load", "inflatable_arm", "--torques", *"123", "--motor-angle-std", "1", "2"), "--motor-angle-std must be 3 numbers"),
+    (("load", "pcc_arm", "--torques", *"123456", "--motor-angle-std", "1"), "--motor-angle-std must be left out for a robot"),
     (("load", "inflatable_arm", "--torques", *"123", "--frame", "nobody"), "no frame is called 'nobody'"),
     (("load", "inflatable_arm", "--torques", *"123", "-o", "x.csv"), "-o must be a file name that ends in .npz"),
     (("load", "helix_tube", "--torques", "1"), "a robot with at least one motor"),

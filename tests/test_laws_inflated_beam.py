@@ -18,6 +18,7 @@ from tests.support.laws import law
 BROADCASTING = ["wrinkling_moment", "required_pressure", "required_tabulated_pressure", "deflection", "moment"]
 BROADCASTING += ["stiffness_from_young_modulus", "young_modulus_from_stiffness"]
 BROADCASTING += ["inflated volume", "tank_volume", "tank_pressure"]
+BROADCASTING += ["beam_stiffness", "two_hinges", "moment_limits", "slack_wall_moment"]
 ROUNDING = 1e-14  # a few dozen operations on positive numbers
 
 
@@ -244,6 +245,11 @@ def test_moment_is_the_slope_of_its_energy(angle: float, stiffness: float, most:
     assert abs(found - slope) <= bound + (0.5 * stiffness * step if abs(abs(angle) * stiffness - most) < 2e-4 * most else 0.0)
 
 
+def parts(answer: Any) -> tuple[Any, ...]:
+    """Fields of an answer, or the answer itself."""
+    return answer if isinstance(answer, tuple) else (answer,)
+
+
 @settings(max_examples=8)
 @given(data=st.data())
 @pytest.mark.parametrize("name", BROADCASTING)
@@ -252,18 +258,20 @@ def test_arrays_are_taken_element_by_element(name: str, data: st.DataObject) -> 
 
     Numbers alone give a number.
     """
-    function, given = getattr(inflated_beam, name.removeprefix("inflated ")), CALLS[name][1]
+    function, given = CALLS[name]
+    function = inflated_beam.required_tabulated_pressure if name == "required_tabulated_pressure" else function
     random = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     shapes = {key: data.draw(st.sampled_from([(), (3,), (2, 1), (2, 3)])) for key in given}
     arguments = {key: value * random.uniform(0.8, 1.0, shapes[key]) for key, value in given.items()}
-    found = function(**arguments)
+    found = parts(function(**arguments))
     shape = np.broadcast_shapes(*shapes.values())
-    assert np.shape(found) == shape
+    assert {np.shape(part) for part in found} == {shape}
     for place in np.ndindex(shape):
         numbers = {key: float(np.broadcast_to(value, shape)[place]) for key, value in arguments.items()}
-        one = function(**numbers)
-        assert one is None or isinstance(one, float)
-        assert (found if shape == () else found[place]) == pytest.approx(np.inf if one is None and shape else one, rel=1e-15)
+        for part, one in zip(found, parts(function(**numbers)), strict=True):
+            assert one is None or isinstance(one, float)
+            expected = np.inf if one is None and shape else one
+            assert (part if shape == () else part[place]) == pytest.approx(expected, rel=1e-14)
 
 
 # --- Characterisation

@@ -66,6 +66,7 @@ def beam_stiffness(
     for name, array in (("radius", r), ("wall_thickness", t), ("shear_modulus", g)):
         shape = common_shape(name, shape, array.shape)
     refuse_where("wall_thickness", wall_thickness, t > 0.1 * r, "a thin wall, at most a tenth of the radius {} m", r)
+    modulus, p, r, t, g = (np.broadcast_to(array, shape) for array in (modulus, p, r, t, g))
     cap_force, section = p * math.pi * r**2, 2.0 * math.pi * r * t
     stress = cap_force / section
     bending, twisting = (modulus + stress) * math.pi * r**3 * t, (g + stress) * section * r**2
