@@ -422,6 +422,8 @@ def test_solve_says_which_springs_are_given(told: Told) -> None:
     assert re.search(r"^springs +given: spring_2_up; of the file: 3$", out, re.M)
     assert re.search(r"^spring_2_up +0\.100000 +rad", out, re.M)  # it keeps its rest
     assert "given:" not in told("solve", "inflatable_arm")[1]
+    out = told("solve", "inflatable_arm", "--spring", "spring_1_side=none", "--spring", "spring_2_side=none")[1]
+    assert re.search(r"^motor\s.*\n(.*\n)*spring_1_side .*\n(.*\n)*spring +position", out, re.M)  # now a motor
 
 
 def test_solve_says_that_the_limits_of_a_helix_are_upper_bounds(told: Told) -> None:

@@ -47,7 +47,7 @@ def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
     """Add the options of `add_robot`, and `--spring`, `--tip` and `--muscles`, to a parser; see `model_of`."""
     add_robot(parser, optional=optional)
     help_text = "spring of a joint: stiffness K [N m/rad or N/m], relaxed at REST [rad or m] (that of the file, or 0); once "
-    help_text += "for each joint; other joints keep the springs of the file"
+    help_text += "for each joint; JOINT=none takes a spring away; other joints keep the springs of the file"
     parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=help_text)
     parser.add_argument("--tip", metavar="LINK", help="link that is the tip (the one that the file names, or its only end)")
     help_text = "input of muscles: lengths [m] or tensions [N] (%(default)s)"
@@ -69,16 +69,17 @@ def assignment(word: str) -> str:
     return word
 
 
-def spring(word: str) -> tuple[str, float | tuple[float, float]]:
-    """Parse JOINT=K or JOINT=K,REST into the joint and its stiffness, or stiffness and rest."""
+def spring(word: str) -> tuple[str, float | tuple[float, float] | None]:
+    """Parse JOINT=K, JOINT=K,REST or JOINT=none into the joint and its spring, as `load_model` takes it."""
     joint, equals, numbers = word.rpartition("=")
     stiffness, _, rest = numbers.partition(",")
     try:
-        values = (float(stiffness), float(rest)) if rest else float(stiffness)
+        number = None if numbers == "none" else float(stiffness)
+        values = (number, float(rest)) if number is not None and rest else number
     except ValueError:
         equals = ""
     if not joint or not equals:
-        raise argparse.ArgumentTypeError(f"{word!r}: JOINT=K or JOINT=K,REST is required")
+        raise argparse.ArgumentTypeError(f"{word!r}: JOINT=K, JOINT=K,REST or JOINT=none is required")
     return joint, values
 
 
@@ -123,7 +124,7 @@ def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = 
         SoftRobotsError: Whatever `source_of` and `load_model` raise.
         ParameterError: If a joint is given two springs.
     """
-    springs: dict[str, float | tuple[float, float]] = {}
+    springs: dict[str, float | tuple[float, float] | None] = {}
     for joint, values in arguments.spring:
         if joint in springs:
             raise ParameterError("--spring", joint, "given once for each joint")
