@@ -93,7 +93,16 @@ class Oracle:
         self.muscles = np.array(rows).reshape(arm.n_muscles, -1)
 
     def lengths(self, z: np.ndarray) -> np.ndarray:
-        return np.repeat(self.arm.segment_lengths, len(self.arm.muscle_azimuths)) + self.muscles @ z.ravel()
+        """Helices around the backbone; those of hinges to second order in the twist, without the strains beside it."""
+        made = []
+        for segment, distance in enumerate(self.arm.muscle_distance):
+            rows = slice(segment * self.n, (segment + 1) * self.n)
+            (a, b, t, e), h = z.reshape(-1, 4)[rows].T, self.h[rows]
+            for azimuth in self.arm.muscle_azimuths:
+                along, across = h + e + distance * (np.sin(azimuth) * a - np.cos(azimuth) * b), distance * t
+                each = along + across**2 / (2.0 * h) if self.arm.chain == "lumped" else np.hypot(along, across)
+                made.append(each.sum())
+        return np.array(made)
 
     def poses(self, z: np.ndarray) -> tuple[dict[str, np.ndarray], list[tuple[float, np.ndarray]]]:
         """Frames at the ends of the segments, and (mass, point)s."""
@@ -156,7 +165,7 @@ class Oracle:
         if gravity is not None:
             total -= sum(mass * float(np.dot(gravity, point)) for mass, point in weights)
         if tensions is not None:
-            total += float(tensions @ (self.muscles @ z.ravel()))
+            total += float(tensions @ self.lengths(z))
         return total
 
 
@@ -297,7 +306,7 @@ def test_residual_is_the_derivative_of_an_energy_written_without_the_package(
             z = strains_at(arm, motors, y)
             return np.array([oracle.energy(z, {"segment_1": MID, "tip": TIP}, gravity, tensions)])
 
-        if muscles == "lengths":  # the free coordinates leave the lengths alone, as (20-22) have them
+        if muscles == "lengths":  # the free coordinates leave the lengths alone
             assert np.abs(oracle.lengths(strains_at(arm, motors, springs)) - motors).max() < 1e-15
         found = elastic_state(arm, motors, springs, load).residual
         expected = central_difference(energy, springs, 1e-5)[0]
@@ -326,7 +335,7 @@ def test_tangent_and_coupling_are_derivatives_of_the_residual(muscles: str, fiel
 
 @pytest.mark.parametrize(("muscles", "fields"), CASES[:3], ids=NAMES[:3])
 def test_equilibrium_is_the_minimum_that_scipy_finds(muscles: str, fields: dict, rng: np.random.Generator) -> None:
-    """BFGS on the energy above over all strains (lengths: over the null space of the muscles), scaled by the stiffness.
+    """BFGS on the energy above over all strains (lengths: over those that keep them), scaled by the stiffness.
 
     It stops at gradients of 1e-6 (rounding of numerical ones) with curvature about 1: 1e-5 in scaled coordinates, over the
     root of the softest stiffness, about 3 N m/rad."""
@@ -334,14 +343,16 @@ def test_equilibrium_is_the_minimum_that_scipy_finds(muscles: str, fields: dict,
     forces, motors = {"segment_1": MID, "tip": TIP}, motors_of(rng, arm, oracle)
     found = sr.solve_equilibrium(arm, motors, wrench=POINT_FORCES)
     softness = 1.0 / np.sqrt(oracle.stiffness.ravel())
-    if muscles == "lengths":
-        offset = np.linalg.pinv(oracle.muscles * softness) @ (motors - oracle.lengths(np.zeros(oracle.h.shape + (4,))))
-        basis, tensions = null_space(oracle.muscles * softness), None
-    else:
-        offset, basis, tensions = np.zeros(4 * len(oracle.h)), np.eye(4 * len(oracle.h)), motors
+    held = muscles == "lengths"
+    back = np.linalg.pinv(oracle.muscles * softness)
+    basis = null_space(oracle.muscles * softness) if held else np.eye(4 * len(oracle.h))
+    tensions = None if held else motors
 
     def z(x: np.ndarray) -> np.ndarray:
-        return (softness * (offset + basis @ x)).reshape(-1, 4)
+        at = softness * (basis @ x)
+        for _ in range(8 if held else 0):  # twist changes the lengths a little: each step leaves a hundredth
+            at = at + softness * (back @ (motors - oracle.lengths(at)))
+        return at.reshape(-1, 4)
 
     def energy(x: np.ndarray) -> float:
         return oracle.energy(z(x), forces, None, tensions)

@@ -1,9 +1,11 @@
-r"""A robot with held actuators: motor positions, and joint springs whose references include the muscle tensions.
+r"""A robot with held actuators: motor positions, and joint springs that include the muscle tensions.
 
-A tension `t` of the muscles adds the energy :math:`t^T A z` (see `softrobots.model.muscles`). On joint springs, where `z` are
-joint coordinates, it shifts the reference of each spring:
+A tension `t` of the muscles adds the energy `t l`. Along lumped sections (`softrobots.model.muscle_paths`) that is linear in
+bending and elongation, with the arms `A`, and quadratic in twist, with the stiffness :math:`\kappa = \sum t d^2 / h`, so that
+it changes the reference and the stiffness of each spring:
 
-.. math:: \tfrac12 k (z - r)^2 + t^T A z = \tfrac12 k (z - r + A^T t / k)^2 + \text{constant}
+.. math:: \tfrac12 k (z - r)^2 + t^T A z + \tfrac12 \kappa z^2
+          = \tfrac12 (k + \kappa) \Bigl(z - \frac{k r - A^T t}{k + \kappa}\Bigr)^2 + \text{constant}
 
 so a lumped chain under tensions is exactly a chain of springs. Muscles of given length couple the joints of a segment, and the
 six joints of a section of constant strain follow four coordinates; neither is a joint spring, and both are refused.
@@ -16,6 +18,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
+from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.urdf_tags import SpringTag
@@ -32,7 +37,7 @@ class HeldRobot:
     motors: Mapping[str, float]
     """Position by motor joint, base to tip [rad or m]."""
     springs: Mapping[str, SpringTag]
-    """Spring by joint, base to tip; the reference includes the muscle tensions."""
+    """Spring by joint, base to tip; they include the muscle tensions."""
     locked: tuple[str, ...]
     """Joints locked at zero."""
     tensions: Mapping[str, float]
@@ -65,7 +70,8 @@ def hold(model: Any, q_motors: Any = None) -> HeldRobot:
     """Hold the actuators of a robot: motors at positions, muscles at tensions; by default `relaxed_motors`.
 
     Raises:
-        ParameterError: If `check_linear` refuses the model, it has muscles of given length, or `q_motors` does not fit it.
+        ParameterError: If `check_linear` refuses the model, it has muscles of given length, `q_motors` does not fit it, or the
+            muscles push so hard that a spring has no stiffness left.
     """
     checked = check_linear(model)
     if checked.muscles and checked.muscle_input != "forces":
@@ -77,12 +83,34 @@ def hold(model: Any, q_motors: Any = None) -> HeldRobot:
     structure = checked.structure
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     count = len(structure.motor_joints)
-    rest = structure.strain_springs.rest - values[count:] @ structure.muscle_matrix / structure.strain_springs.stiffness
-    tags = map(SpringTag, structure.strain_springs.stiffness.tolist(), rest.tolist())
-    springs = dict(zip(structure.spring_joints, tags, strict=True))
+    springs = pulled_springs(checked, values[count:], by_tendons=False)
     motors = dict(zip(structure.motor_joints, values[:count].tolist(), strict=True))
     tensions = dict(zip((muscle.name for muscle in checked.muscles), values[count:].tolist(), strict=True))
     return HeldRobot(MappingProxyType(motors), MappingProxyType(springs), structure.locked_joints, MappingProxyType(tensions))
+
+
+def pulled_springs(model: SoftModel, tensions: FloatArray, *, by_tendons: bool) -> dict[str, SpringTag]:
+    """Return the joint springs of a lumped chain with muscle tensions in them.
+
+    Args:
+        model: The robot.
+        tensions: Tension of each muscle, shape (n_muscles,) [N].
+        by_tendons: Whether linear tendons pull with the arms, so that only the stiffness of the tensions goes into the springs.
+
+    Raises:
+        ParameterError: If the muscles push so hard that a spring has no stiffness left: it buckles in torsion.
+    """
+    springs, paths = model.structure.strain_springs, model.structure.muscle_paths
+    straight = paths.at(np.zeros(paths.count))
+    stiffness = springs.stiffness + np.diag(straight.curvature(tensions))
+    soft = [name for name, value in zip(springs.names, stiffness, strict=True) if value <= 0.0]
+    if soft:
+        raise ParameterError("q_motors", tensions, f"tensions that leave {', '.join(soft)} a stiffness: such a push buckles it")
+    pull = tensions @ straight.arms * (not by_tendons)
+    rest = (springs.stiffness * springs.rest - pull) / stiffness
+    rest = np.where(stiffness == springs.stiffness, springs.rest - pull / stiffness, rest)  # no rounding without tension
+    tags = map(SpringTag, stiffness.tolist(), rest.tolist())
+    return dict(zip(model.structure.spring_joints, tags, strict=True))
 
 
 def weld(tree: RigidTree, positions: Mapping[str, float]) -> RigidTree:

@@ -46,7 +46,7 @@ def to_mjcf(
     Args:
         model: The robot.
         q_motors: Motor joints, then muscles, shape (n_motors,) [rad, m or N]; relaxed by default.
-        actuators: "driven", or "welded": motor joints become fixed, tensions become shifts of the springs' references.
+        actuators: "driven", or "welded": motor joints become fixed, tensions become part of the springs.
         damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.

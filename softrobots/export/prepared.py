@@ -1,7 +1,7 @@
 """A robot prepared for a simulator: fixed and driven joints, springs, damping and servos.
 
 Statics holds motors exactly. In a simulator a motor is a joint with an actuator ("driven"), or a fixed joint at the given
-coordinate ("welded"); then muscle tensions are part of the spring references (`softrobots.export.held`).
+coordinate ("welded"); then muscle tensions are part of the springs (`softrobots.export.held`).
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from softrobots.core.checks import FloatArray, choice, finite_array
 from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
-from softrobots.description.urdf_tags import SpringTag
 from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix, rule_text
-from softrobots.export.held import ACTUATORS, check_linear, hold, weld
+from softrobots.export.held import ACTUATORS, check_linear, hold, pulled_springs, weld
 from softrobots.export.servos import Motor, Muscle, motors_of, muscles_of
 from softrobots.model.soft_model import SoftModel
 
@@ -64,12 +65,12 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
     structure, tree = checked.structure, read_rigid_tree(checked.urdf)
     positions = dict(zip(structure.motor_joints, values.tolist(), strict=False))
     fixed = dict.fromkeys(structure.locked_joints, 0.0)
-    springs: Mapping[str, SpringTag] = {name: SpringTag(*spring) for name, spring in checked.spring_table.items()}
     welded = actuators == "welded"
     if welded:
         springs, fixed = hold(checked, values).springs, fixed | positions
     else:
         _check_limits(checked, values)
+        springs = pulled_springs(checked, _tensions(checked, values), by_tendons=True)
     tree = weld(tree, fixed)
     _refuse_massless(tree)
     mass = mass_matrix(checked, values)
@@ -127,6 +128,16 @@ def _check_limits(model: SoftModel, motors: FloatArray) -> None:
         raise ParameterError("q_motors", motors, f'within the limits of {", ".join(names)}, or actuators="welded"')
 
 
+def _tensions(model: SoftModel, values: FloatArray) -> FloatArray:
+    """Tension of each muscle at home, without load, shape (n_muscles,) [N]."""
+    structure = model.structure
+    if structure.muscle_lengths is None:
+        return values[len(structure.motor_joints) :]
+    springs = structure.strain_springs
+    carried = springs.stiffness * (structure.strains(values, model.rest) - springs.rest)
+    return np.asarray(-carried @ structure.muscle_lengths.spread)
+
+
 def _refuse_massless(tree: RigidTree) -> None:
     group = weld_groups(tree)
     mass = dict.fromkeys(group, 0.0)
@@ -156,11 +167,10 @@ def _remarks(model: SoftModel, motors: FloatArray, welded: bool, frequency: floa
     if model.structure.motor_joints:
         remarks.append("Motors are welded: their joints are fixed." if welded else "Motors are driven: their joints move.")
     if model.muscles and welded:
-        remarks.append(
-            "Muscles are welded: their tensions are in the references of the springs, r - A^T t / k, which is exact."
-        )
+        remarks.append("Muscles are welded: their tensions are in the springs, which is exact.")
     elif model.muscles:
         remarks.append(f"Muscles are driven; given are their {'tensions' if model.muscle_input == 'forces' else 'lengths'}.")
+        remarks.append("Twist does not lengthen them here; the springs of twist have the stiffness of their tensions at home.")
     if model.n_motors:
         at = ", ".join(f"{name} {value!r}" for name, value in zip(model.motor_joints, motors.tolist(), strict=True))
         remarks.append(f"{'Held' if welded else 'Home'} at [rad, m or N]: {at}.")

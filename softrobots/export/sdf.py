@@ -52,7 +52,7 @@ def to_sdf(
         model: The robot.
         q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. For driven
             motors, they only affect the frequency that sets the damping.
-        actuators: "driven", or "welded": motor joints become fixed, tensions become shifts of the springs' references.
+        actuators: "driven", or "welded": motor joints become fixed, tensions become part of the springs.
         damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
 

@@ -91,7 +91,7 @@ def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[
     structure, muscles = model.structure, []
     arms, springs = structure.moment_arms, structure.spring_indices
     elastic = mass[np.ix_(springs, springs)]
-    for tag, row, value in zip(model.muscles, structure.muscle_matrix, values.tolist(), strict=True):
+    for tag, row, value in zip(model.muscles, structure.muscle_paths.matrix, values.tolist(), strict=True):
         motion = row / structure.strain_springs.stiffness
         motion /= row @ motion
         gain = tag.strongest / (LENGTH_ERROR * tag.rest_length)

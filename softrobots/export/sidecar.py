@@ -50,9 +50,10 @@ _CONVENTIONS = {
     "elongation) with the stiffness EI / length, EI / length, GJ / length, EA / length; rest: strains kx, ky, twist, stretch "
     "where all joints are at zero",
     "lumped_sections": "spring joints that stand for a section, by coordinate; hinge: length of rod from its start to them",
-    "muscles": "length = rest_length + sum of arms times coordinates; the arms are distance sin(azimuth) of bend_x, "
-    "-distance cos(azimuth) of bend_y and 1 of stretch; a tension t adds the energy t length, so that it moves the rest of a "
-    "joint spring by -arm t / stiffness; muscle_input tells whether lengths or forces are given",
+    "muscles": "length without twist = rest_length + sum of arms times coordinates; the arms are distance sin(azimuth) of "
+    "bend_x, -distance cos(azimuth) of bend_y and 1 of stretch; with a twist t a section has hypot(length without twist, "
+    "distance t), a lumped one distance^2 t^2 / (2 length) more; a tension adds the energy tension times length, so that it "
+    "moves the rest of a joint spring by -arm tension / stiffness; muscle_input tells whether lengths or forces are given",
     "lines": "lines along a segment that are drawn and do nothing",
 }
 

@@ -130,7 +130,8 @@ def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None)
         assignment("GRAVITY", checked_gravity(gravity), "[m/s^2], of main()"),
         table("SPRINGS", model.spring_table, "joint: stiffness [N m/rad or N/m], rest [rad or m]"),
         assignment("MOTORS", list(held.motors), "joints"),
-        table("MUSCLES", model.structure.moment_arms, "muscle: derivative of its length by joint [m/rad or -]"),
+        table("MUSCLES", model.structure.moment_arms, "muscle: derivative of its length by joint, all at zero [m/rad or -]"),
+        table("TWISTS", _twists(model), "muscle: second derivative of its length by joint, all others are zero [m/rad^2]"),
         assignment("Q_MOTORS", [*held.motors.values(), *held.tensions.values()], "of motors, then muscles [rad, m or N]"),
         assignment("LOCKED", list(held.locked), "joints"),
     ]
@@ -148,6 +149,17 @@ def _held(model: SoftModel, q_motors: Any) -> HeldRobot:
     if not held.springs:
         raise ParameterError("model", model, "a robot with springs; a rigid robot needs no export beyond its URDF")
     return held
+
+
+def _twists(model: SoftModel) -> dict[str, dict[str, float]]:
+    """By muscle, the second derivative of its length by joint, `d^2 / h` for twist; zeros are left out."""
+    names, paths = model.structure.strain_springs.names, model.structure.muscle_paths
+    straight, units = paths.at(np.zeros(paths.count)), np.eye(len(paths.rest))
+    rows = [np.diag(straight.curvature(unit)).tolist() for unit in units]
+    return {
+        tag.name: {name: value for name, value in zip(names, row, strict=True) if value != 0.0}
+        for tag, row in zip(model.muscles, rows, strict=True)
+    }
 
 
 def _inside_quotes(text: str) -> str:
@@ -200,7 +212,7 @@ def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, frequency: fl
         lines.append("Motors are driven: position control holds them at the positions of the table MOTORS.")
     if held.tensions:
         pulls = ", ".join(f"{name} {tension!r}" for name, tension in held.tensions.items())
-        lines.append(f"Muscles pull with [N]: {pulls}. That stands in the rest positions, rest - A^T t / k, exactly.")
+        lines.append(f"Muscles pull with [N]: {pulls}. That stands in the springs, exactly.")
     lines.append(rule_text(frequency) if damping == "critical" else "Damping of the springs is that of the description.")
     if not limits:
         lines.append("The springs have no limits.")

@@ -15,11 +15,13 @@ from softrobots.model.actuators import Actuators
 from softrobots.model.chain_reader import chain_length
 from softrobots.model.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, rest_coordinates
 from softrobots.model.muscle_lengths import MuscleLengths
-from softrobots.model.muscles import MuscleForces, Segments, muscle_matrix
+from softrobots.model.muscle_paths import MusclePaths
+from softrobots.model.muscles import MuscleForces
 from softrobots.model.pinocchio_data import PinocchioData
+from softrobots.model.sections import SectionRow, places_by_segment
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import Springs, spring_groups
-from softrobots.model.structure import SectionRow, Structure
+from softrobots.model.structure import Structure
 
 
 def assemble(
@@ -57,10 +59,9 @@ def assemble(
     section_tags = sorted(tags.sections, key=lambda tag: rigid.getJointId(tag.joints[0]))
     lumped_tags = sorted(tags.lumped_sections, key=lambda tag: rigid.getJointId(tag.joints["bend_x"]))
     sections = _section_rows(section_tags, first=len(spring_joints))
-    lumped = [_lumped_row(tag, spring_joints) for tag in lumped_tags]
+    rows = sections or [_lumped_row(tag, spring_joints) for tag in lumped_tags]
     strain_springs = _strain_springs(rigid, [springs[name] for name in spring_joints], spring_joints, section_tags)
-    segments = _segments([*sections, *lumped])
-    matrix = read_only(muscle_matrix(tags.muscles, segments, len(strain_springs.names)))
+    segments, paths = places_by_segment(rows), MusclePaths(tags.muscles, rows, len(strain_springs.names))
 
     coordinates: Coordinates = DirectCoordinates(motor_indices, spring_indices, rigid.nv)
     elastic_limits: FloatArray = np.tile([-np.inf, np.inf], (rigid.nv, 1))
@@ -72,11 +73,9 @@ def assemble(
         coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
     given_lengths, elastic = None, strain_springs
     if tags.muscles and muscle_input == "forces":
-        coordinates = MuscleForces(coordinates, matrix)
+        coordinates = MuscleForces(coordinates, paths)
     elif tags.muscles:
-        section_lengths = {row.segment: row.length for row in sections or lumped}
-        largest = None if sections else np.pi / 2
-        given_lengths = MuscleLengths(coordinates, tags.muscles, segments, strain_springs, section_lengths, largest)
+        given_lengths = MuscleLengths(coordinates, tags.muscles, rows, strain_springs, paths)
         coordinates, elastic = given_lengths, given_lengths.springs
 
     structure = Structure(
@@ -87,11 +86,11 @@ def assemble(
         motor_indices=motor_indices,
         spring_indices=spring_indices,
         constant_strain=bool(sections),
-        section_table=tuple(sections or lumped),
+        section_table=tuple(rows),
         strain_springs=strain_springs,
         muscles=tags.muscles,
         muscle_input=muscle_input,
-        muscle_matrix=matrix,
+        muscle_paths=paths,
         muscle_lengths=given_lengths,
         lines=tags.lines,
         elastic_limits=read_only(elastic_limits),
@@ -213,11 +212,3 @@ def _strain_springs(rigid: Any, tags: Sequence[SpringTag], joints: tuple[str, ..
         turning += [name != "stretch" for name in STRAINS] * len(sections)
     names = (*joints, *(f"{tag.name}_{strain}" for tag in sections for strain in STRAINS))
     return Springs(names, read_only(stiffness), read_only(rest), np.array(turning, dtype=bool))
-
-
-def _segments(rows: Sequence[SectionRow]) -> Segments:
-    segments: dict[int, dict[str, list[int]]] = {}
-    for row in rows:
-        for name, place in row.places.items():
-            segments.setdefault(row.segment, {}).setdefault(name, []).append(place)
-    return segments

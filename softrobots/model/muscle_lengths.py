@@ -1,9 +1,24 @@
-"""Muscles of given lengths: the constrained and the free coordinates of a robot; see `softrobots.model.muscles`."""
+r"""Muscles of given lengths: the constrained and the free coordinates of a robot.
+
+Without twist the lengths fix the sums `S` of bending and elongation over a segment (three muscles exactly, more in the sense of
+least squares). Free are the differences between its sections, and twist: the strains are `z = W S + F y`. `W` distributes the
+sums in inverse proportion to stiffness, so that `W^T K F = 0` and the stiffness of `y` is diagonal. With the excess `c(z)` of
+the lengths by twist (`softrobots.model.muscle_paths`) and `P` from lengths to sums, `S` is the solution of
+
+.. math:: S + P c(W S + F y) = P (l - l_0)
+
+With its derivative `A = 1 + P c_z W`, the load `w` on the strains, that of the springs included, and the tensions
+:math:`t = P^T A^{-T} W^T w`,
+
+.. math:: z_y = F - W A^{-1} P c_z F, \quad z_l = W A^{-1} P, \quad
+          \mathrm d^2 U = z_y^T \Bigl(K - w_z + \sum t_m l_m''\Bigr) z_y
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,13 +29,18 @@ from softrobots.core.errors import DescriptionError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.coordinates import Coordinates, ReducedLoad
 from softrobots.model.joint_loads import JointLoad
-from softrobots.model.muscles import MUSCLE_STRAINS, MusclePoint, Segments, muscle_arms
+from softrobots.model.muscle_paths import MUSCLE_STRAINS, MusclePaths, MusclePathsAt, muscle_arms
+from softrobots.model.muscles import MusclePoint
+from softrobots.model.sections import SectionRow, places_by_segment
 from softrobots.model.springs import Springs
 
 CONSISTENT = 1e-6
 """Largest accepted difference of the muscle lengths of a segment from those of the nearest arc [m]."""
 
 _LEAST_LENGTH = 0.01  # of a section, relative to its rest length
+_CLOSED = 1e-12  # largest remaining difference of the sums [rad or m]
+_ROUNDING = 1e-15  # of the same, below which no step is of use
+_STEPS = 30  # of Newton's method, that takes two or three
 
 
 class MuscleLengths:
@@ -30,30 +50,28 @@ class MuscleLengths:
         self,
         inner: Coordinates,
         tags: Sequence[MuscleTag],
-        segments: Segments,
+        sections: Sequence[SectionRow],
         springs: Springs,
-        section_lengths: Mapping[int, float],
-        largest_bending: float | None = None,
+        paths: MusclePaths,
     ) -> None:
         """Compute the free coordinates.
 
         Args:
             inner: The robot without muscles.
             tags: The muscles.
-            segments: Places of the coordinates of each segment among its elastic coordinates.
+            sections: Its sections.
             springs: Springs of its elastic coordinates.
-            section_lengths: Rest length of the sections of each segment [m].
-            largest_bending: Limit of the bending of one section [rad]; `LARGEST_BENDING` by default.
+            paths: The paths of the muscles.
 
         Raises:
             DescriptionError: If the muscles of a segment do not fix its bending and elongation.
         """
-        self._inner, self._springs, self._segments, self._section_lengths = inner, springs, segments, section_lengths
-        self._largest_bending = LARGEST_BENDING if largest_bending is None else largest_bending
-        self._tags = tuple(tags)
-        self._rest_lengths = np.array([tag.rest_length for tag in tags])
+        self._segments = segments = places_by_segment(sections)
+        self._section_lengths = {row.segment: row.length for row in sections}
+        self._largest_bending = np.pi / 2 if paths.lumped else LARGEST_BENDING
+        self.inner, self.strain_springs, self.paths, self._tags = inner, springs, paths, tuple(tags)
         count = len(springs.names)
-        spread = np.zeros((count, len(tags)))
+        shares: list[FloatArray] = []
         self._misfit = np.zeros((len(tags), len(tags)))
         groups, slopes, modes, names, turning = [], [], [], [], []
         self._bent: list[tuple[int, Any, Any]] = []
@@ -72,7 +90,8 @@ class MuscleLengths:
             self._misfit[np.ix_(rows, rows)] = np.eye(len(rows)) - arms @ inverse
             for key, row_of_inverse in zip(places, inverse, strict=True):
                 softness = 1.0 / springs.stiffness[places[key]]
-                spread[np.ix_(places[key], rows)] = np.outer(softness / softness.sum(), row_of_inverse)
+                shares.append(np.zeros(count))
+                shares[-1][places[key]] = softness / softness.sum()
                 slope = np.zeros(len(tags))
                 slope[rows] = row_of_inverse
                 groups.append(tuple(places[key]))
@@ -90,8 +109,14 @@ class MuscleLengths:
         """Elastic coordinates of the robot without muscles whose sum the lengths constrain, group by group."""
         self.slopes = read_only(np.array(slopes).reshape(-1, len(tags)))
         """Derivative of those sums with respect to the lengths, shape (n_groups, n_muscles) [rad/m or -]."""
-        self.spread = read_only(spread)
-        """Elastic coordinates of the robot without muscles by change of the lengths, shape (count, n_muscles)."""
+        self.shares = read_only(np.array(shares).reshape(-1, count).T)
+        """Elastic coordinates of the robot without muscles by those sums, shape (count, n_groups)."""
+        self.spread = read_only(self.shares @ self.slopes)
+        """The same by change of the lengths without twist, shape (count, n_muscles)."""
+        self.sum_stiffness = read_only(np.einsum("ik,i,ik->k", self.shares, springs.stiffness, self.shares))
+        """Stiffness of the sums, shape (n_groups,) [N m/rad or N/m]."""
+        self.sum_rest = read_only(np.array([springs.rest[list(group)].sum() for group in groups]))
+        """Relaxed sums, shape (n_groups,) [rad or m]."""
         self.free = read_only(np.concatenate([np.eye(count)[free], np.array(modes).reshape(-1, count)]).T)
         """The same by free coordinates, shape (count, n)."""
         stiffness = read_only(np.einsum("ik,i,ik->k", self.free, springs.stiffness, self.free))
@@ -104,17 +129,37 @@ class MuscleLengths:
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleLengthPoint:
         """Return the robot at given coordinates."""
-        count = len(motors) - len(self._tags)
-        strains = self.strains(motors, elastic)
-        return MuscleLengthPoint(self._inner.at(motors[:count], strains), self.spread, self.free, self._springs, strains)
+        sums, strains, paths, solved = self._solve(motors, elastic)
+        inner = self.inner.at(motors[: len(motors) - len(self._tags)], strains)
+        return MuscleLengthPoint(inner, paths, self, sums, self.slopes @ self._change(motors), strains, solved)
 
     def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
-        return np.asarray(self.spread @ self._change(motors) + self.free @ elastic)
+        return self._solve(motors, elastic)[1]
+
+    def _solve(self, motors: FloatArray, elastic: FloatArray) -> tuple[FloatArray, FloatArray, MusclePathsAt, bool]:
+        """Sums of the strains at given lengths and free coordinates, the strains, the paths, and whether lengths are met."""
+        free, given = self.free @ elastic, self.slopes @ self._change(motors)
+        sums, worst = given, np.inf
+        for _ in range(_STEPS):
+            strains = self.shares @ sums + free
+            paths = self.paths.at(strains)
+            if not paths.valid:
+                break
+            gap = sums - given + self.slopes @ paths.excess
+            worst = float(np.abs(gap).max())
+            if worst <= _ROUNDING:
+                break
+            sums = sums - np.linalg.solve(self.gap_slope(paths), gap)
+        return sums, strains, paths, paths.valid and worst <= _CLOSED
+
+    def gap_slope(self, paths: MusclePathsAt) -> FloatArray:
+        """Derivative `A` of the constraint with respect to the sums, shape (n_groups, n_groups)."""
+        return np.asarray(np.eye(len(self.groups)) + self.slopes @ (paths.slopes @ self.shares))
 
     def _change(self, motors: FloatArray) -> FloatArray:
         """Change of the muscle lengths from rest, shape (n_muscles,) [m]."""
-        return np.asarray(motors[len(motors) - len(self._tags) :] - self._rest_lengths)
+        return np.asarray(motors[len(motors) - len(self._tags) :] - self.paths.rest)
 
     def consistent(self, motors: FloatArray) -> FloatArray:
         """Return motors and the nearest lengths of arcs, shape (n_motors,)."""
@@ -174,7 +219,7 @@ class MuscleLengths:
             if bending > self._largest_bending:
                 rows = [first + row for row, tag in enumerate(self._tags) if tag.segment == segment]
                 arms = muscle_arms([tag for tag in self._tags if tag.segment == segment])
-                rest = self._rest_lengths[[row - first for row in rows]]
+                rest = self.paths.rest[[row - first for row in rows]]
                 sums = np.linalg.lstsq(arms, limited[rows] - rest, rcond=None)[0]
                 limited[rows] -= arms[:, :2] @ sums[:2] * (1.0 - self._largest_bending / bending)
         return limited
@@ -208,33 +253,57 @@ class MuscleLengths:
 class MuscleLengthPoint(MusclePoint):
     """A robot at given muscle lengths."""
 
-    spread: FloatArray
-    """Derivative of its elastic coordinates with respect to the lengths."""
-    free: FloatArray
-    """The same with respect to the free coordinates."""
-    springs: Springs
-    """Its springs."""
+    held: MuscleLengths
+    """The constraint."""
+    sums: FloatArray
+    """Sums of its strains."""
+    given: FloatArray
+    """The same without twist."""
     strains: FloatArray
-    """Its elastic coordinates."""
+    """Its strains."""
+    solved: bool
+    """Whether these lengths are possible with the free coordinates."""
+
+    @property
+    def valid(self) -> bool:
+        """Whether every section and every muscle is within its range, and the twist leaves the lengths possible."""
+        return self.solved and super().valid
+
+    @cached_property
+    def _sum_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the sums with respect to the lengths and to the free coordinates."""
+        held, paths = self.held, self.paths
+        by_lengths = np.linalg.solve(held.gap_slope(paths), held.slopes)
+        return by_lengths, -by_lengths @ (paths.slopes @ held.free)
 
     def reduce(self, joints: JointLoad) -> ReducedLoad:
-        """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included."""
-        load = self.inner.reduce(joints)
-        unbalanced = load.elastic - self.springs.stiffness * (self.strains - self.springs.rest)
-        half = self.free.T @ load.derivative
+        """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included.
+
+        The energy of the sums is that beyond the state without twist.
+        """
+        load, held, paths = self.inner.reduce(joints), self.held, self.paths
+        by_lengths, by_free = self._sum_slopes
+        springs, stiffness = held.strain_springs, held.sum_stiffness
+        tensions = (load.elastic - springs.stiffness * (self.strains - springs.rest)) @ held.shares @ by_lengths
+        to_free, to_lengths = held.free + held.shares @ by_free, held.shares @ by_lengths
+        half = to_free.T @ (load.derivative - paths.curvature(tensions))
+        stiff = stiffness[:, None] * by_free
+        change, middle = self.sums - self.given, 0.5 * (self.sums + self.given) - held.sum_rest
         return ReducedLoad(
-            np.concatenate([load.motors, unbalanced @ self.spread]),
-            load.elastic @ self.free,
-            half @ self.free,
-            np.concatenate([self.free.T @ load.coupling, half @ self.spread], axis=1),
-            load.potential,
+            np.concatenate([load.motors, tensions]),
+            (load.elastic - tensions @ paths.slopes) @ held.free,
+            half @ to_free - by_free.T @ stiff,
+            np.concatenate([to_free.T @ load.coupling, half @ to_lengths - stiff.T @ by_lengths], axis=1),
+            load.potential + float(stiffness @ (change * middle)),
             load.scale,
         )
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns per motor and length, and per free coordinate."""
         motors, elastic = self.inner.columns(jacobian)
-        return np.concatenate([motors, elastic @ self.spread], axis=1), elastic @ self.free
+        by_lengths, by_free = self._sum_slopes
+        by_sums = elastic @ self.held.shares
+        return np.concatenate([motors, by_sums @ by_lengths], axis=1), elastic @ self.held.free + by_sums @ by_free
 
 
 def _differences(stiffness: FloatArray) -> FloatArray:

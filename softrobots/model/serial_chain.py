@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 from softrobots.core.checks import FloatArray
+from softrobots.model.muscle_paths import MusclePaths
 
 
 class ChainBody(NamedTuple):
@@ -93,18 +94,19 @@ class SerialChain:
     """Lower and upper limit of the actuators, motor joints and then muscles, shape (n_actuators, 2) [rad, m or N]."""
     muscle_input: str
     """What `q_motors` holds of the muscles, "lengths" or "forces"."""
-    muscle_rest: FloatArray
-    """Muscle lengths where the strains are zero, shape (n_muscles,) [m]."""
-    muscle_matrix: FloatArray
-    """Derivative of the muscle lengths with respect to the strains, shape (n_muscles, n_strains)."""
+    muscle_paths: MusclePaths
+    """The muscle lengths as functions of the strains."""
     constrained: tuple[tuple[int, ...], ...]
-    """Groups of strains whose sum the given muscle lengths constrain, base to tip; empty without given lengths."""
+    """Groups of strains whose sum the given muscle lengths constrain without twist, base to tip; empty without given lengths.
+
+    With twist the excess of the lengths, times `constrained_slope`, counts in each sum.
+    """
     constrained_slope: FloatArray
     """Derivative of those sums with respect to the muscle lengths, shape (n_groups, n_muscles)."""
     elastic: FloatArray
     """Elastic coordinates by strains, shape (n_springs, n_strains); the identity without given lengths."""
     spread: FloatArray
-    """Part of the strains that muscle lengths prescribe, by their change from rest, shape (n_strains, n_muscles)."""
+    """Part of the strains that muscle lengths prescribe without twist, by their change from rest, (n_strains, n_muscles)."""
     free: FloatArray
     """Part of the strains by elastic coordinates, shape (n_strains, n_springs)."""
     slack_hinges: tuple[tuple[int, int, float], ...] = ()

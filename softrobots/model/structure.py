@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,35 +11,9 @@ from softrobots.constant_curvature.strain_chain import STRAINS, in_range
 from softrobots.core.checks import FloatArray
 from softrobots.description.urdf_tags import LineTag, MuscleTag, RobotTags, SpringTag
 from softrobots.model.muscle_lengths import MuscleLengths
+from softrobots.model.muscle_paths import MusclePaths
+from softrobots.model.sections import SectionRow
 from softrobots.model.springs import Springs
-
-
-class SectionRow(NamedTuple):
-    """A section, of constant strain or lumped."""
-
-    name: str
-    """Name of the section."""
-    segment: int
-    """Number of its segment, from 1."""
-    length: float
-    """Rest length [m]."""
-    radius: float
-    """Radius of the body, for pictures [m]."""
-    hinge: float
-    """Rest length of the piece from its start to its joints [m]; 0 if it is not lumped."""
-    joint_names: tuple[str, ...]
-    """Its joints."""
-    rest_joints: FloatArray
-    """Joint positions that the joint origins carry, shape (6,); zeros if lumped."""
-    rest: FloatArray
-    """Section coordinates where every joint is at zero, shape (4,) [rad, rad, rad, m]."""
-    places: Mapping[str, int]
-    """Place among the strains of each section coordinate that can change."""
-
-    @property
-    def to_joints(self) -> FloatArray:
-        """Section coordinates at rest of the piece from its start to its joints, shape (4,)."""
-        return self.rest * (self.hinge / self.length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,19 +46,14 @@ class Structure:
     """Muscles."""
     muscle_input: str
     """What `q_motors` holds of the muscles, "lengths" or "forces"."""
-    muscle_matrix: FloatArray
-    """Derivative of the muscle lengths with respect to the strains, shape (n_muscles, n_strains)."""
+    muscle_paths: MusclePaths
+    """The muscle lengths as functions of the strains."""
     muscle_lengths: MuscleLengths | None
     """The constraint of given muscle lengths; None if forces are given or there are no muscles."""
     lines: tuple[LineTag, ...]
     """Lines along the segments, for pictures only."""
     elastic_limits: FloatArray
     """Limits of the joints that springs and sections move, in the order of Pinocchio's velocities, shape (nv, 2)."""
-
-    @property
-    def muscle_rest(self) -> FloatArray:
-        """Muscle lengths where all strains are zero, shape (n_muscles,) [m]."""
-        return np.array([tag.rest_length for tag in self.muscles])
 
     @property
     def section_joints(self) -> tuple[str, ...]:
@@ -110,11 +78,11 @@ class Structure:
 
     @property
     def moment_arms(self) -> dict[str, dict[str, float]]:
-        """By muscle, the derivative of its length by spring joint or section coordinate [m/rad or -]; zeros are left out."""
-        names = self.strain_springs.names
+        """By muscle, the derivative of its length by strain where all are zero [m/rad or -]; zeros are left out."""
+        names, paths = self.strain_springs.names, self.muscle_paths
         return {
             tag.name: {name: arm for name, arm in zip(names, row, strict=True) if arm != 0.0}
-            for tag, row in zip(self.muscles, self.muscle_matrix.tolist(), strict=True)
+            for tag, row in zip(self.muscles, paths.at(np.zeros(paths.count)).arms.tolist(), strict=True)
         }
 
     def strains(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
@@ -126,15 +94,16 @@ class Structure:
         strains = self.strains(motors, elastic)
         if self.constant_strain:
             return strains[len(self.spring_joints) :].reshape(-1, 4)
-        coordinates = np.array([section.rest for section in self.section_table]).reshape(-1, 4)
+        coordinates = np.array([section.origin for section in self.section_table]).reshape(-1, 4)
         for row, section in enumerate(self.section_table):
             for name, place in section.places.items():
                 coordinates[row, STRAINS.index(name)] += strains[place]
         return coordinates
 
     def at_range_end(self, motors: FloatArray, elastic: FloatArray) -> tuple[str, ...]:
-        """Return the names of the sections of constant strain that reach the end of their range with 5 % more strain."""
+        """Return the names of the sections of constant strain that 5 % more strain takes out of range, or their muscles."""
         if not self.constant_strain:
             return ()
         rows = zip(self.section_table, self.section_coordinates(motors, elastic), strict=True)
-        return tuple(row.name for row, z in rows if not in_range(1.05 * z, row.length))
+        folded = self.muscle_paths.at(1.05 * self.strains(motors, elastic)).folded
+        return tuple(row.name for row, z in rows if row.name in folded or not in_range(1.05 * z, row.length))

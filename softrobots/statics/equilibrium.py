@@ -109,7 +109,7 @@ class Equilibrium:
         """Length of each muscle, shape (n_muscles,) [m]."""
         structure = self.model.structure
         strains = structure.strains(self.q_motors, self.q_springs)
-        return read_only(np.asarray(structure.muscle_rest + structure.muscle_matrix @ strains))
+        return read_only(structure.muscle_paths.rest + structure.muscle_paths.at(strains).change)
 
     @property
     def muscle_forces(self) -> FloatArray:

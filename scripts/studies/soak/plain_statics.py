@@ -10,8 +10,6 @@ muscle rows of this module. Whole batches of cases are evaluated at once, for an
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +18,7 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray
 from softrobots.description.tag_reader import read_tags
 from softrobots.model.soft_model import SoftModel
+from studies.soak.plain_muscles import PlainMuscles
 from studies.soak.plain_sections import section_joints, section_slopes
 
 
@@ -103,38 +102,15 @@ class PlainStatics:
             for group in model.spring_groups
             if group.max_moment is not None
         ]
-        self._muscles = self._muscle_rows(names)
+        self._muscles = PlainMuscles(read_tags(model.urdf), names)
         self._lengths_given = len(model.muscles) > 0 and model.muscle_input == "lengths"
-        zero = np.zeros(model.n_springs)
-        motors = np.array(model.relaxed_motors)
-        origin = np.array(model.structure.strains(motors, zero))
-        units = np.eye(model.n_springs)
-        self._free = np.array([model.structure.strains(motors, unit) - origin for unit in units]).reshape(-1, len(names))
+        held = model.structure.muscle_lengths
+        self._free = np.eye(len(names)) if held is None else np.array(held.free.T)  # without twist
         self.stiffness = np.einsum("is,s,is->i", self._free, self._stiffness, self._free)
         """Stiffness of the elastic coordinates at rest, shape (n_springs,) [N m/rad or N/m]."""
-        self._left_free = _null_space(self._muscles) if self._lengths_given else np.eye(len(names))
 
     def _names(self, group: Any) -> list[str]:
         return [self.model.spring_joints[place] for place in group.springs]
-
-    def _muscle_rows(self, names: Sequence[str]) -> FloatArray:
-        """Derivative of the muscle lengths with respect to springs and sections, shape (n_muscles, n)."""
-        tags = read_tags(self.model.urdf)
-        rows = np.zeros((len(self.model.muscles), len(names)))
-        for row, muscle in zip(rows, self.model.muscles, strict=True):
-            arms = {
-                "bend_x": muscle.distance * math.sin(muscle.azimuth),
-                "bend_y": -muscle.distance * math.cos(muscle.azimuth),
-                "stretch": 1.0,
-            }
-            for tag in tags.sections:
-                for strain, arm in arms.items() if tag.segment == muscle.segment else ():
-                    row[names.index(f"{tag.name}_{strain}")] = arm
-            for lumped in tags.lumped_sections:
-                for strain, arm in arms.items() if lumped.segment == muscle.segment else ():
-                    if strain in lumped.joints:
-                        row[names.index(lumped.joints[strain])] = arm
-        return rows
 
     def balance(self, case: Case, springs: FloatArray) -> Balance:
         """Sum up the loads.
@@ -149,7 +125,7 @@ class PlainStatics:
         strains = self._strains(case.motors, springs)
         torques, size, tip = self._torques(case, strains)
         rows = self._spring_loads(strains)
-        rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(np.abs(rows) @ np.abs(self._left_free.T), axis=1)
+        rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(rows, axis=1)
         count = len(self._spring_columns)
         rows[:, :count] -= torques[:, self._spring_columns]
         if len(self._lengths):
@@ -157,16 +133,22 @@ class PlainStatics:
             at_joints = torques[:, self._section_columns]
             rows[:, count:] -= np.einsum("nsj,nsjz->nsz", at_joints, section_slopes(z, self._lengths)).reshape(len(z), -1)
         held = np.zeros(len(strains))
-        if len(self._muscles):
+        residual = rows
+        if len(self.model.muscles):
+            lengths, slopes = self._muscles.at(strains)
             given = case.motors[:, len(self._motor_columns) :]
             if self._lengths_given:
-                rest = np.array([muscle.rest_length for muscle in self.model.muscles])
-                held = np.abs(rest + strains @ self._muscles.T - given).max(axis=1)
+                held = np.abs(lengths - given).max(axis=1)
+                # The free coordinates move the springs of the sums so that the lengths stay.
+                back = (self._muscles.rows / self._stiffness).T
+                share = np.linalg.solve(slopes @ back, slopes @ self._free.T)
+                residual = rows @ self._free.T - np.einsum("ns,sm,nmi->ni", rows, back, share)
+                rows = rows - np.einsum("nm,nms->ns", np.einsum("ns,nsm->nm", rows, np.linalg.pinv(slopes)), slopes)
             else:
-                rows += given @ self._muscles
+                residual = rows = rows + np.einsum("nm,nms->ns", given, slopes)
                 size = size + np.abs(given).sum(axis=1) * self.model.reach
-        imbalance = np.linalg.norm(rows @ self._left_free.T, axis=1)
-        return Balance(rows @ self._free.T, imbalance, size, torques[:, self._motor_columns], tip, rounding, held)
+        imbalance = np.linalg.norm(rows, axis=1)
+        return Balance(residual, imbalance, size, torques[:, self._motor_columns], tip, rounding, held)
 
     def _strains(self, motors: FloatArray, springs: FloatArray) -> FloatArray:
         if not self._lengths_given:
@@ -271,13 +253,6 @@ def _turns(axis: FloatArray, angles: FloatArray) -> FloatArray:
     spin = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     result = np.eye(3) + np.sin(angles)[:, None, None] * spin + (1.0 - np.cos(angles))[:, None, None] * (spin @ spin)
     return np.asarray(result)
-
-
-def _null_space(rows: FloatArray) -> FloatArray:
-    """Directions of length 1 that change none of the rows, shape (k, n), by singular values."""
-    _, values, directions = np.linalg.svd(rows)
-    rank = int(np.count_nonzero(values > values.max(initial=0.0) * 1e-12))
-    return np.asarray(directions[rank:])
 
 
 def _axis(rigid: Any, number: int) -> tuple[bool, FloatArray]:

@@ -1,28 +1,37 @@
-"""Ends of a segment with given muscle lengths: its multipliers are added at its tip and eliminated at its base."""
+"""Ends of a segment with muscles: multipliers of given lengths are added at its tip and eliminated at its base.
+
+Given lengths are constraints of the strains, nonlinear where the segment twists. A Newton step closes their gap to first order;
+the tangent takes the tensions from the multipliers of the last point. What closing the gap will save counts in the energy
+already, to second order: minus the mean torque of the sums times the gap, plus the elastic energy of the gap itself.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import vector
+from softrobots.compiled.chain.elements import constants, vector
 from softrobots.compiled.chain.elimination import eliminate_multipliers
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Segment
+from softrobots.compiled.settings import LARGEST_NUMBER
 from softrobots.compiled.trace.blocks import Block, hoist
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Scalar, absolute, if_less
 
 
 def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block], int]:
-    """Trace the functions at the ends of the constrained segment of this number.
+    """Trace the functions at the ends of the segment of this number.
 
     Returns:
-        Functions that add the multipliers at its tip, eliminate them at its base, and solve for them there on the step pass;
-        and the size of the record.
+        Functions that set the tensions and add the multipliers at its tip, and, if it has multipliers, eliminate them at its
+        base, and solve for them there on the step pass; and the size of the record.
     """
     chain, recursion, tip, infix = plan.unknowns.chain, plan.recursion, plan.tip, plan.infix
     softness = [float(np.sum(1.0 / chain.stiffness[list(chain.constrained[group])])) for group in segment.groups]  # of each sum
     count = len(softness)
-    add = Block(f"add_multipliers_{infix}{number}", "Add the multipliers of a segment, without coupling.")
+    add = Block(f"add_multipliers_{infix}{number}", "Set the tensions of a segment, and add its multipliers, without coupling.")
+    _set_tensions(plan, add, segment)
+    if count == 0:
+        return [add], 0
     add.store_all(recursion.matrix + 6, [0.0] * (count * (count + 7) // 2))
     if tip is None:
         add.store_all(recursion.gaps, [0.0] * count)
@@ -32,10 +41,19 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
     eliminate = Block(f"eliminate_multipliers_{infix}{number}", "Eliminate the multipliers of a segment.", ("at",))
     outboard, state = plan.load_outboard(eliminate, 3 + count)
     gaps: list[Scalar] = [0.0] * count
+    slope: Scalar = 0.0
     if tip is None:
-        arrived = eliminate.loads(recursion.gaps, count)
-        state = [*state, *arrived]
+        arrived, totals = eliminate.loads(recursion.gaps, count), eliminate.loads(recursion.constraint_torques, count)
+        energy = eliminate.load(recursion.sums)
+        state = [*state, *arrived, *totals]
         gaps = [*arrived]
+        saved: Scalar = energy
+        for group, total, gap, soft in zip(segment.groups, totals, gaps, softness, strict=True):
+            torque = gap * (1.0 / soft)  # of closing the gap
+            mean = total * (1.0 / len(chain.constrained[group]))
+            saved = saved + gap * (torque * 0.5 - mean)
+            slope = slope + gap * (mean - torque)
+        eliminate.store(recursion.sums, saved)
     eliminated, beyond = eliminate_multipliers(outboard, gaps, softness)
     plan.store_outboard(eliminate, beyond)
     eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
@@ -43,21 +61,41 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
     turns = [solve.loads(place, 3) for place in plan.turns]
     sums = solve.loads(recursion.steps, 3)
     if tip is None:
-        totals = eliminate.loads(recursion.constraint_torques, count)
         error: Scalar = sums[1]
-        for place, (group, total, gap, soft) in enumerate(zip(segment.groups, totals, gaps, softness, strict=True)):
-            solve.store(recursion.constraint_torques + place, total * (1.0 / len(chain.constrained[group])))
-            torque = gap * (1.0 / soft)  # of closing the gap
-            error = error + torque * torque
-        solve.store(recursion.steps + 1, error)
-        state = [*state, *totals]
+        for gap, soft in zip(gaps, softness, strict=True):
+            error = error + (gap * (1.0 / soft)) * (gap * (1.0 / soft))
+        solve.store_all(recursion.steps, [sums[0] + slope, error])
     for side, (place, turn) in enumerate(zip(plan.turns, turns, strict=True)):
         multipliers = eliminated.steps(side, vector(turn)).tolist()
         solve.store_all(place + 3, multipliers)
-        if tip is not None:
-            first = tip.constraint_loads if side == 0 else tip.constraint_columns + (side - 1) * tip.n_constraints
-            for group, value in zip(segment.groups, multipliers, strict=True):
+        for group, value in zip(segment.groups, multipliers, strict=True):
+            if tip is None:  # out of range it may be no number: then the next point begins anew
+                solve.store(plan.layout.held + group, if_less(absolute(value), LARGEST_NUMBER, value, 0.0))
+            else:
+                first = tip.constraint_loads if side == 0 else tip.constraint_columns + (side - 1) * tip.n_constraints
                 solve.store(first + group, value)
     arriving = [*(one for turn in turns for one in turn), *sums]
     size = hoist([solve], eliminate, arriving, 0, "at", overwritten=state)
     return [add, eliminate, solve], size
+
+
+def _set_tensions(plan: Plan, block: Block, segment: Segment) -> None:
+    """Write the tensions of a segment: as given, or as of the multipliers of the last point and the preload of the start."""
+    chain, layout, recursion = plan.unknowns.chain, plan.layout, plan.recursion
+    if not segment.groups:
+        block.store_all(recursion.tensions, [block.load(layout.tensions + muscle) for muscle in segment.muscles])
+        return
+    held = [block.load(layout.held + group) for group in segment.groups]
+    block.store_all(recursion.multipliers, held)
+    first = [chain.constrained[group][0] for group in segment.groups]  # all strains of a sum have the same torque at the start
+    preload = vector(
+        [
+            (block.load(layout.start + plan.unknowns.place[strain]) - float(chain.rest[strain]))
+            * float(chain.stiffness[strain])
+            for strain in first
+        ]
+    )
+    for number, muscle in enumerate(segment.muscles):
+        shares = constants(chain.constrained_slope[list(segment.groups), muscle])
+        block.store(recursion.preload + number, shares @ preload)
+        block.store(recursion.tensions + number, shares @ (vector(held) - preload))

@@ -35,6 +35,9 @@ torque that the force does not explain; squared smallest singular value of the e
 [m]; largest distance from a target [m]; number of steps."""
 
 
+_COUNTS = ("unknowns", "conditions", "muscles", "constraints", "singles", "prepared")  # no places for callers
+
+
 def assign_places(layout: Any, first: int, **sizes: int) -> None:
     """Set attributes of a frozen layout to consecutive places from `first` on, one for each size."""
     for name, size in sizes.items():
@@ -52,12 +55,18 @@ class Layout:
     """Number of unknown strains."""
     conditions: int = 3
     """Number of conditions of a target: 3 for a position, 6 for a pose."""
+    muscles: int = 0
+    """Number of muscles with given tensions."""
+    constraints: int = 0
+    """Number of sums that muscle lengths constrain."""
     force: int = field(init=False)
     """Force on the tip, world axes [N] (3)."""
     gravity: int = field(init=False)
     """Gravity, world axes [m/s^2] (3)."""
-    pull: int = field(init=False)
-    """Constant load of muscle tensions on each unknown [N m or N]."""
+    tensions: int = field(init=False)
+    """Given tension of each muscle [N]."""
+    held: int = field(init=False)
+    """Multiplier of each constrained sum at the last point, beyond those of the start [N m or N]."""
     start: int = field(init=False)
     """Start of the search where muscle lengths constrain sums of the unknowns [rad or m]; others start at rest."""
     unknown: int = field(init=False)
@@ -93,7 +102,9 @@ class Layout:
         """Compute the places."""
         motors, n = self.motors, self.unknowns
         point = self.varied + n
-        before_tip = dict(pull=n, start=n, unknown=n, step=n, line_origin=n, line_direction=n)
+        before_tip = dict(
+            tensions=self.muscles, held=self.constraints, start=n, unknown=n, step=n, line_origin=n, line_direction=n
+        )
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
         searches = dict(tip=3, torques=motors, target=self.target_size, next_target=self.target_size)
         rest = dict(singles=len(SINGLES), prepared=0)
@@ -115,8 +126,7 @@ class Layout:
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""
-        others = ("unknowns", "conditions", "singles", "prepared")
-        places = {name.upper(): place for name, place in vars(self).items() if name not in others}
+        places = {name.upper(): place for name, place in vars(self).items() if name not in _COUNTS}
         places |= {name.upper(): self.single(name) for name in SINGLES}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 
@@ -131,6 +141,8 @@ class RecursionLayout:
 
     first: int
     """First of the places."""
+    muscles: int
+    """Largest number of muscles of a segment."""
     axes: int = field(init=False)
     """Axes behind the last element of the outward pass (9)."""
     lever: int = field(init=False)
@@ -148,7 +160,13 @@ class RecursionLayout:
     gaps: int = field(init=False)
     """Difference of the constrained sums of a segment from their given values (3)."""
     constraint_torques: int = field(init=False)
-    """Sums of the torques of the constraints; in the step pass the mean of each (3)."""
+    """Sums of the torques of the constraints (3)."""
+    multipliers: int = field(init=False)
+    """Multipliers of the segment at the last point (3)."""
+    tensions: int = field(init=False)
+    """Tension of each muscle of the segment at the last point (`muscles`)."""
+    preload: int = field(init=False)
+    """Part of that at the start (`muscles`)."""
     force: int = field(init=False)
     """Force and gravity in the axes behind the leading motors (6)."""
     base: int = field(init=False)
@@ -159,6 +177,7 @@ class RecursionLayout:
     def __post_init__(self) -> None:
         """Compute the places."""
         sums = dict(sums=5, steps=3, gaps=3, constraint_torques=3)
+        sums |= dict(multipliers=3, tensions=self.muscles, preload=self.muscles)
         assign_places(self, self.first, axes=9, lever=6, matrix=21, column=6, turn=6, **sums, force=6, base=12, end=0)
 
 

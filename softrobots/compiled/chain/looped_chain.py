@@ -18,6 +18,7 @@ import numpy as np
 from softrobots.compiled.chain.elements import Load, constants, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
+from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -91,7 +92,8 @@ def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     one = unknowns.traced(row)
     zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
     constraint = unknowns.multipliers_at(row)
-    return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0))
+    muscles = [(muscle.number, muscle.twists, [arm == 0.0 for arm in muscle.arms]) for muscle in one.muscles]
+    return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0)), str(muscles)
 
 
 def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
@@ -109,6 +111,11 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
 
     multipliers = plan.unknowns.multipliers_at(rows[0])
     state, loads, beyond, balance = _arriving(back, element, plan, multipliers)
+    held = back.loads(recursion.multipliers, multipliers)
+    muscles = len(element.muscles)
+    tensions, preload = back.loads(recursion.tensions, muscles), back.loads(recursion.preload, muscles)
+    element = replace(element, tensions=tensions, preload=preload)
+    state = [*state, *held, *tensions, *preload]
     pivot_shift = back.load(layout.single("pivot_shift"))
     result = inward(
         element,
@@ -133,7 +140,7 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
                 result.beyond.n_negative_pivots,
             ],
         )
-        second = _store_step(step_pass, element, result, plan, multipliers)
+        second = _store_step(step_pass, result, plan, held)
     else:
         second = _store_tip_step(step_pass, back, result, plan, tip, multipliers)
     size = hoist([back, step_pass], out, [*state, pivot_shift, *second], 0, "at", overwritten=axes_loads)
@@ -153,28 +160,31 @@ def _store_constraints(
                 element.coordinates[element.moving[place]] - element.rest[place]
             )
             with_own[1][constraint] = with_own[1][constraint] + result.gradient[place]
+    if result.eliminated is not None:
+        with_own[0] = [gap + own for gap, own in zip(with_own[0], result.excess, strict=False)]
     block.store_all(recursion.gaps, with_own[0])
     block.store_all(recursion.constraint_torques, with_own[1])
     return [*gaps, *torques]
 
 
-def _store_step(step_pass: Block, element: TracedElement, result: InwardPass, plan: Plan, multipliers: int) -> list[Expression]:
-    """Trace the Newton step of an element; return the sums of the elements before it."""
+def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence[Scalar]) -> list[Expression]:
+    """Trace the Newton step of an element; return the sums of the elements before it.
+
+    The residual is that with the multipliers of the last point, which those of this one must agree with.
+    """
     layout, recursion = plan.layout, plan.recursion
-    turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + multipliers), step_pass.loads(recursion.steps, 3)
+    turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + len(held)), step_pass.loads(recursion.steps, 3)
     if result.eliminated is not None:
         turn = vector(turn_loads)
         steps = result.eliminated.steps(0, turn)
         sums: list[Scalar] = list(sum_loads)
-        means = step_pass.loads(recursion.constraint_torques, multipliers)
-        for place, step in enumerate(steps):
-            constraint = element.constraints[place]
-            residual = result.gradient[place] if constraint is None else result.gradient[place] - means[constraint]
+        residuals = vector(result.gradient) + result.constrained[: len(held)].T @ vector(held)
+        for place, (step, residual) in enumerate(zip(steps, residuals, strict=True)):
             sums = [sums[0] + result.gradient[place] * step, sums[1] + residual * residual, sums[2] + step * step]
             step_pass.store(layout.step - layout.unknown + place, step, "q")
         step_pass.store_all(recursion.turn, (turn + result.twists @ steps)[:3].tolist())
         step_pass.store_all(recursion.steps, sums)
-        return [*turn_loads, *sum_loads, *means]
+        return [*turn_loads, *sum_loads]
     return [*turn_loads, *sum_loads]
 
 
@@ -212,9 +222,6 @@ def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) ->
         next(unknown) if place in first.moving or not first.moving else columns.entry([one.coordinates[place] for one in ones])
         for place in range(len(first.coordinates))
     ]
-    pulls = [
-        block.load(layout.pull - layout.unknown + place, "q") if unknowns.pulled else 0.0 for place in range(len(first.moving))
-    ]
     return replace(
         first,
         rotation=columns.entries([one.rotation for one in ones]),
@@ -227,8 +234,20 @@ def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) ->
         coordinates=coordinates,
         stiffness=columns.entries([one.stiffness for one in ones]).tolist(),
         rest=_relaxed(ones, block, layout, columns),
-        pull=pulls,
+        muscles=[_muscle([one.muscles[place] for one in ones], columns) for place in range(len(first.muscles))],
         length=columns.entry([one.length for one in ones]),
+    )
+
+
+def _muscle(ones: Sequence[ElementMuscle], columns: TableColumns) -> ElementMuscle:
+    """Return a muscle beside the elements of a kind, with table entries for the numbers in which they differ."""
+    return replace(
+        ones[0],
+        arms=columns.entries([one.arms for one in ones]).tolist(),
+        distance=columns.entry([one.distance for one in ones]),
+        length=columns.entry([one.length for one in ones]),
+        twist=columns.entry([one.twist for one in ones]),
+        shares=columns.entries([one.shares for one in ones]).tolist(),
     )
 
 

@@ -31,12 +31,14 @@ class Plan:
     @cached_property
     def layout(self) -> Layout:
         """Places of the numbers of a case."""
-        return Layout(self.unknowns.chain.n_motors, len(self.unknowns.strains), 6 if self.poses else 3)
+        unknowns, conditions = self.unknowns, 6 if self.poses else 3
+        counts = unknowns.n_tensions, len(unknowns.chain.constrained)
+        return Layout(unknowns.chain.n_motors, len(unknowns.strains), conditions, *counts)
 
     @cached_property
     def recursion(self) -> RecursionLayout:
         """Places of the sums that elements of a looped chain hand on."""
-        return RecursionLayout(self.layout.prepared)
+        return RecursionLayout(self.layout.prepared, self.unknowns.most_muscles)
 
     @property
     def infix(self) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate, resized
+from softrobots.compiled.chain.muscle_terms import ElementMuscle, pulls_on
 from softrobots.compiled.trace.expressions import Scalar, if_less, smaller
 from softrobots.compiled.trace.stumpff_series import LARGEST
 
@@ -54,14 +55,18 @@ class TracedElement:
     """Stiffness of the unknown ones [N m/rad or N/m]."""
     rest: list[Scalar]
     """Rest values of those [rad or m]."""
-    pull: list[Scalar]
-    """Constant load of muscle tensions on them [N m or N]."""
+    muscles: list[ElementMuscle]
+    """The muscles beside it."""
     constraints: tuple[int | None, ...]
     """Number of the multiplier of the segment that constrains each unknown coordinate, or None."""
     length: Scalar = 0.0
     """Rest length of a section [m]."""
     law: SpringLaw | None = None
     """Law of its spring if that is not linear by itself."""
+    tensions: Sequence[Scalar] = ()
+    """Tension of each muscle of its segment [N]."""
+    preload: Sequence[Scalar] = ()
+    """Part of it that the start of the springs accounts for; with given lengths [N]."""
 
 
 @dataclass
@@ -106,6 +111,10 @@ class InwardPass:
     """Sums including it."""
     twists: Any = None
     """Turn per unknown coordinate, with zeros for multipliers, shape (n, k)."""
+    constrained: Any = None
+    """Derivative of the constrained sums by its unknown coordinates, shape (n - 3, k)."""
+    excess: Any = None
+    """What twist adds to the constrained sums, shape (n - 3,)."""
     inner: bool = False
     """Whether its angle is a component of the turn of the next element, which has a spring with the same law."""
 
@@ -154,7 +163,6 @@ def inward(
         stretch = element.coordinates[row] - element.rest[place]
         stored = stretch * stretch * (0.5 * element.stiffness[place]) if element.law is None else element.law.energy
         balance.energy = balance.energy + stored
-        balance.energy = balance.energy - element.pull[place] * element.coordinates[row]
         if len(loads) > 1:
             balance.weight = balance.weight + motion.weight[row] * motion.weight[row]
     if outward_pass.screw is not None:
@@ -176,27 +184,39 @@ def inward(
         carried = [law.torque]
         if law.coupling is not None:  # the inner spring follows: its angle is one more component of the turn
             beyond = beyond.resized(len(beyond.matrix) + 1)
-    gradient = [torque - motion.torque[place] - element.pull[place] for place, torque in enumerate(carried)]
-    incidence = constants(np.zeros((len(beyond.matrix) - 3, len(moving))))
+    constrained = constants(np.zeros((len(beyond.matrix) - 3, len(moving))))
     for place, multiplier in enumerate(element.constraints):
         if multiplier is not None:
-            incidence[multiplier, place] = -1.0
-    twists = np.concatenate([motion.twists, incidence * 0.0])
+            constrained[multiplier, place] = 1.0
+    pulls = pulls_on(element.muscles, element.coordinates, element.tensions, element.preload, len(constrained))
+    balance.energy = balance.energy + pulls.energy
+    if pulls.margin is not None:
+        balance.range_margin = smaller(balance.range_margin, pulls.margin)
+    constrained = constrained + pulls.constrained[:, moving]
+    gradient = [torque - motion.torque[place] + pulls.load[moving[place]] for place, torque in enumerate(carried)]
+    twists = np.concatenate([motion.twists, constrained * 0.0])
     if law is not None and law.coupling is not None:
-        incidence[-1, 0] = -law.coupling
+        constrained[-1, 0] = law.coupling
     elif law is not None:
         twists[-1, 0] = 1.0
-    stiffness = -motion.curvature
+    stiffness = pulls.curvature[np.ix_(moving, moving)] - motion.curvature
     for place, own in enumerate(element.stiffness):
         stiffness[place, place] = stiffness[place, place] + (own if law is None else law.stiffness)
     sides = [gradient, *(-np.concatenate([motion.moves, motion.twists])[:tip_columns]).tolist()]
     eliminated, handed_on = eliminate(
-        beyond, twists, np.concatenate([motion.bends, incidence]), stiffness, sides, element.stiffness, pivot_shift=pivot_shift
+        beyond,
+        twists,
+        np.concatenate([motion.bends, -constrained]),
+        stiffness,
+        sides,
+        element.stiffness,
+        pivot_shift=pivot_shift,
     )
     if law is not None and law.coupling is None:
         n = len(handed_on.matrix) - 1
         eliminated, handed_on = replace(eliminated, coupling=eliminated.coupling[:, :n]), handed_on.resized(n)
-    return InwardPass(motion, gradient, eliminated, shifted, handed_on, twists, inner=law is not None and law.coupling is None)
+    inner = law is not None and law.coupling is None
+    return InwardPass(motion, gradient, eliminated, shifted, handed_on, twists, constrained, pulls.excess, inner)
 
 
 def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:

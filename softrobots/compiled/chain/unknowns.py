@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.compiled.chain.elements import constants
+from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.settings import LARGEST_POSITION, MAX_UNROLLED_JOINTS
 from softrobots.compiled.trace.blocks import Block
@@ -21,14 +22,16 @@ from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, E
 
 
 class Segment(NamedTuple):
-    """Part of a chain with constrained sums of its strains: groups with overlapping elements share one."""
+    """Part of a chain with muscles: those with overlapping elements share one."""
 
     first: int
     """Its first element."""
     last: int
     """Its last element."""
     groups: tuple[int, ...]
-    """Its groups of `SerialChain.constrained`, one multiplier each."""
+    """Its groups of `SerialChain.constrained`, one multiplier each; empty if tensions are given."""
+    muscles: tuple[int, ...]
+    """Its muscles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +85,25 @@ class Unknowns:
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
-        """The constrained segments."""
+        """The segments with muscles."""
         segments: list[Segment] = []
-        for group, constrained in enumerate(self.chain.constrained):
-            rows = [row for row, element in enumerate(self.chain.elements) if set(strains_of(element)) & set(constrained)]
-            new = Segment(min(rows), max(rows), (group,))
+        paths = self.chain.muscle_paths
+        row_of = {strain: row for row, element in enumerate(self.chain.elements) for strain in strains_of(element)}
+        for muscle in range(len(paths.rest)):
+            rows = [row_of[place] for place in paths.places[paths.muscle == muscle].ravel().tolist() if place < paths.count]
+            new = Segment(min(rows), max(rows), (), (muscle,))
             for place, one in enumerate(segments):
                 if one.first <= new.last and new.first <= one.last:
-                    segments[place] = Segment(min(one.first, new.first), max(one.last, new.last), (*one.groups, group))
+                    first, last = min(one.first, new.first), max(one.last, new.last)
+                    segments[place] = Segment(first, last, (), (*one.muscles, muscle))
                     break
             else:
                 segments.append(new)
-        return tuple(segments)
+        rows = [row_of[group[0]] for group in self.chain.constrained]
+        return tuple(
+            one._replace(groups=tuple(group for group, row in enumerate(rows) if one.first <= row <= one.last))
+            for one in segments
+        )
 
     @cached_property
     def multiplier(self) -> dict[int, int]:
@@ -160,21 +170,48 @@ class Unknowns:
             moving=moving,
             stiffness=[float(chain.stiffness[strains[one]]) for one in moving],
             rest=[float(chain.rest[strains[one]]) for one in moving],
-            pull=[0.0] * len(moving),
+            muscles=self._muscles(row, strains),
             constraints=tuple(self.multiplier.get(strains[one]) for one in moving),
             length=element.length if isinstance(element, ChainSection) else 0.0,
         )
 
+    def _muscles(self, row: int, strains: tuple[int, ...]) -> list[ElementMuscle]:
+        """Return the muscles beside an element."""
+        paths, segment = self.chain.muscle_paths, self.segment_at(row)
+        beside: list[ElementMuscle] = []
+        if segment is None:
+            return beside
+        for number, muscle in enumerate(segment.muscles):
+            for path in np.flatnonzero((paths.muscle == muscle) & np.isin(paths.places, strains).any(axis=1)).tolist():
+                own = [paths.places[path].tolist().index(strain) for strain in strains]
+                beside.append(
+                    ElementMuscle(
+                        number=number,
+                        arms=[float(paths.arms[path, place]) for place in own],
+                        distance=float(paths.distance[path]),
+                        length=float(paths.length[path]),
+                        twist=float(paths.origin[path, STRAINS.index("twist")]),
+                        twists=STRAINS.index("twist") in own,
+                        shares=[float(self.chain.constrained_slope[group, muscle]) for group in segment.groups],
+                    )
+                )
+        return beside
+
     @property
-    def pulled(self) -> bool:
-        """Whether muscles have given tensions."""
-        return self.chain.muscle_input == "forces" and len(self.chain.muscle_rest) > 0
+    def n_tensions(self) -> int:
+        """Number of muscles with given tensions."""
+        return len(self.chain.muscle_paths.rest) if self.chain.muscle_input == "forces" else 0
+
+    @property
+    def most_muscles(self) -> int:
+        """Largest number of muscles of a segment."""
+        return max((len(segment.muscles) for segment in self.segments), default=0)
 
     @property
     def is_unrolled(self) -> bool:
         """Whether the chain is unrolled: few joints, no sections and no muscles."""
         sections = any(isinstance(element, ChainSection) for element in self.chain.elements)
-        return not sections and len(self.chain.muscle_rest) == 0 and len(self.chain.elements) <= MAX_UNROLLED_JOINTS
+        return not sections and len(self.chain.muscle_paths.rest) == 0 and len(self.chain.elements) <= MAX_UNROLLED_JOINTS
 
     @property
     def moved_by_motors(self) -> bool:
@@ -189,7 +226,12 @@ class Unknowns:
 
     def multipliers_at(self, row: int) -> int:
         """Return the number of multipliers of the segment of an element; 0 outside of constrained segments."""
-        return next((len(one.groups) for one in self.segments if one.first <= row <= one.last), 0)
+        segment = self.segment_at(row)
+        return 0 if segment is None else len(segment.groups)
+
+    def segment_at(self, row: int) -> Segment | None:
+        """Return the segment with muscles of an element."""
+        return next((one for one in self.segments if one.first <= row <= one.last), None)
 
     def moving(self, row: int) -> tuple[int, ...]:
         """Return the unknown strains of an element."""

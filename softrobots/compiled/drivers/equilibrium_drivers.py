@@ -206,6 +206,8 @@ def go_to_start(w: Array) -> None:
             w[UNKNOWN + i] = w[START + i]
         else:
             w[UNKNOWN + i] = REST[i]
+    for i in range(N_CONSTRAINTS):
+        w[HELD + i] = 0.0
 
 
 def settle_from(w: Array) -> int:

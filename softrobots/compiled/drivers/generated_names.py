@@ -22,6 +22,7 @@ N: int
 N_MOTORS: int
 N_CONSTRAINTS: int
 N_MUSCLES: int
+N_MUSCLE_ROWS: int
 N_VARIED: int
 TARGET_SIZE: int
 N_ERRORS: int
@@ -36,6 +37,7 @@ ENERGY: int
 ERROR: int
 FORCE: int
 GRAVITY: int
+HELD: int
 ITERATIONS: int
 LENGTH: int
 LINE_DIRECTION: int

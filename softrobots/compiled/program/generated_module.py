@@ -49,7 +49,7 @@ def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False) -> Pr
     tables: dict[str, object] = {}
     loops, lane_loops, entries, names = [], [], ["settle", "settle_from"], ["WORKSPACE_SIZE", "N", "N_MOTORS"]
     tip = None
-    if len(unknowns.chain.muscle_rest):
+    if len(unknowns.chain.muscle_paths.rest):
         tables |= _muscle_tables(unknowns, layout)
         functions += functions_of(muscle_drivers)
         entries, names = [*entries, "put_muscles"], [*names, "N_MUSCLES"]
@@ -126,15 +126,15 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
 
 
 def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
-    """Return the tables of `muscle_drivers`: lengths set the start of the unknowns, tensions load them."""
-    chain, strains = unknowns.chain, list(unknowns.strains)
-    if unknowns.pulled:
-        slope, base, rest = -chain.muscle_matrix[:, strains].T, np.zeros(len(strains)), np.zeros(len(chain.muscle_rest))
-    else:
-        slope, base, rest = chain.spread[strains], (chain.free @ chain.elastic @ chain.rest)[strains], chain.muscle_rest
+    """Return the tables of `muscle_drivers`: lengths set the start of the unknowns, tensions stay as they are."""
+    chain, strains, rest = unknowns.chain, list(unknowns.strains), unknowns.chain.muscle_paths.rest
+    slope, base = chain.spread[strains], (chain.free @ chain.elastic @ chain.rest)[strains]
+    if layout.muscles:
+        slope, base, rest = np.eye(len(rest)), np.zeros(len(rest)), np.zeros(len(rest))
     return {
         "N_MUSCLES": len(rest),
-        "MUSCLE_PLACE": layout.pull if unknowns.pulled else layout.start,
+        "N_MUSCLE_ROWS": len(base),
+        "MUSCLE_PLACE": layout.tensions if layout.muscles else layout.start,
         "MUSCLE_REST": tuple(rest.tolist()),
         "MUSCLE_BASE": tuple(base.tolist()),
         "MUSCLE_SLOPE": tuple((slope + 0.0).ravel().tolist()),

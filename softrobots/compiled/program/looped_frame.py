@@ -34,6 +34,7 @@ def _prepare(plan: Plan, count: int) -> Block:
     axes, origin = place_base(unknowns.leading(block))
     for place, load in ((0, layout.force), (3, layout.gravity)):
         block.store_all(recursion.force + place, (axes.T @ vector(block.loads(load, 3))).tolist())
+    block.store_all(layout.held, [0.0] * layout.constraints)
     block.store_all(recursion.base, [*axes.ravel().tolist(), *origin.tolist()])
     block.store_all(recursion.end + 1, [0.0, float(count)])
     return block

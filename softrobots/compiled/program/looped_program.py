@@ -115,7 +115,7 @@ def looped_program(plan: Plan) -> LoopedProgram:
 def _sequence(
     plan: Plan, kinds: list[Kind], record: int, calls: dict[str, list[tuple[int, str]]]
 ) -> tuple[list[Block], list[tuple[int, int, int, int]], int]:
-    """Put the elements in order, with the ends of constrained segments between them.
+    """Put the elements in order, with the ends of segments with muscles between them.
 
     Args:
         plan: The chain and its places.
@@ -146,13 +146,12 @@ def _sequence(
         base = len(kinds) + 2 * number
         end = base + 1
         sequence.insert(segment.last + 1 - leading, (end, 0, 0, 0))
-        sequence.insert(segment.first - leading, (base, record, 0, 0))
-        record += size
-        inward_calls += [
-            (end, f"add_multipliers_{infix}{number}(w)"),
-            (base, f"eliminate_multipliers_{infix}{number}(w, {at})"),
-        ]
-        step_calls.append((base, f"solve_multipliers_{infix}{number}(w, {at})"))
+        inward_calls.append((end, f"add_multipliers_{infix}{number}(w)"))
+        if segment.groups:
+            sequence.insert(segment.first - leading, (base, record, 0, 0))
+            record += size
+            inward_calls.append((base, f"eliminate_multipliers_{infix}{number}(w, {at})"))
+            step_calls.append((base, f"solve_multipliers_{infix}{number}(w, {at})"))
     return blocks, sequence, record
 
 

@@ -55,8 +55,8 @@ def _inputs(plan: Plan) -> list[Place]:
     places.append(Place("FORCE", 3, "force on the tip [N], world axes"))
     if plan.weight:
         places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
-    if unknowns.pulled:
-        places.append(Place("PULL", n, "load of the muscle tensions on each unknown [N m or N]; put_muscles writes it"))
+    if layout.muscles:
+        places.append(Place("TENSIONS", layout.muscles, "muscle tensions [N]; put_muscles writes them"))
     if unknowns.chain.constrained:
         places.append(Place("START", n, "unknowns with the muscle lengths [rad or m]; put_muscles writes them"))
     starts = "for settle_from, reach and follow" if searches else "for settle_from"

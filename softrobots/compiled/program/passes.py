@@ -39,9 +39,8 @@ def point_numbers(
     unknowns, layout = plan.unknowns, plan.layout
     force = block.loads(layout.force, 3)
     load = dot(force, force) * unknowns.chain.reach**2 + balance.weight
-    if unknowns.pulled:
-        pull = block.loads(layout.pull, layout.unknowns)
-        load = load + dot(pull, pull)
+    tensions = block.loads(layout.tensions, layout.muscles)
+    load = load + dot(tensions, tensions) * unknowns.chain.reach**2
     size = larger(load, LEAST_SIZE**2)
     return {
         "energy": if_less(balance.range_margin, 0.0, 1e300, energy),

@@ -15,7 +15,7 @@ from softrobots.model.soft_model import SoftModel
 
 
 class Actuation:
-    """Maps of motors (identity), muscle tensions (constant loads on the strains) and muscle lengths (start of the strains)."""
+    """Maps of motors and muscle tensions (identity) and of muscle lengths (start of the strains)."""
 
     def __init__(self, model: SoftModel, unknowns: Unknowns) -> None:
         """Prepare the linear maps."""
@@ -23,8 +23,8 @@ class Actuation:
         chain = unknowns.chain
         self._count = chain.n_motors
         self._plain = len(chain.constrained) == 0 and len(self._strains) == len(chain.stiffness)
-        self._tensions = len(chain.muscle_rest) > 0 and chain.muscle_input == "forces"
-        self._lengths = len(chain.muscle_rest) > 0 and not self._tensions
+        self._tensions = unknowns.n_tensions > 0
+        self._lengths = len(chain.constrained) > 0
         self._relaxed = chain.free @ model.rest  # strains at rest of elastic coordinates and muscles
 
     def workspace(self, run: Any, motors: FloatArray, **numbers: FloatArray) -> Any:
@@ -32,7 +32,7 @@ class Actuation:
         layout, w = run.layout, run.workspace()
         run.put(w, 0, motors[: self._count])
         if self._tensions:
-            run.put(w, layout.pull, self._pulls(motors[None]))
+            run.put(w, layout.tensions, motors[self._count :])
         if self._lengths:
             run.put(w, layout.start, self._starts(motors[None]))
         for name, values in numbers.items():
@@ -47,9 +47,10 @@ class Actuation:
             return np.concatenate(
                 [joints, _rows(w, tip.constraint_columns, tip.n_constraints) @ chain.constrained_slope], axis=1
             )
-        if self._tensions:  # a tension adds the energy t A s
-            by_force = _rows(w, tip.tip_columns, tip.unknowns)
-            return np.concatenate([joints, -by_force @ chain.muscle_matrix[:, self._strains].T], axis=1)
+        if self._tensions:  # a tension loads the strains with its arms
+            by_force, strains = _rows(w, tip.tip_columns, tip.unknowns), np.array(chain.rest)
+            strains[self._strains] = _rows(w, run.layout.unknown, len(self._strains), 1)[0]
+            return np.concatenate([joints, -by_force @ chain.muscle_paths.at(strains).arms[:, self._strains].T], axis=1)
         return joints
 
     def loads(self, run: Any, w: Any) -> FloatArray:
@@ -70,7 +71,7 @@ class Actuation:
         """Return places in the workspace and values of many cases: motor joints, loads of tensions, starts at the lengths."""
         inputs = [(0, motors[:, : self._count])]
         if self._tensions:
-            inputs.append((layout.pull, self._pulls(motors)))
+            inputs.append((layout.tensions, np.ascontiguousarray(motors[:, self._count :])))
         if self._lengths:
             starts = self._starts(motors)
             inputs += [(layout.start, starts), (layout.unknown, starts)]
@@ -110,7 +111,7 @@ class Actuation:
             return elastic
         strains = elastic @ self._chain.free.T
         if self._lengths:
-            strains = strains + (motors[:, self._count :] - self._chain.muscle_rest) @ self._chain.spread.T
+            strains = strains + (motors[:, self._count :] - self._chain.muscle_paths.rest) @ self._chain.spread.T
         return np.asarray(strains[:, self._strains])
 
     def elastic(self, unknowns: FloatArray) -> FloatArray:
@@ -121,11 +122,8 @@ class Actuation:
         strains[..., self._strains] = unknowns
         return np.asarray(strains @ self._chain.elastic.T)
 
-    def _pulls(self, motors: FloatArray) -> FloatArray:
-        return np.ascontiguousarray(-(motors[:, self._count :] @ self._chain.muscle_matrix)[:, self._strains])
-
     def _starts(self, motors: FloatArray) -> FloatArray:
-        change = motors[:, self._count :] - self._chain.muscle_rest
+        change = motors[:, self._count :] - self._chain.muscle_paths.rest
         return np.ascontiguousarray((self._relaxed + change @ self._chain.spread.T)[:, self._strains])
 
 

@@ -43,7 +43,7 @@ class CompiledStatics:
         run = self._run(False)
         self._settle, self._size, self._layout = run.settle, run.program.size, run.layout
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
-        self._plain = len(self._chain.muscle_rest) == 0 and backend == "numba"
+        self._plain = len(self._chain.muscle_paths.rest) == 0 and backend == "numba"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as the robot and its options; the other process compiles it again, or finds the code in its cache."""
