@@ -60,7 +60,16 @@ def test_the_places_of_the_workspace_do_not_overlap(kind: str) -> None:
     layout = program_of(model).layout
     motors, unknowns = layout.motors, layout.unknowns
     varied = max(motors, 3) + unknowns
-    sizes = dict(MOTORS=motors, FORCE=3, GRAVITY=3, PULL=unknowns, START=unknowns, UNKNOWN=unknowns, STEP=unknowns)
+    sizes = dict(
+        MOTORS=motors,
+        FORCE=3,
+        GRAVITY=3,
+        TENSIONS=layout.muscles,
+        HELD=layout.constraints,
+        START=unknowns,
+        UNKNOWN=unknowns,
+        STEP=unknowns,
+    )
     sizes |= dict(LINE_ORIGIN=unknowns, LINE_DIRECTION=unknowns, TIP=3, TORQUES=motors, TARGET=3, NEXT_TARGET=3)
     sizes |= dict(NEXT_POINT=varied, PREVIOUS=varied, PREDICTED=varied, CORRECTION=varied)
     places = layout.constants()

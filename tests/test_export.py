@@ -424,7 +424,7 @@ def test_a_file_says_what_it_is() -> None:
     frequency = re.search(r"w1 = (\S+) rad/s", head)
     assert frequency is not None
     assert "pcc_arm, for MuJoCo" in head
-    assert "their tensions are in the references of the springs" in head
+    assert "their tensions are in the springs" in head
     assert "muscle_1_3 -10.0" in head
     arm = re.sub(r"\s+", " ", to_sdf(case_of("arm").model, damping="file").split("-->")[0])
     assert "Motors are driven" in arm

@@ -38,6 +38,7 @@ from softrobots.statics.displacement_control import Probe, face_normal, touch
 from softrobots.statics.loads import cross_matrix
 from softrobots.statics.workspace_map import required_pressures
 from studies.shared.markdown import marked
+from tests.support.law_robots import muscle_lengths
 from tests.support.laws import law
 
 numbers_ = st.floats(-1e3, 1e3)
@@ -369,8 +370,9 @@ def test_muscle_lengths_are_held_whatever_moves_freely(seed: int) -> None:
     lengths = held.consistent(rest + random.uniform(-0.03, 0.03, len(rest)))
     assert np.allclose(held.consistent(lengths), lengths, rtol=0.0, atol=1e-15)
     strains = held.strains(lengths, random.uniform(-0.2, 0.2, robot.n_springs))
-    arms = robot.structure.muscle_matrix
-    assert np.allclose(rest + arms @ strains, lengths, rtol=0.0, atol=1e-14)
+    arms = robot.structure.muscle_paths.matrix
+    assert np.abs(muscle_lengths(robot, strains) - rest - arms @ strains).max() > 1e-6  # it is twisted
+    assert np.allclose(arms.T @ (muscle_lengths(robot, strains) - lengths), 0.0, rtol=0.0, atol=1e-14)  # least squares
     assert np.allclose(arms @ held.free, 0.0, rtol=0.0, atol=1e-15)
     law_ = robot.structure.strain_springs
     mixed = held.free.T @ (law_.stiffness[:, None] * held.free)

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.linalg import expm, null_space
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 
 import softrobots as sr
 from softrobots.constant_curvature import arc_from_muscles, chain_transform
@@ -725,9 +725,17 @@ def test_one_section_a_segment_leaves_only_twist() -> None:
     rest = np.full(6, 0.524)
     assert sr.solve_equilibrium(arm, rest, (3.0, 2.0, 5.0)).tip_position == pytest.approx([0, 0, 1.048], abs=1e-15)
     twisted = sr.solve_equilibrium(arm, rest, wrench=(0, 0, 0, 0, 0, 0.5))
-    assert twisted.q_springs == pytest.approx([0.5 * 0.524 / 1.28] * 2, rel=1e-12)
+
+    def torque(rate: float) -> float:  # the muscles become helices, and compress the backbone to nu
+        nu = np.sqrt(1.0 - (0.04 * rate) ** 2)
+        return float(1.28 * rate + 2400.0 * (1.0 - nu) * 0.04**2 * rate / nu)
+
+    rate = brentq(lambda rate: torque(rate) - 0.5, 0.0, 1.0, xtol=1e-15)
+    assert twisted.q_springs == pytest.approx([rate * 0.524] * 2, rel=1e-12)
+    assert rate < 0.5 / 1.28 * (1.0 - 1e-4)
     bent = sr.solve_equilibrium(arm, LENGTHS, FORCE)
-    arcs = arc_from_muscles(LENGTHS.reshape(2, 3), 0.04)
+    around = 0.04 * 0.524 * bent.strains[:, 2:3]
+    arcs = arc_from_muscles(np.sqrt(LENGTHS.reshape(2, 3) ** 2 - around**2), 0.04)
     assert np.abs(bent.strains[:, 0] * 0.524 + arcs.bending * np.sin(arcs.azimuth)).max() < 1e-13
     assert np.abs(bent.strains[:, 1] * 0.524 - arcs.bending * np.cos(arcs.azimuth)).max() < 1e-13
     assert np.abs(bent.strains[:, 3] * 0.524 - arcs.length).max() < 1e-13
@@ -874,7 +882,10 @@ def test_a_chain_without_stretch_refuses_lengths_that_need_it() -> None:
     bent = np.array([0.524 - 0.01, 0.524 + 0.004, 0.524 + 0.006, 0.524, 0.524, 0.524])  # the mean stays
     found = sr.solve_equilibrium(arm, bent, FORCE)
     assert found.stable
-    assert found.muscle_lengths == pytest.approx(bent, abs=1e-14)
+    longer = (
+        0.04**2 * (0.524 / 3) * (found.strains[:, 2] ** 2).reshape(2, 3).sum(axis=1) / 2
+    )  # all three, and nothing gives way
+    assert found.muscle_lengths == pytest.approx(bent + np.repeat(longer, 3), abs=1e-14)
     assert np.abs(found.strains[:, 3] - 1.0).max() == 0.0
     with pytest.raises(sr.ParameterError, match=r"without elongation.*segment 2 miss the nearest arc by 0\.002 m"):
         sr.solve_equilibrium(arm, bent + [0, 0, 0, 0.002, 0.002, 0.002])

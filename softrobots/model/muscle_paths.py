@@ -53,6 +53,8 @@ class MusclePaths:
         """Number of strains."""
         self.muscle = np.array([m for m, _, _ in pairs], dtype=np.intp)
         """Muscle of each path along a section, shape (n_paths,)."""
+        self.starts = np.flatnonzero(np.diff(self.muscle, prepend=-1))
+        """First path of each muscle, shape (n_muscles,)."""
         self.places = np.array([[row.places.get(key, count) for key in STRAINS] for *_, row in pairs], dtype=np.intp)
         """Places of the four section coordinates of each path among the strains, `count` if locked, shape (n_paths, 4)."""
         self.places = self.places.reshape(-1, len(STRAINS))
@@ -76,14 +78,14 @@ class MusclePaths:
 
 
 class MusclePathsAt:
-    """Muscle lengths of a robot at given strains, with derivatives."""
+    """Muscle lengths of a robot at given strains, with derivatives; `excess` also for many rows of strains."""
 
     def __init__(self, paths: MusclePaths, strains: FloatArray) -> None:
         """Evaluate the paths along all sections."""
         self._paths, self._strains = paths, strains
-        z = np.append(strains, 0.0)[paths.places] + paths.origin
-        self._across = paths.distance * z[:, _TWIST]
-        self._along = paths.length + (z * paths.arms).sum(axis=1)
+        z = np.concatenate([strains, np.zeros((*strains.shape[:-1], 1))], axis=-1)[..., paths.places] + paths.origin
+        self._across = paths.distance * z[..., _TWIST]
+        self._along = paths.length + (z * paths.arms).sum(axis=-1)
         self._folds = (self._along <= _SHORTEST * paths.length) & (not paths.lumped)
         self.valid = not self._folds.any()
         """Whether no muscle folds within a section; otherwise lengths and derivatives have no meaning."""
@@ -96,12 +98,12 @@ class MusclePathsAt:
 
     @cached_property
     def excess(self) -> FloatArray:
-        """Lengths beyond their linear part `matrix @ strains`, shape (n_muscles,) [m]."""
+        """Lengths beyond their linear part `matrix @ strains`, shape (..., n_muscles) [m]."""
         paths, size = self._paths, self._size
-        each = self._across**2 / (size + (size if paths.lumped else self._along))
+        each = self._across**2 / (size + (size if paths.lumped else np.maximum(self._along, 0.0)))
         if paths.lumped:
             each = each - (paths.distance * paths.origin[:, _TWIST]) ** 2 / (2.0 * size)
-        return np.bincount(paths.muscle, each, minlength=len(paths.rest))
+        return np.add.reduceat(each, paths.starts, axis=-1) if len(paths.starts) else np.zeros((*each.shape[:-1], 0))
 
     @property
     def change(self) -> FloatArray:

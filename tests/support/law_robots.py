@@ -166,7 +166,23 @@ def load_energy(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray, fo
             body = pinocchio.inertias[joint]
             energy -= body.mass * float(np.dot(gravity, data.oMi[joint].act(body.lever)))
     if robot.muscles and robot.muscle_input == "forces":
-        structure = robot.structure
-        lengths = structure.muscle_rest + structure.muscle_matrix @ structure.strains(motors, springs)
-        energy += float(motors[-len(robot.muscles) :] @ lengths)
+        energy += float(motors[-len(robot.muscles) :] @ muscle_lengths(robot, robot.structure.strains(motors, springs)))
     return energy
+
+
+def muscle_lengths(robot: sr.SoftModel, strains: np.ndarray) -> np.ndarray:
+    """Lengths of the muscles: a helix around each section; beside a hinge the square of its twist over twice its length."""
+    made = []
+    for tag in robot.muscles:
+        length, (x, y) = tag.rest_length, tag.distance * np.array([np.sin(tag.azimuth), -np.cos(tag.azimuth)])
+        for row in robot.structure.section_table:
+            if row.segment == tag.segment:
+                z = {name: strains[place] for name, place in row.places.items()}
+                change = x * z["bend_x"] + y * z["bend_y"] + z.get("stretch", 0.0)
+                twist = tag.distance * z.get("twist", 0.0)
+                if row.hinge > 0.0:
+                    length += change + twist**2 / (2.0 * row.length)
+                else:
+                    length += np.hypot(row.length + change, twist) - row.length
+        made.append(length)
+    return np.array(made)

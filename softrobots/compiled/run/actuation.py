@@ -13,6 +13,8 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
 
+_CLOSING_STEPS = 8  # of the sums to the muscle lengths, where segments are twisted; each leaves a hundredth
+
 
 class Actuation:
     """Maps of motors and muscle tensions (identity) and of muscle lengths (start of the strains)."""
@@ -26,6 +28,9 @@ class Actuation:
         self._tensions = unknowns.n_tensions > 0
         self._lengths = len(chain.constrained) > 0
         self._relaxed = chain.free @ model.rest  # strains at rest of elastic coordinates and muscles
+        self._shares = np.zeros((len(chain.constrained), len(chain.stiffness)))  # of each strain in the sums
+        for row, group in zip(self._shares, map(list, chain.constrained), strict=True):
+            row[group] = 1.0 / chain.stiffness[group] / float((1.0 / chain.stiffness[group]).sum())
 
     def workspace(self, run: Any, motors: FloatArray, **numbers: FloatArray) -> Any:
         """Return a workspace of one case: actuators, start, and other numbers by the name of their place in the layout."""
@@ -111,7 +116,10 @@ class Actuation:
             return elastic
         strains = elastic @ self._chain.free.T
         if self._lengths:
-            strains = strains + (motors[:, self._count :] - self._chain.muscle_paths.rest) @ self._chain.spread.T
+            paths, slope = self._chain.muscle_paths, self._chain.constrained_slope
+            straight = strains = strains + (motors[:, self._count :] - paths.rest) @ self._chain.spread.T
+            for _ in range(_CLOSING_STEPS):
+                strains = straight - paths.at(strains).excess @ slope.T @ self._shares
         return np.asarray(strains[:, self._strains])
 
     def elastic(self, unknowns: FloatArray) -> FloatArray:

@@ -1,0 +1,230 @@
+"""The exact length of muscles: twist under co-contraction, torsional buckling, and rods with guided tendons by `solve_bvp`.
+
+The oracles here are closed forms of a twisted straight rod, and a Cosserat rod with tendons (Rucker and Webster 2011) whose
+strains follow at every point from the internal force and moment; nothing of the package is in them.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_bvp
+from scipy.optimize import brentq, minimize_scalar
+
+import softrobots as sr
+from softrobots.statics.elastic_state import elastic_state
+from softrobots.statics.loads import Load
+from tests.support.oracles import central_difference
+from tests.support.rods import quaternion_rotation
+
+EI, GJ, EA, DISTANCE, LENGTH = 1.92, 1.28, 2400.0, 0.04, 0.524
+AZIMUTHS = np.array([0.0, -2.0, 2.0]) * np.pi / 3.0
+
+
+@cache
+def arm(muscles: str = "forces", **fields: object) -> sr.SoftModel:
+    return sr.load_model(sr.PccArm(**fields), muscles=muscles)
+
+
+def one(muscles: str = "forces", **fields: object) -> sr.SoftModel:
+    return arm(muscles, segment_lengths=(LENGTH,), **fields)
+
+
+# --- A straight rod that is twisted
+
+
+@pytest.mark.parametrize(("tension", "first_order"), [(0.0, 0.164), (50.0, 0.138), (133.0, 0.109)])
+def test_tension_stiffens_torsion(tension: float, first_order: float) -> None:
+    """0.2 N m twist the arm by M L / (GJ + sum T d^2) to first order in T: a lumped chain exactly, sections with stretch."""
+    motors, wrench = np.full(6, tension), (0, 0, 0, 0, 0, 0.2)
+    lumped = sr.solve_equilibrium(arm(chain="lumped", hinges=4), motors, wrench=wrench)
+    twist = 0.2 * 2 * LENGTH / (GJ + 3 * tension * DISTANCE**2)
+    assert lumped.strains[:, 2].mean() * 2 * LENGTH == pytest.approx(twist, rel=1e-10)
+    assert twist == pytest.approx(first_order, abs=5e-4)
+
+    def stretch(rate: float) -> float:
+        def pull(nu: float) -> float:
+            return float(EA * (nu - 1.0) + 3 * tension * nu / np.hypot(nu, DISTANCE * rate))
+
+        return float(brentq(pull, 0.5, 1.5, xtol=1e-15))
+
+    def torque(rate: float) -> float:
+        return GJ * rate + 3 * tension * DISTANCE**2 * rate / np.hypot(stretch(rate), DISTANCE * rate)
+
+    rate = brentq(lambda rate: torque(rate) - 0.2, 0.0, 1.0, xtol=1e-15)
+    found = sr.solve_equilibrium(arm(), motors, wrench=wrench)
+    assert found.strains[:, 2] == pytest.approx(rate, rel=1e-9)
+    assert found.strains[:, 3] == pytest.approx(stretch(rate), rel=1e-9)
+    assert found.muscle_lengths == pytest.approx(LENGTH * np.hypot(stretch(rate), DISTANCE * rate), rel=1e-12)
+    held = sr.solve_equilibrium(arm("lengths"), found.muscle_lengths, wrench=wrench)
+    assert held.muscle_forces == pytest.approx(motors, abs=1e-7)  # of 4600 N/m times 1e-12 m
+    assert held.strains == pytest.approx(found.strains, abs=1e-9)
+
+
+@pytest.mark.parametrize("axial", [2400.0, 24000.0, 240000.0])
+@pytest.mark.parametrize("chain", ["sections", "lumped"])
+def test_a_push_buckles_the_arm_in_torsion(axial: float, chain: str) -> None:
+    """GJ + sum T d^2 / nu = 0 with the stretch nu = 1 - sum T / EA: -1200 N for the default arm, to leading order -800 N.
+
+    The lumped chain has the leading order. Beyond the limit the straight arm is a saddle, which the solver leaves.
+    """
+    fields = {"chain": "lumped", "hinges": 2} if chain == "lumped" else {"elastic_sections": 2}
+    robot = one(axial_stiffness=axial, **fields)
+    limit = GJ / DISTANCE**2 if chain == "lumped" else GJ / (DISTANCE**2 - GJ / axial)
+    straight = np.array(robot.rest)
+    for share, stable in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
+        push = -share * limit / 3.0
+        if chain == "sections" or robot.springs.turning.sum() < len(straight):
+            straight[~robot.springs.turning] = -3.0 * push / axial * LENGTH / 2
+        state = elastic_state(robot, np.full(3, push), straight, Load.of(robot, (0.0, 0.0, 0.0)))
+        assert state.error < 1e-9
+        assert (np.linalg.eigvalsh(state.tangent)[0] > 0.0) == stable
+    if chain == "sections":
+        push = -1.02 * limit / 3.0
+        found = sr.solve_equilibrium(robot, np.full(3, push))
+
+        def energy(rate: float) -> tuple[float, float]:
+            def total(nu: float) -> float:
+                return 0.5 * GJ * rate**2 + 0.5 * axial * (nu - 1.0) ** 2 + 3 * push * np.hypot(nu, DISTANCE * rate)
+
+            best = minimize_scalar(total, bounds=(0.9, 1.8), method="bounded", options={"xatol": 1e-12})
+            return float(best.fun), float(best.x)
+
+        best = minimize_scalar(lambda rate: energy(rate)[0], bounds=(1e-3, 40.0), method="bounded", options={"xatol": 1e-10})
+        assert found.stable
+        assert np.abs(found.strains[:, 2]) == pytest.approx(best.x, rel=1e-4)  # where the energy is flat: the root of 1e-9
+
+
+def test_held_lengths_change_the_torsional_stiffness() -> None:
+    """Muscles held short pull with EA (1 - nu) in all; those held long push. GJ + sum T d^2 / nu by hand."""
+    wrench = (0, 0, 0, 0, 0, 1e-4)
+    for stretch in (0.9, 1.0, 1.1):
+        found = sr.solve_equilibrium(one("lengths"), np.full(3, stretch * LENGTH), wrench=wrench)
+        stiffness = GJ + EA * (1.0 - stretch) / stretch * DISTANCE**2  # sum T = EA (1 - nu)
+        assert found.strains[:, 2].mean() == pytest.approx(1e-4 / stiffness, rel=1e-6)
+
+
+def test_a_twist_that_the_lengths_do_not_allow_is_refused() -> None:
+    """Three rad a section of four: helices of 0.48 m around the backbone do not fit into muscles of 0.45 m."""
+    robot = one("lengths", muscle_contraction=0.5)
+    start = np.array(robot.rest)
+    start[[name.endswith("twist") for name in robot.spring_joints]] = 3.0
+    assert robot.coordinates.at(np.full(3, 0.60), start).valid
+    with pytest.raises(sr.ParameterError, match="within the range of every section"):
+        sr.solve_equilibrium(robot, np.full(3, 0.45), q_springs0=start)
+
+
+def test_more_than_three_lengths_are_met_in_the_least_squares() -> None:
+    """And the derivatives are exact: tangent and coupling against central differences of the residual."""
+    robot = one("lengths", muscle_azimuths=(0.1, 1.5, 3.0, 4.4), elastic_sections=2)
+    rest = np.array([muscle.rest_length for muscle in robot.muscles])
+    arms = robot.structure.muscle_paths.matrix[:, :4]
+    lengths = rest + arms @ np.array([0.2, -0.3, 0.0, 0.01])
+    springs = np.where([name.endswith("twist") for name in robot.spring_joints], 0.5, 0.02)
+    springs[~robot.springs.turning] = 1e-3
+    load = Load.of(robot, (1.0, -2.0, 1.5))
+    state = elastic_state(robot, lengths, springs, load)
+    tangent = central_difference(lambda y: elastic_state(robot, lengths, y, load).residual, springs)
+    coupling = -central_difference(lambda u: elastic_state(robot, u, springs, load).residual, lengths)
+    assert np.abs(state.tangent - tangent).max() < 2e-8 * np.abs(tangent).max()
+    assert np.abs(state.load.coupling - coupling).max() < 1e-6 * max(1.0, np.abs(coupling).max())
+
+
+# --- A rod with guided tendons
+
+
+def strains_of(tensions: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """kx, ky, tau, nu from force along the axis and moment in the frame of the section, shape (n,), (3, n); Newton.
+
+    They minimise EI/2 (kx^2 + ky^2) + GJ/2 tau^2 + EA/2 (nu - 1)^2 + sum T |path| - m . u - n nu.
+    """
+    rows = np.stack([DISTANCE * np.sin(AZIMUTHS), -DISTANCE * np.cos(AZIMUTHS), 0 * AZIMUTHS, 1 + 0 * AZIMUTHS], axis=1)
+    around = np.array([0.0, 0.0, DISTANCE, 0.0])
+    stiff, rest = np.array([EI, EI, GJ, EA]), np.array([0.0, 0.0, 0.0, 1.0])
+    loads = np.vstack([moment, force])
+    x = np.tile(rest[:, None], loads.shape[1])
+    for _ in range(12):
+        gradient, hessian = stiff[:, None] * (x - rest[:, None]) - loads, np.tile(np.diag(stiff), (loads.shape[1], 1, 1))
+        for tension, row in zip(tensions, rows, strict=True):
+            along, across = row @ x, around @ x
+            size = np.hypot(along, across)
+            gradient = gradient + tension * (row[:, None] * along + around[:, None] * across) / size
+            normal = (around[:, None] * along - row[:, None] * across) / size
+            hessian += (tension / size)[:, None, None] * normal.T[:, :, None] * normal.T[:, None, :]
+        x = x - np.linalg.solve(hessian, gradient.T[..., None])[..., 0].T
+    return x
+
+
+def tendon_rod(tensions: np.ndarray, force: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position and rotation of the tip, and the lengths of the tendons, under a dead force and a world-fixed moment."""
+
+    def rates(_: np.ndarray, y: np.ndarray) -> np.ndarray:
+        q, m = y[3:7], y[7:10]
+        turns = quaternion_rotation(q.T)
+        axis = turns[:, :, 2].T
+        x = strains_of(tensions, force @ axis, np.einsum("nji,jn->in", turns, m))
+        u, way = x[:3], axis * x[3]
+        dq = 0.5 * np.vstack([-np.sum(q[1:] * u, axis=0), q[0] * u + np.cross(q[1:], u, axis=0)])
+        along = x[3] + DISTANCE * (np.sin(AZIMUTHS)[:, None] * x[0] - np.cos(AZIMUTHS)[:, None] * x[1])
+        return LENGTH * np.vstack([way, dq, np.cross(force[:, None], way, axis=0), np.hypot(along, DISTANCE * x[2])])
+
+    def ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.r_[a[:7] - np.r_[np.zeros(3), 1.0, np.zeros(3)], a[10:], b[7:10] - moment]
+
+    s = np.linspace(0.0, 1.0, 21)
+    y = np.zeros((13, 21))
+    y[2], y[3], y[10:] = LENGTH * s, 1.0, LENGTH * s
+    found = solve_bvp(rates, ends, s, y, tol=1e-9, bc_tol=1e-11)
+    assert found.success
+    last = found.y[:, -1]
+    return last[:3], quaternion_rotation(last[None, 3:7])[0], last[10:]
+
+
+@pytest.mark.parametrize("moment", [0.0, 0.3])
+def test_sections_converge_to_a_rod_with_guided_tendons(moment: float) -> None:
+    """Unequal tensions of 300 N, a force across, a moment about z: error 4 times less with twice the sections.
+
+    So do the lengths; and the arm held at the lengths of the rod finds its tensions.
+    """
+    tensions, force, about = np.array([140.0, 60.0, 100.0]), np.array([4.0, -6.0, 2.0]), np.array([0.0, 0.0, moment])
+    tip, rotation, lengths = tendon_rod(tensions, force, about)
+    wrench, errors = np.r_[force, about], []
+    for sections in (2, 4, 8):
+        pulled = sr.solve_equilibrium(one(elastic_sections=sections), tensions, wrench=wrench)
+        held = sr.solve_equilibrium(one("lengths", elastic_sections=sections), lengths, wrench=wrench)
+        pose = pulled.transform_tip_to_world
+        errors.append(
+            [
+                np.linalg.norm(pose.translation - tip),
+                np.linalg.norm(pose.rotation - rotation),
+                np.abs(pulled.muscle_lengths - lengths).max(),
+                np.linalg.norm(held.tip_position - tip),
+                np.abs(held.muscle_forces - tensions).max(),
+            ]
+        )
+    ratios = np.array(errors[:-1]) / np.array(errors[1:])
+    assert ratios[-1] == pytest.approx(4.0, abs=0.3)
+    assert errors[-1][0] < 2e-3 * LENGTH
+
+
+# --- The compiled path
+
+
+@pytest.mark.parametrize("muscles", ["lengths", "forces"])
+@pytest.mark.parametrize("fields", [{"elastic_sections": 2}, {"chain": "lumped", "hinges": 2}], ids=["sections", "lumped"])
+def test_compiled_solvers_find_the_same_twisted_arm(muscles: str, fields: dict, rng: np.random.Generator) -> None:
+    """Two segments, loads across that twist it: equilibrium, tip Jacobian and tensions of both engines, to their tolerance."""
+    model = arm(muscles, **fields)
+    fast = sr.compile(model, backend="python")
+    for _ in range(2):
+        motors = LENGTH * (1.0 + rng.uniform(-0.1, 0.1, 6)) if muscles == "lengths" else rng.uniform(60.0, 140.0, 6)
+        force = rng.uniform(-8.0, 8.0, 3)
+        slow, quick = sr.solve_equilibrium(model, motors, force), fast.equilibrium(motors, force)
+        assert np.abs(slow.strains[:, 2]).max() > 0.02
+        assert np.abs(quick.q_springs - slow.q_springs).max() < 1e-7  # 1e-10 of 1 kN m over 3 N m/rad
+        assert np.abs(quick.tip_position - slow.tip_position).max() < 1e-7
+        if muscles == "lengths":
+            torques = fast.estimate_load(motors, slow.motor_torques)
+            assert torques.force == pytest.approx(force, abs=1e-5)
