@@ -145,10 +145,6 @@ def summarise(equilibrium: sr.Equilibrium) -> dict[str, object]:
         "arc_bending_deg": np.degrees(arcs.bending).tolist(),
         "arc_azimuth_deg": np.degrees(arcs.azimuth).tolist(),
         "twist_under_load_deg": np.degrees(twist).tolist(),
-        "neglected_by_twist_m": [
-            float((model.muscles[0].distance * turn) ** 2 / (2.0 * length))
-            for turn, length in zip(twist, arcs.length, strict=True)
-        ],
         "tip_m": equilibrium.tip_position.tolist(),
         "tip_direction": np.array(equilibrium.transform_tip_to_world.rotation)[:, 2].tolist(),
         "tip_without_load_m": unloaded.tolist(),
@@ -183,9 +179,6 @@ def table(summary: dict[str, object]) -> str:
         f"certified stable        {'yes' if summary['stable'] else 'NO'}   (residual {summary['residual_N_m']:.1e} N m)",
         f"within limits           {'yes' if summary['within_limits'] else 'NO'}   (muscle lengths and tensions, joints)",
     ]
-    most = max(summary["neglected_by_twist_m"])  # type: ignore[call-overload]
-    if most > 1e-3:
-        lines.append(f"WARNING: so much twist would lengthen the muscles by {1e3 * most:.1f} mm, which the model neglects.")
     return "\n".join(lines)
 
 
