@@ -267,13 +267,19 @@ def program_at(
     return program, functions(program.text), actuation, w
 
 
-def evaluated(run: tuple[Any, dict[str, Any], Actuation, list[float]], unknown: np.ndarray, pivot_shift: float = 0.0) -> Any:
-    """Step, energy and the other numbers of a point."""
+def evaluated(
+    run: tuple[Any, dict[str, Any], Actuation, list[float]],
+    unknown: np.ndarray,
+    pivot_shift: float = 0.0,
+    multipliers: Sequence[float] = (),
+) -> Any:
+    """Step, energy and the other numbers of a point, with the multipliers of the muscle lengths from which tensions follow."""
     program, code, _, before = run
     w, layout = list(before), program.layout
     w[layout.unknown : layout.unknown + layout.unknowns] = unknown.tolist()
     w[layout.single("pivot_shift")] = pivot_shift
     code["prepare"](w)
+    w[layout.held : layout.held + len(multipliers)] = multipliers
     code["evaluate"](w)
     numbers = {
         name: w[layout.single(name)]
@@ -282,6 +288,14 @@ def evaluated(run: tuple[Any, dict[str, Any], Actuation, list[float]], unknown: 
     return SimpleNamespace(
         step=np.array(w[layout.step : layout.step + layout.unknowns]), tip=np.array(w[layout.tip : layout.tip + 3]), **numbers
     )
+
+
+def held_loads(model: SoftModel, loads: np.ndarray, start: np.ndarray) -> list[float]:
+    """Multipliers of the sums beyond those of the start, from the tensions: `A^T t + k (start - rest)` of one strain a sum."""
+    chain = model.chain()
+    first = [group[0] for group in chain.constrained]
+    by_tension = loads[chain.n_motors :] @ chain.muscle_paths.matrix[:, first] if first else np.zeros(0)
+    return list(by_tension + chain.stiffness[first] * (start[first] - chain.rest[first]) if first else by_tension)
 
 
 def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np.random.Generator, size: float = 3.0) -> None:
@@ -296,7 +310,8 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
         springs = model.rest + 0.3 * (drawn(model, rng)[1] - model.rest)
         state = elastic_state(model, motors, springs, load)
         unknown = actuation.unknowns(motors, springs)
-        found = evaluated(run, unknown)
+        multipliers = held_loads(model, state.load.motors, np.array(run[3][run[0].layout.start :]))
+        found = evaluated(run, unknown, multipliers=multipliers)
         step = np.linalg.solve(state.tangent, -state.residual)
         assert np.linalg.norm(model.chain().elastic @ found.step - step) < 1e-10 * np.linalg.norm(step)
         # The residual as numbers of forces on all coordinates, rounding of springs' torques.
@@ -308,7 +323,7 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
         assert found.range_margin > 0.0
         assert np.abs(found.tip - frame_placement(model, state.q, model.tip).translation).max() < 1e-13
         offsets.append((found.energy - state.energy, abs(state.energy) + 1.0))
-        shifted = evaluated(run, unknown, pivot_shift=FLOOR)
+        shifted = evaluated(run, unknown, FLOOR, multipliers)
         assert shifted.slope < 0.0
         # With multipliers, stable springs may have negative pivots.
         if shifted.n_negative_pivots == held and shifted.min_pivot > FLOOR:

@@ -326,7 +326,11 @@ def test_driven_motors_settle_where_our_statics_says(tool: Tool) -> None:
 
 @pytest.mark.parametrize("given", ["lengths", "forces"])
 def test_driven_muscles_settle_where_our_statics_says(tool: Tool, given: str) -> None:
-    """The lengths that MuJoCo's tendons reach, or the tensions, are an equilibrium of ours."""
+    """The lengths that MuJoCo's tendons reach, or the tensions, are an equilibrium of ours.
+
+    Its tendons are linear: with given lengths the square of the twist, up to 4e-3 rad a hinge, does not lengthen them, and tensions
+    that are not those of home stiffen torsion by 1 % less or more.
+    """
     model = _pcc(muscles=given)
     motors = (0.5, 0.55, 0.52, 0.53, 0.5, 0.5) if given == "lengths" else (20.0, 5.0, -10.0, 30.0, 3.0, 0.0)
     robot = InMujoco(tool("mujoco"), to_mjcf(model, motors, gravity=sr.EARTH_GRAVITY))
@@ -339,9 +343,11 @@ def test_driven_muscles_settle_where_our_statics_says(tool: Tool, given: str) ->
     reached = robot.data.ten_length + rest if given == "lengths" else motors
     found = sr.solve_equilibrium(model, reached, gravity=sr.EARTH_GRAVITY)
     strains = model.structure.strains(found.q_motors, found.q_springs)
-    assert np.abs(robot.data.qpos[robot.dofs(list(model.structure.spring_joints))] - strains).max() < 1e-8
+    assert np.abs(robot.data.qpos[robot.dofs(list(model.structure.spring_joints))] - strains).max() < (
+        1e-8 if given == "forces" else 3e-5
+    )
     tensions = robot.data.actuator_force if given == "forces" else -robot.data.actuator_force  # it lengthens the tendon
-    assert np.abs(tensions - found.motor_torques).max() < 1e-6
+    assert np.abs(tensions - found.motor_torques).max() < (1e-6 if given == "forces" else 1e-2)
 
 
 # --- Numbers

@@ -24,17 +24,20 @@ STATES = 13  # of a segment: position 3, quaternion 4, moment 3, bending about x
 
 @dataclass(frozen=True)
 class MuscleSegment:
-    """A uniform rod whose muscles fix its whole bending and elongation, but not how they spread along it.
+    """A uniform rod whose three muscles have given lengths, but not how bending and elongation spread along it.
+
+    A muscle runs beside the rod as a guided tendon, a helix where the rod twists (Rucker and Webster 2011).
 
     Attributes:
         length: at rest [m].
         turn: about z before the segment [rad].
-        bend: whole bending about x and y of its sections, the integral of both curvatures, (2,) [rad].
-        elongation: the integral of the stretch [m].
+        bend: whole bending about x and y without twist, the integral of both curvatures, (2,) [rad].
+        elongation: the integral of the stretch without twist [m].
         bending_stiffness: EI [N m^2].
         torsional_stiffness: GJ [N m^2].
         axial_stiffness: EA [N].
         density: mass per rest length [kg/m].
+        distance: of the muscles at 0, -120 and 120 degrees from the rod [m]; 0: too near to feel its twist.
     """
 
     length: float
@@ -45,6 +48,7 @@ class MuscleSegment:
     torsional_stiffness: float
     axial_stiffness: float
     density: float = 0.0
+    distance: float = 0.0
 
     @classmethod
     def of_three(cls, lengths: ArrayLike, distance: float, **fields: Any) -> MuscleSegment:
@@ -55,7 +59,33 @@ class MuscleSegment:
         """
         one, two, three = np.asarray(lengths, dtype=float)
         along, across = (two + three - 2.0 * one) / (3.0 * distance), (two - three) / (np.sqrt(3.0) * distance)
-        return cls(bend=(-across, along), elongation=(one + two + three) / 3.0 - fields["length"], **fields)
+        mean = (one + two + three) / 3.0
+        return cls(bend=(-across, along), elongation=mean - fields["length"], distance=distance, **fields)
+
+    def strains(self, moment: np.ndarray, push: np.ndarray, pulls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Curvatures, twist and stretch from the internal loads, (4, n), and the rates of the sums, (3, n).
+
+        The strains (x, y, t, e) minimise EI/2 (x^2 + y^2) + GJ/2 t^2 + EA/2 e^2 + sum T_i |path_i| - moment . (x, y, t)
+        - push e, with the tensions T = - P^T pulls and P from the lengths to the sums as in `of_three`; by Newton's method.
+        """
+        stiff = np.array([self.bending_stiffness] * 2 + [self.torsional_stiffness, self.axial_stiffness])
+        loads = np.vstack([moment, push])
+        x = (loads + np.array([pulls[0], pulls[1], 0.0, pulls[2]])[:, None]) / stiff[:, None]
+        if self.distance == 0.0:
+            return x, x[[0, 1, 3]]
+        angles, d = np.array([0.0, -2.0, 2.0]) * np.pi / 3.0, self.distance
+        arms = np.stack([d * np.sin(angles), -d * np.cos(angles), 0.0 * angles, 1.0 + 0.0 * angles], axis=1)
+        sums = np.linalg.inv(arms[:, [0, 1, 3]])
+        tensions, around = -sums.T @ pulls, np.array([0.0, 0.0, d, 0.0])
+        for _ in range(7):
+            along, across = 1.0 + arms @ x, np.tile(around @ x, (3, 1))
+            size = np.hypot(along, across)
+            slopes = np.einsum("ij,in->ijn", arms, along / size) + np.einsum("j,in->ijn", around, across / size)
+            normals = np.einsum("j,in->ijn", around, along / size) - np.einsum("ij,in->ijn", arms, across / size)
+            gradient = stiff[:, None] * x - loads + np.einsum("i,ijn->jn", tensions, slopes)
+            tangent = np.diag(stiff) + np.einsum("i,in,ijn,ikn->njk", tensions, 1.0 / size, normals, normals)
+            x = x - np.linalg.solve(tangent, gradient.T[..., None])[..., 0].T
+        return x, sums @ (np.hypot(1.0 + arms @ x, around @ x) - 1.0)
 
 
 @dataclass(frozen=True)
@@ -78,19 +108,16 @@ def solve_muscle_arm(
 ) -> MuscleArm:
     """Equilibrium under a dead tip force [N] and gravity [m/s^2], on the branch that starts without load, by `solve_bvp`.
 
-    A muscle that slides freely beside the rod pulls alike all along it, so in the frames of the sections its moment and push
-    are the same everywhere; they are what keeps its length. By rest length, with R of the quaternion q, the force n and the
-    moment m carried, and the pulls (a, b, c) of the segment:
+    A muscle that slides freely beside the rod pulls alike all along it; its tension is what keeps its length. By rest length,
+    with R of the quaternion q, the force n and the moment m carried, and the pulls of the segment (`MuscleSegment.strains`):
 
-        u = K^-1 (R^T m + (a, b, 0)),  e = (t.n + c) / EA,  p' = (1 + e) t,  q' = q (0, u) / 2,  m' = n x p'
+        u, e = strains(R^T m, t.n, pulls),  p' = (1 + e) t,  q' = q (0, u) / 2,  m' = n x p'
 
-    and the integrals of u_x, u_y and e over the segment are given. m = 0 at the tip.
+    and the integrals of the rates of the sums over the segment are given. m = 0 at the tip.
     """
     count, pull, fall = len(segments), np.asarray(force, dtype=float), np.asarray(gravity, dtype=float)
     lengths = np.array([one.length for one in segments])
     masses = lengths * [one.density for one in segments]
-    soft = np.array([[1.0 / one.bending_stiffness] * 2 + [1.0 / one.torsional_stiffness] for one in segments])
-    slack = np.array([1.0 / one.axial_stiffness for one in segments])
 
     def rates(share: float, x: np.ndarray, y: np.ndarray, pulls: np.ndarray) -> np.ndarray:
         made = []
@@ -100,11 +127,10 @@ def solve_muscle_arm(
             n = share * (pull[:, None] + fall[:, None] * beyond)
             rotations = quaternion_rotation(q.T)
             t = rotations[:, :, 2].T
-            u = soft[i][:, None] * (np.einsum("nji,jn->in", rotations, m) + np.array([[push[0]], [push[1]], [0.0]]))
-            e = slack[i] * (np.sum(t * n, axis=0) + push[2])
-            dp = (1.0 + e) * t
+            strains, sums = segments[i].strains(np.einsum("nji,jn->in", rotations, m), np.sum(t * n, axis=0), push)
+            u, dp = strains[:3], (1.0 + strains[3]) * t
             dq = 0.5 * np.vstack([-np.sum(q[1:] * u, axis=0), q[0] * u + np.cross(q[1:], u, axis=0)])
-            made.append(lengths[i] * np.vstack([dp, dq, np.cross(n, dp, axis=0), u[:2], e]))
+            made.append(lengths[i] * np.vstack([dp, dq, np.cross(n, dp, axis=0), sums]))
         return np.vstack(made)
 
     def ends(share: float, a: np.ndarray, b: np.ndarray, pulls: np.ndarray) -> np.ndarray:
