@@ -17,8 +17,6 @@ With its derivative `A = 1 + P c_z W`, the load `w` on the strains, that of the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,10 +25,9 @@ from softrobots.constant_curvature.strain_chain import LARGEST_BENDING
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.description.urdf_tags import MuscleTag
-from softrobots.model.coordinates import Coordinates, ReducedLoad
-from softrobots.model.joint_loads import JointLoad
+from softrobots.model.coordinates import Coordinates
+from softrobots.model.muscle_length_point import MuscleLengthPoint
 from softrobots.model.muscle_paths import MUSCLE_STRAINS, MusclePaths, MusclePathsAt, muscle_arms
-from softrobots.model.muscles import MusclePoint
 from softrobots.model.sections import SectionRow, places_by_segment
 from softrobots.model.springs import Springs
 
@@ -247,63 +244,6 @@ class MuscleLengths:
             most = int(sizes.argmax())
             bendings.append((segment, float(sizes[most]), (int(about_x[most]), int(about_y[most]))))
         return bendings
-
-
-@dataclass(frozen=True, eq=False)
-class MuscleLengthPoint(MusclePoint):
-    """A robot at given muscle lengths."""
-
-    held: MuscleLengths
-    """The constraint."""
-    sums: FloatArray
-    """Sums of its strains."""
-    given: FloatArray
-    """The same without twist."""
-    strains: FloatArray
-    """Its strains."""
-    solved: bool
-    """Whether these lengths are possible with the free coordinates."""
-
-    @property
-    def valid(self) -> bool:
-        """Whether every section and every muscle is within its range, and the twist leaves the lengths possible."""
-        return self.solved and super().valid
-
-    @cached_property
-    def _sum_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of the sums with respect to the lengths and to the free coordinates."""
-        held, paths = self.held, self.paths
-        by_lengths = np.linalg.solve(held.gap_slope(paths), held.slopes)
-        return by_lengths, -by_lengths @ (paths.slopes @ held.free)
-
-    def reduce(self, joints: JointLoad) -> ReducedLoad:
-        """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included.
-
-        The energy of the sums is that beyond the state without twist.
-        """
-        load, held, paths = self.inner.reduce(joints), self.held, self.paths
-        by_lengths, by_free = self._sum_slopes
-        springs, stiffness = held.strain_springs, held.sum_stiffness
-        tensions = (load.elastic - springs.stiffness * (self.strains - springs.rest)) @ held.shares @ by_lengths
-        to_free, to_lengths = held.free + held.shares @ by_free, held.shares @ by_lengths
-        half = to_free.T @ (load.derivative - paths.curvature(tensions))
-        stiff = stiffness[:, None] * by_free
-        change, middle = self.sums - self.given, 0.5 * (self.sums + self.given) - held.sum_rest
-        return ReducedLoad(
-            np.concatenate([load.motors, tensions]),
-            (load.elastic - tensions @ paths.slopes) @ held.free,
-            half @ to_free - by_free.T @ stiff,
-            np.concatenate([to_free.T @ load.coupling, half @ to_lengths - stiff.T @ by_lengths], axis=1),
-            load.potential + float(stiffness @ (change * middle)),
-            load.scale,
-        )
-
-    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Columns per motor and length, and per free coordinate."""
-        motors, elastic = self.inner.columns(jacobian)
-        by_lengths, by_free = self._sum_slopes
-        by_sums = elastic @ self.held.shares
-        return np.concatenate([motors, by_sums @ by_lengths], axis=1), elastic @ self.held.free + by_sums @ by_free
 
 
 def _differences(stiffness: FloatArray) -> FloatArray:

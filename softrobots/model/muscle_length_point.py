@@ -1,0 +1,77 @@
+"""A robot at given muscle lengths: its load and its motion, reduced to the free coordinates.
+
+The equations are in `softrobots.model.muscle_lengths`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.model.coordinates import ReducedLoad
+from softrobots.model.joint_loads import JointLoad
+from softrobots.model.muscles import MusclePoint
+
+if TYPE_CHECKING:
+    from softrobots.model.muscle_lengths import MuscleLengths
+
+
+@dataclass(frozen=True, eq=False)
+class MuscleLengthPoint(MusclePoint):
+    """A robot at given muscle lengths."""
+
+    held: MuscleLengths
+    """The constraint."""
+    sums: FloatArray
+    """Sums of its strains."""
+    given: FloatArray
+    """The same without twist."""
+    strains: FloatArray
+    """Its strains."""
+    solved: bool
+    """Whether these lengths are possible with the free coordinates."""
+
+    @property
+    def valid(self) -> bool:
+        """Whether every section and every muscle is within its range, and the twist leaves the lengths possible."""
+        return self.solved and super().valid
+
+    @cached_property
+    def _sum_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the sums with respect to the lengths and to the free coordinates."""
+        held, paths = self.held, self.paths
+        by_lengths = np.asarray(np.linalg.solve(held.gap_slope(paths), held.slopes), dtype=np.float64)
+        return by_lengths, -by_lengths @ (paths.slopes @ held.free)
+
+    def reduce(self, joints: JointLoad) -> ReducedLoad:
+        """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included.
+
+        The energy of the sums is that beyond the state without twist.
+        """
+        load, held, paths = self.inner.reduce(joints), self.held, self.paths
+        by_lengths, by_free = self._sum_slopes
+        springs, stiffness = held.strain_springs, held.sum_stiffness
+        tensions = (load.elastic - springs.stiffness * (self.strains - springs.rest)) @ held.shares @ by_lengths
+        to_free, to_lengths = held.free + held.shares @ by_free, held.shares @ by_lengths
+        half = to_free.T @ (load.derivative - paths.curvature(tensions))
+        stiff = stiffness[:, None] * by_free
+        change, middle = self.sums - self.given, 0.5 * (self.sums + self.given) - held.sum_rest
+        return ReducedLoad(
+            np.concatenate([load.motors, tensions]),
+            (load.elastic - tensions @ paths.slopes) @ held.free,
+            half @ to_free - by_free.T @ stiff,
+            np.concatenate([to_free.T @ load.coupling, half @ to_lengths - stiff.T @ by_lengths], axis=1),
+            load.potential + float(stiffness @ (change * middle)),
+            load.scale,
+        )
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns per motor and length, and per free coordinate."""
+        motors, elastic = self.inner.columns(jacobian)
+        by_lengths, by_free = self._sum_slopes
+        by_sums = elastic @ self.held.shares
+        return np.concatenate([motors, by_sums @ by_lengths], axis=1), elastic @ self.held.free + by_sums @ by_free
