@@ -328,8 +328,8 @@ def test_driven_motors_settle_where_our_statics_says(tool: Tool) -> None:
 def test_driven_muscles_settle_where_our_statics_says(tool: Tool, given: str) -> None:
     """The lengths that MuJoCo's tendons reach, or the tensions, are an equilibrium of ours.
 
-    Its tendons are linear: with given lengths, twist of up to 4e-3 rad a hinge does not lengthen them, and torsion has the stiffness
-    of the tensions at home.
+    Its tendons are linear: with given lengths, twist of up to 4e-3 rad a hinge does not lengthen them, and torsion has the
+    stiffness of the tensions at home.
     """
     model = _pcc(muscles=given)
     motors = (0.5, 0.55, 0.52, 0.53, 0.5, 0.5) if given == "lengths" else (20.0, 5.0, -10.0, 30.0, 3.0, 0.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +16,13 @@ from softrobots.model.coordinates import ReducedLoad
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.muscles import MusclePoint
 
-if TYPE_CHECKING:
-    from softrobots.model.muscle_lengths import MuscleLengths
-
 
 @dataclass(frozen=True, eq=False)
 class MuscleLengthPoint(MusclePoint):
     """A robot at given muscle lengths."""
 
-    held: MuscleLengths
-    """The constraint."""
+    held: Any
+    """The constraint, a `softrobots.model.muscle_lengths.MuscleLengths`."""
     sums: FloatArray
     """Sums of its strains."""
     given: FloatArray
