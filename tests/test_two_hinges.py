@@ -425,5 +425,6 @@ def test_the_wall_is_drawn_without_gaps(torsion: bool) -> None:
         balls = [drawn[f"link_{link}_{name}"] for name in ("middle_0", "0")]
         assert [ball.geometry.radius for ball, _ in balls] == [0.055] * 2
         assert [pose[:3, 3] for _, pose in balls] == [pytest.approx(ends[place][0], abs=1e-12) for place in (1, -1)]
+        assert not any(ball.elastic for ball, _ in balls)  # the arm without load is drawn straight
         own = {name for name, (shape, _) in drawn.items() if shape.inflated_link == link - 1}
         assert own == {*pieces, f"link_{link}_middle_0", f"link_{link}_0"}

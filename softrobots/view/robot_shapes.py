@@ -30,7 +30,7 @@ class Shape(NamedTuple):
     inflated_link: int | None
     """Number of the inflated link that it is part of, for colouring by wrinkling."""
     elastic: bool
-    """Whether springs or sections move it, so that its pose depends on the load."""
+    """Whether springs or sections move it, so that it is drawn without the load, too; not the balls in the bends of a wall."""
     of_section: bool
     """Whether it is a link of the rigid chain that stands for a section."""
     place: int
@@ -74,7 +74,8 @@ class RobotShapes:
             for geometry, colour in _parts(shape):
                 names[shape.name] = names.get(shape.name, 0) + 1
                 unique = shape.name if names[shape.name] == 1 else f"{shape.name}_{names[shape.name]}"
-                moved = shape.parentJoint in elastic
+                ball = isinstance(geometry, coal.Sphere) and links[place] is not None
+                moved = shape.parentJoint in elastic and not ball
                 shapes.append(Shape(unique, geometry, colour, links[place], moved, unique.startswith(sections), place))
         self.shapes = tuple(shapes)
         """Every shape."""
