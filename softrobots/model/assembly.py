@@ -34,6 +34,7 @@ def assemble(
     tip: str,
     muscle_input: str = "lengths",
     locked: Sequence[str] = (),
+    like: SoftModel | None = None,
 ) -> SoftModel:
     """Build the model of a robot; `softrobots.load_model` has checked the arguments.
 
@@ -46,6 +47,7 @@ def assemble(
         tip: Name of the tip frame.
         muscle_input: What `q_motors` holds of the muscles, "lengths" or "forces".
         locked: Names of the movable joints of the text that are fixed in `rigid`.
+        like: A model that differs in its springs alone, for what it can share.
 
     Returns:
         The model.
@@ -103,7 +105,8 @@ def assemble(
         np.array([float((1.0 / strain_springs.stiffness[list(segments[m.segment]["bend_x"])]).sum()) for m in tags.muscles]),
         given_lengths,
     )
-    data = PinocchioData(rigid)
+    data = PinocchioData(rigid) if like is None else like.data
+    inside = {joint for row in rows for joint in row.joint_names}
     return SoftModel(
         pinocchio=rigid,
         urdf=urdf,
@@ -113,7 +116,7 @@ def assemble(
         coordinates=coordinates,
         springs=_grouped(elastic, structure),
         data=data,
-        reach=chain_length(rigid, data.frame_ids[tip], {joint for row in structure.section_table for joint in row.joint_names}),
+        reach=chain_length(rigid, data.frame_ids[tip], inside) if like is None else like.reach,
     )
 
 
@@ -132,7 +135,7 @@ def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
     """
     structure = model.structure
     if structure.muscles:
-        again = assemble(
+        return assemble(
             model.pinocchio,
             model.urdf,
             structure.tags,
@@ -141,8 +144,8 @@ def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
             tip=model.tip,
             muscle_input=model.muscle_input,
             locked=structure.locked_joints,
+            like=model,
         )
-        return replace(again, data=model.data)
     stiffness, rest = structure.strain_springs.stiffness.copy(), structure.strain_springs.rest.copy()
     for place, name in enumerate(structure.spring_joints):
         stiffness[place], rest[place] = springs[name].stiffness, springs[name].rest

@@ -116,7 +116,7 @@ def load_model(
 def with_springs(model: SoftModel, springs: Mapping[str, float | tuple[float, float]]) -> SoftModel:
     """Return a robot with other springs, equal to loading it anew; neither xacro nor the URDF is read again.
 
-    That is 15 to 100 times faster: tens of microseconds for an arm of two links; a millisecond for muscles of given length
+    That is 10 to 100 times faster: tens of microseconds for an arm of two links; two milliseconds for muscles of given length
     along 90 hinges, whose free coordinates depend on the stiffness. The two models share Pinocchio's model and workspace.
 
     Args:
