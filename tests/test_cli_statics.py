@@ -492,6 +492,7 @@ def test_ik_follows_waypoints(told: Told, answer, arm: sr.SoftModel, path: Path,
         assert found[name] == getattr(followed, name).tolist(), name
     assert found["required_pressure"] == followed.required_pressure
     assert found["wrinkling_margin"] == followed.wrinkling_margin
+    assert found["slack_margin"] == min(float(state.link_limits.slack_margins.min()) for state in followed.equilibria)
     assert found["motor_torques"] == [equilibrium.motor_torques.tolist() for equilibrium in followed.equilibria]
     assert (found["stable"], found["wrinkled"]) == ([True] * 6, [False] * 6)
     assert np.array_equal(sr.load_result(npz).q_motors, followed.q_motors)

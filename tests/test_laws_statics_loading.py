@@ -195,6 +195,7 @@ def in_a_plane(lengths: tuple[float, float], hinge: float, stiffness: np.ndarray
     """Two straight links that bend in one plane, without motors."""
     text = sr.InflatableArm(link_lengths=lengths, hinge_offset=hinge * np.array(lengths)).urdf()
     springs = dict(zip(("spring_1_up", "spring_2_up"), stiffness.tolist(), strict=True))
+    springs |= dict.fromkeys(("spring_1_side", "spring_2_side"))
     return sr.load_model(text, springs=springs, motors=[])
 
 

@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from tests.support.foreign import BRANCHED, SPRINGS
+from tests.support.membrane import hinge_energy
 
 PUSHES = {
     "arm": 100.0,
     "limp": 30.0,
+    "slack": 60.0,
     "three_links": 60.0,
     "two_hinges": 60.0,
     "pcc": 2.0,
@@ -42,6 +44,7 @@ def model(kind: str) -> sr.SoftModel:
     robot = {
         "arm": lambda: sr.InflatableArm(),
         "limp": lambda: sr.InflatableArm(max_moment=12.0),  # beyond it a link is on the plateau of its moment
+        "slack": lambda: sr.InflatableArm(moment_law="slack_wall", rest_up=0.05),  # beyond 13 N m the wall of a link goes slack
         "three_links": lambda: sr.InflatableArm(
             link_lengths=(0.5, 0.4, 0.3), stiffness=(250.0, 120.0, 80.0), rest_side=(0.05, -0.02, 0.0), rest_up=-0.1
         ),
@@ -107,8 +110,8 @@ def cases(largest: float = 0.3, gravity: st.SearchStrategy[Any] = gravities) -> 
 
 
 def scaled(robot: sr.SoftModel, factor: float) -> sr.SoftModel:
-    """The robot of a material and of muscles so many times as stiff and strong, by its text."""
-    names = "EI|GJ|EA|stiffness|max_moment|strongest"
+    """The robot of a material, pressure and muscles so many times as stiff and strong, by its text."""
+    names = "EI|GJ|EA|stiffness|max_moment|pressure|strongest"
     text = re.sub(rf'\b({names})="([^"]+)"', lambda at: f'{at[1]}="{float(at[2]) * factor!r}"', robot.urdf)
     springs = {name: (factor * stiffness, rest) for name, (stiffness, rest) in robot.spring_table.items()}
     return sr.load_model(text, springs=springs, motors=robot.structure.motor_joints, tip=robot.tip, muscles=robot.muscle_input)
@@ -152,6 +155,13 @@ def stored_energy(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray) 
             if stiffness[0] * bend > group.max_moment:
                 energies[list(group.springs)] = 0.0
                 energies[group.springs[0]] = group.max_moment * (bend - 0.5 * group.max_moment / stiffness[0])
+        elif group.slack_wall:
+            for hinge in group.hinges:
+                places, stiffness = list(hinge), float(law.stiffness[hinge[0]])
+                bend = float(np.linalg.norm((strains - law.rest)[places]))
+                energies[places] = 0.0
+                tension = group.pressure * np.pi * group.radius**2
+                energies[places[0]] = hinge_energy(bend, stiffness, group.radius, tension)
     return float(energies.sum())
 
 

@@ -32,3 +32,14 @@ def section_moment(curvature: float, rigidity: float, radius: float, tension: fl
 def hinge_moment(angle: float, stiffness: float, radius: float, tension: float) -> float:
     """Moment of a hinge with such a wall [N m]: a curvature over a length of one."""
     return float(np.sign(angle)) * section_moment(abs(angle), stiffness, radius, tension) if angle else 0.0
+
+
+def hinge_energy(angle: float, stiffness: float, radius: float, tension: float) -> float:
+    """Energy of such a hinge [J]: the moment by Gauss's rule, in halves of the way since the first slack fibre."""
+    first = 0.5 * tension * radius / stiffness
+    if angle <= first:
+        return 0.5 * stiffness * angle**2
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    roots = 0.5 * np.sqrt(angle - first) * (1.0 + nodes)  # angles first + root^2: smooth at the first slack fibre
+    moments = [hinge_moment(first + root**2, stiffness, radius, tension) for root in roots]
+    return 0.5 * stiffness * first**2 + float(0.5 * np.sqrt(angle - first) * weights @ (2.0 * roots * np.array(moments)))

@@ -115,13 +115,18 @@ def _walls(equilibrium: Equilibrium) -> list[tuple[str, str]]:
     limits, soft = equilibrium.link_limits, all(group.slack_wall for group in groups)
     actuated = bool(equilibrium.model.structure.lines) and any(group.segment is not None for group in groups)
     share = "at most" if actuated else "at least"
-    least = [100.0 * float(margins.min()) for margins in (limits.wrinkling_margins, limits.slack_margins)]
+    least = float(limits.wrinkling_margins.min())
     wrinkled = "YES: half of a wall is slack" if soft else "YES: linear springs no longer hold"
-    slack = f"no, {share} {least[1]:.1f} % of its moment is left" if least[1] > 0.0 else "YES: by membrane theory"
-    left = f"no, {share} {least[0]:.1f} % of the wrinkling moment is left"
+    left = f"no, {share} {100.0 * least:.1f} % of the wrinkling moment is left"
+    slack = slack_words(float(limits.slack_margins.min()), share)
     rows = [("wrinkled", wrinkled if equilibrium.wrinkled else left), ("first slack fibre", slack)]
     bounds = "upper bounds, of a straight tube: the wall along the actuator is slack before any load"
     return [*rows, ("limits of the wall", bounds)] if actuated else rows
+
+
+def slack_words(margin: float, share: str = "at least") -> str:
+    """Whether the wall of a link is slack, from the least margin to its first slack fibre [-]."""
+    return f"no, {share} {100.0 * margin:.1f} % of its moment is left" if margin > 0.0 else "YES: by membrane theory"
 
 
 def head_lines(model: SoftModel, load: Load) -> list[str]:

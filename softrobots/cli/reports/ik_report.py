@@ -12,8 +12,10 @@ from softrobots.cli.reports.equilibrium_report import (
     equilibrium_lines,
     head_lines,
     joined_units,
+    known_margins,
     load_units,
     model_answer,
+    slack_words,
     spring_units,
 )
 from softrobots.core.checks import FloatArray
@@ -63,7 +65,8 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         Fact("q_springs", trajectory.q_springs, joined_units(spring_units(model))),
         Fact("link_moments", trajectory.link_moments, "N m"),
         Fact("wrinkling_moments", [equilibrium.link_limits.wrinkling_moments for equilibrium in equilibria], "N m"),
-        Fact("wrinkling_margin", _margin(trajectory), "-"),
+        Fact("slack_margin", _margin(trajectory, "slack_margins"), "-"),
+        Fact("wrinkling_margin", _margin(trajectory, "wrinkling_margins"), "-"),
         Fact("required_pressure", trajectory.required_pressure, "Pa"),
         Fact("wrinkled", [equilibrium.wrinkled for equilibrium in equilibria]),
         Fact("stable", [equilibrium.stable for equilibrium in equilibria]),
@@ -94,11 +97,13 @@ def trajectory_lines(trajectory: Trajectory) -> list[str]:
         ("within limits", _everywhere([equilibrium.within_limits for equilibrium in equilibria])),
     ]
     if trajectory.link_moments is not None:
-        largest, margin = trajectory.link_moments.max(axis=0), _margin(trajectory)
+        largest = trajectory.link_moments.max(axis=0)
+        margin, slack = (_margin(trajectory, name) for name in ("wrinkling_margins", "slack_margins"))
         left = "" if margin is None else f", {100.0 * margin:.1f} % of the wrinkling moment is left"
         summary += [
             ("not wrinkled", _everywhere([not equilibrium.wrinkled for equilibrium in equilibria])),
             ("largest moment", f"{formatted(largest)} N m by link{left}"),
+            ("first slack fibre", "-" if slack is None else slack_words(slack)),
             ("required pressure", f"{formatted(trajectory.required_pressure)} Pa"),
         ]
     return [*head_lines(model, equilibria[0].load), "", *aligned(rows, right=(1, 2, 3, 4, 6)), "", *aligned(summary)]
@@ -109,11 +114,11 @@ def _motor_torques(trajectory: Trajectory) -> FloatArray:
     return np.array([equilibrium.motor_torques for equilibrium in trajectory.equilibria])
 
 
-def _margin(trajectory: Trajectory) -> float | None:
-    """Least share of the wrinkling moment that is left at any waypoint and link; None without pressure or links."""
+def _margin(trajectory: Trajectory, name: str) -> float | None:
+    """Least of the margins of this name in `LinkLimits`, at any waypoint and link; None without pressure or links."""
     if trajectory.link_moments is None or any(group.pressure == 0.0 for group in trajectory.model.spring_groups):
         return None
-    return trajectory.wrinkling_margin
+    return known_margins(np.array([min(getattr(one.link_limits, name).min() for one in trajectory.equilibria)]))[0]
 
 
 def _everywhere(truths: list[bool]) -> str:
