@@ -387,6 +387,23 @@ def test_a_link_on_its_plateau_leaves_two_forces() -> None:
         assert np.allclose(again.motor_torques, torques, rtol=0.0, atol=1e-8)
 
 
+def test_a_neutral_equilibrium_on_the_way_to_another_force_is_no_error(
+    arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from softrobots.statics.tip_force import measured_torques
+
+    search = measured_torques.search_force
+
+    def meeting_neutral(problem, state, most, *, start, **scales):
+        if np.any(start):
+            raise sr.NeutralEquilibrium("on the way")
+        return search(problem, state, most, start=start, **scales)
+
+    torques = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15)).motor_torques
+    monkeypatch.setattr(measured_torques, "search_force", meeting_neutral)
+    assert np.allclose(sr.estimate_load(arm, (0.3, 0.6, -0.8), torques).force, (0, 10, -15), atol=1e-8)
+
+
 def local_minimum(robot: sr.SoftModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Motors, force and torques of a case in which the search from no force ends in a local minimum."""
     rng = np.random.default_rng(25)

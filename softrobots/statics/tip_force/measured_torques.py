@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
 from softrobots.statics.elastostatics import balanced_state
@@ -181,9 +182,16 @@ def _search(problem: MeasuredTorques, force: FloatArray, state: ElasticState, mo
 
 
 def _search_from(problem: MeasuredTorques, force: FloatArray, near: ElasticState, most: int) -> Explanation | None:
-    """Search from the equilibrium under a force; None if there is none."""
+    """Search from the equilibrium under a force; None if there is none, or the search meets a neutral one."""
     start = problem.equilibrium(force, near)
-    return None if start is None else _search(problem, force, start, most)
+    if start is None:
+        return None
+    try:
+        found = _search(problem, force, start, most)
+        problem.directions(found.state)
+    except NeutralEquilibrium:
+        return None
+    return found
 
 
 def _felt(problem: MeasuredTorques, found: Explanation) -> bool:
