@@ -190,6 +190,19 @@ def test_poses(folder: Path, rng: np.random.Generator) -> None:
     assert np.sqrt(errors).max() <= 1e-9
 
 
+@pytest.mark.study
+def test_slack_walls(folder: Path, rng: np.random.Generator) -> None:
+    """The law of a slack wall, its cube roots and the coupling of both springs of a link, as in Python."""
+    solver = sr.compile(sr.load_model(sr.InflatableArm(moment_law="slack_wall")), backend="python")
+    in_c = Controller(solver, folder, gravity=True, name="slack_arm")
+    motors, forces = cases(rng, 60, 1.0, 60.0)
+    for q, f in zip(motors, forces, strict=True):
+        ready(in_c, q, f, GRAVITY)
+        assert in_c.call("settle") == Status.CERTIFIED
+        expected = solver.equilibrium(q, f, gravity=GRAVITY)
+        assert np.allclose(in_c.get("UNKNOWN", 4), expected.q_springs, rtol=0.0, atol=1e-9)  # soft springs
+
+
 def test_muscles(folder: Path, rng: np.random.Generator) -> None:
     """Lengths start the unknowns at a shape that has them; tensions pull on the strains."""
     for input_ in ("lengths", "forces"):
