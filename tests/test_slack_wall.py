@@ -335,6 +335,14 @@ def test_branches_fall_as_the_wall_softens(one_link: sr.SoftModel) -> None:
         assert branch.forces.min() < 45.0
 
 
+@each_row(("pressure", "links"), [(5e3, 1), (5e3, 2), (20e3, 3)])
+def test_no_branch_is_lost_where_walls_go_slack_early(pressure: float, links: int) -> None:
+    """From 8 mrad on, where a path turns within 1e-7 rad: four planes of the universal joints, both ways, to the end."""
+    robot = sr.InflatableArm(link_lengths=(0.6,) * links, pressure=pressure, stiffness=K, moment_law="slack_wall")
+    branches = sr.post_buckling_branches(sr.load_model(robot), (0.0,) * (links + 1), (-1.0, 0.0, 0.0))
+    assert [branch.ended for branch in branches] == ["largest force"] * 9
+
+
 def test_motors_and_loads_are_found_again(two_links: sr.SoftModel) -> None:
     """Inverse kinematics and load estimation go through slack walls: the tip is reached, the force found again."""
     force = (0.0, 8.0, -18.0)

@@ -68,6 +68,11 @@ class SpringGroup:
         return float(inflated_beam.moment_limits(self.pressure, self.radius).slack)
 
     @property
+    def linear_up_to(self) -> float | None:
+        """Moment up to which the law is linear: the plateau, or that of the first slack fibre [N m]; None: it always is."""
+        return self.slack_moment if self.slack_wall else self.max_moment
+
+    @property
     def largest_moment(self) -> float | None:
         """Moment that no bend exceeds: the plateau, or collapse with a slack wall, `pi p r^3` [N m]; None if linear."""
         return 2.0 * self.slack_moment if self.slack_wall else self.max_moment
@@ -129,7 +134,7 @@ class Springs:
     @cached_property
     def linear(self) -> bool:
         """Whether the moment of every link is linear."""
-        return all(group.max_moment is None and not group.slack_wall for group in self.groups)
+        return all(group.linear_up_to is None for group in self.groups)
 
     def at(self, y: FloatArray) -> SpringState:
         """Return energy, torque and tangent at coordinates `y`, shape (n,) [rad or m]."""
@@ -185,7 +190,7 @@ class Springs:
         """The hinges beyond the linear part of their law at coordinates `y`."""
         softened = []
         for group in self.groups:
-            first = group.slack_moment if group.slack_wall else group.max_moment
+            first = group.linear_up_to
             if first is None:
                 continue
             stiffness = float(self.stiffness[group.springs[0]])

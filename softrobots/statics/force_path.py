@@ -28,7 +28,7 @@ _NEWTON_STEPS = 15
 _GAP = 1e-12  # tolerance of a constraint [rad]
 _LONGEST = 1.0  # Newton step [rad]
 _SHORTEST = 1e-5  # step along a path [rad]
-_SHORTEST_STABLE = 1e-10  # step on the way to the loss of stability [rad]
+_SHORTEST_STABLE = 1e-10  # step on the way to the loss of stability, or where a wall goes slack [rad]
 _BEHIND = 1e-3  # first step along a path behind a knee [rad]
 _TURN = 0.95  # least cosine between the directions of two steps
 _MOST_POINTS = 2000
@@ -198,7 +198,7 @@ class ForcePath:
         """
         points, step, way = list(first), largest_step, way / np.linalg.norm(way)
         crossings: list[Crossing] = []
-        shortest = _SHORTEST_STABLE if while_stable else _SHORTEST
+        shortest = _SHORTEST_STABLE if while_stable or any(one.slack_wall for one in self.model.spring_groups) else _SHORTEST
         n_stable, knee = len(points), 0  # number of points at the last stable one, and at the last knee
         before = 0.0  # the step before it was halved at a crossing
         values, tangent = self.eigenvalues(points[-1]), way

@@ -206,11 +206,10 @@ def _all_found(path: ForcePath, least: int, found: list[Found]) -> list[Found]:
 
 
 def _distance(model: SoftModel, along: FloatArray, largest: float = _AWAY) -> float:
-    """Distance along a unit vector at which branches are sought: before the knee of any link."""
+    """Distance along a unit vector at which branches are sought: where every link is linear."""
     stiffness = model.stiffness
-    knees = [
-        group.max_moment / float(stiffness[group.springs[0]]) for group in model.spring_groups if group.max_moment is not None
-    ]
+    linear = [(group.linear_up_to, float(stiffness[group.springs[0]])) for group in model.spring_groups]
+    knees = [moment / own for moment, own in linear if moment is not None]
     return min([largest, *(0.5 * knee for knee in knees)]) / float(np.abs(along).max())
 
 
