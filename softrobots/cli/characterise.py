@@ -58,11 +58,10 @@ def run(arguments: argparse.Namespace) -> None:
     rig = BendingTest(probe_distance=arguments.probe_distance, hinge_offset=arguments.hinge_offset, offset=arguments.offset)
     data = read_characterisation(arguments.data, rig)
     fit = fit_characterisation(*data, **tube, angle_offset=arguments.angle_offset)
-    low, high = fit.stiffness_interval
     facts = [
         Fact("stiffness", fit.stiffness, "N m/rad", "stiffness k"),
         Fact("stiffness_std", fit.stiffness_std, "N m/rad", "  standard error"),
-        Fact("stiffness_interval", np.array([low, high]), "N m/rad", "  interval of 95 %"),
+        Fact("stiffness_interval", np.array(fit.stiffness_interval), "N m/rad", "  interval of 95 %"),
         Fact("angle_offset", fit.angle_offset, "rad", "zero error of the angle"),
         Fact("angle_offset_std", fit.angle_offset_std, "rad", "  standard error"),
         Fact("max_moment", fit.max_moment, "N m", "plateau M_max"),

@@ -61,13 +61,7 @@ def _link_stiffness(robot: InflatableArm) -> list[_Row]:
     one = "1 / (link_lengths[0] / (3 * bending[0]) + 1 / (link_lengths[0] * shearing[0]))"
     rows: list[_Row] = [
         ("wall_modulus", list(modulus), "Pa", "Young's modulus of the wall", source),
-        (
-            "shear_of_wall",
-            list(robot.wall_shear_modulus),
-            "Pa",
-            "Shear modulus of the wall",
-            shear,
-        ),
+        ("shear_of_wall", list(robot.wall_shear_modulus), "Pa", "Shear modulus of the wall", shear),
         ("bending", bending, "N m2", "Bending stiffness of a link", f"(wall_modulus[0] + {stress}) * {second}"),
         ("shearing", shearing, "N", "Shear stiffness of a link", area),
     ]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softrobots import inflated_beam
+from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import MOMENT_LAWS
 from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, parameter, per_part
@@ -189,8 +190,7 @@ class InflatedLinks(XacroRobot):
         Raises:
             ParameterError: If `wall_modulus` refuses the stiffness.
         """
-        wall = {name: self._each(name) for name in ("pressure", "radius", "wall_thickness")}
-        return inflated_beam.beam_stiffness(self.wall_modulus, shear_modulus=self.wall_shear_modulus, **wall)
+        return inflated_beam.beam_stiffness(self.wall_modulus, shear_modulus=self.wall_shear_modulus, **self._tubes())
 
     @property
     def wall_shear_modulus(self) -> tuple[float, ...]:
@@ -209,16 +209,13 @@ class InflatedLinks(XacroRobot):
         if self.young_modulus is not None:
             return self._each("young_modulus")
         if self.stiffness is None:
-            return (
-                float(inflated_beam.young_modulus_from_stiffness(inflated_beam.MEAN_STIFFNESS, **PAPER_LINK)),
-            ) * self.n_links
+            modulus = inflated_beam.young_modulus_from_stiffness(inflated_beam.MEAN_STIFFNESS, **PAPER_LINK)
+            return (float(modulus),) * self.n_links
         if self.link_model == "paper":
-            link = {name: self._each(name) for name in ("pressure", "radius", "wall_thickness")}
-            modulus = inflated_beam.young_modulus_from_stiffness(self.stiffness, length=self.link_lengths, **link)
+            modulus = inflated_beam.young_modulus_from_stiffness(self.stiffness, length=self.link_lengths, **self._tubes())
             return tuple(modulus.tolist())
-        k, lengths, pressure, radius, wall = (
-            np.array(self._each(name)) for name in ("stiffness", "link_lengths", "pressure", "radius", "wall_thickness")
-        )
+        k, lengths = np.array(self.stiffness), np.array(self.link_lengths)
+        pressure, radius, wall = self._tubes().values()
         modulus = 0.5 * k * lengths / (math.pi * radius**3 * wall) - 0.5 * pressure * radius / wall
         if modulus.min() <= 0.0:
             least = (math.pi * pressure * radius**4 / lengths).tolist()
@@ -259,6 +256,9 @@ class InflatedLinks(XacroRobot):
         return float(
             inflated_beam.tank_pressure(self.volume, self._one_pressure(), tank_volume, ambient_pressure=ambient_pressure)
         )
+
+    def _tubes(self) -> dict[str, FloatArray]:
+        return {name: np.array(self._each(name)) for name in ("pressure", "radius", "wall_thickness")}
 
     def _one_pressure(self) -> float:
         pressures = self._each("pressure")

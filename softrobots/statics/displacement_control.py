@@ -23,14 +23,16 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
+from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual, scaled
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
-from softrobots.statics.loads import Load, cross_matrix
+from softrobots.statics.loads import Load
 
 GAP = 1e-12
 """Tolerance of the displacement of a probe, relative to the reach."""
@@ -41,7 +43,6 @@ _LARGEST_STEP = 0.5  # [rad], norm of one Newton step
 _NEWTON_STEPS = 20
 _SHORTEST = 1e-6  # least share of the displacement in one step
 _SMALL_MOVE = 0.01  # [rad or m] of a spring: other paths are farther away
-_STABLE = 1e-9  # smallest eigenvalue that counts as positive, relative to the springs' own stiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,21 +96,21 @@ def touch(probe: Probe, pose: Any, jacobian: FloatArray) -> Contact:
     lever, n = pose.rotation @ probe.point, probe.direction
     offset = pose.translation + lever - probe.origin
     if probe.normal is None:
-        wrench = np.concatenate([n, cross_matrix(lever) @ n])
-        lever_moved = -cross_matrix(lever) @ angular
-        turning = angular.T @ (cross_matrix(n).T @ lever_moved)
+        wrench = np.concatenate([n, pin.skew(lever) @ n])
+        lever_moved = -pin.skew(lever) @ angular
+        turning = angular.T @ (pin.skew(n).T @ lever_moved)
         return Contact(float(n @ offset), probe.origin + offset, wrench, wrench @ jacobian, turning)
     m = pose.rotation @ probe.normal
     slope = float(m @ n)
     displacement = float(m @ offset) / slope if slope > _FLAT else math.nan
     slope = max(slope, _FLAT)
     force, arm = m / slope, lever + displacement * n - offset  # arm: from the frame to the probe
-    wrench = np.concatenate([force, cross_matrix(arm) @ force])
+    wrench = np.concatenate([force, pin.skew(arm) @ force])
     gradient = wrench @ jacobian
-    turned = -cross_matrix(m) @ angular  # derivative of the normal
+    turned = -pin.skew(m) @ angular  # derivative of the normal
     force_turned = turned / slope - np.outer(m, n @ turned) / slope**2
     arm_moved = np.outer(n, gradient) - linear
-    moment_turned = cross_matrix(force).T @ arm_moved + cross_matrix(arm) @ force_turned
+    moment_turned = pin.skew(force).T @ arm_moved + pin.skew(arm) @ force_turned
     return Contact(
         displacement, probe.origin + displacement * n, wrench, gradient, linear.T @ force_turned + angular.T @ moment_turned
     )
@@ -245,4 +246,4 @@ def stable_under_constraint(model: SoftModel, tangent: FloatArray, gradient: Flo
     softness = 1.0 / np.sqrt(model.stiffness)
     free = np.linalg.qr((softness * gradient)[:, None], mode="complete")[0][:, 1:]
     on_free = free.T @ scaled(tangent, model.stiffness) @ free
-    return bool(np.linalg.eigvalsh(on_free).min(initial=math.inf) > _STABLE)
+    return bool(np.linalg.eigvalsh(on_free).min(initial=math.inf) > POSITIVE)

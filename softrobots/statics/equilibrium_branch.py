@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled
@@ -37,12 +38,21 @@ class EquilibriumBranch:
     """Distance of the springs from the critical point along the buckling modes, shape (n,) [rad or m]; 0 without a mode."""
     energy: FloatArray
     """Elastic energy and potential of the load, shape (n,) [J]."""
-    softest: FloatArray
-    """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, shape (n,)."""
     crossings: FloatArray
     """Forces at which it crosses another path, or its stability jumps at a plateau, shape (k,) [N]."""
     ended: str
     """Why it ends: "largest force", "zero force", "end of range" of a section, "points", or "lost"."""
+
+    def __post_init__(self) -> None:
+        for array in (self.forces, self.amplitude, self.energy, self.crossings):
+            read_only(array)
+
+    @cached_property
+    def softest(self) -> FloatArray:
+        """Least real part of the eigenvalues of the tangent stiffness, relative to the springs, shape (n,)."""
+        tangents = [scaled(one.tangent_stiffness, one.model.stiffness) for one in self.equilibria]
+        with one_blas_thread(len(tangents[0])):
+            return read_only(np.array([float(np.linalg.eigvalsh(tangent)[0]) for tangent in tangents]))
 
     @cached_property
     def stable(self) -> Any:
@@ -53,20 +63,3 @@ class EquilibriumBranch:
     def neutral(self) -> Any:
         """Which are neutral, shape (n,), truth values: all of a ring, and the critical point itself."""
         return np.abs(self.softest) <= POSITIVE
-
-    @classmethod
-    def of(
-        cls,
-        label: str,
-        equilibria: tuple[Equilibrium, ...],
-        forces: FloatArray,
-        amplitude: FloatArray,
-        energy: FloatArray,
-        crossings: FloatArray,
-        ended: str,
-    ) -> EquilibriumBranch:
-        """Return a branch with read-only arrays and the stability of its equilibria."""
-        tangents = (scaled(one.tangent_stiffness, one.model.stiffness) for one in equilibria)
-        softest = np.array([float(np.linalg.eigvalsh(tangent)[0]) for tangent in tangents])
-        forces, amplitude, energy, softest, crossings = map(read_only, (forces, amplitude, energy, softest, crossings))
-        return cls(label, equilibria, forces, amplitude, energy, softest, crossings, ended)

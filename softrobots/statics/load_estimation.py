@@ -22,7 +22,7 @@ from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.loads import Load
-from softrobots.statics.tip_force.load_errors import MeasurementErrors, covariance_parts
+from softrobots.statics.tip_force.load_errors import MeasurementErrors
 from softrobots.statics.tip_force.measured_torques import SOLVERS, Explanation, MeasuredTorques
 
 METHODS = tuple(SOLVERS)
@@ -175,7 +175,8 @@ def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others:
     singular_values[: len(values)] = values
     inverse = observable.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
     load = problem.load(force)
-    parts = covariance_parts(inverse, problem.errors.as_torques(problem.model, load, state))
+    errors = problem.errors.as_torques(problem.model, load, state)
+    parts = {name: read_only(moved @ moved.T) for name, moved in ((name, inverse @ error) for name, error in errors.items())}
     unobservable = np.concatenate([right[: len(values)][~keep], right[len(values) :]])
     return LoadEstimate(
         force=read_only(force),

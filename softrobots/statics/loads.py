@@ -22,17 +22,11 @@ EARTH_GRAVITY = (0.0, 0.0, -9.81)
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-def cross_matrix(vector: FloatArray) -> FloatArray:
-    """Matrix `[v]` with `[v] u = v x u`, shape (3, 3)."""
-    x, y, z = vector.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def _rows(wrench: FloatArray) -> FloatArray:
     """`LoadTerm.rows` of a wrench."""
     force, moment = wrench[:3], wrench[3:]
     nothing = np.zeros((3, 3))
-    return np.vstack([wrench, np.hstack([cross_matrix(force).T, nothing]), np.hstack([nothing, cross_matrix(moment)])])
+    return np.vstack([wrench, np.hstack([pin.skew(force).T, nothing]), np.hstack([nothing, pin.skew(moment)])])
 
 
 _UNIT_ROWS = np.stack([_rows(unit).ravel() for unit in np.eye(6)], axis=-1)  # (42, 6): rows are linear in the wrench

@@ -231,7 +231,7 @@ def _result(branch: _Branch) -> EquilibriumBranch:
     amplitude = np.array([float(np.linalg.norm(branch.modes @ (point.springs - path.springs))) for point in points])
     crossings = np.array([point.force for point in branch.crossings])
     forces, energy = np.array([(point.force, point.state.energy) for point in points]).T
-    return EquilibriumBranch.of(branch.label, equilibria, forces, amplitude, energy, crossings, branch.followed.ended)
+    return EquilibriumBranch(branch.label, equilibria, forces, amplitude, energy, crossings, branch.followed.ended)
 
 
 def _name(model: SoftModel, along: FloatArray) -> str:

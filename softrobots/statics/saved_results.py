@@ -221,7 +221,7 @@ def _unpack_branches(fields: Mapping[str, Any]) -> tuple[EquilibriumBranch, ...]
     columns = [np.split(column, ends) for column in (np.arange(len(rows)), forces, amplitudes, energies)]
     others = np.split(crossings, np.cumsum(n_crossings)[:-1])
     return tuple(
-        EquilibriumBranch.of(label, tuple(rows[place] for place in places), force, amplitude, energy, crossed, ended)
+        EquilibriumBranch(label, tuple(rows[place] for place in places), force, amplitude, energy, crossed, ended)
         for label, ended, places, force, amplitude, energy, crossed in zip(*names, *columns, others, strict=True)
     )
 

@@ -137,9 +137,7 @@ def read_waypoints(path: str | Path) -> Path3D:
         raise FileFormatError(f"{path}: of roll, pitch and yaw it has {', '.join(turned)}; all three or none are required")
     try:
         found = waypoints(table.numbers[:, -3:], times)
-        angles = table.numbers[:, -6:-3]
-        return (
-            replace(found, orientations=read_only(np.array([pin.rpy.rpyToMatrix(*one) for one in angles]))) if turned else found
-        )
     except ParameterError as error:
         raise FileFormatError(f"{path}: {error}") from error
+    rotations = [pin.rpy.rpyToMatrix(*angles) for angles in table.numbers[:, -6:-3]] if turned else []
+    return replace(found, orientations=read_only(np.array(rotations))) if turned else found

@@ -141,14 +141,8 @@ def head_lines(model: SoftModel, load: Load) -> list[str]:
             moment = f", moment {formatted(wrench[3:])} N m" if wrench[3:].any() else ""
             rows.append((f"load on {frame}", f"force {formatted(wrench[:3])} N{moment}"))
     gravity = "none" if load.gravity is None else f"{formatted(np.array(load.gravity))} m/s^2"
-    return aligned(
-        [
-            ("robot", f"{model.pinocchio.name} (tip: {model.tip})"),
-            *springs,
-            *(rows or [("load", "none")]),
-            ("gravity", gravity),
-        ]
-    )
+    robot = ("robot", f"{model.pinocchio.name} (tip: {model.tip})")
+    return aligned([robot, *springs, *(rows or [("load", "none")]), ("gravity", gravity)])
 
 
 def spring_units(model: SoftModel) -> tuple[str, ...]:

@@ -79,19 +79,6 @@ class MeasurementErrors(NamedTuple):
         return parts
 
 
-def covariance_parts(inverse: FloatArray, errors: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return the covariance of a force by source of error.
-
-    Args:
-        inverse: Derivative of the force with respect to the motor torques, shape (3, n_motors) [1/m].
-        errors: Independent errors of the torques by source, as `MeasurementErrors.as_torques` returns them.
-
-    Returns:
-        Covariances, shape (3, 3) [N^2].
-    """
-    return {name: read_only(moved @ moved.T) for name, moved in ((name, inverse @ error) for name, error in errors.items())}
-
-
 def _shared(model: SoftModel) -> FloatArray:
     """Which springs have an error in common: those that bend one link, of one wall; shape (n_springs, n), ones and zeros."""
     groups = [list(group.springs) for group in model.spring_groups]

@@ -136,7 +136,8 @@ def newton(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explan
     if not restart:
         return [best]
     size, others = problem.elastic_force, list[Explanation]()
-    if not problem.explained(best) or (problem.residual(best.state) > problem.tolerance and _felt(problem, best)):
+    felt = problem.directions(best.state).observable.all()
+    if not problem.explained(best) or (felt and problem.residual(best.state) > problem.tolerance):
         for direction in sphere(_STARTS):
             again = _search_from(problem, 2.0 * size * direction, start, most)
             if again is not None and problem.residual(again.state) < problem.residual(best.state):
@@ -192,10 +193,6 @@ def _search_from(problem: MeasuredTorques, force: FloatArray, near: ElasticState
     except NeutralEquilibrium:
         return None
     return found
-
-
-def _felt(problem: MeasuredTorques, found: Explanation) -> bool:
-    return bool(problem.directions(found.state).observable.all())
 
 
 def _same(one: Explanation, other: Explanation) -> bool:
