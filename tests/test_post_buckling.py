@@ -348,6 +348,23 @@ def test_an_arm_of_two_links_folds_at_its_plateau_as_its_plane_says(plateau: flo
         assert force == pytest.approx(plateau / (0.6 * np.sin(angle) + LEVER * np.sin(angle + balanced)), rel=1e-8)
 
 
+@pytest.mark.parametrize("largest_step", [0.1, 0.03])
+def test_a_path_does_not_turn_back_at_a_knee(largest_step: float) -> None:
+    """At 17.3 N the second link comes off its plateau and springs back: beyond, the first link bends on, to the largest force.
+
+    A step from a hair before that knee found the path on which it had come. Planar: with the second link relaxed again,
+    20 N m = F (0.6 sin a + 0.57 sin(a + b)).
+    """
+    for stiffness, plateaus in (((127.32, 313.46), (20.0, 9.77)), ((127.319182, 313.461050), (19.9973111, 9.7678682))):
+        model = sr.load_model(sr.InflatableArm(stiffness=stiffness, max_moment=plateaus))
+        found = sr.post_buckling_branches(model, (0, 0, 0), PUSH, max_force=115.0, largest_step=largest_step)[1]
+        first, second = springs_of(found)[-1, ::2]
+        assert (found.label, found.ended) == ("+spring_1_side", "largest force")
+        assert first > 2.9
+        assert plateaus[0] == pytest.approx(115.0 * (0.6 * np.sin(first) + LEVER * np.sin(first + second)), rel=1e-8)
+        assert stiffness[1] * second == pytest.approx(115.0 * LEVER * np.sin(first + second), rel=1e-8)
+
+
 def test_branches_are_found_before_a_plateau_that_begins_early() -> None:
     """At 0.017 rad; they end in balance."""
     model = sr.load_model(sr.InflatableArm(max_moment=3.0))

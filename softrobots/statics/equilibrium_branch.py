@@ -41,7 +41,7 @@ class EquilibriumBranch:
     crossings: FloatArray
     """Forces at which it crosses another path, or its stability jumps at a plateau, shape (k,) [N]."""
     ended: str
-    """Why it ends: "largest force", "zero force", "end of range" of a section, "points", or "lost"."""
+    """Why it ends: "largest force", "zero force", "end of range" of a section, "points" (too many), or "lost"."""
 
     def __post_init__(self) -> None:
         for array in (self.forces, self.amplitude, self.energy, self.crossings):

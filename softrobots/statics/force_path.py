@@ -29,6 +29,7 @@ _GAP = 1e-12  # tolerance of a constraint [rad]
 _LONGEST = 1.0  # Newton step [rad]
 _SHORTEST = 1e-5  # step along a path [rad]
 _SHORTEST_STABLE = 1e-10  # step on the way to the loss of stability, or where a wall goes slack [rad]
+_OVER = 10.0 * _SHORTEST  # distance that leads over a knee, so that a path does not turn back before it [rad]
 _BEHIND = 1e-3  # first step along a path behind a knee [rad]
 _TURN = 0.95  # least cosine between the directions of two steps
 _MOST_POINTS = 2000
@@ -69,7 +70,7 @@ class FollowedPath(NamedTuple):
     crossings: list[Crossing]
     """Where other paths cross it, or its stability jumps at a plateau."""
     ended: str
-    """Why it ends: "largest force", "zero force", "end of range", "points", "unstable" or "lost"."""
+    """Why it ends, as of `EquilibriumBranch`, or "unstable"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,13 +200,13 @@ class ForcePath:
         points, step, way = list(first), largest_step, way / np.linalg.norm(way)
         crossings: list[Crossing] = []
         shortest = _SHORTEST_STABLE if while_stable or any(one.slack_wall for one in self.model.spring_groups) else _SHORTEST
-        n_stable, knee = len(points), 0  # number of points at the last stable one, and at the last knee
+        n_stable, knee, over = len(points), 0, 0.0 * way  # numbers of points at the last stable one and knee; a way over that
         before = 0.0  # the step before it was halved at a crossing
         values, tangent = self.eigenvalues(points[-1]), way
         nearly_zero = _NEARLY_ZERO * abs(values[0])
         while len(points) < _MOST_POINTS:
             last = points[-1]
-            here, least = self.place(last), shortest * max(1.0, last.force / self.force)
+            here, least = self.place(last) + (knee == len(points)) * over, shortest * max(1.0, last.force / self.force)
             with np.errstate(divide="ignore", invalid="ignore"):
                 longest = np.divide((largest_step, growth * last.force / self.force), (np.linalg.norm(way[:-1]), abs(way[-1])))
             step = min(step, max(largest_step, float(longest.min())))
@@ -216,7 +217,7 @@ class ForcePath:
                 if step < least:
                     turned = None if knee == len(points) else self._behind_knee(points[-2:], way)
                     if turned is not None:
-                        knee, way, step = len(points), turned, _BEHIND
+                        knee, over, way, step = len(points), _OVER * way, turned, _BEHIND
                         continue
                     ends = self.model.structure.at_range_end(self.motors, last.springs)
                     return FollowedPath(points, crossings, "end of range" if ends else "lost")
@@ -238,9 +239,8 @@ class ForcePath:
             points.append(there)
             values, tangent = new_values, new_tangent
             way, step = tangent if regular else secant, 1.5 * step
-            if values[0] > 0.0:
-                n_stable = len(points)
-            elif while_stable and values[0] < -NEUTRAL:
+            n_stable = len(points) if values[0] > 0.0 else n_stable
+            if while_stable and values[0] < -NEUTRAL:
                 return FollowedPath([*points[:n_stable], there], crossings, "unstable")
         return FollowedPath(points, crossings, "points")
 
@@ -253,9 +253,8 @@ class ForcePath:
             middle = 0.5 * (low + high)
             point = self.newton(start + middle * way, way[None], np.array([way @ start + middle * (way @ way)]))
             # Where it is stable, the force rises along a path.
-            if point is None or (not below and point.force < found.force):
-                high = middle
-            elif (self.eigenvalues(point) <= level).sum() == below:
+            rises = point is not None and (below > 0 or point.force >= found.force)
+            if point is not None and rises and (self.eigenvalues(point) <= level).sum() == below:
                 low, found = middle, point
             else:
                 high = middle
@@ -289,7 +288,7 @@ class ForcePath:
         before.
         """
         here, law = last[-1], self.model.springs
-        beyond = here.springs + 10.0 * _SHORTEST * way[:-1]
+        beyond = here.springs + _OVER * way[:-1]
         places = sorted(law.saturated(last[0].springs) ^ law.saturated(beyond))
         ahead = self.point(beyond, here.force)
         if not places or not math.isfinite(ahead.state.error):
