@@ -16,6 +16,7 @@ import softrobots as sr
 from softrobots.statics import force_path, post_buckling
 from softrobots.statics.critical_load import CriticalPoint, critical_point
 from softrobots.statics.equilibrium_branch import FUNDAMENTAL, RING
+from softrobots.statics.force_path import ForcePath
 from softrobots.view.figures import equilibria
 from tests.support.laws import law
 from tests.support.oracles import arm_balance
@@ -206,7 +207,7 @@ def test_branches_that_leave_branches_are_named_after_them() -> None:
 def test_a_later_crossing_of_too_many_modes_is_named_and_the_rest_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     modes_at = post_buckling._modes
 
-    def refusing(path: force_path.ForcePath, count: int) -> np.ndarray:
+    def refusing(path: ForcePath, count: int) -> np.ndarray:
         if path.force > 172.8 / LEVER:
             raise sr.NeutralEquilibrium("3 modes")
         return modes_at(path, count)
@@ -377,7 +378,7 @@ def test_a_knee_at_which_stability_is_lost_is_no_crossing() -> None:
     """The tangent stiffness jumps there; under a larger force there is no equilibrium nearby."""
     model = sr.load_model(sr.InflatableArm(max_moment=(12.0, 3.0)))
     motors, direction = (0, 0, 0.20753406386703446), (-1.0, -0.08838592885714874, 0.017351505102718986)
-    critical = critical_point(model, motors, direction)
+    critical = critical_point(ForcePath.of(model, motors, direction, frame=None, gravity=None))
     assert not critical.crosses
     (path,) = sr.post_buckling_branches(model, motors, direction)
     top = int(np.argmax(np.diff(path.forces) < 0.0))
@@ -398,8 +399,8 @@ def test_a_branch_tells_why_it_ends(arm: sr.SoftModel, monkeypatch: pytest.Monke
     assert {len(branch.equilibria) for branch in few.values()} == {100}
     monkeypatch.undo()
     for model, motors, push in ((arm, *FOLDED), (link(None, 172.71), (0, 0), PUSH)):
-        known[model] = critical_point(model, motors, push)
-    monkeypatch.setattr(post_buckling, "critical_point", lambda model, *_, **__: known[model])
+        known[model] = critical_point(ForcePath.of(model, motors, push, frame=None, gravity=None))
+    monkeypatch.setattr(post_buckling, "critical_point", lambda path, *_: known[path.model])
     monkeypatch.setattr(force_path, "_NEWTON_STEPS", 1)
     (lost,) = sr.post_buckling_branches(arm, *FOLDED)
     assert lost.ended == "lost"

@@ -11,7 +11,7 @@ import numpy as np
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.output_files import add_output, check_output, save
 from softrobots.cli.options.robot_argument import add_model, add_motors, check_one_each, motors_of, statics_model_of
-from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, formatted, print_answer
+from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, attributes, formatted, print_answer
 from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines, joined_units, load_units
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load
 
@@ -98,23 +98,16 @@ def _one_or_each(option: str, values: Any, names: Sequence[str], units: Sequence
 
 
 def _answer(estimate: LoadEstimate) -> dict[str, Any]:
-    units = joined_units(load_units(estimate.equilibrium.model.actuators.units))
+    motors = estimate.equilibrium.model.actuators.units
+    torques = joined_units(load_units(motors))
     facts = [
         Fact("force", estimate.force, "N"),
         Fact("force_std", _deviations(estimate), "N"),
         Fact("covariance", estimate.covariance, "N^2"),
         Fact("covariance_parts", dict(estimate.covariance_parts), "N^2"),
-        Fact("singular_values", estimate.singular_values, "m"),
-        Fact("condition_number", estimate.condition_number, "-"),
-        Fact("unobservable_directions", estimate.unobservable_directions, "-"),
-        Fact("measured_torques", estimate.measured_torques, units),
-        Fact("torque_std", estimate.torque_std, units),
-        Fact("stiffness_std", estimate.stiffness_std, "-"),
-        Fact("motor_angle_std", estimate.motor_angle_std, joined_units(estimate.equilibrium.model.actuators.units)),
-        Fact("residual", estimate.residual, units),
-        Fact("iterations", estimate.iterations, "-"),
-        Fact("frame", estimate.frame),
-        Fact("method", estimate.method),
+        *attributes(estimate, singular_values="m", condition_number="-", unobservable_directions="-", measured_torques=torques),
+        *attributes(estimate, torque_std=torques, stiffness_std="-", motor_angle_std=joined_units(motors)),
+        *attributes(estimate, residual=torques, iterations="-", frame="", method=""),
     ]
     others = [
         answer_of([Fact("force", other.force, "N")]) | {"equilibrium": equilibrium_answer(other.equilibrium)}

@@ -63,20 +63,13 @@ def critical_load(
         NoCriticalLoad: If the path is stable up to `max_force` (the direction pulls or bends rather than pushes), or as far
             as it could be followed.
     """
-    return critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force).path.force
-
-
-def critical_point(
-    model: SoftModel,
-    q_motors: Any,
-    direction: Any,
-    *,
-    frame: str | None = None,
-    gravity: Any = None,
-    max_force: float | None = None,
-) -> CriticalPoint:
-    """Find the critical point of the path under a growing force, with the arguments and errors of `critical_load`."""
     path = ForcePath.of(model, q_motors, direction, frame=frame, gravity=gravity)
+    return critical_point(path, gravity, max_force).path.force
+
+
+def critical_point(path: ForcePath, gravity: Any = None, max_force: float | None = None) -> CriticalPoint:
+    """Find the critical point of a path from zero force, with `gravity`, `max_force` and errors of `critical_load`."""
+    model = path.model
     if model.n_springs == 0:
         raise ParameterError("model", model, "a robot with springs")
     reach = max(model.reach, 1e-9)

@@ -83,7 +83,7 @@ def post_buckling_branches(
             there. At later crossings only those that are found are followed.
     """
     positive_number("largest_step", largest_step, "rad")
-    critical = critical_point(model, q_motors, direction, frame=frame, gravity=gravity, max_force=max_force)
+    critical = critical_point(ForcePath.of(model, q_motors, direction, frame=frame, gravity=gravity), gravity, max_force)
     path = critical.path
     most = BEYOND * path.force if max_force is None else float(max_force)
     with one_blas_thread(model.n_springs):

@@ -26,6 +26,11 @@ class Fact(NamedTuple):
     """What it is, for a person."""
 
 
+def attributes(result: Any, **units: str) -> list[Fact]:
+    """Return facts with the names and values of attributes of a result, which have these units."""
+    return [Fact(name, getattr(result, name), unit) for name, unit in units.items()]
+
+
 def answer_of(facts: Sequence[Fact]) -> dict[str, Any]:
     """Return the values by name, and under `units` the units of those that have one."""
     return {fact.name: plain(fact.value) for fact in facts} | {"units": {fact.name: fact.unit for fact in facts if fact.unit}}

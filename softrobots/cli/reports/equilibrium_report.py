@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
+from softrobots.cli.reports.answers import Fact, aligned, answer_of, attributes, formatted
 from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
@@ -23,32 +23,21 @@ _LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
 def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     """Everything about an equilibrium by the names of its attributes, with `units`."""
     model, limits = equilibrium.model, equilibrium.link_limits
+    motors, springs = model.actuators.units, spring_units(model)
     facts = [
-        Fact("q_motors", equilibrium.q_motors, joined_units(model.actuators.units)),
-        Fact("motor_torques", equilibrium.motor_torques, joined_units(load_units(model.actuators.units))),
-        Fact("q_springs", equilibrium.q_springs, joined_units(spring_units(model))),
-        Fact("spring_torques", equilibrium.spring_torques, joined_units(load_units(spring_units(model)))),
+        *attributes(equilibrium, q_motors=joined_units(motors), motor_torques=joined_units(load_units(motors))),
+        *attributes(equilibrium, q_springs=joined_units(springs), spring_torques=joined_units(load_units(springs))),
         Fact("tip_position", equilibrium.tip_position, "m"),
         Fact("transform_tip_to_world", equilibrium.transform_tip_to_world.homogeneous, "m"),
         Fact("link_moments", equilibrium.link_moments, "N m"),
-        Fact("axial_forces", limits.axial_forces, "N"),
-        Fact("slack_moments", limits.slack_moments, "N m"),
+        *attributes(limits, axial_forces="N", slack_moments="N m"),
         Fact("slack_margins", known_margins(limits.slack_margins), "-"),
         Fact("wrinkling_moments", limits.wrinkling_moments, "N m"),
         Fact("wrinkling_margins", known_margins(limits.wrinkling_margins), "-"),
-        Fact("wrinkled", equilibrium.wrinkled),
-        Fact("saturated", list(equilibrium.saturated)),
-        Fact("muscle_lengths", equilibrium.muscle_lengths, "m"),
-        Fact("muscle_forces", equilibrium.muscle_forces, "N"),
-        Fact("stable", equilibrium.stable),
+        *attributes(equilibrium, wrinkled="", saturated="", muscle_lengths="m", muscle_forces="N", stable=""),
         Fact("stability", equilibrium.stability.kind),
         Fact("growth_rate", equilibrium.stability.growth_rate, "1/s"),
-        Fact("conservative", equilibrium.conservative),
-        Fact("within_limits", equilibrium.within_limits),
-        Fact("residual", equilibrium.residual, "N m"),
-        Fact("tolerance", equilibrium.tolerance, "N m"),
-        Fact("iterations", equilibrium.iterations, "-"),
-        Fact("method", equilibrium.method),
+        *attributes(equilibrium, conservative="", within_limits="", residual="N m", tolerance="N m", iterations="-", method=""),
     ]
     return model_answer(model, equilibrium.load, facts)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.reports.answers import Fact, aligned, answer_of, formatted
+from softrobots.cli.reports.answers import Fact, aligned, answer_of, attributes, formatted
 from softrobots.cli.reports.equilibrium_report import (
     equilibrium_answer,
     equilibrium_lines,
@@ -25,17 +25,9 @@ from softrobots.statics.trajectory import Trajectory
 
 def solution_answer(solution: IkSolution) -> dict[str, Any]:
     """A solution by the names of its attributes, with `units`."""
-    units = joined_units(solution.equilibrium.model.actuators.units)
-    facts = [
-        Fact("q_motors", solution.q_motors, units),
-        Fact("target", solution.target, "m"),
-        Fact("orientation", solution.orientation, "-"),
-        Fact("error", solution.error, "m"),
-        Fact("orientation_error", solution.orientation_error, "rad"),
-        Fact("iterations", solution.iterations, "-"),
-        Fact("alternatives", solution.alternatives, units),
-        Fact("wrist_singularity", solution.wrist_singularity),
-    ]
+    motors = joined_units(solution.equilibrium.model.actuators.units)
+    units = {"q_motors": motors, "target": "m", "orientation": "-", "error": "m", "orientation_error": "rad", "iterations": "-"}
+    facts = attributes(solution, **units, alternatives=motors, wrist_singularity="")
     return {**answer_of(facts), "equilibrium": equilibrium_answer(solution.equilibrium)}
 
 
@@ -54,13 +46,8 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
     """A trajectory by the names of its attributes, one row a waypoint, with `units`."""
     model, equilibria = trajectory.model, trajectory.equilibria
     facts = [
-        Fact("times", trajectory.times, "s"),
-        Fact("targets", trajectory.targets, "m"),
-        Fact("tip_positions", trajectory.tip_positions, "m"),
-        Fact("tip_error", trajectory.tip_error, "m"),
-        Fact("orientations", trajectory.orientations, "-"),
-        Fact("orientation_error", trajectory.orientation_error, "rad"),
-        Fact("q_motors", trajectory.q_motors, joined_units(model.actuators.units)),
+        *attributes(trajectory, times="s", targets="m", tip_positions="m", tip_error="m"),
+        *attributes(trajectory, orientations="-", orientation_error="rad", q_motors=joined_units(model.actuators.units)),
         Fact("motor_torques", _motor_torques(trajectory), joined_units(load_units(model.actuators.units))),
         Fact("q_springs", trajectory.q_springs, joined_units(spring_units(model))),
         Fact("link_moments", trajectory.link_moments, "N m"),

@@ -35,11 +35,13 @@ def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, 
     figure = new_figure((10.0, 4.4))
     left, right = figure.subplots(1, 2)
     for number, (label, branch) in enumerate(branches.items()):
+        if branch[0].model.n_springs == 0:
+            raise ParameterError("branches", branch[0].model, "of a robot with springs")
         forces = [_force(equilibrium) @ unit for equilibrium in branch]
         ways = [1e3 * float(np.linalg.norm(one.tip_position - branch[0].tip_position)) for one in branch]
         style = {"label": label, "markevery": max(len(branch) // 10, 1)} | line_style(number)
         left.plot(forces, ways, **style)
-        right.plot(forces, [_least_stiffness(equilibrium) for equilibrium in branch], **style)
+        right.plot(forces, [one.eigenvalues[0] for one in branch], **style)
     for axes in (left, right):
         if critical is not None:
             force = positive_number("critical", critical, "N")
@@ -130,10 +132,3 @@ def _check(lines: Any, kind: type) -> None:
 
 def _force(equilibrium: Equilibrium) -> FloatArray:
     return np.asarray(equilibrium.load.wrenches.get(equilibrium.model.tip, np.zeros(6))[:3])
-
-
-def _least_stiffness(equilibrium: Equilibrium) -> float:
-    values = np.linalg.eigvals(equilibrium.tangent_stiffness).real
-    if not len(values):
-        raise ParameterError("branches", equilibrium.model, "of a robot with springs")
-    return float(values.min())
