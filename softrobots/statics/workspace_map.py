@@ -161,8 +161,8 @@ class WorkspaceMap:
     def wrinkled(self) -> BoolArray:
         """Whether the target is reached with a link that needs more than its own pressure, shape (..., n_loads).
 
-        In the stored posture, which needs the least pressure. Where links differ in pressure, another posture may still
-        carry the load: `payload` includes that one.
+        Axial forces are neglected, unlike in `Equilibrium.wrinkled`. In the stored posture, which needs the least pressure.
+        Where links differ in pressure, another posture may still carry the load: `payload` includes that one.
         """
         own = np.array([group.pressure for group in self.model.spring_groups])
         springs = self.q_springs.reshape(-1, self.model.n_springs)
