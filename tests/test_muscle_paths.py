@@ -106,6 +106,29 @@ def test_held_lengths_change_the_torsional_stiffness() -> None:
         assert found.strains[:, 2].mean() == pytest.approx(1e-4 / stiffness, rel=1e-6)
 
 
+@pytest.mark.parametrize("stretch", [1.0, 1.1])
+def test_a_push_on_the_tip_of_a_held_arm_buckles_it_in_torsion(stretch: float) -> None:
+    """Muscles carry what the backbone does not: sum T = -F - EA (nu - 1), and GJ + sum T d^2 / nu = 0 at the critical force.
+
+    One section cannot bend while its lengths are held; every further section buckles at the same force.
+    """
+    force = GJ * stretch / DISTANCE**2 - EA * (stretch - 1.0)
+    robot, motors = one("lengths", elastic_sections=1), np.full(3, stretch * LENGTH)
+    assert sr.critical_load(robot, motors, (0, 0, -1), max_force=1500.0) == pytest.approx(force, rel=1e-10)
+    stiff = one("lengths", elastic_sections=3, bending_stiffness=1e3)
+    assert sr.critical_load(stiff, motors, (0, 0, -1), max_force=1500.0) == pytest.approx(force, rel=1e-10)
+
+
+def test_the_branches_of_an_arm_that_buckles_in_torsion_are_mirror_images() -> None:
+    robot, motors, force = one("lengths", elastic_sections=1), np.full(3, LENGTH), GJ / DISTANCE**2
+    straight, *branches = sr.post_buckling_branches(robot, motors, (0, 0, -1), max_force=1.02 * force)
+    assert not straight.stable[-1]
+    assert [bool(branch.stable[-1]) for branch in branches] == [True, True]
+    ends = [branch.equilibria[-1].strains[0, 2] for branch in branches]
+    assert ends[0] == pytest.approx(-ends[1], rel=1e-6)
+    assert abs(ends[0]) > 0.5
+
+
 def test_a_twist_that_the_lengths_do_not_allow_is_refused() -> None:
     """Three rad a section of four: helices of 0.48 m around the backbone do not fit into muscles of 0.45 m."""
     robot = one("lengths", muscle_contraction=0.5)
