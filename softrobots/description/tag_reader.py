@@ -92,12 +92,9 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
             f"{'' if twist is None else f' and the twist {twist!r}'}; "
             f"springs that exist are required: {', '.join(springs) or 'none'}"
         )
-    hinges = element.get("hinges", "1")
+    where, hinges = f"the inflated_link of {' '.join(names)} in {source}", element.get("hinges", "1")
     if hinges not in map(str, range(1, len(names) + 1)) or len(names) % int(hinges):
-        raise DescriptionError(
-            f"the inflated_link of {' '.join(names)} in {source} has hinges = {hinges!r}; a divisor of {len(names)} is required"
-        )
-    where = f"the inflated_link of {' '.join(names)} in {source}"
+        raise DescriptionError(f"{where} has hinges = {hinges!r}; a divisor of {len(names)} is required")
     most = _positive(element, "max_moment", where) if "max_moment" in element.attrib else None
     law = element.get("moment_law", "linear" if most is None else "plateau")
     if law not in MOMENT_LAWS or (law == "plateau") != (most is not None):

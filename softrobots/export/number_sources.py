@@ -124,12 +124,10 @@ def _inflatable_arm(robot: InflatableArm) -> Rules:
     motor = {"lower": "-motor_limit", "upper": "motor_limit", "damping": "0.0"}
     rules = {(f"motor_{i}", name): rule for i in range(1, robot.n_links + 2) for name, rule in motor.items()}
     stiffness = "spring_stiffness" if robot.stiffness is None else "stiffness"
-    pairs: tuple[str, ...] = ("side", "up")
-    share = ""
-    if robot.link_model == "two_hinges":
-        pairs, share = ("a_side", "a_up", "b_up", "b_side"), " / 2"
+    two = robot.link_model == "two_hinges"
+    names, share = (("a_side", "a_up", "b_up", "b_side"), " / 2") if two else (("side", "up"), "")
     for i in range(robot.n_links):
-        bending = {f"spring_{i + 1}_{name}": f"rest_{name.split('_')[-1]}[{i}]{share}" for name in pairs}
+        bending = {f"spring_{i + 1}_{name}": f"rest_{name.split('_')[-1]}[{i}]{share}" for name in names}
         twist = {f"spring_{i + 1}_twist": "0.0"} if robot.torsion else {}
         for joint, rest in (bending | twist).items():
             rules[joint, "stiffness"] = f"{'twist_stiffness' if joint in twist else stiffness}[{i}]"

@@ -149,20 +149,15 @@ class _Parts:
         values = {"radius": (tag.radius, "m"), "pressure": (tag.pressure, "Pa")}
         if tag.max_moment is not None:
             values["max_moment"] = (tag.max_moment, "N m")
-        entry: dict[str, Any] = {
-            key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()
-        }
+        entry: dict[str, Any] = {"springs": list(tag.springs)}
+        if tag.hinges > 1:
+            entry |= {"hinges": tag.hinges} | ({} if tag.twist is None else {"twist": tag.twist})
+        entry |= {key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()}
         if tag.slack_wall:
             entry["moment_law"] = "slack_wall"
         moment = wrinkling_moment(tag.pressure, tag.radius)
         source = self._rules.get((name, "wrinkling_moment"), "pi**2 / 4 * pressure * radius**3")
-        hinges = {} if tag.hinges == 1 else {"hinges": tag.hinges} | ({} if tag.twist is None else {"twist": tag.twist})
-        return {
-            "springs": list(tag.springs),
-            **hinges,
-            **entry,
-            "wrinkling_moment": {"value": moment, "unit": "N m", "source": source},
-        }
+        return entry | {"wrinkling_moment": {"value": moment, "unit": "N m", "source": source}}
 
     def _section(self, tag: SectionTag | LumpedSectionTag) -> dict[str, Any]:
         entry: dict[str, Any] = {"name": tag.name, "segment": tag.segment}

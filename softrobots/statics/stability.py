@@ -68,17 +68,16 @@ class Stability:
         return float(np.sqrt(-self.eigenvalues).real.max(initial=0.0))
 
 
-def is_stable(model: SoftModel, load: Load, state: ElasticState, factors: Any = None) -> bool:
+def is_stable(model: SoftModel, load: Load, state: ElasticState) -> bool:
     """Whether a state in equilibrium is stable, see `stability`.
 
     Args:
         model: The robot.
         load: The load; for one with a potential the masses are not needed.
         state: The state; one whose tangent stiffness is not finite is not stable.
-        factors: An `eigenpy.LDLT` of the size of the tangent stiffness to reuse; None: a new one.
     """
     if load.conservative:
-        return is_positive(model, state.tangent, factors)
+        return is_positive(model, state.tangent)
     return stability(model, state.point, state.q, state.tangent).kind == STABLE
 
 

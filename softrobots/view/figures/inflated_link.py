@@ -192,8 +192,8 @@ def pressure_effects(
     _check_rows(rows)
     pressures = np.linspace(0.0, 1.1 * max(row.pressure for row in rows), 56)
     tube = {"length": length, "radius": radius, "wall_thickness": wall_thickness, "poisson_ratio": poisson_ratio}
-    stiffness = [inflated_beam.stiffness_from_young_modulus(young_modulus, pressure=p, **tube) for p in pressures.tolist()]
-    wrinkling = np.array([inflated_beam.wrinkling_moment(p, radius) for p in pressures.tolist()])
+    stiffness = inflated_beam.stiffness_from_young_modulus(young_modulus, pressure=pressures, **tube)
+    limits = inflated_beam.moment_limits(pressures, radius)
     figure = new_figure((10.0, 4.4))
     left, right = figure.subplots(1, 2)
     measured = np.array([(row.pressure, row.stiffness, row.stiffness_std) for row in rows])
@@ -205,9 +205,9 @@ def pressure_effects(
     left.set(xlabel="gauge pressure [kPa]", ylabel="stiffness [N m/rad]", title="Stiffness hardly depends on pressure")
     left.set_ylim(0.0, 1.08 * float((measured[:, 1] + measured[:, 2]).max()))
     plateaus = np.array([(row.pressure, row.max_moment) for row in rows if row.max_moment is not None]).reshape(-1, 2)
-    right.plot(1e-3 * pressures, 4.0 / math.pi * wrinkling, color=COLOURS[2], ls=LINES[1], label="upper bound, pi p r^3")
+    right.plot(1e-3 * pressures, limits.collapse, color=COLOURS[2], ls=LINES[1], label="upper bound, pi p r^3")
     right.plot(1e-3 * plateaus[:, 0], plateaus[:, 1], label="largest moment, measured", **style)
-    right.plot(1e-3 * pressures, wrinkling, color=COLOURS[1], label="wrinkling moment (3)")
+    right.plot(1e-3 * pressures, limits.wrinkling, color=COLOURS[1], label="wrinkling moment (3)")
     right.set(xlabel="gauge pressure [kPa]", ylabel="moment [N m]", title="What a link can carry does")
     for axes in (left, right):
         axes.set_xlim(0.0, None)
