@@ -72,13 +72,12 @@ def critical_point(path: ForcePath, gravity: Any = None, max_force: float | None
     model = path.model
     if model.n_springs == 0:
         raise ParameterError("model", model, "a robot with springs")
-    reach = max(model.reach, 1e-9)
-    largest = 100.0 * model.stiffest / reach if max_force is None else positive_number("max_force", max_force, "N")
+    largest = 100.0 * model.stiffest / model.reach if max_force is None else positive_number("max_force", max_force, "N")
 
     with one_blas_thread(model.n_springs):
         first_state = balanced_state(model, path.motors, path.constant, model.rest)
         if first_state is not None:
-            scale = float(model.stiffness.min()) / reach
+            scale = float(model.stiffness.min()) / model.reach
             path = replace(path, springs=first_state.q_springs, force=scale)
         origin = path.point(path.springs, 0.0)
         if first_state is None or path.eigenvalues(origin)[0] <= 0.0:

@@ -170,11 +170,9 @@ def checked_orientation(value: Any) -> FloatArray | None:
     given = finite_array("orientation", value, None)
     if given.shape == (3,) and float(np.linalg.norm(given)) > 0.0:
         return np.asarray(given / np.linalg.norm(given))
-    if given.shape == (3, 3) and _is_rotation(given, 1e-13):
-        return given
     if given.shape == (3, 3) and _is_rotation(given):
         left, _, right = np.linalg.svd(given)
-        return np.asarray(left @ right)
+        return given if _is_rotation(given, 1e-13) else np.asarray(left @ right)
     raise ParameterError(
         "orientation", value, "a rotation matrix, shape (3, 3), or a direction different from zero, shape (3,)"
     )

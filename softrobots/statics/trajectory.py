@@ -187,9 +187,10 @@ def follow_trajectory(
     else:
         moments = increasing("times", finite_array("times", times, (len(points),), "s"), "s")
     inner = "newton" if method == "newton" else "fixed_point"
-    options = {"wrench": dict(load.wrenches), "gravity": gravity, "method": inner, "tolerance": tolerance}
+    options: dict[str, Any] = {"wrench": dict(load.wrenches), "gravity": gravity, "method": inner, "tolerance": tolerance}
+    options["orientation"] = goals[0].rotation
     try:
-        begin = solve_ik(model, points[0], orientation=goals[0].rotation, q_motors0=q_motors0, elbow=elbow, **options)
+        begin = solve_ik(model, points[0], q_motors0=q_motors0, elbow=elbow, **options)
     except TargetUnreachable as error:
         raise _named(error, 1, len(points)) from error
 
@@ -200,8 +201,7 @@ def follow_trajectory(
             else _exact_steps(LoadedTip(model, goals[0], load, inner), goals, first, tolerance, allow_jumps)
         )
         bar = with_progress(steps, progress, label=f"waypoints ({method})", unit="wp", total=len(points) - 1)
-        equilibria = (first, *bar)
-        return Trajectory(read_only(moments), read_only(points), equilibria, method, orientations)
+        return Trajectory(read_only(moments), read_only(points), (first, *bar), method, orientations)
 
     try:
         return follow_from(begin.equilibrium)
@@ -210,8 +210,7 @@ def follow_trajectory(
             raise
         for motors in begin.alternatives:  # the same tip, another shoulder or elbow: perhaps no limit blocks the path
             with contextlib.suppress(TargetUnreachable):
-                first = solve_ik(model, points[0], orientation=goals[0].rotation, q_motors0=motors, starts=1, **options)
-                return follow_from(first.equilibrium)
+                return follow_from(solve_ik(model, points[0], q_motors0=motors, starts=1, **options).equilibrium)
         raise
 
 

@@ -178,8 +178,7 @@ SOLVERS: dict[str, Callable[..., list[Explanation]]] = {"newton": newton, "alter
 
 
 def _search(problem: MeasuredTorques, force: FloatArray, state: ElasticState, most: int) -> Explanation:
-    scales = {"reach": problem.model.reach, "tolerance": problem.tolerance}
-    return Explanation(*search_force(problem, state, most, **scales, start=force))
+    return Explanation(*search_force(problem, state, most, reach=problem.model.reach, tolerance=problem.tolerance, start=force))
 
 
 def _search_from(problem: MeasuredTorques, force: FloatArray, near: ElasticState, most: int) -> Explanation | None:
