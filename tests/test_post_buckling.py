@@ -366,6 +366,14 @@ def test_a_path_does_not_turn_back_at_a_knee(largest_step: float) -> None:
         assert stiffness[1] * second == pytest.approx(115.0 * LEVER * np.sin(first + second), rel=1e-8)
 
 
+def test_two_knees_that_are_nearly_one_are_passed_one_after_the_other() -> None:
+    """When the second link comes onto its plateau, the first is 5e-5 rad before its own."""
+    model = sr.load_model(sr.InflatableArm(stiffness=(338.4153290, 187.1467356), max_moment=(20.0559514, 13.5996616)))
+    found = by_label(sr.post_buckling_branches(model, (0, 0, 0), PUSH, max_force=198.8))
+    assert len(found) == 9
+    assert {branch.ended for branch in found.values()} == {"largest force"}
+
+
 def test_branches_are_found_before_a_plateau_that_begins_early() -> None:
     """At 0.017 rad; they end in balance."""
     model = sr.load_model(sr.InflatableArm(max_moment=3.0))
