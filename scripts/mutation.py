@@ -141,7 +141,7 @@ def test_changes(folder: Path, parts: list[Part], processes: int, *, again: bool
     write_text(copy / "setup.cfg", settings(parts), overwrite=True)
     with log.open("a", encoding="utf-8") as output:
         if not (copy / ".venv").is_dir():
-            make_environment(copy, sys.executable, ["-e", ".[test,helix,fast]", MUTMUT], output)
+            make_environment(copy, sys.executable, ["-e", ".[test,fast]", MUTMUT], output)
         (copy / "mutants" / "mutmut-stats.json").unlink(missing_ok=True)  # the tests may call other functions today
         for module in (copy / "mutants" / "softrobots" / file for part in parts for file in part.modules):
             if module.is_file() and "__mutmut_orig" not in module.read_text(encoding="utf-8"):

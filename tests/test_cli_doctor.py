@@ -95,21 +95,21 @@ def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: 
 
 def test_doctor_tells_what_is_missing_and_what_to_type(told, monkeypatch: pytest.MonkeyPatch) -> None:
     """A missing package of an extra is no trouble; a required one that is missing or too old is."""
-    versions = {"meshcat": None, "numpy": "1.26.4", "mujoco": None, "scipy": "1.2"}
+    versions = {"meshcat": None, "numpy": "1.26.4", "mujoco": None, "pillow": "1.2"}
     monkeypatch.setattr(packages, "installed_version", lambda name: versions.get(name, "9999"))
     status, out, _ = told("doctor")
     assert status == 1
     assert "missing: pip install 'meshcat>=0.3.2'" in out
     assert "1.26.4 is older than 2.2: pip install -U 'numpy>=2.2'" in out
     assert "missing: pip install 'softrobots[interop]'" in out
-    assert "1.2 is older than 1.13: pip install -U 'softrobots[helix]'" in out
+    assert "1.2 is older than 11: pip install -U 'softrobots[pictures]'" in out
     wrong = out[out.index("\nwrong:\n") :]
     assert "numpy" in wrong
     assert "meshcat" in wrong
     assert "mujoco" not in wrong
-    assert "scipy" not in wrong
+    assert "pillow" not in wrong
     assert re.search(r"^  interop +lacks mujoco +simulators", out, re.M)
-    assert re.search(r"^  helix +lacks scipy +actuators", out, re.M)
+    assert re.search(r"^  pictures +lacks pillow +", out, re.M)
     assert re.search(r"^  plot +complete +plots", out, re.M)
 
 

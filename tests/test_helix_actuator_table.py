@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import sys
 from dataclasses import FrozenInstanceError
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from softrobots import helix
-from softrobots.core.errors import FileFormatError, MissingDependency, OutputExists, ParameterError, StraightTube
+from softrobots.core.errors import FileFormatError, OutputExists, ParameterError, StraightTube
 from softrobots.helix import ActuatorTable
 from tests.support.laws import law
 from tests.support.tables import each_row
@@ -264,10 +263,3 @@ def test_bad_paths_and_interpolations_are_refused(tmp_path: Path) -> None:
 def test_a_straight_tube_has_no_helix() -> None:
     with pytest.raises(StraightTube):
         ActuatorTable(PRESSURES, CONTRACTING).shape_at(0.0, 0.0, 0.0331)
-
-
-def test_only_the_cubic_needs_scipy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "scipy.interpolate", None)
-    assert ActuatorTable(PRESSURES, LENGTHENING).contraction_at(10e3) == 0.58
-    with pytest.raises(MissingDependency, match=r"softrobots\[helix\]"):
-        ActuatorTable(PRESSURES, LENGTHENING, "pchip")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import sys
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError
 from typing import Any
@@ -18,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from softrobots import helix
-from softrobots.core.errors import MissingDependency, ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.helix import bent_tube
 from tests.support.laws import law
 from tests.support.tables import each_row
@@ -421,9 +420,3 @@ def test_sizes_at_the_ends_of_the_range_are_computed(diameter: float, length: fl
     tube = bent_tube(0.66, FIVE, diameter, length)
     assert np.isfinite(tube.poses).all()
     assert tube.arc_length[-1] == pytest.approx(float(helix.centre_length(0.66, FIVE, length)), rel=1e-12)
-
-
-def test_without_scipy_the_error_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
-    with pytest.raises(MissingDependency, match=r"softrobots\[helix\]"):
-        bent_tube(0.66, FIVE, D, LENGTH)

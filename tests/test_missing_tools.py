@@ -20,7 +20,7 @@ import pytest
 import softrobots as sr
 
 def test_imports(): import mujoco.nothing_of_this_name
-def test_is_told(): raise sr.MissingDependency("scipy", "helix")
+def test_is_told(): raise sr.MissingDependency("mujoco", "interop")
 def test_is_told_by_another_error():
     try:
         import viser.nothing_of_this_name
@@ -33,7 +33,7 @@ def test_wrong(): assert 1 == 0
 def test_standard_library(): import json.nothing_of_this_name
 def test_right():
     with pytest.raises(sr.MissingDependency):
-        raise sr.MissingDependency("scipy", "helix")
+        raise sr.MissingDependency("mujoco", "interop")
 """,
 }
 

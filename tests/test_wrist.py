@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy import optimize
 
 import softrobots as sr
 from softrobots.cli.main import main
@@ -211,7 +212,6 @@ def test_a_stiff_arm_has_the_solutions_of_the_closed_form() -> None:
 
 def test_scipy_finds_no_nearer_motors(wristed: sr.SoftModel) -> None:
     """SLSQP from random starts: least change of the motors at given pose and balance of the springs, all ten joints unknown."""
-    optimize = pytest.importorskip("scipy.optimize")
     random = np.random.default_rng(2)
     low, high = wristed.motor_limits.T
     for motors, load, pose in poses(wristed, 2, 21, largest=10.0):

@@ -27,7 +27,7 @@ from softrobots.core.checks import (
     read_only,
 )
 from softrobots.core.csv_table import read_table
-from softrobots.core.errors import FileFormatError, MissingDependency, ParameterError
+from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path, csv_text, write_text
 from softrobots.helix.shapes import HelixShape, checked_contraction, forward
 
@@ -45,7 +45,6 @@ class ActuatorTable:
     Raises:
         ParameterError: If there are fewer than two rows, a number is not finite, the pressures do not increase, a contraction
             is not in (0, 1], the contractions neither rise throughout nor fall throughout, or there is no such interpolation.
-        MissingDependency: For "pchip", if SciPy is not installed.
     """
 
     pressure: FloatArray
@@ -91,7 +90,6 @@ class ActuatorTable:
             FileFormatError: If the file cannot be read, lacks a column or has it twice, has fewer than two rows, or (naming the
                 line) has a cell that is not a finite number, more or fewer cells than the first line, a pressure not above the
                 previous one, or a contraction outside (0, 1] or not monotone.
-            MissingDependency: For "pchip", if SciPy is not installed.
         """
         file, kind = as_path("path", path), choice("interpolation", interpolation, INTERPOLATIONS)
         table = read_table(file, _COLUMNS)
@@ -216,8 +214,8 @@ class ActuatorTable:
     @cached_property
     def _cubic(self) -> Any:
         """SciPy's monotone cubic interpolation of the rows."""
-        with MissingDependency.of_imports("scipy", "helix"):
-            from scipy.interpolate import PchipInterpolator
+        from scipy.interpolate import PchipInterpolator  # here, because importing it takes longer than all of this package
+
         return PchipInterpolator(self.pressure, self.contraction)
 
 

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, positive_number, read_only
-from softrobots.core.errors import MissingDependency, ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.helix.paths import actuator_curvature_torsion
 from softrobots.helix.profiles import Profile, checked_profile, sample_positions
 from softrobots.helix.shapes import PATHS, turning_sign
@@ -125,7 +125,6 @@ def bent_tube(
         ParameterError: If an argument is out of range; a function raises or does not return one number in range (the error
             names the position); a table does not extend from 0 to the length; the tube turns by more than 1e5 rad; or the
             integrator does not converge, for a function that is not smooth between breakpoints.
-        MissingDependency: If SciPy is not installed.
     """
     diameter, length = positive_number("diameter", diameter, "m"), positive_number("length", length, "m")
     sign = turning_sign(handedness)
@@ -228,8 +227,8 @@ def _integrate(
     parts: list[tuple[_Piece, FloatArray]], *, scale: float, accuracy: float, longest: float, budget: int
 ) -> FloatArray:
     """States at the samples in each piece, shape (n, 8)."""
-    with MissingDependency.of_imports("scipy", "helix"):
-        from scipy.integrate import solve_ivp
+    from scipy.integrate import solve_ivp  # here, because importing it takes longer than all of this package
+
     starts = [piece.start for piece, _ in parts[1:]]
     evaluations = 0
 

@@ -1,26 +1,18 @@
-"""Equilibria by SciPy's general solver over Pinocchio, with the exact derivative. Needs SciPy (extra `helix`)."""
+"""Equilibria by SciPy's general solver over Pinocchio, with the exact derivative."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from scipy import optimize
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import MissingDependency
 from studies.benchmark.pinocchio_solvers import TOLERANCE, PinocchioArm, Solver, residual_and_slope
 
 
 def scipy_root() -> Solver:
-    """Return `scipy.optimize.root` (Powell's hybrid method, MINPACK) from relaxed springs, weightless.
-
-    Raises:
-        MissingDependency: If SciPy is not installed.
-    """
-    try:
-        from scipy import optimize
-    except ImportError as error:
-        raise MissingDependency("scipy", "helix") from error
+    """Return `scipy.optimize.root` (Powell's hybrid method, MINPACK) from relaxed springs, weightless."""
 
     def solve(arm: PinocchioArm, q_motors: FloatArray, force: FloatArray) -> FloatArray:
         q = arm.start(q_motors)

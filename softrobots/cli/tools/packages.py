@@ -13,7 +13,6 @@ from softrobots.core.errors import SoftRobotsError
 EXTRAS = {
     "plot": "plots: --plot, the figures of scripts",
     "fast": "compiled solvers by numba",
-    "helix": "actuators that vary along the tube",
     "viser": "sliders in the browser: softrobots view ROBOT --sliders",
     "pictures": "pictures of the browser view",
     "robots": "the UR5 and other third-party robots",
