@@ -219,8 +219,9 @@ def grasping() -> list[Row]:
     note = "our model, not the paper's; 10 kPa, D = 3.31 cm assumed. The paper's forces are not printed, and rise up to 4 mm"
     for depth, force in zip(test.deflections, found.force[-1], strict=True):
         rows.append(own("Figure 9", f"force, deflected by {1e3 * depth:g} mm", float(force), "N", note))
-    note = "the range of its sensor: the paper measures less than this"
-    rows.append(own("section III-C", "largest force of our model at 10 kPa", float(found.force.max()), "N", note, SENSOR_RANGE))
+    note = "our model, not the paper's, whose forces are not printed; within the range of its sensor"
+    rows.append(own("section III-C", "largest force of our model at 10 kPa", float(found.force.max()), "N", note))
+    rows.append(absent(MEASURED, "section III-C", "range of the sensor", SENSOR_RANGE, "N", "the forces are not published"))
     note = "resolution of the sensor; the forces are not published"
     rows.append(absent(MEASURED, "section III-C", "smallest difference of forces", SENSOR_RESOLUTION, "mN", note))
     raw = "pressures and forces of the test are not published"
