@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
     result.add_argument("--json", action="store_true", help="print the numbers as one JSON object instead of tables")
     help_text = "new or empty folder for agreement.json, agreement.md and agreement.png (none)"
     result.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
-    help_text = "write its tables of docs/agreement.md, docs/validation/agreement.json and docs/images/agreement.png of this checkout"
+    help_text = "write tables of docs/agreement.md, docs/validation/agreement.json and the picture of a checkout (this one)"
     result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
     return result
 

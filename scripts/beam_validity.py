@@ -50,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
     result.add_argument("--json", action="store_true", help="print the numbers as one JSON object instead of tables")
     help_text = f"new or empty folder for beam_validity.json, beam_validity.md and {' and '.join(PICTURES)} (none)"
     result.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
-    help_text = "write its tables of docs/agreement.md, docs/validation/beam_validity.json and the pictures of a checkout (this one)"
+    help_text = "write tables into docs/agreement.md, docs/validation/beam_validity.json and pictures, of a checkout (this)"
     result.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
     return result
 
