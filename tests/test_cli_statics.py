@@ -280,6 +280,18 @@ def test_branches_are_printed_saved_and_drawn(answer, told, tool, tmp_path: Path
     assert len(re.findall(r"114|303 to 378.75", out)) == 8
 
 
+def test_branches_that_fall_on_the_way_say_how_far(told, tmp_path: Path) -> None:
+    """Past a plateau the force falls below the one where the branch starts and where it ends."""
+    file = tmp_path / "b.npz"
+    words = ("--set", "link_lengths=[0.6]", "max_moment=21.76", "--direction", "-1", "0", "0", "--largest-step", "0.2")
+    status, out, _ = told("branches", "inflatable_arm", *words, "-o", str(file))
+    assert status == 0
+    bent = sr.load_result(file)[1]
+    least, most = min(one.load.wrenches["tip"][:3] @ (-1, 0, 0) for one in bent.equilibria), max(bent.forces)
+    assert least < 0.9 * min(bent.forces[0], bent.forces[-1])
+    assert re.search(rf"^{re.escape(bent.label)} +{bent.forces[0]:.6g} +{least:.6g} to {most:.6g} ", out, re.M)
+
+
 def test_a_pull_has_no_branches(told) -> None:
     status, out, _ = told("branches", "inflatable_arm", "--direction", "1", "0", "0", "--max-force", "50")
     assert (status, out) == (1, "no branches: the equilibrium stays stable up to 50 N along [1.0, 0.0, 0.0]\n")

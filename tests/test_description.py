@@ -351,6 +351,11 @@ def test_malformed_tags_are_refused(text: str, message: str) -> None:
         ({"link_lengths": "0.6"}, "link_lengths"),
         ({"hinge_offset": 0.6}, "hinge_offset"),
         ({"hinge_offset": 0.0}, "hinge_offset"),
+        ({"hinge_offset": 0.05, "link_model": "two_hinges"}, "hinge_offset"),  # these have no effect
+        ({"shear_modulus": 1e7}, "shear_modulus"),
+        ({"shear_modulus": 1e7, "stiffness": 150.0}, "shear_modulus"),
+        ({"wrist_mass": 0.4}, "wrist_mass"),
+        ({"wrist_limits": 1.0}, "wrist_limits"),
         ({"hinge_offset": (0.03, 0.03, 0.03)}, "hinge_offset"),
         ({"radius": 0.0}, "radius"),
         ({"radius": None}, "radius"),

@@ -182,6 +182,12 @@ def test_yourdfpy_finds_every_joint_by_the_file_alone(tmp_path: Path) -> None:
             assert muscle["arms"].keys() <= set(tree.joint_map)
 
 
+def test_a_foreign_link_with_one_hinge_keeps_its_twist() -> None:
+    text = ROBOTS["arm of two hinges that twist"].urdf().replace('hinges="2"', 'hinges="1"')
+    links = read(to_json(sr.load_model(text)))["inflated_links"]
+    assert [(link.get("hinges", 1), link["twist"]) for link in links] == [(1, "spring_1_twist"), (1, "spring_2_twist")]
+
+
 def test_inflated_links() -> None:
     robot = ROBOTS["odd arm"]
     links = read(to_json(sr.load_model(robot), robot))["inflated_links"]

@@ -503,6 +503,8 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("equilibrium", {"residual": np.array([np.nan])}, "finite"),
         ("load_estimate", {"estimation": np.array("magic")}, "estimation must be one of"),
         ("characterisation", {"stiffness": np.array(-1.0)}, "not those of a fit"),
+        ("characterisation", {"stiffness": None}, "has no 'stiffness'"),
+        ("characterisation", {"wrinkling_moment": None}, "has no 'wrinkling_moment'"),
         ("characterisation", {"stiffness_interval": np.array([300.0, 400.0])}, "not those of a fit"),
         ("characterisation", {"n_saturated": np.array(0)}, "not those of a fit"),
         ("characterisation", {"angle_offset": np.array(np.nan)}, "finite"),

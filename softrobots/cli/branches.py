@@ -83,11 +83,12 @@ def _answer(found: Sequence[EquilibriumBranch]) -> dict[str, Any]:
 
 def _lines(found: Sequence[EquilibriumBranch]) -> list[str]:
     """A table of the branches."""
-    head = ("branch", "force [N]", "stable points", "tip at the end [m]", "ends at")
+    head = ("branch", "starts at [N]", "forces [N]", "stable points", "tip at the end [m]", "ends at")
     rows = [
         (
             branch.label,
-            f"{branch.forces[0]:.6g} to {branch.forces[-1]:.6g}",
+            formatted(branch.forces[0]),
+            f"{branch.forces.min():.6g} to {branch.forces.max():.6g}",
             "neutral" if branch.neutral.all() else f"{np.count_nonzero(branch.stable)} of {len(branch.stable)}",
             formatted(branch.equilibria[-1].tip_position.round(6)),
             branch.ended,

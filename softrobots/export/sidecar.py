@@ -151,7 +151,9 @@ class _Parts:
             values["max_moment"] = (tag.max_moment, "N m")
         entry: dict[str, Any] = {"springs": list(tag.springs)}
         if tag.hinges > 1:
-            entry |= {"hinges": tag.hinges} | ({} if tag.twist is None else {"twist": tag.twist})
+            entry["hinges"] = tag.hinges
+        if tag.twist is not None:
+            entry["twist"] = tag.twist
         entry |= {key: self._number(name, key, *value, "softrobots:inflated_link") for key, value in values.items()}
         if tag.slack_wall:
             entry["moment_law"] = "slack_wall"

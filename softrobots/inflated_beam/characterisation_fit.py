@@ -199,10 +199,10 @@ def _is_plateau(theta: FloatArray, tau: FloatArray, rising: FittedLine) -> bool:
 
 def _unpack(fields: Mapping[str, Any]) -> Characterisation:
     """Result of named arrays; one that no fit has is refused."""
-    names = ["stiffness", "stiffness_std", "angle_offset", "angle_offset_std", "max_moment", "mean_moment_above_wrinkling"]
-    names.append("wrinkling_moment")
+    names = ["stiffness", "stiffness_std", "angle_offset", "angle_offset_std", "wrinkling_moment"]
     low, high = finite_array("stiffness_interval", fields["stiffness_interval"], (2,), "N m/rad").tolist()
-    numbers = {name: finite_number(name, fields[name]) if name in fields else None for name in names}
+    names += [name for name in ("max_moment", "mean_moment_above_wrinkling") if name in fields]
+    numbers = dict.fromkeys(("max_moment", "mean_moment_above_wrinkling")) | {n: finite_number(n, fields[n]) for n in names}
     n_linear, n_saturated = (counts(fields, name)[0] for name in ("n_linear", "n_saturated"))
     found = Characterisation(**numbers, stiffness_interval=(low, high), n_linear=n_linear, n_saturated=n_saturated)  # type: ignore[arg-type]
     positive = min(found.stiffness, found.wrinkling_moment) > 0.0 and min(found.stiffness_std, found.angle_offset_std) >= 0.0

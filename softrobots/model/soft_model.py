@@ -134,7 +134,10 @@ class SoftModel:
 
     @property
     def joint_roles(self) -> dict[str, str]:
-        """By movable joint of the file: "motor", "spring" of the file, "given spring" of the caller, "section" or "locked"."""
+        """By movable joint of the file: "motor", "spring" of the file, "given spring" of the caller, "section" or "locked".
+
+        An inflated link that lost a spring is none of `spring_groups` any more: it has no moment of its own, and no limits.
+        """
         return self.structure.joint_roles
 
     @property

@@ -214,7 +214,7 @@ def spring_groups(
     """Group the springs of each inflated link.
 
     Args:
-        links: The inflated links. One whose springs the caller has left out altogether does not count.
+        links: The inflated links. One that lacks a spring, because the caller has taken it away, has no group.
         springs: The springs of the elastic coordinates.
         joints: The spring joints of the robot.
         segments: Number of the segment by joint and section coordinate, for those of sections.
@@ -243,11 +243,11 @@ def _check_springs(link: InflatedLinkTag, springs: Springs, joints: Collection[s
     law = "moment_law slack_wall" if link.max_moment is None else f"max_moment {link.max_moment} N m"
     subject = f"the inflated_link of {' '.join(link.springs)} has {law}"
     names = [name for name in springs.names if name in joints]
-    if not all(name in names for name in link.springs):
-        raise DescriptionError(
-            f"{subject}; its springs must be joints with a spring each, not constrained by muscle lengths; available: "
-            f"{', '.join(names) or 'none'}"
-        )
+    for name in link.springs:
+        if name not in names:
+            what = f"{name} is {'constrained by muscle lengths' if name in joints else 'none'}"
+            available = ", ".join(names) or "none"
+            raise DescriptionError(f"{subject}; its springs must be joints with a spring each; {what}; available: {available}")
     stiffness = [float(springs.stiffness[springs.names.index(name)]) for name in link.springs]
     if len(set(stiffness)) != 1:
         raise DescriptionError(

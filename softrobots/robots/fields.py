@@ -123,6 +123,14 @@ def check_parameters(robot: Any, parts: str = "parts", lengths: str | None = Non
     return count
 
 
+def refuse_given(robot: Any, names: Sequence[str], requirement: str) -> None:
+    """Refuse parameters that have no effect in a robot whose fields are checked: those that differ from their default."""
+    for field in dataclasses.fields(robot):
+        value = getattr(robot, field.name)
+        if field.name in names and np.any(np.asarray(value) != np.asarray(field.default)):
+            raise ParameterError(field.name, value, f"left out {requirement}; it has no effect there")
+
+
 def numbers(name: str, value: Any, count: int | None, unit: str, parts: str = "parts") -> tuple[float, ...]:
     """Return numbers as a tuple of `count`, a single one repeated, of any length without `count`; or raise ParameterError."""
     if isinstance(value, str | bytes):

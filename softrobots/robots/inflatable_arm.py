@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, numbers, parameter, per_part
+from softrobots.robots.fields import PerPart, numbers, parameter, per_part, refuse_given
 from softrobots.robots.inflated_links import InflatedLinks
 
 
@@ -54,11 +54,13 @@ class InflatableArm(InflatedLinks):
         at_least=0.0,
         form="special",
     )
-    wrist_mass: float = parameter(0.3, "kg", "Mass of the wrist, spread evenly over its lengths", "assumed", above=0.0)
+    wrist_mass: float = parameter(
+        0.3, "kg", "Mass of the wrist, spread evenly over its lengths; of no effect without", "assumed", above=0.0
+    )
     wrist_limits: Sequence[float] = parameter(
         (2.0, 2.0, math.pi),
         "rad",
-        "Pitch, yaw and roll of the wrist turn between minus and plus these angles",
+        "Pitch, yaw and roll of the wrist turn between minus and plus these angles; of no effect without",
         "assumed",
         above=0.0,
         form="special",
@@ -85,6 +87,8 @@ class InflatableArm(InflatedLinks):
         if min(limits) <= 0.0:
             raise ParameterError("wrist_limits", self.wrist_limits, "above 0 [rad]")
         object.__setattr__(self, "wrist_limits", limits)
+        if self.wrist is None:
+            refuse_given(self, ("wrist_mass", "wrist_limits"), "without a wrist")
         if self.payload is not None:
             object.__setattr__(self, "payload", self._checked_payload(self.payload))
 

@@ -13,7 +13,7 @@ from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import MOMENT_LAWS
-from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, parameter, per_part
+from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, parameter, per_part, refuse_given
 
 LINK_MODELS = ("paper", "two_hinges")
 """Where an inflated link bends."""
@@ -83,7 +83,7 @@ class InflatedLinks(XacroRobot):
     shear_modulus: PerPart | None = per_part(
         None,
         "Pa",
-        "Shear modulus of the wall, for young_modulus or link_model = two_hinges",
+        "Shear modulus of the wall, for young_modulus or link_model = two_hinges, else of no effect",
         "assumed, without it: that of an isotropic wall with a Poisson ratio of 0.3, young_modulus / 2.6; a weave has its own",
         above=0.0,
     )
@@ -271,6 +271,7 @@ class InflatedLinks(XacroRobot):
             requirement = f"left out where stiffness = {self.stiffness} N m/rad is given, or stiffness left out"
             raise ParameterError("young_modulus", self.young_modulus, requirement)
         if self.link_model == "two_hinges":
+            refuse_given(self, ("hinge_offset",), "for link_model = 'two_hinges'")
             _ = self.hinges
             return
         if self.torsion:
@@ -279,6 +280,8 @@ class InflatedLinks(XacroRobot):
         for offset, length in zip(self._each("hinge_offset"), lengths, strict=True):
             if offset >= length:
                 raise ParameterError("hinge_offset", self.hinge_offset, f"below the link lengths {lengths} m")
+        if self.young_modulus is None:
+            refuse_given(self, ("shear_modulus",), "for link_model = 'paper' without young_modulus")
         if self.stiffness is None and self.young_modulus is None:
             self._tell_assumed_stiffness()
 
