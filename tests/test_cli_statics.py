@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,9 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
+from softrobots.cli.reports.equilibrium_report import stability_words
 from softrobots.core.errors import NeutralEquilibrium
+from softrobots.statics.stability import Stability
 from softrobots.view.figures.loaded_robot import loaded_shape
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.tables import each_row
@@ -192,6 +195,14 @@ def test_solve_says_that_a_neutral_equilibrium_has_no_compliance(told: Told, mon
     status, out, _ = told("solve", "inflatable_arm", "--compliance", "--json")
     assert (status, json.loads(out)["compliance"]) == (0, None)
     assert "compliance  none: the tangent stiffness is singular" in told("solve", "inflatable_arm", "--compliance")[1]
+
+
+def test_solve_says_what_the_kinds_of_stability_mean(told: Told) -> None:
+    """Any torque along a straight round arm is flutter without damping; `unknown` has two causes."""
+    _, out, _ = told("solve", "inflatable_arm_two_hinges", "--moment", "0.001", "0", "0")
+    assert re.search(r"^stable +NO: flutter grows by 9\.\d+e-05 1/s, which damping may suppress$", out, re.M)
+    unknown: Any = SimpleNamespace(stability=Stability("unknown", np.zeros(0)))
+    assert "a moment acts without masses, or a section is out of range" in stability_words(unknown)
 
 
 def test_solve_tells_what_is_unstable_wrinkled_or_beyond_limits(told: Told) -> None:

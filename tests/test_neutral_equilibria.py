@@ -79,6 +79,20 @@ def test_a_bow_that_can_turn_is_neutral_and_every_place_of_its_ring_solves(case:
         assert np.abs(beside.q_springs - there).max() < 0.05
 
 
+@pytest.mark.parametrize("function", [sr.compliance, sr.elastostatic_jacobian])
+def test_a_neutral_equilibrium_has_no_derivatives(function: Any) -> None:
+    """A ring, whose tangent has an eigenvalue of rounding, never exactly zero; and the arm at its own buckling load."""
+    model = rod("two segments")
+    arm = sr.load_model(sr.InflatableArm())
+    push = sr.critical_load(arm, (0, 0, 0), (-1, 0, 0))
+    for robot, found in ((model, ring("two segments")), (arm, sr.solve_equilibrium(arm, (0, 0, 0), (-push, 0, 0)))):
+        assert found.stability.kind == "neutral"
+        with pytest.raises(sr.NeutralEquilibrium, match="singular"):
+            function(robot, found)
+    held = sr.solve_equilibrium(model, np.zeros(model.n_motors), (0.1, 0, 0), gravity=(0, 0, -9.81))
+    assert np.abs(function(model, held)).max() < 100.0  # [m/N]; about 1 / (0.1 N) where a bow can nearly turn
+
+
 def test_what_cannot_turn_is_not_neutral() -> None:
     """The same arm with a side force; and the inflatable arm, whose universal joints are not round."""
     model = rod("two segments")
@@ -106,9 +120,12 @@ def test_the_compiled_solvers_name_the_ring(rng: np.random.Generator) -> None:
     motors, start = np.zeros(model.n_motors), ring("two segments").q_springs
     for angle in (None, *rng.uniform(-np.pi, np.pi, 2)):
         options = {} if angle is None else {"q_springs0": turned(start, angle)}
-        with pytest.raises(sr.EquilibriumNotFound, match="in balance, but neutral") as caught:
-            solver.equilibrium(motors, gravity=(0, 0, -9.81), **options)
+        found = solver.equilibrium(motors, gravity=(0, 0, -9.81), **options)
+        assert (found.status, found.stable) == (Status.NEUTRAL, False)
+        assert abs(found.tip_position[2] - ring("two segments").tip_position[2]) < 1e-8
         if angle is not None:
-            assert np.abs(caught.value.best.q_springs - turned(start, angle)).max() < 1e-8
+            assert np.abs(found.q_springs - turned(start, angle)).max() < 1e-8
+    held = solver.equilibrium(motors, (0.1, 0, 0), gravity=(0, 0, -9.81))
+    assert (held.status, held.stable) == (Status.CERTIFIED, True)
     batch = solver.equilibria(motors, [(0, 0, 0), (0.1, 0, 0)], gravity=(0, 0, -9.81))
     assert batch.status.tolist() == [Status.NEUTRAL, Status.CERTIFIED]

@@ -417,7 +417,7 @@ def test_a_branch_tells_why_it_ends(arm: sr.SoftModel, monkeypatch: pytest.Monke
 
 
 def test_more_than_two_modes_at_once_are_refused(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(post_buckling, "NEUTRAL", 2.0)
+    monkeypatch.setattr(post_buckling, "ZERO_EIGENVALUE", 2.0)
     with pytest.raises(sr.NeutralEquilibrium, match=r"4 modes buckle at 114\.066 N"):
         sr.post_buckling_branches(arm, (0, 0, 0), PUSH)
 

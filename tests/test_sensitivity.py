@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.statics.sensitivity import motor_torque_slope, tip_columns
+from softrobots.statics.sensitivity import inverse_stiffness, motor_torque_slope, tip_columns
 from tests.support.oracles import central_difference
 
 # Step 1e-5 on equilibria solved to 1e-13: truncation 1e-10, rounding 1e-13 * 20 / 172 / 1e-5 = 1e-9; 1e-6 is required.
@@ -73,7 +76,7 @@ def test_motor_torques_by_tip_force_match_solved_equilibria(arm: sr.SoftModel, r
             force,
             1e-3,
         )
-        slope = motor_torque_slope(*columns, found.tangent_stiffness, found.coupling)
+        slope = motor_torque_slope(arm, *columns, found.tangent_stiffness, found.coupling)
         assert np.abs(slope - expected).max() < RELATIVE * np.abs(expected).max()
 
 
@@ -103,3 +106,22 @@ def test_a_neutral_equilibrium_has_no_derivative() -> None:
     for function in (sr.compliance, sr.elastostatic_jacobian):
         with pytest.raises(sr.NeutralEquilibrium, match="neutral"):
             function(model, balanced)
+
+
+@pytest.mark.parametrize("unsymmetric", [0.0, 0.3])
+def test_the_smallest_eigenvalue_decides_in_all_units(unsymmetric: float, rng: np.random.Generator) -> None:
+    """1e-9 of the springs' own stiffness, as for stability; also two at once, and springs from 1 to 1e6 N m/rad."""
+    model: Any = SimpleNamespace(stiffness=np.array([1.0, 1e2, 1e4, 1e6]))
+    turn, units = np.linalg.qr(rng.normal(size=(4, 4)))[0], np.sqrt(np.outer(model.stiffness, model.stiffness))
+    for least in ((2e-9,), (1.1e-9, -1.1e-9), (-2e-9,), (9e-10,), (-9e-10, 2e-9), (0.0,)):
+        relative = np.diag([*least, 0.5, 0.7, 1.2][:4])
+        relative[2, 3] = unsymmetric
+        tangent = units * (turn @ relative @ turn.T)
+        if min(map(abs, least)) > 1e-9:
+            # Eigenvalues of 1e-9 lose 1e-16 / 1e-9 to rounding.
+            assert np.allclose(
+                inverse_stiffness(model, tangent) * units, turn @ np.linalg.inv(relative) @ turn.T, rtol=1e-5, atol=1e3
+            )
+        else:
+            with pytest.raises(sr.NeutralEquilibrium, match="singular"):
+                inverse_stiffness(model, tangent)

@@ -10,7 +10,7 @@ from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import NoCriticalLoad, ParameterError
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastostatics import balanced_state
-from softrobots.statics.force_path import NEUTRAL, ForcePath
+from softrobots.statics.force_path import ZERO_EIGENVALUE, ForcePath
 
 _LARGEST_STEP = 0.1  # of the springs between two points of the path [rad]
 _GROWTH = 0.25  # of the force between two points
@@ -86,7 +86,7 @@ def critical_point(path: ForcePath, gravity: Any = None, max_force: float | None
         if followed.ended == "unstable":
             stable, unstable = followed.points[-2:]
             last = path.before_change(stable, unstable)
-            crosses = bool(followed.crossings and path.eigenvalues(last)[0] <= NEUTRAL)
+            crosses = bool(followed.crossings and path.eigenvalues(last)[0] <= ZERO_EIGENVALUE)
             return CriticalPoint(replace(path, springs=last.springs, force=last.force), crosses, path.springs)
     complete = followed.ended == "largest force"
     reached = largest if complete else followed.points[-1].force

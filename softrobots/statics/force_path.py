@@ -21,7 +21,7 @@ from softrobots.statics.loads import Load
 TOLERANCE = 1e-12
 """Largest residual of a point, relative to the scale of the load."""
 
-NEUTRAL = 1e-7
+ZERO_EIGENVALUE = 1e-7
 """Eigenvalue, relative to the springs' own stiffness, up to which it counts as zero."""
 
 _NEWTON_STEPS = 15
@@ -223,8 +223,8 @@ class ForcePath:
                     return FollowedPath(points, crossings, "end of range" if ends else "lost")
                 continue
             secant, new_values = moved / np.linalg.norm(moved), self.eigenvalues(there)
-            new_tangent = secant if np.abs(new_values).min() <= NEUTRAL else self.direction(there, secant)
-            changed = abs(int((new_values < -NEUTRAL).sum() - (values < -NEUTRAL).sum()))
+            new_tangent = secant if np.abs(new_values).min() <= ZERO_EIGENVALUE else self.direction(there, secant)
+            changed = abs(int((new_values < -ZERO_EIGENVALUE).sum() - (values < -ZERO_EIGENVALUE).sum()))
             regular = knee == len(points) or changed == (new_tangent[-1] * tangent[-1] < 0.0)
             falls = while_stable and knee < len(points) and nearly_zero < values[0] and new_values[0] < 0.5 * values[0]
             if step > least and (falls or not regular):
@@ -240,7 +240,7 @@ class ForcePath:
             values, tangent = new_values, new_tangent
             way, step = tangent if regular else secant, 1.5 * step
             n_stable = len(points) if values[0] > 0.0 else n_stable
-            if while_stable and values[0] < -NEUTRAL:
+            if while_stable and values[0] < -ZERO_EIGENVALUE:
                 return FollowedPath([*points[:n_stable], there], crossings, "unstable")
         return FollowedPath(points, crossings, "points")
 

@@ -34,7 +34,7 @@ from softrobots.statics.critical_load import CriticalPoint, critical_point
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import equilibrium_from_state
 from softrobots.statics.equilibrium_branch import FUNDAMENTAL, RING, EquilibriumBranch
-from softrobots.statics.force_path import NEUTRAL, FollowedPath, ForcePath, PathPoint
+from softrobots.statics.force_path import ZERO_EIGENVALUE, FollowedPath, ForcePath, PathPoint
 
 BEYOND = 1.25
 """Default limit of the force on branches, relative to the critical force."""
@@ -117,7 +117,7 @@ class _Branch(NamedTuple):
 
 
 def _branch(label: str, path: ForcePath, modes: FloatArray, followed: FollowedPath) -> _Branch:
-    crossings = [path.before_change(crossing.before, crossing.after, -NEUTRAL) for crossing in followed.crossings]
+    crossings = [path.before_change(crossing.before, crossing.after, -ZERO_EIGENVALUE) for crossing in followed.crossings]
     return _Branch(label, path, modes, followed, crossings)
 
 
@@ -129,7 +129,7 @@ def _modes(path: ForcePath, count: int) -> FloatArray:
     """
     stiffness = path.model.stiffness
     values, vectors = np.linalg.eigh(scaled(path.point(path.springs, path.force).state.tangent, stiffness))
-    order = np.argsort(np.abs(values))[: max(count, int((np.abs(values) <= NEUTRAL).sum()))]
+    order = np.argsort(np.abs(values))[: max(count, int((np.abs(values) <= ZERO_EIGENVALUE).sum()))]
     if len(order) > 2:
         raise NeutralEquilibrium(f"{len(order)} modes buckle at {path.force:.6g} N; branches are sought where one or two do")
     return np.asarray(np.linalg.qr(vectors[:, order] / np.sqrt(stiffness)[:, None])[0].T)
@@ -141,7 +141,7 @@ def _crossings(branch: _Branch, critical: CriticalPoint) -> Iterator[tuple[Force
         return
     known = int(branch.label == FUNDAMENTAL and critical.crosses)
     for last, crossing in list(zip(branch.crossings, branch.followed.crossings, strict=True))[known:]:
-        if np.abs(branch.path.eigenvalues(last)).min() <= 2.0 * NEUTRAL:  # else a link comes onto its plateau
+        if np.abs(branch.path.eigenvalues(last)).min() <= 2.0 * ZERO_EIGENVALUE:  # else a link comes onto its plateau
             yield replace(branch.path, springs=last.springs, force=last.force), crossing.modes
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
+from softrobots.model.springs import POSITIVE
+from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_jacobian
 
@@ -26,11 +30,11 @@ def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatAr
 
     Raises:
         ParameterError: If the equilibrium belongs to another model.
-        NeutralEquilibrium: If its tangent stiffness is singular.
+        NeutralEquilibrium: If its tangent stiffness is singular, see `inverse_stiffness`.
     """
     check_same_model(model, equilibrium)
     motors, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
-    return tip_motion(motors[:3], springs[:3], equilibrium.tangent_stiffness, equilibrium.coupling)[0]
+    return tip_motion(model, motors[:3], springs[:3], equilibrium.tangent_stiffness, equilibrium.coupling)[0]
 
 
 def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
@@ -48,11 +52,11 @@ def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
 
     Raises:
         ParameterError: If the equilibrium belongs to another model.
-        NeutralEquilibrium: If its tangent stiffness is singular.
+        NeutralEquilibrium: If its tangent stiffness is singular, see `inverse_stiffness`.
     """
     check_same_model(model, equilibrium)
     _, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
-    return np.asarray(springs @ _solve(equilibrium.tangent_stiffness, springs.T))
+    return np.asarray(springs @ inverse_stiffness(model, equilibrium.tangent_stiffness) @ springs.T)
 
 
 def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -65,11 +69,12 @@ def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -
 
 
 def tip_motion(
-    motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
+    model: SoftModel, motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Derivatives of tip and springs by the motors at constant load, from matrices at an equilibrium.
 
     Args:
+        model: The robot.
         motors: Rows of the tip Jacobian, columns per actuator, shape (m, n_motors).
         springs: The same rows, columns per elastic coordinate, shape (m, n_springs).
         tangent: Tangent stiffness, shape (n_springs, n_springs).
@@ -81,11 +86,13 @@ def tip_motion(
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.
     """
-    follow = _solve(tangent, coupling)
+    follow = inverse_stiffness(model, tangent) @ coupling
     return motors + springs @ follow, follow
 
 
-def motor_torque_slope(motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray) -> FloatArray:
+def motor_torque_slope(
+    model: SoftModel, motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
+) -> FloatArray:
     r"""Derivative of the actuator loads with respect to a tip force, springs in equilibrium.
 
     .. math:: d\tau_m/df = J_m^T + d(J_m^T w - g_m)/dy \, K_t^{-1} J_k^T
@@ -96,12 +103,20 @@ def motor_torque_slope(motors: FloatArray, springs: FloatArray, tangent: FloatAr
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.
     """
-    return np.asarray(motors.T + coupling.T @ _solve(tangent, springs.T))
+    return np.asarray(motors.T + coupling.T @ inverse_stiffness(model, tangent) @ springs.T)
 
 
-def _solve(tangent: FloatArray, right: FloatArray) -> FloatArray:
-    try:
-        with one_blas_thread(len(tangent)):
-            return np.asarray(np.linalg.solve(tangent, right))
-    except np.linalg.LinAlgError as error:
-        raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has no derivative") from error
+def inverse_stiffness(model: SoftModel, tangent: FloatArray) -> FloatArray:
+    """Return the inverse of a tangent stiffness, both of shape (n_springs, n_springs).
+
+    Raises:
+        NeutralEquilibrium: If the smallest singular value, of a symmetric matrix the size of the smallest eigenvalue, is at
+            most `POSITIVE` in the coordinates of `scaled`, as in `stability`.
+    """
+    stiffness = model.stiffness
+    with contextlib.suppress(np.linalg.LinAlgError), one_blas_thread(len(tangent)):
+        inverse = np.asarray(np.linalg.inv(tangent), dtype=np.float64)
+        squared = float(stiffness @ (inverse * inverse) @ stiffness)  # Frobenius norm: a cheap upper bound of the other
+        if squared < POSITIVE**-2 or np.linalg.norm(scaled(inverse, 1.0 / stiffness), 2) < 1.0 / POSITIVE:
+            return inverse
+    raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has no derivative")

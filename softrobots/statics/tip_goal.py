@@ -154,7 +154,7 @@ class LoadedTip:
     def motion(self, state: ElasticState) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of tip and elastic coordinates by the actuators; see `sensitivity.tip_motion`."""
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
-        return tip_motion(motors, springs, state.tangent, state.load.coupling)
+        return tip_motion(self.model, motors, springs, state.tangent, state.load.coupling)
 
 
 def checked_orientation(value: Any) -> FloatArray | None:

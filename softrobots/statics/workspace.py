@@ -176,7 +176,7 @@ def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArra
         return None
     by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, model.tip)[:3])
     try:
-        slope = tip_motion(by_motors, by_springs, state.tangent, state.load.coupling)[0] @ model.actuators.basis
+        slope = tip_motion(model, by_motors, by_springs, state.tangent, state.load.coupling)[0] @ model.actuators.basis
     except NeutralEquilibrium:
         return None
     tip = np.array(frame_placement(model, state.q, model.tip).translation)

@@ -85,8 +85,8 @@ def stability_words(equilibrium: Equilibrium) -> str:
         STABLE: "yes, certified",
         NEUTRAL: "NO: neutral, it can be moved aside without a force",
         DIVERGENT: f"NO: divergent, a disturbance grows by {equilibrium.stability.growth_rate:.3g} 1/s",
-        FLUTTER: f"NO: flutter, vibrations grow by {equilibrium.stability.growth_rate:.3g} 1/s without damping",
-        UNKNOWN: "NO: not known, a moment acts and the description has no masses",
+        FLUTTER: f"NO: flutter grows by {equilibrium.stability.growth_rate:.3g} 1/s, which damping may suppress",
+        UNKNOWN: "NO: not known, a moment acts without masses, or a section is out of range",
     }
     return words[equilibrium.stability.kind]
 

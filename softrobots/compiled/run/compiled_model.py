@@ -106,7 +106,7 @@ class CompiledModel(CompiledStatics):
         motors = self._actuation.checked(q_motors)
         torques = finite_array("motor_torques", motor_torques, self._shape, "N m")
         status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
-        estimate = CompiledLoadEstimate(w, run.layout, self._actuation, motors)
+        estimate = CompiledLoadEstimate(w, run.layout, self._actuation, motors, Status(status))
         if status != Status.CERTIFIED:
             raise LoadNotFound(
                 f"no unique force explains the motor torques {torques.tolist()} N m: {Status(status).explanation}; "

@@ -107,11 +107,11 @@ class CompiledStatics:
             q_springs0: Start of the search, shape (n_springs,) [rad or m]; at rest by default.
 
         Returns:
-            The equilibrium, certified stable.
+            The equilibrium, `stable`, or neutral as `solve_equilibrium` finds it, too: `status` tells which.
 
         Raises:
             ParameterError: If a shape differs, a number is not finite, or no shape of the robot has these muscle lengths.
-            EquilibriumNotFound: If no stable equilibrium is found; the error carries the best point.
+            EquilibriumNotFound: If no stable or neutral equilibrium is found; the error carries the best point.
         """
         if (
             self._plain
@@ -137,16 +137,16 @@ class CompiledStatics:
         load = finite_array("force", force, (3,), "N")
         w = self._actuation.workspace(run, motors, force=load, gravity=gravity_vector(gravity))
         if q_springs0 is None:
-            status = run.settle(w)
+            status = Status(run.settle(w))
         else:
             springs = finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
             run.put(w, run.layout.unknown, self._actuation.unknowns(motors, springs))
-            status = run.settle_from(w)
-        equilibrium = CompiledEquilibrium(w, run.layout, self._actuation, motors)
-        if status != Status.CERTIFIED:
+            status = Status(run.settle_from(w))
+        equilibrium = CompiledEquilibrium(w, run.layout, self._actuation, motors, status)
+        if status not in (Status.CERTIFIED, Status.NEUTRAL):
             raise EquilibriumNotFound(
                 f"no certified equilibrium at motors {motors.tolist()} under {equilibrium.force.tolist()} N: "
-                f"{Status(status).explanation}; {equilibrium.residual:.3g} N m are out of balance",
+                f"{status.explanation}; {equilibrium.residual:.3g} N m are out of balance",
                 best=equilibrium,
                 residual=equilibrium.residual,
                 iterations=int(w[run.layout.single("iterations")]),

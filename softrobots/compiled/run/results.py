@@ -15,24 +15,37 @@ from softrobots.core.checks import FloatArray, read_only
 
 
 class CompiledEquilibrium:
-    """An equilibrium, certified stable.
+    """An equilibrium, certified stable or neutral.
 
     For motor torques, tangent stiffness, pictures or files pass its `q_springs` to
     `softrobots.solve_equilibrium(..., q_springs0=...)`, which then only checks them.
     """
 
-    __slots__ = ("_actuation", "_layout", "_motors", "_workspace")
+    __slots__ = ("_actuation", "_layout", "_motors", "_workspace", "status")
 
-    def __init__(self, workspace: Any, layout: Layout, actuation: Actuation, motors: FloatArray | None = None) -> None:
-        """Store the workspace of the solver, and the actuators if they are not all in it, without copies."""
+    def __init__(
+        self,
+        workspace: Any,
+        layout: Layout,
+        actuation: Actuation,
+        motors: FloatArray | None = None,
+        status: Status = Status.CERTIFIED,
+    ) -> None:
+        """Store the workspace of the solver, and the actuators if they are not all in it, without copies, and the status."""
         self._workspace = workspace
         self._layout = layout
         self._actuation = actuation
         self._motors = motors
+        self.status = status
 
     def __repr__(self) -> str:
         """Elastic coordinates and residual."""
         return f"CompiledEquilibrium(q_springs={self.q_springs.tolist()}, residual={self.residual:.3g})"
+
+    @property
+    def stable(self) -> bool:
+        """Whether it is certified stable; else `status` says what it is."""
+        return self.status == Status.CERTIFIED
 
     @property
     def q_motors(self) -> FloatArray:

@@ -22,6 +22,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState
 from softrobots.statics.loads import AppliedLoad, Load
+from softrobots.statics.sensitivity import inverse_stiffness
 
 FIVE = 5.0
 """Standard deviations of the torques that may stay unexplained."""
@@ -71,11 +72,12 @@ class MeasurementErrors(NamedTuple):
         coupling = state.load.coupling
         if self.stiffness_std is not None:
             bent = model.springs.at(state.q_springs)[2] * (self.stiffness_std * (state.q_springs - model.rest))
-            parts["stiffness"] = coupling.T @ np.linalg.solve(state.tangent, bent @ _shared(model))
+            parts["stiffness"] = coupling.T @ inverse_stiffness(model, state.tangent) @ bent @ _shared(model)
         if self.motor_angle_std is not None:
             point: Any = state.point
             direct = point.motor_derivative(AppliedLoad(model, load).at(state.q))
-            parts["motor_angles"] = -(direct + coupling.T @ np.linalg.solve(state.tangent, coupling)) * self.motor_angle_std
+            followed = coupling.T @ inverse_stiffness(model, state.tangent) @ coupling
+            parts["motor_angles"] = -(direct + followed) * self.motor_angle_std
         return parts
 
 

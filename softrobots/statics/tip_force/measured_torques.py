@@ -78,7 +78,8 @@ class MeasuredTorques:
     def directions(self, state: ElasticState) -> Directions:
         """Decompose the derivative of the torques with respect to the force."""
         motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
-        return Directions.of(motor_torque_slope(motors, springs, state.tangent, state.load.coupling), self.model.reach)
+        slope = motor_torque_slope(self.model, motors, springs, state.tangent, state.load.coupling)
+        return Directions.of(slope, self.model.reach)
 
     def scatter(self, force: FloatArray, state: ElasticState) -> float:
         """Return the norm of the torques that errors of measurement may leave unexplained [N m]; 0 if none are known."""
