@@ -60,8 +60,8 @@ def fit_characterisation(
     the sum significantly (ratio F above 12), the moment past the knee rises with less than half the slope, and its mean, which
     is the saturation moment, lies below the line by Welch's test at 99.5 %. (Noise that grows with the reading passes the
     first two.) The stiffness is the slope of the points whose moment by the fit is below the theoretical wrinkling moment (3),
-    and below the plateau or before the knee: the noisy moment itself would select points of the plateau too. The law is odd:
-    moments at negative angles count with the other sign.
+    and below the plateau by its standard deviation: noise chose the knee, and would choose points beside it, too. The law is
+    odd: moments at negative angles count with the other sign.
 
     Standard errors are those of a sandwich (HC3; MacKinnon and White 1985, doi:10.1016/0304-4076(85)90158-7), which hold
     for noise that grows with the reading, too:
@@ -132,8 +132,11 @@ class _Law(NamedTuple):
         knee = _knee(theta, tau, free)
         before = np.arange(len(theta)) < knee
         line = _rising(theta[before], tau[before], free, moment, limit)
-        plateau = float(folded[knee:].mean()) if knee < len(theta) else math.inf
-        chosen = before | (np.abs(line.at(theta)) < plateau)
+        saturated = folded[knee:]
+        plateau = float(saturated.mean() - saturated.std(ddof=1)) if len(saturated) else math.inf
+        chosen = np.abs(line.at(theta)) < plateau
+        if FittedLine.of(theta[chosen], tau[chosen], free) is None:  # too few: a knee close to the zero
+            chosen = before
         while True:  # line and set of points below wrinkling depend on each other; a point left out stays out
             line = _rising(theta[chosen], tau[chosen], free, moment, limit)
             below = chosen & (np.abs(line.at(theta)) < limit)

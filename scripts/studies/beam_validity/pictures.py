@@ -84,7 +84,7 @@ def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Ma
         model = sr.load_model(hinges.robot(2))
         points = backbone(model, sr.solve_equilibrium(model, case.motors, case.force).q)
         shape.plot(points[:, 0], points[:, 2], label=name, **canvas.line_style(number))
-    shape.set(xlabel="x [m]", ylabel="z [m]", title="The arm under 15 N downwards", aspect="equal")
+    shape.set(xlabel="x [m]", ylabel="z [m]", title="The arm under 15 N downwards", ylim=(-0.08, 0.72), aspect="equal")
     looks = (
         ("bend and shear", 0, 1e3, "tip error [mm]"),
         ("bend and shear", 1, 180.0 / math.pi, "error of the angle [degrees]"),
@@ -97,7 +97,8 @@ def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Ma
             sizes, look = unit * np.sort(found[:, column]), looks_of.get(name, {"color": "0.55", "lw": 3.5, "zorder": 1})
             if name != RIGID:
                 axes.plot(sizes, np.linspace(0.0, 100.0, len(sizes)), markevery=0.2, label=name, **look)
-        axes.set(xlabel=label, ylabel="share of the cases [%]", title=f"Against beams that {kind}")
+        title = f"{label.partition(' [')[0].capitalize()} against beams that {kind}"
+        axes.set(xlabel=label, ylabel="share of the cases [%]", title=title)
         axes.set_xlim(0.0, None)
     for axes in panels.ravel():
         axes.grid(alpha=0.3)

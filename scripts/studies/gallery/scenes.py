@@ -86,7 +86,7 @@ def pointing_wrist(duration: float = 6.0, steps: int = 90) -> Viewer:
     push = (0.0, 0.0, -5.0)
     path = follow_trajectory(model, poses, push, gravity=EARTH_GRAVITY, times=times, elbow="up", progress="poses")
     viewer = view(model, path)
-    viewer.look_from((0.2, -1.1, 0.55), (0.45, 0.0, 0.2))
+    viewer.look_from((0.95, -0.75, 0.62), (0.55, 0.0, 0.22))
     return viewer
 
 

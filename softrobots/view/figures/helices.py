@@ -130,14 +130,17 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
         style = {"color": colour, "marker": MARKERS[number], "ms": 7, "clip_on": False}
         left.plot(pressures / 1e3, bounds.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
         label = f"force, deflected by {1e3 * depth:.3g} mm"
-        left.plot(pressures / 1e3, bounds.force, lw=2.2, ls=_STYLES[number % 3], markevery=(number, 3), label=label, **style)
+        wide = 4.5 if number == 1 else 2.2  # lines may lie upon each other, and all but the first on their bound
+        left.plot(
+            pressures / 1e3, bounds.force, lw=wide, ls=_STYLES[number // 2 % 3], markevery=(number, 3), label=label, **style
+        )
         right.plot([1e3 * depth], [bounds.force[-1]], ls="none", zorder=4, **style)
     bounds = test.force(most, range_of)
     right.plot(1e3 * range_of, bounds.force, color="0.75", lw=6.0, label="force, the smaller bound", zorder=1)
-    right.plot(1e3 * range_of, bounds.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
+    right.plot(1e3 * range_of, bounds.unwrapping, color="black", lw=1.2, label="bound (a): the tube unwraps")
     right.plot(1e3 * range_of, bounds.contact, color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b): the wall flattens")
     undeflected = test.force(pressures, 0.0)
-    left.plot(pressures / 1e3, undeflected.unwrapping, color="black", lw=1.2, ls="--", label="bound (a): the tube unwraps")
+    left.plot(pressures / 1e3, undeflected.unwrapping, color="black", lw=6.5, zorder=1, label="bound (a): the tube unwraps")
     left.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), open marks: the wall flattens")
     left.set(xlabel="gauge pressure [kPa]", ylabel="grasp force [N]", xlim=(0.0, most / 1e3))
     right.set(xlabel=f"deflection of the inner radius at {most / 1e3:.3g} kPa [mm]", xlim=(0.0, 1e3 * deepest))

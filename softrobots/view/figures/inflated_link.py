@@ -12,6 +12,8 @@ from softrobots import inflated_beam
 from softrobots.core.checks import finite_number, instance_of, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam import BendingData, Characterisation, CharacterisationRow
+from softrobots.inflated_beam.characterisation_fit import CONFIDENCE
+from softrobots.inflated_beam.fitted_line import FittedLine, student_quantile
 from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, grid_and_legend, line_style, new_figure, new_plot
 
 _FAINT = "#7f7f7f"
@@ -117,7 +119,8 @@ def moment_angle_laws(rows: Sequence[CharacterisationRow], radius: float) -> Any
 def characterisation(data: BendingData, fit: Characterisation, *, pressure: float, radius: float) -> Any:
     """Measured moments over the hinge angle, the fitted law, and the limits of the moment.
 
-    Points in the fit of the slope are filled. The band of the line is that of the 95 % interval of its slope.
+    Points in the fit of the slope are filled. The band is the 95 % confidence of the line: narrowest at
+    the mean angle of those points if the zero was fitted, at the zero if it was given.
 
     Args:
         data: The measured points.
@@ -138,14 +141,17 @@ def characterisation(data: BendingData, fit: Characterisation, *, pressure: floa
     sides = np.where(data.angle < fit.angle_offset, -1.0, 1.0)
     bent, moments = sides * (data.angle - fit.angle_offset), sides * data.moment
     knee = math.inf if fit.max_moment is None else fit.max_moment
-    used = fit.stiffness * bent < min(fit.wrinkling_moment, knee)
+    used = np.argsort(np.argsort(bent)) < fit.n_linear
     for chosen, face, label in ((used, COLOURS[0], "measured, on the slope"), (~used, "white", "measured, beyond")):
         if chosen.any():
             style = {"color": COLOURS[0], "mfc": face, "ms": 5}
             axes.plot(fit.angle_offset + bent[chosen], moments[chosen], "o", label=label, **style)
     angles = np.linspace(0.0, 1.03 * float(bent.max()), 301)
-    low, high = (np.minimum(slope * angles, knee) for slope in fit.stiffness_interval)
-    axes.fill_between(fit.angle_offset + angles, low, high, color=COLOURS[1], alpha=0.2, lw=0)
+    line = FittedLine.of((sides * bent)[used], data.moment[used], fit.angle_offset_std > 0.0)
+    if line is not None:
+        half = student_quantile(0.5 + 0.5 * CONFIDENCE, line.freedoms) * np.sqrt([line.variance(one) for one in angles])
+        low, high = (np.minimum(fit.stiffness * angles + sign * half, knee) for sign in (-1.0, 1.0))
+        axes.fill_between(fit.angle_offset + angles, low, high, color=COLOURS[1], alpha=0.2, lw=0)
     low_k, high_k = fit.stiffness_interval
     label = f"k = {fit.stiffness:.1f} ({low_k:.1f} to {high_k:.1f}) N m/rad"
     label += "" if fit.max_moment is None else f", $M_{{max}}$ = {fit.max_moment:.2f} N m"
