@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,14 @@ def test_the_link_of_the_table_comes_back(probe: Path) -> None:
     assert fit.stiffness == pytest.approx(169.44, abs=3.0 * fit.stiffness_std)
     assert fit.angle_offset == pytest.approx(1.5 / 470.0, abs=3.0 * fit.angle_offset_std)
     assert fit.max_moment == pytest.approx(21.76, abs=3.0 * 0.03 * 21.76 / np.sqrt(fit.n_saturated))
+
+
+def test_the_command_names_what_it_requires_and_no_unit_of_nothing(told, tmp_path: Path) -> None:
+    file = tmp_path / "line.csv"
+    file.write_text("angle [rad],moment [N m]\n" + "".join(f"{0.01 * n},{1.7 * n}\n" for n in range(8)), encoding="utf-8")
+    assert re.search(r"^plateau M_max +none$", told(*words(file))[1], re.M)
+    told_error = told(*words(file), "--pressure", "nan")[2]
+    assert "--pressure = nan: --pressure must be a finite number [Pa]" in told_error
 
 
 def test_the_command_prints_saves_and_draws_the_fit(probe: Path, told, tool, tmp_path: Path) -> None:

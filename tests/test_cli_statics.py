@@ -269,6 +269,19 @@ def test_the_picture_shows_loaded_and_relaxed_arm(arm: sr.SoftModel, tool) -> No
         loaded_shape(arm)
 
 
+def test_springs_that_are_taken_away_are_told(told) -> None:
+    status, out, _ = told("solve", "inflatable_arm", "--spring", "spring_1_up=none")
+    assert status == 0
+    assert re.search(r"^springs +taken away: spring_1_up; of the file: 3$", out, re.M)
+    status, out, _ = told("solve", "inflatable_arm", "--spring", "spring_1_up=none", "--spring", "spring_2_up=50")
+    assert re.search(r"^springs +given: spring_2_up; taken away: spring_1_up; of the file: 2$", out, re.M)
+
+
+def test_the_number_of_hinges_of_a_link_is_told(told) -> None:
+    for name, hinges in (("inflatable_arm", ""), ("inflatable_arm_two_hinges", ", 2 hinges a link")):
+        assert re.search(rf"^robot +inflatable_arm{hinges} \(tip: tip\)$", told("solve", name)[1], re.M)
+
+
 # --- softrobots branches
 
 
@@ -618,9 +631,15 @@ REFUSED = [
     (("ik", *TARGET, "--start", "1"), "--start must be 3 numbers"),
     (("ik", *TARGET, "--start", "9", "0", "0"), "within the motor limits"),
     (("ik", *TARGET, "--elbow", "left"), "invalid choice: 'left'"),
-    (("ik", *TARGET, "--orientation", "1", "0", "0"), "it has 3 freedoms, 5 are needed"),
+    (
+        ("ik", *TARGET, "--orientation", "1", "0", "0"),
+        "--orientation must be left out for this robot: it has 3 freedoms, 5 are needed",
+    ),
     (("ik", *TARGET, "--orientation", "0", "0", "0"), "a direction different from zero"),
-    (("ik", *TARGET, "--rpy", "0", "0", "0"), "it has 3 freedoms, 6 are needed"),
+    (
+        ("ik", *TARGET, "--rpy", "0", "0", "0"),
+        "--rpy = [0.0, 0.0, 0.0]: --rpy must be left out for this robot: it has 3 freedoms, 6 are needed",
+    ),
     (("ik", *TARGET, "--rpy", "0", "0", "inf"), "--rpy must be an array of shape (3,) of finite numbers"),
     (("ik", *TARGET, "--rpy", "0", "0", "0", "--orientation", *"001"), "not allowed with argument --rpy"),
     (("ik", *TARGET, "--starts", "0"), "starts must be a positive integer"),

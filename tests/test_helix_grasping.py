@@ -274,6 +274,12 @@ def test_the_largest_deflection_is_told(change: dict[str, Any], told: str) -> No
         grasp_force(**({"pressure": 1e4, **PAPER} | change))
 
 
+def test_a_gap_wider_than_the_tube_is_blamed_itself() -> None:
+    with pytest.raises(ParameterError, match=r"below pi times the radius of the tube, less the deflection, 0\.0457") as caught:
+        grasp_force(1e4, deflection=0.002, gap=[0.001, 1e3], **PAPER)
+    assert caught.value.field == "gap"
+
+
 def test_the_result_is_frozen() -> None:
     grasp = grasp_force(1e4, deflection=[0.0, 0.002], **PAPER)
     with pytest.raises(ValueError, match="read-only"):

@@ -181,6 +181,7 @@ def test_torques_that_no_force_gives_are_an_error_with_the_best(arm: sr.SoftMode
         ({"motor_angle_std": (0.1, 0.1)}, "motor_angle_std"),
         ({"gravity": (0, 0)}, "gravity"),
         ({"max_iterations": -3}, "max_iterations"),
+        ({"restart": "no"}, "restart"),
     ],
 )
 def test_bad_input_is_refused(arm: sr.SoftModel, options: dict, message: str) -> None:

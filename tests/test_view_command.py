@@ -391,7 +391,7 @@ def test_a_branch_is_shown_at_its_last_stable_point(tmp_path: Path, capsys: pyte
         shown = state_line(found[label].equilibria[place])
         assert capsys.readouterr().out.splitlines()[0] == shown
     for words, told in (
-        ([], r"--branch = '\(nothing\)'.*one of .*fundamental.*, as --branch=LABEL"),
+        ([], r"--result = .*branches.npz.* given with --branch=LABEL; available: fundamental, .*spring_1_up"),
         (["--branch=side"], "--branch = 'side'.*fundamental"),
     ):
         assert main(["view", "--result", str(file), *words, "--html", str(tmp_path / "other.html")]) == 2

@@ -54,10 +54,10 @@ def run(arguments: argparse.Namespace) -> None:
     check_output(arguments, ".npz")
     check_plot(arguments)
     tube = {"pressure": arguments.pressure, "radius": arguments.radius}
-    limits = moment_limits(**tube)
     rig = BendingTest(probe_distance=arguments.probe_distance, hinge_offset=arguments.hinge_offset, offset=arguments.offset)
     data = read_characterisation(arguments.data, rig)
     fit = fit_characterisation(*data, **tube, angle_offset=arguments.angle_offset)
+    limits = moment_limits(**tube)
     facts = [
         Fact("stiffness", fit.stiffness, "N m/rad", "stiffness k"),
         Fact("stiffness_std", fit.stiffness_std, "N m/rad", "  standard error"),

@@ -55,7 +55,8 @@ def add_parser(subparsers: Any) -> None:
     )
     what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=help_text)
     how = parser.add_mutually_exclusive_group()
-    add_numbers(how, "--orientation", "X Y Z", "direction of the tip's z axis at --target, of any length [-] (any direction)")
+    help_text = "direction of the tip's z axis at --target, of any length [-] (any); a wrist's hand is x: see --rpy"
+    add_numbers(how, "--orientation", "X Y Z", help_text)
     add_numbers(how, "--rpy", "R P Y", "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)")
     add_loads(parser)
     help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
@@ -115,7 +116,12 @@ def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, A
     if arguments.rpy is not None:
         orientation = pin.rpy.rpyToMatrix(*finite_array("--rpy", arguments.rpy, (3,), "rad"))
     starts = _STARTS if arguments.starts is None else arguments.starts
-    solution = solve_ik(model, arguments.target, orientation=orientation, starts=starts, **options)
+    try:
+        solution = solve_ik(model, arguments.target, orientation=orientation, starts=starts, **options)
+    except ParameterError as error:
+        if arguments.rpy is None or error.field != "orientation":
+            raise
+        raise ParameterError("--rpy", arguments.rpy, error.requirement) from error
     files = save(arguments, solution) + write_plot(arguments, lambda: loaded_shape(solution.equilibrium))
     print_answer(arguments, solution_answer(solution), solution_lines(solution), files)
 

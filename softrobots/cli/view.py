@@ -137,6 +137,9 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Traject
         return solve_ik(model, arguments.target, q_motors0=None if arguments.motors is None else motors, **load)
     result = load_result(arguments.result)
     if isinstance(result, tuple) and isinstance(result[0], EquilibriumBranch):
+        if arguments.branch is None and len(result) > 1:
+            labels = ", ".join(branch.label for branch in result)
+            raise ParameterError("--result", str(arguments.result), f"given with --branch=LABEL; available: {labels}")
         return _point_of(result, arguments.branch)
     if arguments.branch is not None:
         raise ParameterError("--branch", arguments.branch, "left out: the result has no branches")
@@ -153,8 +156,8 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Traject
 def _point_of(branches: Sequence[EquilibriumBranch], label: str | None) -> Equilibrium:
     """The last stable equilibrium of a branch, or its last one if none is."""
     by_label = {branch.label: branch for branch in branches}
-    if label not in by_label and (label is not None or len(by_label) > 1):
-        raise ParameterError("--branch", label or "(nothing)", f"one of {', '.join(by_label)}, as --branch=LABEL")
+    if label is not None and label not in by_label:
+        raise ParameterError("--branch", label, f"one of {', '.join(by_label)}, as --branch=LABEL")
     branch = by_label[label] if label is not None else branches[0]
     stable = [one for one, certified in zip(branch.equilibria, branch.stable, strict=True) if certified]
     return (stable or branch.equilibria)[-1]

@@ -39,7 +39,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, common_shape, finite_array, non_negative_array, positive_array, read_only
+from softrobots.core.checks import (
+    FloatArray,
+    common_shape,
+    finite_array,
+    non_negative_array,
+    positive_array,
+    read_only,
+    refuse_where,
+)
 from softrobots.core.errors import ParameterError
 
 
@@ -153,6 +161,9 @@ def grasp_force(
     wider = gaps / np.pi
     radii, depths = radii + wider, depths + wider
     deepest = np.minimum(0.5 * diameters, radii)
+    room = deepest - (depths - wider)
+    wide = (depths > deepest) & (wider > 0.5 * diameters) & (room > 0.0)
+    refuse_where("gap", gap, wide, "below pi times the radius of the tube, less the deflection, {:.6g} m", np.pi * room)
     if np.any(depths < 0.0) or np.any(depths > deepest):
         least, less = f"{0.0 - wider.min():.6g}", ", less gap/pi" if wider.any() else ""
         requirement = f"from {least} to {(deepest - wider).min():.6g} m, the radius of the tube or that of the object{less}"

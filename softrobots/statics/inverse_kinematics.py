@@ -125,9 +125,8 @@ def solve_ik(
         raise ParameterError("elbow", elbow, "None for this robot: its last motor joint is where its first one is")
     freedom = model.actuators.basis.shape[1]
     if goal.rotation is not None and freedom < goal.rows:
-        raise ParameterError(
-            "orientation", goal.rotation, f"None for this robot: it has {freedom} freedoms, {goal.rows} are needed"
-        )
+        requirement = f"left out for this robot: it has {freedom} freedoms, {goal.rows} are needed"
+        raise ParameterError("orientation", goal.rotation.tolist(), requirement)
 
     def allowed(local: LocalSolution[ElasticState]) -> bool:
         return elbow is None or elbow_side(model, local.state.q) == elbow

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, read_only
+from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, read_only
 from softrobots.core.errors import LoadNotFound, ParameterError
 from softrobots.core.result_file import text
 from softrobots.model.soft_model import SoftModel, check_model
@@ -133,6 +133,7 @@ def estimate_load(
     """
     check_model(model)
     choice("method", method, METHODS)
+    instance_of("restart", restart, bool, "True or False")
     check_feels(model)
     motors = model.checked_motors(q_motors)
     torques = finite_array("motor_torques", motor_torques, (model.n_motors,), "N m")

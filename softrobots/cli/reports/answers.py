@@ -37,8 +37,9 @@ def answer_of(facts: Sequence[Fact]) -> dict[str, Any]:
 
 
 def lines_of(facts: Sequence[Fact]) -> list[str]:
-    """Return one line for each fact: label, value and unit."""
-    return aligned((fact.label, f"{formatted(fact.value)} {fact.unit.strip('-')}".strip()) for fact in facts)
+    """Return one line for each fact: label, value, and unit unless the value is None."""
+    units = ["" if fact.value is None else fact.unit.strip("-") for fact in facts]
+    return aligned((fact.label, f"{formatted(fact.value)} {unit}".strip()) for fact, unit in zip(facts, units, strict=True))
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

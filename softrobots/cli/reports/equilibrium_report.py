@@ -119,18 +119,21 @@ def slack_words(margin: float, share: str = "at least") -> str:
 
 
 def head_lines(model: SoftModel, load: Load) -> list[str]:
-    """Return a line for the robot, one for springs that the caller gave, one for each load, and one for gravity."""
+    """Return a line for the robot, one for springs that the caller gave or took away, and those of the load."""
     roles = model.joint_roles
     given = [name for name, role in roles.items() if role == "given spring"]
     kept = sum(role == "spring" for role in roles.values())
-    springs = [("springs", f"given: {', '.join(given)}; of the file: {kept or 'none'}")] if given else []
+    taken = [name for name in model.structure.tags.springs if roles.get(name) in ("motor", "locked")]
+    changes = [f"{what}: {', '.join(names)}" for what, names in (("given", given), ("taken away", taken)) if names]
+    springs = [("springs", "; ".join([*changes, f"of the file: {kept or 'none'}"]))] if changes else []
     rows = []
     for frame, wrench in load.wrenches.items():
         if wrench.any():
             moment = f", moment {formatted(wrench[3:])} N m" if wrench[3:].any() else ""
             rows.append((f"load on {frame}", f"force {formatted(wrench[:3])} N{moment}"))
     gravity = "none" if load.gravity is None else f"{formatted(np.array(load.gravity))} m/s^2"
-    robot = ("robot", f"{model.pinocchio.name} (tip: {model.tip})")
+    hinges = max((group.n_hinges for group in model.spring_groups), default=1)
+    robot = ("robot", f"{model.pinocchio.name}{f', {hinges} hinges a link' if hinges > 1 else ''} (tip: {model.tip})")
     return aligned([robot, *springs, *(rows or [("load", "none")]), ("gravity", gravity)])
 
 
