@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.statics.sensitivity import inverse_stiffness, motor_torque_slope, tip_columns
+from softrobots.statics.sensitivity import inverse_stiffness, tip_columns, tip_motion
 from tests.support.oracles import central_difference
 
 # Step 1e-5 on equilibria solved to 1e-13: truncation 1e-10, rounding 1e-13 * 20 / 172 / 1e-5 = 1e-9; 1e-6 is required.
@@ -76,7 +76,7 @@ def test_motor_torques_by_tip_force_match_solved_equilibria(arm: sr.SoftModel, r
             force,
             1e-3,
         )
-        slope = motor_torque_slope(arm, *columns, found.tangent_stiffness, found.coupling)
+        slope = tip_motion(arm, *columns, found.tangent_stiffness, found.coupling)[0].T
         assert np.abs(slope - expected).max() < RELATIVE * np.abs(expected).max()
 
 

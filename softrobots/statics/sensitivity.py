@@ -1,4 +1,4 @@
-"""First derivatives of a loaded equilibrium: elastostatic Jacobian, compliance, and slope of the motor torques."""
+"""First derivatives of a loaded equilibrium: elastostatic Jacobian and compliance."""
 
 from __future__ import annotations
 
@@ -81,29 +81,14 @@ def tip_motion(
         coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
 
     Returns:
-        `dx/dq_m`, shape (m, n_motors), and `dy/dq_m`, shape (n_springs, n_motors).
+        `dx/dq_m`, shape (m, n_motors), and `dy/dq_m`, shape (n_springs, n_motors). Of a load with a potential, the first one,
+        transposed, is the derivative of the actuator loads with respect to what acts at the tip (Maxwell-Betti).
 
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.
     """
     follow = inverse_stiffness(model, tangent) @ coupling
     return motors + springs @ follow, follow
-
-
-def motor_torque_slope(
-    model: SoftModel, motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
-) -> FloatArray:
-    r"""Derivative of the actuator loads with respect to a tip force, springs in equilibrium.
-
-    .. math:: d\tau_m/df = J_m^T + d(J_m^T w - g_m)/dy \, K_t^{-1} J_k^T
-
-    The transpose of the elastostatic Jacobian: the load must have a potential. Arguments are those of `tip_motion`, with the
-    linear rows. Shape (n_motors, 3) [m].
-
-    Raises:
-        NeutralEquilibrium: If the tangent stiffness is singular.
-    """
-    return np.asarray(motors.T + coupling.T @ inverse_stiffness(model, tangent) @ springs.T)
 
 
 def inverse_stiffness(model: SoftModel, tangent: FloatArray) -> FloatArray:

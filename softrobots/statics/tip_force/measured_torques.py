@@ -16,7 +16,7 @@ from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_st
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
-from softrobots.statics.sensitivity import motor_torque_slope
+from softrobots.statics.sensitivity import tip_motion
 from softrobots.statics.tip_force.force_search import HIDDEN, OBSERVABLE, Directions, search_force, sphere, torque_tolerance
 from softrobots.statics.tip_force.load_errors import FIVE, MeasurementErrors
 
@@ -78,8 +78,8 @@ class MeasuredTorques:
     def directions(self, state: ElasticState) -> Directions:
         """Decompose the derivative of the torques with respect to the force."""
         motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
-        slope = motor_torque_slope(self.model, motors, springs, state.tangent, state.load.coupling)
-        return Directions.of(slope, self.model.reach)
+        moved, _ = tip_motion(self.model, motors, springs, state.tangent, state.load.coupling)
+        return Directions.of(moved.T, self.model.reach)
 
     def scatter(self, force: FloatArray, state: ElasticState) -> float:
         """Return the norm of the torques that errors of measurement may leave unexplained [N m]; 0 if none are known."""
