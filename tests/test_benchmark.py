@@ -440,7 +440,6 @@ def test_the_script_runs_end_to_end(tool: Callable, stand_in: list, tmp_path: Pa
     ("module", "job", "told"),
     [
         ("mujoco", "equilibrium", r"mujoco is not installed.*softrobots\[interop\]"),
-        ("scipy", "equilibrium", r"scipy is not installed.*softrobots\[helix\]"),
         ("pink", "trajectory", r"pin-pink with daqp is not installed.*softrobots\[bench\]"),
     ],
 )

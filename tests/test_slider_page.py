@@ -179,7 +179,7 @@ def drawn_boxes(page: SliderPage, below: str) -> dict[str, np.ndarray]:
     import viser.transforms
 
     found = {}
-    for path, handle in page._drawing.handles.items():
+    for path, handle in page._drawing.handles.copy().items():  # the page draws in a thread of its own
         if path.startswith(f"{below}/"):
             turn = viser.transforms.SO3(np.asarray(handle.wxyz)).as_matrix()
             points = np.asarray(handle.vertices, dtype=float) @ turn.T + np.asarray(handle.position)
