@@ -169,14 +169,12 @@ def check_feels(model: SoftModel) -> None:
 
 
 def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others: list[Explanation]) -> LoadEstimate:
-    force, state, iterations = found
-    left, values, right, keep = problem.directions(state)
+    force, state, iterations, (left, values, right, keep), errors = found
     observable = right[: len(values)][keep]
     singular_values = np.zeros(3)
     singular_values[: len(values)] = values
     inverse = observable.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
     load = problem.load(force)
-    errors = problem.errors.as_torques(problem.model, load, state)
     parts = {name: read_only(moved @ moved.T) for name, moved in ((name, inverse @ error) for name, error in errors.items())}
     unobservable = np.concatenate([right[: len(values)][~keep], right[len(values) :]])
     return LoadEstimate(
@@ -226,7 +224,7 @@ def estimate_at(equilibrium: Equilibrium, fields: Mapping[str, Any]) -> LoadEsti
     errors = MeasurementErrors.of(model, *(fields.get(name) for name in MeasurementErrors._fields))
     problem = MeasuredTorques(model, motors, torques, base, frame, errors)
     best, *rest = (
-        Explanation(one, elastic_state(model, motors, springs, problem.load(one)), equilibrium.iterations)
+        problem.explanation(one, elastic_state(model, motors, springs, problem.load(one)), equilibrium.iterations)
         for one, springs in ((force, equilibrium.q_springs), *zip(others, other_springs, strict=True))
     )
     result = _estimate(problem, best, choice("estimation", text(fields, "estimation"), METHODS), rest)

@@ -46,9 +46,9 @@ class MeasurementErrors(NamedTuple):
             ParameterError: If a shape differs, a number is not positive, or stiffness or motor angles are given for a robot
                 with muscles.
         """
-        if model.muscles and (stiffness_std is not None or motor_angle_std is not None):
-            name, value = ("stiffness_std", stiffness_std) if motor_angle_std is None else ("motor_angle_std", motor_angle_std)
-            raise ParameterError(name, value, "left out for a robot with muscles; torque_std is available")
+        for name, value in (("stiffness_std", stiffness_std), ("motor_angle_std", motor_angle_std)):
+            if model.muscles and value is not None:
+                raise ParameterError(name, value, "left out for a robot with muscles; torque_std is available")
         return cls(
             _spread("torque_std", torque_std, model.n_motors, "N m"),
             _spread("stiffness_std", stiffness_std, model.n_springs, "-"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -35,6 +35,15 @@ class Explanation(NamedTuple):
     """The robot."""
     iterations: int
     """Steps of the search."""
+    directions: Directions
+    """Decomposition of the derivative of its motor torques with respect to the force."""
+    errors: Mapping[str, FloatArray]
+    """Errors of measurement as torques, by source, see `MeasurementErrors.as_torques`."""
+
+    @property
+    def scatter(self) -> float:
+        """Norm of the torques that errors of measurement may leave unexplained [N m]; 0 if none are known."""
+        return FIVE * float(np.sqrt(sum(float(np.sum(part**2)) for part in self.errors.values())))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +90,14 @@ class MeasuredTorques:
         moved, _ = tip_motion(self.model, motors, springs, state.tangent, state.load.coupling)
         return Directions.of(moved.T, self.model.reach)
 
-    def scatter(self, force: FloatArray, state: ElasticState) -> float:
-        """Return the norm of the torques that errors of measurement may leave unexplained [N m]; 0 if none are known."""
-        parts = self.errors.as_torques(self.model, self.load(force), state).values()
-        return FIVE * float(np.sqrt(sum(float(np.sum(part**2)) for part in parts)))
+    def explanation(self, force: FloatArray, state: ElasticState, iterations: int) -> Explanation:
+        """Return a force with the robot under it and what tells how well it explains the torques.
+
+        Raises:
+            NeutralEquilibrium: If the tangent stiffness is singular.
+        """
+        errors = self.errors.as_torques(self.model, self.load(force), state)
+        return Explanation(force, state, iterations, self.directions(state), errors)
 
     def explained(self, found: Explanation) -> bool:
         """Whether the unexplained torques are rounding, errors of measurement, or from unobservable directions.
@@ -93,9 +106,8 @@ class MeasuredTorques:
         and `OBSERVABLE` of the stiffest spring. With more than three motors the residual of the least-squares fit may have any
         size if the noise is unknown.
         """
-        left, values, _, keep = self.directions(found.state)
-        missing = left.T @ self.unexplained(found.state)
-        scatter = self.scatter(found.force, found.state)
+        left, values, _, keep = found.directions
+        missing, scatter = left.T @ self.unexplained(found.state), found.scatter
         hidden = HIDDEN * float(np.linalg.norm(self.torques)) + OBSERVABLE * self.model.stiffest
         seen, surplus = missing[: len(values)], missing[len(values) :]
         allowed = max(self.tolerance, scatter) if keep.all() else hidden + scatter
@@ -104,9 +116,8 @@ class MeasuredTorques:
 
     def fitted(self, found: Explanation) -> bool:
         """Whether a force leaves no more than rounding or errors of measurement, by directions that the motors all feel."""
-        directions = self.directions(found.state)
-        felt = len(directions.values) == 3 and bool(directions.observable.all())
-        return felt and self.residual(found.state) <= max(self.tolerance, self.scatter(found.force, found.state))
+        felt = len(found.directions.values) == 3 and bool(found.directions.observable.all())
+        return felt and self.residual(found.state) <= max(self.tolerance, found.scatter)
 
     @property
     def elastic_force(self) -> float:
@@ -137,7 +148,7 @@ def newton(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explan
     if not restart:
         return [best]
     size, others = problem.elastic_force, list[Explanation]()
-    felt = problem.directions(best.state).observable.all()
+    felt = best.directions.observable.all()
     if not problem.explained(best) or (felt and problem.residual(best.state) > problem.tolerance):
         for direction in sphere(_STARTS):
             again = _search_from(problem, 2.0 * size * direction, start, most)
@@ -146,7 +157,7 @@ def newton(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explan
                 if problem.fitted(best):
                     break
     if problem.fitted(best):
-        along = problem.directions(best.state).right[2]
+        along = best.directions.right[2]
         for step in _STEPS:
             other = _search_from(problem, best.force + step * size * along, best.state, most)
             if other is not None and problem.fitted(other) and not any(_same(other, one) for one in (best, *others)):
@@ -166,12 +177,12 @@ def alternation(problem: MeasuredTorques, most: int, *, restart: bool) -> list[E
         springs = model.rest + (unloaded.elastic + by_springs.T @ estimate) / model.stiffness
         trial = elastic_state(model, problem.motors, springs, problem.load(estimate))
         if not trial.point.valid:  # a section beyond its range: the recursion diverges
-            return [Explanation(force, state, iteration)]
+            return [problem.explanation(force, state, iteration)]
         force, state = estimate, trial
         balanced = state.error <= largest_residual(model, state.scale, TOLERANCE)
         if balanced and problem.residual(state) <= problem.tolerance:
-            return [Explanation(force, state, iteration)]
-    return [Explanation(force, state, most)]
+            return [problem.explanation(force, state, iteration)]
+    return [problem.explanation(force, state, most)]
 
 
 SOLVERS: dict[str, Callable[..., list[Explanation]]] = {"newton": newton, "alternation": alternation}
@@ -179,7 +190,8 @@ SOLVERS: dict[str, Callable[..., list[Explanation]]] = {"newton": newton, "alter
 
 
 def _search(problem: MeasuredTorques, force: FloatArray, state: ElasticState, most: int) -> Explanation:
-    return Explanation(*search_force(problem, state, most, reach=problem.model.reach, tolerance=problem.tolerance, start=force))
+    found = search_force(problem, state, most, reach=problem.model.reach, tolerance=problem.tolerance, start=force)
+    return problem.explanation(*found)
 
 
 def _search_from(problem: MeasuredTorques, force: FloatArray, near: ElasticState, most: int) -> Explanation | None:
@@ -188,11 +200,9 @@ def _search_from(problem: MeasuredTorques, force: FloatArray, near: ElasticState
     if start is None:
         return None
     try:
-        found = _search(problem, force, start, most)
-        problem.directions(found.state)
+        return _search(problem, force, start, most)
     except NeutralEquilibrium:
         return None
-    return found
 
 
 def _same(one: Explanation, other: Explanation) -> bool:
