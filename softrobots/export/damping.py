@@ -16,7 +16,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import DescriptionError
@@ -38,9 +37,7 @@ def mass_matrix(model: SoftModel, q_motors: FloatArray) -> FloatArray:
     joints = np.zeros(model.pinocchio.nv)
     joints[structure.motor_indices] = q_motors[: len(structure.motor_joints)]
     joints[structure.spring_indices] = structure.strain_springs.rest
-    pinocchio_model, data = model.workspace(None)
-    upper = np.triu(pin.crba(pinocchio_model, data, model.embed(joints)))
-    return np.asarray(upper + np.triu(upper, 1).T)
+    return model.data.mass_matrix(model.embed(joints))
 
 
 def lowest_frequency(model: SoftModel, mass: FloatArray) -> float:

@@ -53,8 +53,8 @@ def to_pybullet(
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Tensions shift the
-            references of the springs.
+        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Tensions become part
+            of the springs.
         actuators: "driven": PyBullet's position control holds the motors, whatever the load; "welded": their joints are fixed.
         damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
         gravity: Gravity, shape (3,) [m/s^2], world axes, used when the file is run as a script; None: weightless.

@@ -1,4 +1,4 @@
-"""Pinocchio's working memory for a robot, one for each thread and gravity, and its numbers of frames and coordinates."""
+"""Pinocchio's working memory for a robot, one for each thread and gravity; its numbering; and the mass matrix."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from softrobots.core.checks import FloatArray
 from softrobots.core.errors import DescriptionError
 
 MAX_DOF = 300
@@ -51,6 +52,16 @@ class PinocchioData(threading.local):
     def q_indices(self) -> Any:
         """Place in the configuration of each place in the velocity."""
         return np.array([joint.idx_q for joint in list(self._model.joints)[1:]], dtype=np.intp)
+
+    def mass_matrix(self, q: FloatArray) -> FloatArray:
+        """Return the mass matrix at a configuration, shape (nq,), per velocity, shape (nv, nv) [kg m^2, kg m, kg].
+
+        Raises:
+            DescriptionError: If the robot has more than `MAX_DOF` coordinates.
+        """
+        model, data = self.at(None)
+        upper = np.triu(pin.crba(model, data, q))
+        return np.asarray(upper + np.triu(upper, 1).T)
 
     def _pair(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         if gravity is None:

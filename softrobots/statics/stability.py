@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from eigenpy import LDLT
 
 from softrobots.core.blas_threads import one_blas_thread
@@ -109,9 +108,7 @@ def stability(model: SoftModel, point: Point, q: FloatArray, tangent: FloatArray
 
 def mass_matrix(model: SoftModel, point: Point, q: FloatArray) -> FloatArray:
     r"""Mass matrix of the elastic coordinates at held actuators, :math:`Q^T M_q Q` with :math:`Q = dq/dy`, shape (n, n)."""
-    pin_model, data = model.workspace(None)
-    upper = np.triu(pin.crba(pin_model, data, q))
-    rows = point.columns(upper + np.triu(upper, 1).T)[1]
+    rows = point.columns(model.data.mass_matrix(q))[1]
     return point.columns(np.ascontiguousarray(rows.T))[1]
 
 
