@@ -67,7 +67,7 @@ def link_laws() -> Any:
     for number, (label, moments) in enumerate(laws.items()):
         style = canvas.line_style(number) | {"marker": None}
         axes.plot(angles, moments, lw=2.0, label=label, **style)
-    names = {"slack": "first fibre slack", "wrinkling": "half slack: wrinkling moment (3)", "collapse": "collapse"}
+    names = {"slack": "first slack fibre", "wrinkling": "half slack: wrinkling (3)", "collapse": "collapse"}
     for name, words in names.items():
         limit = float(getattr(limits, name))
         axes.axhline(limit, color="0.45", lw=0.8)

@@ -55,7 +55,7 @@ def add_parser(subparsers: Any) -> None:
     )
     what.add_argument("--waypoints", type=Path, metavar="FILE.csv", help=help_text)
     how = parser.add_mutually_exclusive_group()
-    help_text = "direction of the tip's z axis at --target, of any length [-] (any); a wrist's hand is x: see --rpy"
+    help_text = "direction of the tip's z axis at --target, of any length [-] (any); a wrist's hand points along x: use --rpy"
     add_numbers(how, "--orientation", "X Y Z", help_text)
     add_numbers(how, "--rpy", "R P Y", "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)")
     add_loads(parser)

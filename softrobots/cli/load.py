@@ -37,14 +37,16 @@ def add_parser(subparsers: Any) -> None:
     add_motors(parser, "motor joints, then muscles, base to tip [rad or m] (relaxed)")
     help_text = "load on each motor, the negative of what it exerts, as motor_torques of softrobots solve [N m or N] (required)"
     add_numbers(parser, "--torques", "TAU", help_text, nargs="+", required=True)
-    help_text = "standard deviation of the torques, one for all or one for each [N m or N], for that of the force (unknown)"
+    help_text = "standard deviation of the torques, one for all or one for each [N m or N]; gives that of the force (unknown)"
     add_numbers(parser, "--torque-std", "S", help_text, nargs="+")
     help_text = "standard deviation of the stiffness as a share of it, one for all springs or one for each [-] (unknown)"
     add_numbers(parser, "--stiffness-std", "S", help_text, nargs="+")
     help_text = "standard deviation of the motor coordinates, one for all or one for each [rad or m] (unknown)"
     add_numbers(parser, "--motor-angle-std", "S", help_text, nargs="+")
     parser.add_argument(
-        "--no-restart", action="store_true", help="search from no force only: ten times as fast, without other explanations"
+        "--no-restart",
+        action="store_true",
+        help="search once, from zero force: ten times as fast, but without other forces that explain the torques",
     )
     parser.add_argument("--frame", metavar="LINK", help="where the force acts (the tip)")
     add_gravity(parser)

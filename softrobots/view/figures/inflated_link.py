@@ -151,7 +151,8 @@ def characterisation(data: BendingData, fit: Characterisation, *, pressure: floa
     if line is not None:
         half = student_quantile(0.5 + 0.5 * CONFIDENCE, line.freedoms) * np.sqrt([line.variance(one) for one in angles])
         low, high = (np.minimum(fit.stiffness * angles + sign * half, knee) for sign in (-1.0, 1.0))
-        axes.fill_between(fit.angle_offset + angles, low, high, color=COLOURS[1], alpha=0.2, lw=0)
+        label = f"{100 * CONFIDENCE:g} % band of the line"
+        axes.fill_between(fit.angle_offset + angles, low, high, color=COLOURS[1], alpha=0.2, lw=0, label=label)
     low_k, high_k = fit.stiffness_interval
     label = f"k = {fit.stiffness:.1f} ({low_k:.1f} to {high_k:.1f}) N m/rad"
     label += "" if fit.max_moment is None else f", $M_{{max}}$ = {fit.max_moment:.2f} N m"

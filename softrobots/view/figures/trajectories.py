@@ -150,10 +150,8 @@ def link_moments(trajectory: Trajectory) -> Any:
     for number, moment in enumerate(moments.T):
         axes.plot(trajectory.times, moment, markevery=every, label=f"link {number + 1}", **line_style(number))
     limits = np.array([equilibrium.link_limits.wrinkling_moments for equilibrium in trajectory.equilibria])
-    told: set[float] = set()
     for number, (limit, group) in enumerate(zip(limits.T, trajectory.model.spring_groups, strict=True)):
-        label = None if group.pressure in told else f"wrinkling moments at {group.pressure / 1e3:g} kPa, with axial force"
-        told.add(group.pressure)
+        label = f"link {number + 1}: wrinkling moment at {group.pressure / 1e3:g} kPa, with axial force"
         axes.plot(trajectory.times, limit, label=label, color=line_style(number)["color"], ls=":", lw=1.5)
     axes.set_ylim(0.0, 1.12 * max(float(moments.max()), float(limits.max())))
     axes.legend(fontsize=9)
