@@ -175,6 +175,10 @@ def test_bad_links_are_refused_by_name(parameters: dict[str, Any], field: str, t
         ({"link_model": "three"}, "link_model = three : one of"),
         ({"link_model": "two_hinges", "link_lengths": "[0.6,0.1]"}, "required below 1/6"),
         ({"link_model": "two_hinges", "stiffness": "1"}, "stiffness = .* required above that of the pressure alone"),
+        (
+            {"link_model": "two_hinges", "stiffness": "1", "shear_modulus": "5e7"},
+            "stiffness = .* required above that of the pressure alone",
+        ),
         ({"link_model": "two_hinges", "density": "1"}, "too light to cut"),
         ({"young_modulus": "0"}, "young_modulus .* required > 0"),
         ({"payload": "[1,2]"}, "payload = .* required a mass above 1e-6 kg, or mass, x, y, z"),
