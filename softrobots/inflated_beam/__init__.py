@@ -1,7 +1,10 @@
 """One inflated link as a beam: bending and wrinkling, characterisation data, inflation; [Troise 2021] section 2.1."""
 
 from softrobots.inflated_beam.beam import (
+    POISSON_RATIO,
     SHEAR_COEFFICIENT,
+    BeamStiffness,
+    beam_stiffness,
     deflection,
     required_pressure,
     stiffness_from_young_modulus,
@@ -20,7 +23,7 @@ from softrobots.inflated_beam.characterisation_data import BendingData, read_cha
 from softrobots.inflated_beam.characterisation_fit import Characterisation, fit_characterisation
 from softrobots.inflated_beam.inflation import tank_pressure, tank_volume, volume
 from softrobots.inflated_beam.membrane_tube import MomentLimits, SlackWallMoment, moment_limits, slack_wall_moment
-from softrobots.inflated_beam.two_hinges import POISSON_RATIO, BeamStiffness, TwoHinges, beam_stiffness, two_hinges
+from softrobots.inflated_beam.two_hinges import TwoHinges, two_hinges
 
 __all__ = [
     "MEAN_STIFFNESS",

@@ -1,4 +1,4 @@
-"""Bending of one inflated link: deflection, stiffness, Young's modulus, wrinkling.
+"""One inflated link as a beam: deflection, stiffness, Young's modulus, wrinkling.
 
 Notation of [Troise 2021], section 2.1: a tube of length `L`, radius `r` and wall thickness `t` (thin wall), gauge
 pressure `p`; cap force `P = p pi r^2`, wall section `S = 2 pi r t`, second moment `I = pi r^3 t`, shear coefficient
@@ -19,6 +19,8 @@ from softrobots.core.checks import FloatArray, common_shape, finite_array, non_n
 
 SHEAR_COEFFICIENT = 0.5
 """Shear coefficient `j` of a circular thin tube [-], [Troise 2021] section 2.1 after Cowper."""
+POISSON_RATIO = 0.3
+"""Poisson ratio of the wall where no shear modulus is given [-]: an isotropic wall, an assumption."""
 
 
 def wrinkling_moment(pressure: Any, radius: Any) -> Any:
@@ -72,22 +74,79 @@ class _Section(NamedTuple):
     """Section `S` of the wall [m^2]."""
     second_moment: FloatArray
     """`I` [m^4]."""
-    shear_ratio: FloatArray
-    """`j G / E` [-]."""
 
     @classmethod
-    def of(cls, pressure: Any, radius: Any, wall_thickness: Any, poisson_ratio: Any, **others: FloatArray) -> _Section:
+    def of(cls, pressure: Any, radius: Any, wall_thickness: Any, **others: FloatArray) -> _Section:
         """Check a tube, and that other arguments broadcast with it."""
         p, r = non_negative_array("pressure", pressure, "Pa"), positive_array("radius", radius, "m")
-        t, nu = positive_array("wall_thickness", wall_thickness, "m"), finite_array("poisson_ratio", poisson_ratio, None, "-")
-        arrays = {"pressure": p, "radius": r, "wall_thickness": t, "poisson_ratio": nu} | others
+        t = positive_array("wall_thickness", wall_thickness, "m")
         shape: tuple[int, ...] = ()
-        for name, array in arrays.items():
+        for name, array in ({"pressure": p, "radius": r, "wall_thickness": t} | others).items():
             shape = common_shape(name, shape, array.shape)
-        too_thick = "a thin wall, at most a tenth of the radius {} m"
-        refuse_where("wall_thickness", wall_thickness, t > 0.1 * r, too_thick, r)
-        refuse_where("poisson_ratio", poisson_ratio, (nu <= -1.0) | (nu > 0.5), "in (-1, 0.5]")
-        return cls(p * math.pi * r**2, 2.0 * math.pi * r * t, math.pi * r**3 * t, SHEAR_COEFFICIENT / (2.0 * (1.0 + nu)))
+        refuse_where("wall_thickness", wall_thickness, t > 0.1 * r, "a thin wall, at most a tenth of the radius {} m", r)
+        return cls(p * math.pi * r**2, 2.0 * math.pi * r * t, math.pi * r**3 * t)
+
+    @property
+    def stress(self) -> FloatArray:
+        """Axial stress of the wall by the pressure, `P/S` [Pa]."""
+        return self.cap_force / self.wall
+
+    def bending(self, modulus: FloatArray) -> FloatArray:
+        """`B = (E + P/S) I` [N m^2]."""
+        return (modulus + self.stress) * self.second_moment
+
+    def shear(self, reduced_modulus: FloatArray) -> FloatArray:
+        """`A = P + j G S` [N] of the shear modulus times the shear coefficient, `j G` [Pa]."""
+        return self.cap_force + reduced_modulus * self.wall
+
+
+def _shear_ratio(poisson_ratio: Any) -> FloatArray:
+    """`j G / E` [-] of an isotropic wall."""
+    nu = finite_array("poisson_ratio", poisson_ratio, None, "-")
+    refuse_where("poisson_ratio", poisson_ratio, (nu <= -1.0) | (nu > 0.5), "in (-1, 0.5]")
+    return SHEAR_COEFFICIENT / (2.0 * (1.0 + nu))
+
+
+class BeamStiffness(NamedTuple):
+    """Stiffness of an inflated link as a Timoshenko beam that also twists."""
+
+    bending: Any
+    """`B = (E + P/S) I` [N m^2]."""
+    shear: Any
+    """`A = P + j G S`, force over shear angle [N]."""
+    twisting: Any
+    """`C = (G + P/S) 2 pi r^3 t` [N m^2]."""
+
+
+def beam_stiffness(
+    young_modulus: Any, *, pressure: Any, radius: Any, wall_thickness: Any, shear_modulus: Any = None
+) -> BeamStiffness:
+    """Return the stiffness of an inflated tube in bending, shear and torsion.
+
+    Bending and shear are those of [Troise 2021] (1). In torsion the tension of the wall, `N = P / (2 pi r)` a length, adds
+    `2 pi r^3 N` to that of the wall, the effect of Wagner.
+
+    Args:
+        young_modulus: Modulus `E` of the wall [Pa], positive.
+        pressure: Gauge pressure [Pa], zero or positive.
+        radius: Tube radius `r` [m], positive.
+        wall_thickness: Wall thickness `t` [m], positive, at most a tenth of the radius.
+        shear_modulus: Modulus `G` of the wall [Pa], positive; by default that of an isotropic wall with a Poisson ratio of 0.3,
+            `E / 2.6`. A coated weave has one of its own.
+
+    Returns:
+        The three, each of the common shape.
+
+    Raises:
+        ParameterError: If an argument is out of range or the shapes do not broadcast.
+    """
+    modulus = positive_array("young_modulus", young_modulus, "Pa")
+    isotropic = modulus / (2.0 * (1.0 + POISSON_RATIO))
+    g = isotropic if shear_modulus is None else positive_array("shear_modulus", shear_modulus, "Pa")
+    section = _Section.of(pressure, radius, wall_thickness, young_modulus=modulus, shear_modulus=g)
+    modulus, g = np.broadcast_arrays(modulus, g)
+    twisting = (g + section.stress) * 2.0 * section.second_moment
+    return BeamStiffness(section.bending(modulus), section.shear(SHEAR_COEFFICIENT * g), twisting)
 
 
 def deflection(
@@ -99,7 +158,7 @@ def deflection(
     wall_thickness: Any,
     pressure: Any,
     young_modulus: Any,
-    poisson_ratio: Any = 0.3,
+    poisson_ratio: Any = POISSON_RATIO,
 ) -> Any:
     r"""Return the deflection of an inflated cantilever under a transverse tip force.
 
@@ -126,11 +185,11 @@ def deflection(
     """
     x, loads = finite_array("position", position, None, "m"), finite_array("force", force, None, "N")
     lengths, modulus = positive_array("length", length, "m"), positive_array("young_modulus", young_modulus, "Pa")
-    others = {"young_modulus": modulus, "length": lengths, "position": x, "force": loads}
-    section = _Section.of(pressure, radius, wall_thickness, poisson_ratio, **others)
+    ratio = _shear_ratio(poisson_ratio)
+    others = {"poisson_ratio": ratio, "young_modulus": modulus, "length": lengths, "position": x, "force": loads}
+    section = _Section.of(pressure, radius, wall_thickness, **others)
     refuse_where("position", position, (x < 0.0) | (x > lengths), "within [0, {}] m, the length of the beam", lengths)
-    bending = (modulus + section.cap_force / section.wall) * section.second_moment
-    shear = section.cap_force + section.shear_ratio * modulus * section.wall
+    bending, shear = section.bending(modulus), section.shear(ratio * modulus)
     return loads / bending * (lengths * x**2 / 2.0 - x**3 / 6.0) + loads * x / shear
 
 
@@ -141,7 +200,7 @@ def stiffness_from_young_modulus(
     length: Any,
     radius: Any,
     wall_thickness: Any,
-    poisson_ratio: Any = 0.3,
+    poisson_ratio: Any = POISSON_RATIO,
 ) -> Any:
     """Return the stiffness `k` of the pseudo-rigid hinge from Young's modulus.
 
@@ -183,7 +242,7 @@ def young_modulus_from_stiffness(
     length: Any,
     radius: Any,
     wall_thickness: Any,
-    poisson_ratio: Any = 0.3,
+    poisson_ratio: Any = POISSON_RATIO,
 ) -> Any:
     r"""Return Young's modulus of the wall from a hinge stiffness; inverse of `stiffness_from_young_modulus`.
 
@@ -207,10 +266,11 @@ def young_modulus_from_stiffness(
             pressure alone.
     """
     k, lengths = positive_array("stiffness", stiffness, "N m/rad"), positive_array("length", length, "m")
-    section = _Section.of(pressure, radius, wall_thickness, poisson_ratio, length=lengths, stiffness=k)
-    c = section.shear_ratio * section.wall
+    ratio = _shear_ratio(poisson_ratio)
+    section = _Section.of(pressure, radius, wall_thickness, poisson_ratio=ratio, length=lengths, stiffness=k)
+    c = ratio * section.wall
     bending, shear = k * lengths / (3.0 * section.second_moment), k / (c * lengths)
-    stress, shear_stress = section.cap_force / section.wall, section.cap_force / c
+    stress, shear_stress = section.stress, section.cap_force / c
     middle = 0.5 * ((bending - stress) + (shear - shear_stress))
     half_difference = np.hypot(0.5 * ((bending - stress) - (shear - shear_stress)), np.sqrt(bending) * np.sqrt(shear))
     larger = half_difference + np.abs(middle)

@@ -60,8 +60,8 @@ def deflection(
     modulus = inflated_beam.young_modulus_from_stiffness(stiffness, **tube)
     x = np.linspace(0.0, length, 121)
     beam = inflated_beam.deflection(x, finite_number("force", force, "N"), young_modulus=modulus, **tube)
-    axial = modulus + pressure * radius / (2.0 * wall_thickness)  # E + P/S
-    curvature = force / (axial * math.pi * radius**3 * wall_thickness)
+    sizes = {"pressure": pressure, "radius": radius, "wall_thickness": wall_thickness}
+    curvature = force / inflated_beam.beam_stiffness(modulus, **sizes).bending
     bending = curvature * (length * x**2 / 2.0 - x**3 / 6.0)
     printed = beam + curvature * x**3 / 3.0
     rigid = force * (length - offset) / stiffness * np.maximum(x - offset, 0.0)
