@@ -16,11 +16,11 @@ from scipy.optimize import brentq, minimize_scalar
 import softrobots as sr
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.loads import Load
+from tests.support.muscle_rods import MuscleSegment
 from tests.support.oracles import central_difference
 from tests.support.rods import quaternion_rotation
 
 EI, GJ, EA, DISTANCE, LENGTH = 1.92, 1.28, 2400.0, 0.04, 0.524
-AZIMUTHS = np.array([0.0, -2.0, 2.0]) * np.pi / 3.0
 
 
 @cache
@@ -158,26 +158,10 @@ def test_more_than_three_lengths_are_met_in_the_least_squares() -> None:
 # --- A rod with guided tendons
 
 
-def strains_of(tensions: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-    """kx, ky, tau, nu from force along the axis and moment in the frame of the section, shape (n,), (3, n); Newton.
-
-    They minimise EI/2 (kx^2 + ky^2) + GJ/2 tau^2 + EA/2 (nu - 1)^2 + sum T |path| - m . u - n nu.
-    """
-    rows = np.stack([DISTANCE * np.sin(AZIMUTHS), -DISTANCE * np.cos(AZIMUTHS), 0 * AZIMUTHS, 1 + 0 * AZIMUTHS], axis=1)
-    around = np.array([0.0, 0.0, DISTANCE, 0.0])
-    stiff, rest = np.array([EI, EI, GJ, EA]), np.array([0.0, 0.0, 0.0, 1.0])
-    loads = np.vstack([moment, force])
-    x = np.tile(rest[:, None], loads.shape[1])
-    for _ in range(12):
-        gradient, hessian = stiff[:, None] * (x - rest[:, None]) - loads, np.tile(np.diag(stiff), (loads.shape[1], 1, 1))
-        for tension, row in zip(tensions, rows, strict=True):
-            along, across = row @ x, around @ x
-            size = np.hypot(along, across)
-            gradient = gradient + tension * (row[:, None] * along + around[:, None] * across) / size
-            normal = (around[:, None] * along - row[:, None] * across) / size
-            hessian += (tension / size)[:, None, None] * normal.T[:, :, None] * normal.T[:, None, :]
-        x = x - np.linalg.solve(hessian, gradient.T[..., None])[..., 0].T
-    return x
+ROD = MuscleSegment(
+    length=LENGTH, turn=0.0, bend=(0.0, 0.0), elongation=0.0,
+    bending_stiffness=EI, torsional_stiffness=GJ, axial_stiffness=EA, distance=DISTANCE,
+)  # fmt: skip
 
 
 def tendon_rod(tensions: np.ndarray, force: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -187,11 +171,10 @@ def tendon_rod(tensions: np.ndarray, force: np.ndarray, moment: np.ndarray) -> t
         q, m = y[3:7], y[7:10]
         turns = quaternion_rotation(q.T)
         axis = turns[:, :, 2].T
-        x = strains_of(tensions, force @ axis, np.einsum("nji,jn->in", turns, m))
-        u, way = x[:3], axis * x[3]
+        x = ROD.pulled(np.einsum("nji,jn->in", turns, m), force @ axis, tensions)
+        u, way = x[:3], axis * (1.0 + x[3])
         dq = 0.5 * np.vstack([-np.sum(q[1:] * u, axis=0), q[0] * u + np.cross(q[1:], u, axis=0)])
-        along = x[3] + DISTANCE * (np.sin(AZIMUTHS)[:, None] * x[0] - np.cos(AZIMUTHS)[:, None] * x[1])
-        return LENGTH * np.vstack([way, dq, np.cross(force[:, None], way, axis=0), np.hypot(along, DISTANCE * x[2])])
+        return LENGTH * np.vstack([way, dq, np.cross(force[:, None], way, axis=0), np.hypot(*ROD.rates(x))])
 
     def ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return np.r_[a[:7] - np.r_[np.zeros(3), 1.0, np.zeros(3)], a[10:], b[7:10] - moment]

@@ -45,7 +45,7 @@ class PreparedRobot:
 
 
 def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damping: str = "critical") -> PreparedRobot:
-    """Fix or drive the actuators, shift spring references, choose damping and servos.
+    """Fix or drive the actuators, put muscle tensions into the springs, choose damping and servos.
 
     Args:
         model: The robot.

@@ -62,30 +62,51 @@ class MuscleSegment:
         mean = (one + two + three) / 3.0
         return cls(bend=(-across, along), elongation=mean - fields["length"], distance=distance, **fields)
 
-    def strains(self, moment: np.ndarray, push: np.ndarray, pulls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Curvatures, twist and stretch from the internal loads, (4, n), and the rates of the sums, (3, n).
+    @property
+    def stiffness(self) -> np.ndarray:
+        """EI, EI, GJ, EA: of bending about x and y [N m^2], twist [N m^2] and stretch [N]."""
+        return np.array([self.bending_stiffness] * 2 + [self.torsional_stiffness, self.axial_stiffness])
 
-        The strains (x, y, t, e) minimise EI/2 (x^2 + y^2) + GJ/2 t^2 + EA/2 e^2 + sum T_i |path_i| - moment . (x, y, t)
-        - push e, with the tensions T = - P^T pulls and P from the lengths to the sums as in `of_three`; by Newton's method.
-        """
-        stiff = np.array([self.bending_stiffness] * 2 + [self.torsional_stiffness, self.axial_stiffness])
-        loads = np.vstack([moment, push])
-        x = (loads + np.array([pulls[0], pulls[1], 0.0, pulls[2]])[:, None]) / stiff[:, None]
-        if self.distance == 0.0:
-            return x, x[[0, 1, 3]]
+    @property
+    def arms(self) -> np.ndarray:
+        """Derivative of the rate along each muscle without twist with respect to the strains, (3, 4)."""
         angles, d = np.array([0.0, -2.0, 2.0]) * np.pi / 3.0, self.distance
-        arms = np.stack([d * np.sin(angles), -d * np.cos(angles), 0.0 * angles, 1.0 + 0.0 * angles], axis=1)
-        sums = np.linalg.inv(arms[:, [0, 1, 3]])
-        tensions, around = -sums.T @ pulls, np.array([0.0, 0.0, d, 0.0])
+        return np.stack([d * np.sin(angles), -d * np.cos(angles), 0.0 * angles, 1.0 + 0.0 * angles], axis=1)
+
+    def rates(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rates of the muscles along the rod and around it at strains (4, n), (3, n) each; their norm is that of the length."""
+        return 1.0 + self.arms @ x, np.tile(self.distance * x[2], (3, 1))
+
+    def pulled(self, moment: np.ndarray, push: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+        """Strains (x, y, t, e) from the internal loads and the tensions, (4, n), by Newton's method.
+
+        They minimise EI/2 (x^2 + y^2) + GJ/2 t^2 + EA/2 e^2 + sum T_i |path_i| - moment . (x, y, t) - push e.
+        """
+        stiff, loads = self.stiffness, np.vstack([moment, push])
+        arms, around = self.arms, np.array([0.0, 0.0, self.distance, 0.0])
+        x = (loads - (tensions @ arms)[:, None]) / stiff[:, None]
         for _ in range(7):
-            along, across = 1.0 + arms @ x, np.tile(around @ x, (3, 1))
+            along, across = self.rates(x)
             size = np.hypot(along, across)
             slopes = np.einsum("ij,in->ijn", arms, along / size) + np.einsum("j,in->ijn", around, across / size)
             normals = np.einsum("j,in->ijn", around, along / size) - np.einsum("ij,in->ijn", arms, across / size)
             gradient = stiff[:, None] * x - loads + np.einsum("i,ijn->jn", tensions, slopes)
             tangent = np.diag(stiff) + np.einsum("i,in,ijn,ikn->njk", tensions, 1.0 / size, normals, normals)
             x = x - np.linalg.solve(tangent, gradient.T[..., None])[..., 0].T
-        return x, sums @ (np.hypot(1.0 + arms @ x, around @ x) - 1.0)
+        return x
+
+    def strains(self, moment: np.ndarray, push: np.ndarray, pulls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Strains from the internal loads, (4, n), and the rates of the sums, (3, n).
+
+        The tensions are - P^T pulls, with P from the lengths to the sums as in `of_three`.
+        """
+        if self.distance == 0.0:
+            loads = np.vstack([moment, push]) + np.array([pulls[0], pulls[1], 0.0, pulls[2]])[:, None]
+            x = loads / self.stiffness[:, None]
+            return x, x[[0, 1, 3]]
+        sums = np.linalg.inv(self.arms[:, [0, 1, 3]])
+        x = self.pulled(moment, push, -sums.T @ pulls)
+        return x, sums @ (np.hypot(*self.rates(x)) - 1.0)
 
 
 @dataclass(frozen=True)
