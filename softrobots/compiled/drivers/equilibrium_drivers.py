@@ -93,8 +93,13 @@ def outcome(w: Array) -> int:
 def search_line(w: Array, longest: float) -> bool:
     """Search along the step for a lower energy (Armijo); tell whether it or the residual decreased.
 
-    The step is doubled while the energy falls and it stays shorter than `longest`.
+    The step is doubled while the energy falls and it stays shorter than `longest`. With given muscle lengths the energy counts
+    their gap to second order only, and near the equilibrium its own decrease is smaller than that: there a Newton step at a
+    stable point is taken, too, if it halves the residual.
     """
+    halved = 0.0
+    if N_CONSTRAINTS > 0 and is_stable(w):
+        halved = 0.25 * w[ERROR]
     keep(w)
     energy = w[ENERGY]
     slope = w[SLOPE]
@@ -108,11 +113,13 @@ def search_line(w: Array, longest: float) -> bool:
     largest = share
     move(w, share)
     evaluate(w)
-    while not w[ENERGY] <= energy + ARMIJO * slope + rounding and share > 1e-12 * largest:
+    while not w[ENERGY] <= energy + ARMIJO * slope + rounding and not w[ERROR] < halved and share > 1e-12 * largest:
         share *= 0.5
         slope *= 0.5
         move(w, share)
         evaluate(w)
+    if w[ERROR] < halved:
+        return True
     if not w[ENERGY] <= energy + rounding or (-slope < rounding and not w[ERROR] < error):
         move(w, 0.0)  # no progress
         evaluate(w)
