@@ -190,7 +190,7 @@ class InflatedLinks(XacroRobot):
         Raises:
             ParameterError: If `wall_modulus` refuses the stiffness.
         """
-        return inflated_beam.beam_stiffness(self.wall_modulus, shear_modulus=self.wall_shear_modulus, **self._tubes())
+        return inflated_beam.beam_stiffness(self.wall_modulus, shear_modulus=self.shear_modulus, **self._tubes())
 
     @property
     def wall_shear_modulus(self) -> tuple[float, ...]:

@@ -36,7 +36,7 @@ def mass_matrix(statics: PlainStatics, case: Case, springs: FloatArray) -> Float
 
 def least_eigenvalue(statics: PlainStatics, case: Case, springs: FloatArray) -> tuple[float, float]:
     """Least eigenvalue of the tangent stiffness of a case without moments, relative to the springs, and how exact it is."""
-    scaled, error = _scaled_tangent(statics, case, springs)
+    scaled, error = _scaled(tangent(statics, case, springs), statics, case, springs)
     return float(np.linalg.eigvals(scaled).real.min()), error
 
 
@@ -45,8 +45,9 @@ def growth(statics: PlainStatics, case: Case, springs: FloatArray) -> float | No
 
     None where differences cannot tell: an eigenvalue is nearly zero, or two are closer than `CLOSE`.
     """
-    scaled, error = _scaled_tangent(statics, case, springs)
-    values = np.linalg.eigvals(np.linalg.solve(mass_matrix(statics, case, springs), tangent(statics, case, springs)))
+    stiffness = tangent(statics, case, springs)
+    scaled, error = _scaled(stiffness, statics, case, springs)
+    values = np.linalg.eigvals(np.linalg.solve(mass_matrix(statics, case, springs), stiffness))
     rate = float((np.sqrt(-values.astype(complex)).real / np.sqrt(np.abs(values))).max())
     gaps = np.abs(values[:, None] - values) + np.diag(np.full(len(values), np.inf))
     close = (gaps <= CLOSE * np.abs(values)).any()
@@ -58,9 +59,9 @@ def _around(springs: FloatArray) -> FloatArray:
     return np.concatenate([springs + steps, springs - steps])
 
 
-def _scaled_tangent(statics: PlainStatics, case: Case, springs: FloatArray) -> tuple[FloatArray, float]:
+def _scaled(stiffness: FloatArray, statics: PlainStatics, case: Case, springs: FloatArray) -> tuple[FloatArray, float]:
     """Tangent stiffness relative to the springs, and how exact it is."""
     softness = 1.0 / np.sqrt(statics.stiffness)
     size = float(statics.balance(case, springs[None]).size[0])
     error = 1e-9 * (1.0 + size / float(statics.stiffness.min())) * len(springs)
-    return softness[:, None] * tangent(statics, case, springs) * softness, error
+    return softness[:, None] * stiffness * softness, error
