@@ -148,7 +148,7 @@ def test_the_table_of_the_guide_has_the_defaults_of_the_arm() -> None:
     facts, scales = facts_of(sr.InflatableArm), {"mm": (1e-3, "m"), "kPa": (1e3, "Pa")}
     defaults = {field.name: field.default for field in dataclasses.fields(sr.InflatableArm)}
     checked = []
-    for names, cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]*) \|", page, flags=re.MULTILINE)[:12]:
+    for names, cell in re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]*) \|", page, flags=re.MULTILINE)[:13]:
         values = re.findall(r"(\([\d., ]+\)|[\d.]+|pi|none|paper|false) ?([^,:]*)", cell)
         for name, (number, unit) in zip(re.findall(r"\w+", names), itertools.cycle(values), strict=False):
             scale, unit = scales.get(unit, (1.0, unit))
