@@ -198,26 +198,19 @@ def table(summary: dict[str, object], method: str) -> str:
     def distance(value: object) -> str:
         return "failed" if value is None else f"{1e3 * float(value):.4g} mm"  # type: ignore[arg-type]
 
-    turned = "orientation_error_compensated_rad" in summary
-    tabulated = summary["required_tabulated_pressure_Pa"]
+    gain, tabulated = summary["paper_gain_1_s"], summary["required_tabulated_pressure_Pa"]
+    compared = [(f"largest tip error, the paper's method (gain {gain:g} 1/s)", distance(summary["tip_error_paper_m"]))]
+    if "orientation_error_compensated_rad" in summary:  # the paper's method follows positions
+        compared = [
+            ("largest angle, compensated", f"{summary['orientation_error_compensated_rad']:.3g} rad"),
+            ("largest angle, rigid IK on the flexible arm", f"{summary['orientation_error_uncompensated_rad']:.3g} rad"),
+            ("largest tip error, equilibria solved anew", distance(summary["verified_tip_error_m"])),
+            ("largest angle, equilibria solved anew", f"{summary['verified_orientation_error_rad']:.3g} rad"),
+        ]
     rows = [
         (f"largest tip error, compensated ({method})", distance(summary["tip_error_compensated_m"])),
         ("largest tip error, rigid IK on the flexible arm", distance(summary["tip_error_uncompensated_m"])),
-        *(
-            [
-                ("largest angle, compensated", f"{summary['orientation_error_compensated_rad']:.3g} rad"),
-                ("largest angle, rigid IK on the flexible arm", f"{summary['orientation_error_uncompensated_rad']:.3g} rad"),
-                ("largest tip error, equilibria solved anew", distance(summary["verified_tip_error_m"])),
-                ("largest angle, equilibria solved anew", f"{summary['verified_orientation_error_rad']:.3g} rad"),
-            ]
-            if turned
-            else [
-                (
-                    f"largest tip error, the paper's method (gain {summary['paper_gain_1_s']:g} 1/s)",
-                    distance(summary["tip_error_paper_m"]),
-                )
-            ]
-        ),
+        *compared,
         *((f"largest moment at link {i + 1}", f"{m:.2f} N m") for i, m in enumerate(summary["largest_moment_N_m"])),  # type: ignore[arg-type]
         (f"wrinkling margin at {summary['pressure_Pa'] / 1e3:g} kPa", f"{100 * summary['wrinkling_margin']:.1f} %"),  # type: ignore[operator]
         ("smallest pressure without wrinkles, exact", f"{summary['required_pressure_Pa'] / 1e3:.2f} kPa"),  # type: ignore[operator]
