@@ -91,10 +91,11 @@ ROOMS = {
     "robots": "core inflated_beam constant_curvature helix description",
     "model": "core inflated_beam constant_curvature description",
     "statics": "core inflated_beam model",
-    "compiled": "core inflated_beam constant_curvature description model statics",
+    "dynamics": "core constant_curvature model statics",
+    "compiled": "core inflated_beam constant_curvature description model statics dynamics",
     "export": "core inflated_beam constant_curvature description robots model",
-    "view": "core inflated_beam constant_curvature helix description robots model statics",
-    "cli": "core inflated_beam constant_curvature helix description robots model statics compiled export view",
+    "view": "core inflated_beam constant_curvature helix description robots model statics dynamics",
+    "cli": "core inflated_beam constant_curvature helix description robots model statics dynamics compiled export view",
 }
 """Every folder of the package, and the rooms that it may import."""
 TO_CODE = ("trace", "chain", "drivers", "program", "c", "run", "sweeps")

@@ -1,0 +1,1 @@
+"""Motion of robots: vibration modes, time stepping, linear models, input shaping."""
