@@ -1,0 +1,162 @@
+r"""Damping of the elastic coordinates: Kelvin-Voigt material, the numbers of the file, Rayleigh's mass term, and measured decay.
+
+The damper beside each spring carries the load :math:`D \dot y`. A Kelvin-Voigt material has one time :math:`\beta` for all of
+its stiffness, so that with Rayleigh's term :math:`\alpha` for the mass
+
+.. math:: D = \beta K + \alpha M
+
+and about the relaxed robot mode i of angular frequency :math:`\omega_i` has the damping ratio :math:`\zeta_i = (\beta \omega_i
++ \alpha / \omega_i) / 2` (Clough and Penzien, Dynamics of Structures, 1993, section 12-5). A robot's `damping_time` is written
+into its file as `<dynamics damping>` of each joint, :math:`\beta` times the stiffness of that joint.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_number
+from softrobots.core.errors import NotConverged, ParameterError
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.stability import mass_matrix
+
+_SHARING = ((0, 3), (1, 4), (5, 5), (2, 2))  # of the six joints of a section, those of bend_x, bend_y, twist, stretch
+_LEAST_SAMPLES = 8
+
+
+class Decay(NamedTuple):
+    """Free vibration of one mode that dies away."""
+
+    decrement: float
+    """Logarithmic decrement, `ln(x_n / x_(n+1))` of two peaks one period apart [-]."""
+    frequency: float
+    """Frequency at which it was seen to vibrate [Hz]."""
+
+
+def damping_matrix(
+    model: SoftModel, damping_time: Any = None, mass_damping: Any = 0.0, mass: FloatArray | None = None
+) -> FloatArray:
+    r"""Damping of the elastic coordinates, constant: what their dampers carry per rate of the coordinates.
+
+    Args:
+        model: The robot.
+        damping_time: Time :math:`\beta` of the material [s]: the damping is it times the stiffness near rest. None: the numbers
+            of the file, `<dynamics damping>` of each spring joint. For a section of constant strain the number of each joint
+            counts for the coordinate that it follows, the mean of two for bending, so that a file written with a damping time
+            gives that time. If muscle lengths are given, their free coordinates take their part of the damping of the strains.
+        mass_damping: Rayleigh's term :math:`\alpha` for the mass [1/s].
+        mass: Mass matrix of the elastic coordinates that it multiplies, shape (n_springs, n_springs); that of the relaxed robot
+            by default.
+
+    Returns:
+        Shape (n_springs, n_springs) [N m s/rad or N s/m], symmetric, no eigenvalue negative.
+
+    Raises:
+        ParameterError: If a number is negative or not finite.
+        DescriptionError: If the robot has more joints than Pinocchio supports, and its mass is needed.
+    """
+    check_model(model)
+    alpha = non_negative_number("mass_damping", mass_damping, "1/s")
+    if damping_time is None:
+        damping = _of_the_file(model)
+    else:
+        damping = np.diag(non_negative_number("damping_time", damping_time, "s") * model.stiffness)
+    if alpha == 0.0:
+        return damping
+    if mass is None:
+        point = model.coordinates.at(model.relaxed_motors, model.rest)
+        mass = mass_matrix(model, point, model.embed(point.joints))
+    return damping + alpha * mass
+
+
+def damping_time_from_decrement(decrement: Any, frequency: Any) -> float:
+    r"""Damping time of a robot from the logarithmic decrement of one of its modes.
+
+    A mode with damping ratio :math:`\zeta` has :math:`\delta = 2 \pi \zeta / \sqrt{1 - \zeta^2}` and is seen to vibrate at
+    :math:`f = \omega \sqrt{1 - \zeta^2} / 2 \pi`; with :math:`\beta = 2 \zeta / \omega`
+
+    .. math:: \beta = \frac{2 \delta}{(4 \pi^2 + \delta^2) f}
+
+    Args:
+        decrement: Logarithmic decrement, `ln(x_n / x_(n+1))` of two peaks one period apart; `ln(x_0 / x_n) / n` of n periods [-].
+        frequency: Frequency at which the mode was seen to vibrate [Hz].
+
+    Returns:
+        The `damping_time` [s] of robots, `vibration_modes` and `simulate`.
+
+    Raises:
+        ParameterError: If the decrement is negative, the frequency is not positive, or one of them is not finite.
+    """
+    delta, f = non_negative_number("decrement", decrement, "-"), positive_number("frequency", frequency, "Hz")
+    return 2.0 * delta / ((4.0 * math.pi**2 + delta**2) * f)
+
+
+def measured_decay(time: Any, signal: Any) -> Decay:
+    r"""Decrement and frequency of a measured free vibration, e.g. the tip's height after the robot is plucked.
+
+    The best fit of :math:`c + e^{-\sigma t} (a \cos \omega t + b \sin \omega t)` by least squares, which needs no peaks and takes
+    an offset; one mode is to dominate. `damping_time_from_decrement(*measured_decay(time, signal))` is the damping time.
+
+    Args:
+        time: Times, ascending, at least 8 that span a period or more, shape (n,) [s].
+        signal: What was measured then, any unit, shape (n,).
+
+    Returns:
+        Decrement and frequency.
+
+    Raises:
+        ParameterError: If shapes differ, times do not ascend, or the signal is constant.
+        NotConverged: If no decaying vibration fits the signal.
+    """
+    from scipy.optimize import least_squares
+
+    t = finite_array("time", time, (None,), "s")
+    x = finite_array("signal", signal, (len(t),))
+    if len(t) < _LEAST_SAMPLES or not np.all(np.diff(t) > 0.0):
+        raise ParameterError("time", time, f"at least {_LEAST_SAMPLES} ascending times [s]")
+    if not np.ptp(x) > 1e-12 * float(np.abs(x).max()):
+        raise ParameterError("signal", signal, "one that changes")
+    span = float(t[-1] - t[0])
+    moments, scale = (t - t[0]) / span, float(np.ptp(x))
+
+    def missing(shape: FloatArray) -> FloatArray:
+        decay = np.exp(-shape[0] * moments)
+        basis = np.column_stack([np.ones(len(t)), decay * np.cos(shape[1] * moments), decay * np.sin(shape[1] * moments)])
+        return np.asarray(basis @ np.linalg.lstsq(basis, x / scale, rcond=None)[0] - x / scale)
+
+    grid = np.linspace(0.0, 1.0, 8 * len(t))
+    even = np.interp(grid, moments, x / scale)
+    power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(len(grid)), 4 * len(grid)))
+    angular = 0.5 * math.pi * max(int(power.argmax()), 4)
+    fits = [least_squares(missing, [start, angular], x_scale=[1.0, angular], xtol=1e-14, ftol=1e-14) for start in (1.0, 6.0)]
+    best = min(fits, key=lambda fit: fit.cost)
+    rate, angular = float(best.x[0]), abs(float(best.x[1]))
+    explained = 1.0 - 2.0 * best.cost / float(np.sum((x / scale - (x / scale).mean()) ** 2))
+    decay = Decay(2.0 * math.pi * max(rate, 0.0) / angular, angular / (2.0 * math.pi * span))
+    if not (best.success and rate >= -1e-9 and angular > math.pi and explained > 0.5):
+        raise NotConverged(
+            f"no decaying vibration of a period or more fits the signal (decay {rate / span:.3g} 1/s, {angular / span:.3g} rad/s, "
+            f"{explained:.0%} of its variance)",
+            best=decay,
+            residual=math.sqrt(2.0 * best.cost) * scale,
+            iterations=int(best.nfev),
+        )
+    return decay
+
+
+def _of_the_file(model: SoftModel) -> FloatArray:
+    """The damping of the joints of the file, in elastic coordinates."""
+    structure, joints = model.structure, np.array(model.pinocchio.damping)
+    strains = [joints[structure.spring_indices]]
+    if structure.constant_strain:
+        places = {name: model.pinocchio.joints[model.pinocchio.getJointId(name)].idx_v for name in structure.section_joints}
+        for row in structure.section_table:
+            of_section = joints[[places[name] for name in row.joint_names]]
+            strains.append(of_section[np.array(_SHARING)].mean(axis=1))
+    damping = np.concatenate(strains)
+    if structure.muscle_lengths is None:
+        return np.diag(damping)
+    free = structure.muscle_lengths.free
+    return np.asarray(free.T @ (damping[:, None] * free))
