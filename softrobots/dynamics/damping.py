@@ -1,4 +1,4 @@
-r"""Damping of the elastic coordinates: Kelvin-Voigt material, the numbers of the file, Rayleigh's mass term, and measured decay.
+r"""Damping of the elastic coordinates: by a time of the material, by the numbers of the file, and as measured.
 
 The damper beside each spring carries the load :math:`D \dot y`. A Kelvin-Voigt material has one time :math:`\beta` for all of
 its stiffness, so that with Rayleigh's term :math:`\alpha` for the mass
@@ -80,7 +80,7 @@ def damping_time_from_decrement(decrement: Any, frequency: Any) -> float:
     .. math:: \beta = \frac{2 \delta}{(4 \pi^2 + \delta^2) f}
 
     Args:
-        decrement: Logarithmic decrement, `ln(x_n / x_(n+1))` of two peaks one period apart; `ln(x_0 / x_n) / n` of n periods [-].
+        decrement: Logarithmic decrement, `ln(x_n / x_(n+1))` of peaks one period apart, `ln(x_0 / x_n) / n` of n periods [-].
         frequency: Frequency at which the mode was seen to vibrate [Hz].
 
     Returns:
@@ -96,8 +96,8 @@ def damping_time_from_decrement(decrement: Any, frequency: Any) -> float:
 def measured_decay(time: Any, signal: Any) -> Decay:
     r"""Decrement and frequency of a measured free vibration, e.g. the tip's height after the robot is plucked.
 
-    The best fit of :math:`c + e^{-\sigma t} (a \cos \omega t + b \sin \omega t)` by least squares, which needs no peaks and takes
-    an offset; one mode is to dominate. `damping_time_from_decrement(*measured_decay(time, signal))` is the damping time.
+    The best fit of :math:`c + e^{-\sigma t} (a \cos \omega t + b \sin \omega t)` by least squares, which needs no peaks and
+    takes an offset; one mode is to dominate. `damping_time_from_decrement(*measured_decay(time, signal))` is the damping time.
 
     Args:
         time: Times, ascending, at least 8 that span a period or more, shape (n,) [s].
@@ -137,8 +137,8 @@ def measured_decay(time: Any, signal: Any) -> Decay:
     decay = Decay(2.0 * math.pi * max(rate, 0.0) / angular, angular / (2.0 * math.pi * span))
     if not (best.success and rate >= -1e-9 and angular > math.pi and explained > 0.5):
         raise NotConverged(
-            f"no decaying vibration of a period or more fits the signal (decay {rate / span:.3g} 1/s, {angular / span:.3g} rad/s, "
-            f"{explained:.0%} of its variance)",
+            f"no decaying vibration of a period or more fits the signal (decay {rate / span:.3g} 1/s, "
+            f"{angular / span:.3g} rad/s, {explained:.0%} of its variance)",
             best=decay,
             residual=math.sqrt(2.0 * best.cost) * scale,
             iterations=int(best.nfev),
