@@ -46,6 +46,18 @@ def potential(bodies: list[tuple[np.ndarray, ChainBody]], gravity: np.ndarray) -
     return -sum(float(gravity @ (body.mass * pose[:3, 3] + pose[:3, :3] @ body.first_moment)) for pose, body in bodies)
 
 
+def inertia_about_base(bodies: list[tuple[np.ndarray, ChainBody]]) -> np.ndarray:
+    """Rotational inertia of the robot about the origin of the world, from that of each body about its own frame."""
+    total = np.zeros((3, 3))
+    for pose, body in bodies:
+        turn, origin = pose[:3, :3], pose[:3, 3]
+        total += turn @ body.inertia @ turn.T
+        moment = turn @ body.first_moment
+        for one, other in ((origin, moment), (moment, origin), (body.mass * origin, origin)):  # parallel axes, any point
+            total += one @ other * np.eye(3) - np.outer(one, other)
+    return total
+
+
 # --- Robots of every kind
 
 
@@ -54,6 +66,7 @@ def check_against_pinocchio(model: SoftModel, rng: np.random.Generator, times: i
     chain, gravity = model.chain(), rng.normal(size=3)
     whole, data = model.workspace(tuple(gravity.tolist()))
     offsets = []
+    zero = np.zeros(model.pinocchio.nv)
     for _ in range(times):
         motors, springs = drawn(model, rng)
         q, strains = model.configuration(motors, springs), model.structure.strains(motors, springs)
@@ -62,6 +75,10 @@ def check_against_pinocchio(model: SoftModel, rng: np.random.Generator, times: i
         # Rounding of metres through at most 24 joints.
         assert np.abs(tip - expected).max() < 1e-13
         offsets.append(potential(bodies, gravity) - pin.computePotentialEnergy(whole, data, q))
+        pin.ccrba(whole, data, q, zero)
+        mass, centre = data.Ig.mass, np.array(data.com[0])
+        inertia = np.array(data.Ig.inertia) + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        assert np.abs(inertia_about_base(bodies) - inertia).max() <= 1e-12 * max(1.0, np.abs(inertia).max())  # [kg m^2]
     total = sum(inertia.mass for inertia in model.pinocchio.inertias)
     assert np.ptp(offsets) <= 1e-12 * max(1.0, total * model.reach)  # [J]
 
@@ -135,7 +152,7 @@ def test_a_chain_is_made_once_and_cannot_be_changed(arm: SoftModel) -> None:
     assert isinstance(first, ChainJoint)
     arrays = [value for value in vars(chain).values() if isinstance(value, np.ndarray)]
     assert len(arrays) == 9
-    for array in (*arrays, first.rotation, first.translation, first.body.first_moment):
+    for array in (*arrays, first.rotation, first.translation, first.body.first_moment, first.body.inertia):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
 

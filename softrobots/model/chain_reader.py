@@ -177,5 +177,6 @@ def _snapped(array: FloatArray) -> FloatArray:
 
 
 def _body(inertia: Any, axes: FloatArray) -> ChainBody:
-    mass = float(inertia.mass)
-    return ChainBody(mass, read_only(axes.T @ (mass * np.asarray(inertia.lever)) + 0.0))
+    mass, centre = float(inertia.mass), np.asarray(inertia.lever)
+    about_origin = np.asarray(inertia.inertia) + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    return ChainBody(mass, read_only(axes.T @ (mass * centre) + 0.0), read_only(axes.T @ about_origin @ axes + 0.0))

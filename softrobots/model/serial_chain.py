@@ -14,12 +14,14 @@ from softrobots.model.muscle_paths import MusclePaths
 
 
 class ChainBody(NamedTuple):
-    """Mass fixed to a frame of the chain."""
+    """A rigid body fixed to a frame of the chain."""
 
     mass: float
     """Mass [kg]."""
     first_moment: FloatArray
     """Mass times centre of mass, in the axes of the frame and from its origin, shape (3,) [kg m]."""
+    inertia: FloatArray
+    """Rotational inertia in the axes of the frame and about its origin, shape (3, 3) [kg m^2]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,103 @@
+"""Places of numbers in the workspace of generated code for motion, and the inputs of the functions that trace it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from softrobots.compiled.chain.layout import assign_places
+from softrobots.compiled.chain.unknowns import Unknowns
+
+HISTORY = 4
+"""Number of earlier accelerations from which that of the next step is extrapolated."""
+
+_COUNTS = ("unknowns", "full_damping", "prepared")  # no places for callers
+
+
+@dataclass(frozen=True)
+class MotionLayout:
+    """Places in the workspace of a step of time, in this order.
+
+    `n` unknowns, `m` motor joints. Straight-line functions read motors, force, gravity, damping, time step, `unknown`, `rate`
+    and `acceleration`, and write `correction` and `tip`; all else is for the drivers.
+    """
+
+    motors: int
+    """Number of motor joints, whose positions in the middle of the step come first (m) [rad or m]."""
+    unknowns: int
+    """Number of unknown strains."""
+    full_damping: bool = False
+    """Whether the damping is a matrix rather than a number for each unknown."""
+    motor_velocities: int = field(init=False)
+    """Their velocities there (m) [rad/s or m/s]."""
+    motor_accelerations: int = field(init=False)
+    """Their accelerations there (m) [rad/s^2 or m/s^2]."""
+    force: int = field(init=False)
+    """Force on the tip in the middle of the step, world axes [N] (3)."""
+    gravity: int = field(init=False)
+    """Gravity, world axes [m/s^2] (3)."""
+    damping: int = field(init=False)
+    """Damping of each unknown (n) [N m s/rad or N s/m], or the matrix, row by row (n, n)."""
+    time_step: int = field(init=False)
+    """Length of the step [s]."""
+    unknown: int = field(init=False)
+    """The unknowns in the middle of the step, or where the tip is asked for (n) [rad or m]."""
+    rate: int = field(init=False)
+    """Their velocities there (n)."""
+    acceleration: int = field(init=False)
+    """Their accelerations there (n)."""
+    correction: int = field(init=False)
+    """Newton's correction of the accelerations (n)."""
+    tip: int = field(init=False)
+    """Tip at `unknown` and the motors, world axes [m] (3)."""
+    position: int = field(init=False)
+    """The unknowns at the beginning of the step, behind it at its end (n)."""
+    velocity: int = field(init=False)
+    """Their velocities there (n)."""
+    begin_position: int = field(init=False)
+    """The unknowns at the beginning of the step that was taken last (n)."""
+    begin_velocity: int = field(init=False)
+    """Their velocities there (n)."""
+    history: int = field(init=False)
+    """Accelerations of the steps before, the last one first (`HISTORY`, n)."""
+    n_history: int = field(init=False)
+    """Number of those that are of equal steps."""
+    motors_begin: int = field(init=False)
+    """Motors at the beginning of the step (m)."""
+    motors_middle: int = field(init=False)
+    """Motors in its middle (m)."""
+    motors_end: int = field(init=False)
+    """Motors at its end (m)."""
+    change: int = field(init=False)
+    """Largest change of an unknown in the middle of the step by the last correction, relative to 1 or its size."""
+    prepared: int = field(init=False)
+    """Values that do not depend on the unknowns, factors, records: as many places as the code needs."""
+
+    def __post_init__(self) -> None:
+        """Compute the places."""
+        m, n = self.motors, self.unknowns
+        given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3, damping=n * n if self.full_damping else n)
+        middle = dict(time_step=1, unknown=n, rate=n, acceleration=n, correction=n, tip=3)
+        state = dict(position=n, velocity=n, begin_position=n, begin_velocity=n, history=HISTORY * n, n_history=1)
+        path = dict(motors_begin=m, motors_middle=m, motors_end=m)
+        assign_places(self, m, **given, **middle, **state, **path, change=1, prepared=0)
+
+    def constants(self) -> dict[str, int]:
+        """Return the places by their names in generated code."""
+        places = {name.upper(): place for name, place in vars(self).items() if name not in _COUNTS}
+        return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
+
+
+@dataclass(frozen=True)
+class MotionPlan:
+    """A chain and its places in the workspace of a step of time."""
+
+    unknowns: Unknowns
+    """The chain."""
+    full_damping: bool = False
+    """Whether the damping is a matrix."""
+
+    @cached_property
+    def layout(self) -> MotionLayout:
+        """Places of the numbers of a case."""
+        return MotionLayout(self.unknowns.chain.n_motors, len(self.unknowns.strains), self.full_damping)
