@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+import softrobots.statics.saved_results  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.core.errors import (
     ClusterError,
@@ -23,7 +24,7 @@ from softrobots.core.errors import (
     TargetUnreachable,
     ViewerError,
 )
-from softrobots.core.result_file import load_result, save_result
+from softrobots.core.result_file import load_result, save_csv, save_result
 from softrobots.description.composition import mount
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
@@ -39,7 +40,6 @@ from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate, estimate_load
 from softrobots.statics.loads import EARTH_GRAVITY, distributed_force
 from softrobots.statics.post_buckling import post_buckling_branches
-from softrobots.statics.saved_results import save_csv
 from softrobots.statics.sensitivity import compliance, elastostatic_jacobian
 from softrobots.statics.stability import Stability
 from softrobots.statics.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints

@@ -711,7 +711,7 @@ def test_the_scan_sees_what_it_looks_for(tmp_path: Path) -> None:
 
 # --- No reader is forgotten
 
-DOORS = {"opened", "read_bytes", "read_text", "read_json", "read_xml", "read_arrays", "read_table"}
+DOORS = {"opened", "read_bytes", "read_text", "read_json", "arrays_of_json", "read_xml", "read_arrays", "read_table"}
 """Names of functions that bring in what a file says."""
 DOORWAYS = {
     "core.bounded_reading": "the door itself",
@@ -728,7 +728,7 @@ DOORWAYS = {
     "helix.actuators": ("actuator CSV",),
     "inflated_beam.characterisation_data": ("characterisation CSV",),
     "helix.design": ("design JSON",),
-    "core.result_file": ("results NPZ",),
+    "core.result_file": ("results NPZ", "results JSON"),
     "core.checkpoint": ("checkpoint JSON", "checkpoint NPZ"),
     "studies.benchmark.results": ("benchmark JSON",),
     "robots.parameter_file": ("parameters YAML", "parameters JSON"),

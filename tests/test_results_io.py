@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import json
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +61,32 @@ def test_what_is_saved_comes_back_equal(results: dict, kind: str, tmp_path: Path
     file = sr.save_result(results[kind], tmp_path / kind)
     assert file.suffix == ".npz"
     same(results[kind], sr.load_result(file))
+    text = sr.save_result(results[kind], tmp_path / f"{kind}.json")
+    assert json.loads(text.read_text(encoding="utf-8"))["kind"]["values"] == [kind]
+    same(results[kind], sr.load_result(text))
+
+
+def test_json_that_is_no_table_of_arrays_is_refused(results: dict, tmp_path: Path) -> None:
+    """Of the right kind, the words say what is wrong; a number that JSON does not have is refused before it is written."""
+    good = json.loads(sr.save_result(results["equilibrium"], tmp_path / "a.json").read_text(encoding="utf-8"))
+    row = good["residual"]
+    for change, words in (
+        ([1, 2], "no type, shape and values"),
+        ({"type": "object", "shape": [], "values": [1]}, "no type, shape and values"),
+        (row | {"values": ["1"]}, "entries that are no number"),
+        (row | {"values": [True]}, "entries that are no number"),
+        (row | {"shape": [-1]}, "which is not its shape"),
+        (row | {"shape": [2]}, "which is not its shape"),
+    ):
+        file = tmp_path / "b.json"
+        file.write_text(json.dumps(good | {"residual": change}), encoding="utf-8")
+        with pytest.raises(sr.FileFormatError, match=words):
+            sr.load_result(file)
+    file.write_text("[]", encoding="utf-8")
+    with pytest.raises(sr.FileFormatError, match="no object of arrays"):
+        sr.load_result(file)
+    with pytest.raises(sr.ParameterError, match="finite to be JSON"):
+        sr.save_result(replace(results["equilibrium"], residual=float("inf")), tmp_path / "c.json")
 
 
 def test_springs_said_by_the_caller_come_back(tmp_path: Path) -> None:
@@ -297,6 +325,6 @@ def test_other_objects_are_refused(arm: sr.SoftModel, results: dict, tmp_path: P
         match="ImposedDisplacement, LoadEstimate, Trajectory, Workspace, WorkspaceMap, tuple of EquilibriumBranch",
     ):
         sr.save_result(arm, tmp_path / "a.npz")
-    with pytest.raises(sr.ParameterError, match="a Trajectory"):
+    with pytest.raises(sr.ParameterError, match="one of Trajectory"):
         sr.save_csv(results["equilibrium"], tmp_path / "a.csv")
     assert list(tmp_path.iterdir()) == []

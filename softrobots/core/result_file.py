@@ -1,4 +1,4 @@
-"""Result files: NPZ without pickle, and the table of the kinds of results that can be saved.
+"""Result files: NPZ without pickle or JSON, CSV tables, and the table of the kinds of results that can be saved.
 
 A module with result classes adds them to `KINDS`.
 """
@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core import npz_file
+from softrobots.core.checks import FloatArray
 from softrobots.core.errors import FileFormatError, ParameterError
-from softrobots.core.files import as_path, new_file, write_atomically
+from softrobots.core.files import as_path, csv_text, new_file, write_atomically, write_text
+from softrobots.core.json_text import arrays_of_json, json_of_arrays
 from softrobots.core.npz_file import check_size, read_arrays
 
 FORMAT = 1
@@ -38,6 +40,8 @@ class Kind(NamedTuple):
     """Whether a result has any number of configurations, so that only `npz_file.LARGEST` limits it."""
     items: type | None = None
     """Class of the items where `cls` is `tuple`."""
+    to_table: Callable[[Any], dict[str, FloatArray]] | None = None
+    """Return the columns of a result over its rows, by their names, each shape (n,); None: it is no table."""
 
     def holds(self, result: Any) -> bool:
         """Return whether a result is of this kind."""
@@ -60,13 +64,14 @@ KINDS: dict[str, Kind] = {}
 
 
 def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Save a result as an NPZ file, without pickle.
+    """Save a result as an NPZ file, without pickle, or as JSON if the name of the file ends in `.json`.
 
-    The file appears complete or not at all: it is written under another name and renamed.
+    The file appears complete or not at all: it is written under another name and renamed. Both formats keep every number to the
+    last bit; JSON takes two to four times the space and is read without NumPy, too.
 
     Args:
-        result: A characterisation, equilibrium, imposed displacement, load estimate, IK solution, trajectory, workspace,
-            workspace map, or the branches that `post_buckling_branches` returns.
+        result: A characterisation, equilibrium, imposed displacement, load estimate, IK solution, trajectory, motion,
+            workspace, workspace map, or the branches that `post_buckling_branches` returns.
         path: File to write; `.npz` is added if it has no suffix.
         overwrite: Replace an existing file.
 
@@ -74,20 +79,49 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
         The path of the file.
 
     Raises:
-        ParameterError: If the result is something else, or has more arrays than `load_result` reads, or the path is not one.
+        ParameterError: If the result is something else, has more arrays than `load_result` reads or, for JSON, a number that is
+            not finite, or the path is not one.
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
-    name = next((name for name, kind in KINDS.items() if kind.holds(result)), None)
-    if name is None:
-        raise ParameterError("result", result, f"one of {', '.join(map(str, KINDS.values()))}")
+    name = _kind_of(result, KINDS)
     path = as_path("path", path)
     target = new_file(path if path.suffix or path.is_dir() else path.with_suffix(".npz"), overwrite=overwrite)
     fields = {"format": np.array(FORMAT), "kind": np.array(name), **KINDS[name].to_arrays(result)}
     arrays = {name: array for name, array in fields.items() if array is not None}
     check_size("result", arrays, KINDS[name].largest)
+    if _is_json(target):
+        return write_text(target, json_of_arrays("result", arrays), overwrite=overwrite)
     write_atomically(target, lambda file: np.savez_compressed(file, **arrays), overwrite=overwrite)
     return target
+
+
+def save_csv(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Save a trajectory or a motion as a CSV table in full precision, one line a waypoint or an instant.
+
+    Columns of a trajectory: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z`
+    [m], `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and spring
+    [rad] (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link. Those of a motion have their unit
+    in their name: time, motors, springs, their velocities, motor torques, tip, force on the tip and energies.
+
+    Args:
+        result: The trajectory or motion.
+        path: File to write.
+        overwrite: Replace an existing file.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ParameterError: If it is neither, or the path is none.
+        OutputExists: If the file exists and `overwrite` is false.
+        OutputError: If the file cannot be written.
+    """
+    tables = {name: kind for name, kind in KINDS.items() if kind.to_table is not None}
+    to_table = tables[_kind_of(result, tables)].to_table
+    columns = {} if to_table is None else to_table(result)
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return write_text(path, csv_text(columns, rows), overwrite=overwrite)
 
 
 def load_result(path: str | Path) -> Any:
@@ -97,7 +131,7 @@ def load_result(path: str | Path) -> Any:
     the size that its directory states, at most 1 GiB (64 MiB for a result of a single configuration).
 
     Args:
-        path: The NPZ file.
+        path: The NPZ file, or a JSON file whose name ends in `.json`.
 
     Returns:
         The result, with its model.
@@ -108,16 +142,29 @@ def load_result(path: str | Path) -> Any:
     """
     path = as_path("path", path)
     try:
-        head = read_arrays(path, only=("kind", "format"))
+        content = arrays_of_json(path) if _is_json(path) else None
+        head = read_arrays(path, only=("kind", "format")) if content is None else content
         name = str(head["kind"])
         if int(head["format"]) != FORMAT or name not in KINDS:
             raise FileFormatError(
                 f"it holds {name[:60]!r} in format {head['format']}; known: {', '.join(KINDS)} in format {FORMAT}"
             )
-        return KINDS[name].from_arrays(read_arrays(path, largest=KINDS[name].largest))
+        return KINDS[name].from_arrays(read_arrays(path, largest=KINDS[name].largest) if content is None else content)
     except Exception as error:  # arrays of another type or shape raise various errors of NumPy
         reason = f"it has no {error}" if isinstance(error, KeyError) else error
         raise FileFormatError(f"cannot read a result from {path}: {reason}") from error
+
+
+def _kind_of(result: Any, kinds: Mapping[str, Kind]) -> str:
+    """The name of the kind of a result, or ParameterError with the kinds that there are."""
+    name = next((name for name, kind in kinds.items() if kind.holds(result)), None)
+    if name is None:
+        raise ParameterError("result", result, f"one of {', '.join(map(str, kinds.values()))}")
+    return name
+
+
+def _is_json(path: Path) -> bool:
+    return path.suffix.lower() == ".json"
 
 
 def text(arrays: Mapping[str, Any], name: str) -> str:

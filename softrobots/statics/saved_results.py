@@ -1,4 +1,4 @@
-"""Serialisation of the results of statics: named arrays for result files, and trajectories as CSV tables.
+"""Serialisation of the results of statics: named arrays for result files, and columns of CSV tables.
 
 A file holds the robot (URDF and springs), the load and the coordinates. Everything else is computed again on loading, and a
 file whose residual is larger than it claims is refused.
@@ -9,15 +9,13 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, increasing, instance_of, read_only
+from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, increasing, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
-from softrobots.core.files import csv_text, write_text
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
 from softrobots.model.loader import load_again, load_arguments
@@ -41,13 +39,19 @@ _COLUMNS = ("q_motors", "q_springs", "residual", "tolerance", "iterations")
 _SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
 
 
-def _pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
+def pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
+    """Return the named texts that hold a robot and a load in a result file."""
     wrenches = {name: wrench.tolist() for name, wrench in load.wrenches.items()}
     load_text = json.dumps({"wrenches": wrenches, "gravity": load.gravity})
     return {"urdf": model.urdf, "model": json.dumps(load_arguments(model)), "load": load_text}
 
 
-def _unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
+def unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
+    """Return the robot and the load of the texts of `pack_model`.
+
+    Raises:
+        FileFormatError: If they hold none; other exceptions of readers mean the same.
+    """
     arguments, load = (parse_json(text(fields, name)) for name in ("model", "load"))
     urdf = text(fields, "urdf")
     if not urdf.startswith("<"):
@@ -63,12 +67,12 @@ def _pack_rows(equilibria: tuple[Equilibrium, ...], *, one_load: bool = True) ->
     if one_load and any(not e.load.same_as(first.load) for e in equilibria):
         raise ParameterError("result", first.model, "equilibria under one load; these have several")
     columns = {name: [getattr(equilibrium, name) for equilibrium in equilibria] for name in _COLUMNS}
-    return _pack_model(first.model, first.load) | columns | {"solver": [equilibrium.method for equilibrium in equilibria]}
+    return pack_model(first.model, first.load) | columns | {"solver": [equilibrium.method for equilibrium in equilibria]}
 
 
 def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, frame: str = "") -> tuple[Equilibrium, ...]:
     """Equilibria under one load, each with one more force, shape (n, 3) [N], at a frame."""
-    model, load = _unpack_model(fields)
+    model, load = unpack_model(fields)
     count = len(fields["q_motors"])
     if count == 0 or any(len(fields[name]) != count for name in (*_COLUMNS, "solver")):
         raise FileFormatError("its arrays must have one row for each of at least one configuration")
@@ -125,12 +129,12 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
 
 
 def _pack_imposed(result: ImposedDisplacement) -> dict[str, Any]:
-    rows, load = _pack_rows((result.equilibrium,)), _pack_model(result.model, result.load)
+    rows, load = _pack_rows((result.equilibrium,)), pack_model(result.model, result.load)
     return rows | load | vars(result.probe) | {"displacement": result.displacement, "reaction": result.reaction}
 
 
 def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
-    model, load = _unpack_model(fields)
+    model, load = unpack_model(fields)
     point, direction, origin = (read_only(finite_array(name, fields[name], (3,))) for name in ("point", "direction", "origin"))
     normal = read_only(finite_array("normal", fields["normal"], (3,))) if "normal" in fields else None
     probe = Probe(text(fields, "frame"), point, direction, origin, normal)
@@ -168,22 +172,41 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
     )
 
 
+def _table(trajectory: Trajectory) -> dict[str, FloatArray]:
+    """Columns of a CSV file of a trajectory; see `save_csv`."""
+    model, angles = trajectory.model, trajectory.orientation_error
+    moments = np.zeros((len(trajectory.times), 0)) if trajectory.link_moments is None else trajectory.link_moments
+    last = {f"moment_{link}": column for link, column in enumerate(moments.T, start=1)}
+    columns = {"t": trajectory.times} | dict(zip("xyz", trajectory.targets.T, strict=True))
+    columns |= dict(zip(("tip_x", "tip_y", "tip_z"), trajectory.tip_positions.T, strict=True))
+    columns["tip_error"] = trajectory.tip_error
+    if trajectory.orientations is not None and angles is not None:
+        turned = np.array([pin.rpy.matrixToRpy(one) for one in trajectory.orientations])
+        columns |= dict(zip(("roll", "pitch", "yaw"), turned.T, strict=True)) | {"orientation_error": angles}
+    joints = np.hstack([trajectory.q_motors, trajectory.q_springs])
+    for name, column in zip((*model.motor_joints, *model.spring_joints), joints.T, strict=True):
+        while name in columns or name in last:
+            name = f"joint_{name}"
+        columns[name] = column
+    return columns | last
+
+
 def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
     arrays = {name: getattr(workspace, name) for name in FIELDS}
-    return _pack_model(workspace.model, workspace.load) | arrays | {"refused": workspace.refused}
+    return pack_model(workspace.model, workspace.load) | arrays | {"refused": workspace.refused}
 
 
 def _unpack_workspace(fields: Mapping[str, Any]) -> Workspace:
-    model, load = _unpack_model(fields)
+    model, load = unpack_model(fields)
     return workspace_at(model, load, **{name: fields[name] for name in FIELDS}, refused=counts(fields, "refused")[0])
 
 
 def _pack_map(result: WorkspaceMap) -> dict[str, Any]:
-    return _pack_model(result.model, Load.of(result.model, gravity=result.gravity)) | packed(result)
+    return pack_model(result.model, Load.of(result.model, gravity=result.gravity)) | packed(result)
 
 
 def _unpack_map(fields: Mapping[str, Any]) -> WorkspaceMap:
-    model, load = _unpack_model(fields)
+    model, load = unpack_model(fields)
     return unpacked(model, load.gravity, fields)
 
 
@@ -235,46 +258,8 @@ KINDS.update(
         lambda result: _pack_rows((result.equilibrium,)) | packed_estimate(result),
         lambda fields: estimate_at(_unpack_rows(fields)[0], fields),
     ),
-    trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True),
+    trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True, to_table=_table),
     workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True),
     workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True),
     branches=Kind(tuple, _pack_branches, _unpack_branches, many=True, items=EquilibriumBranch),
 )
-
-
-def save_csv(trajectory: Trajectory, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Save a trajectory as a CSV table, one line a waypoint, full precision.
-
-    Columns: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z` [m],
-    `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and spring [rad]
-    (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link.
-
-    Args:
-        trajectory: The trajectory.
-        path: File to write.
-        overwrite: Replace an existing file.
-
-    Returns:
-        The path of the file.
-
-    Raises:
-        ParameterError: If it is no trajectory, or the path is none.
-        OutputExists: If the file exists and `overwrite` is false.
-        OutputError: If the file cannot be written.
-    """
-    instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
-    model, moments = trajectory.model, trajectory.link_moments
-    names = ["t", "x", "y", "z", "tip_x", "tip_y", "tip_z", "tip_error"]
-    names += [f"joint_{name}" if name in names else name for name in (*model.motor_joints, *model.spring_joints)]
-    columns = [trajectory.times[:, None], trajectory.targets, trajectory.tip_positions, trajectory.tip_error[:, None]]
-    if trajectory.orientations is not None and trajectory.orientation_error is not None:
-        names[8:8] = ["roll", "pitch", "yaw", "orientation_error"]
-        columns += [
-            np.array([pin.rpy.matrixToRpy(one) for one in trajectory.orientations]),
-            trajectory.orientation_error[:, None],
-        ]
-    columns += [trajectory.q_motors, trajectory.q_springs]
-    if moments is not None:
-        names += [f"moment_{i + 1}" for i in range(moments.shape[1])]
-        columns.append(moments)
-    return write_text(path, csv_text(names, np.hstack(columns).tolist()), overwrite=overwrite)

@@ -245,6 +245,14 @@ def result_corpus() -> list[bytes]:
         return [sr.save_result(result, Path(folder) / f"{kind}.npz").read_bytes() for kind, result in results().items()]
 
 
+@cache
+def result_json_corpus() -> list[bytes]:
+    """Some of them as JSON."""
+    with TemporaryDirectory() as folder:
+        chosen = {kind: results()[kind] for kind in ("equilibrium", "trajectory", "branches")}
+        return [sr.save_result(result, Path(folder) / f"{kind}.json").read_bytes() for kind, result in chosen.items()]
+
+
 def read_result(file: Path) -> None:
     """A saved result."""
     result: Any = sr.load_result(file)
@@ -329,6 +337,7 @@ READERS: dict[str, tuple[Callable[[], list[bytes]], Damage, Callable[[Path], obj
     "actuator CSV": (table_corpus, damaged_bytes, read_table, ".csv"),
     "characterisation CSV": (bending_corpus, damaged_bytes, read_bending, ".csv"),
     "results NPZ": (result_corpus, damaged_archive, read_result, ".npz"),
+    "results JSON": (result_json_corpus, damaged_bytes, read_result, ".json"),
     "design JSON": (design_corpus, damaged_bytes, read_design, ".json"),
     "benchmark JSON": (bench_corpus, damaged_bytes, read_bench, ".json"),
     "parameters YAML": (parameter_corpus, damaged_bytes, read_parameter_file, ".yaml"),

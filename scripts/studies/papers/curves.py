@@ -8,9 +8,9 @@ import numpy as np
 
 from softrobots import helix, inflated_beam
 from softrobots.core.files import csv_text, write_text
+from softrobots.core.result_file import save_csv
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_DIAMETER
 from softrobots.inflated_beam import TABLE_3
-from softrobots.statics.saved_results import save_csv
 from studies.papers.arm_path import movement
 
 

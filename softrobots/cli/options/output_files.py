@@ -9,8 +9,7 @@ from typing import Any
 
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
-from softrobots.core.result_file import save_result
-from softrobots.statics.saved_results import save_csv
+from softrobots.core.result_file import save_csv, save_result
 from softrobots.view.figures import canvas
 
 
