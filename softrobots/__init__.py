@@ -26,6 +26,7 @@ from softrobots.core.errors import (
 )
 from softrobots.core.result_file import load_result, save_csv, save_result
 from softrobots.description.composition import mount
+from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
@@ -65,6 +66,7 @@ __all__ = [
     "IkSolution",
     "ImposedDisplacement",
     "InflatableArm",
+    "InputShaper",
     "LinkLimits",
     "LoadEstimate",
     "LoadNotFound",
@@ -79,6 +81,7 @@ __all__ = [
     "Path3D",
     "PccArm",
     "SelfIntersection",
+    "ShapedTrajectory",
     "SoftModel",
     "SoftRobotsError",
     "SpringGroup",
@@ -101,15 +104,18 @@ __all__ = [
     "grown_coordinates",
     "helix",
     "inflated_beam",
+    "input_shaper",
     "load_model",
     "load_result",
     "mount",
     "post_buckling_branches",
     "quintic",
     "read_waypoints",
+    "residual_vibration",
     "sample_workspace",
     "save_csv",
     "save_result",
+    "shape_input",
     "solve_equilibrium",
     "solve_ik",
     "solve_imposed_displacement",

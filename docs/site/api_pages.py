@@ -71,6 +71,11 @@ PAGES = {
             *_top("Path3D", "quintic", "straight_line", "waypoints", "read_waypoints", "sample_workspace", "Workspace"),
         ),
     ),
+    "input_shaping": ApiPage(
+        "Input shaping",
+        "Motor paths that leave no vibration behind.",
+        _top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),
+    ),
     "inflated_beam": ApiPage("inflated_beam", "One inflated link as a beam.", _top("inflated_beam")),
     "constant_curvature": ApiPage(
         "constant_curvature", "Segments of constant curvature in closed form.", _top("constant_curvature")

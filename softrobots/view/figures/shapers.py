@@ -1,0 +1,49 @@
+"""Figures of input shaping. Needs matplotlib (extra `plot`).
+
+The functions return a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import finite_number, positive_number
+from softrobots.core.errors import ParameterError
+from softrobots.dynamics.input_shaping import SHAPERS, input_shaper, residual_vibration
+from softrobots.view.figures.canvas import line_style, new_plot
+
+
+def sensitivity(frequency: float, damping_ratio: float = 0.0, *, tolerance: float = 0.05, widest: float = 0.5) -> Any:
+    """Vibration that each shaper leaves over the frequency that the robot really has: after [Singhose et al. 1994].
+
+    Args:
+        frequency: Frequency that the shapers are made for [Hz].
+        damping_ratio: Its damping ratio, from 0 to below 1; the robot has it too [-].
+        tolerance: Share of the vibration that the shaper "ei" leaves at the frequency [-].
+        widest: Largest error of the frequency that is drawn, as a share of it, above 0 and below 1 [-].
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+        MissingDependency: If matplotlib is not installed.
+    """
+    if not 0.0 < finite_number("widest", widest) < 1.0:
+        raise ParameterError("widest", widest, "above 0 and below 1")
+    made = [input_shaper(frequency, damping_ratio, shaper=kind, tolerance=tolerance) for kind in SHAPERS]
+    real = positive_number("frequency", frequency, "Hz") * np.linspace(1.0 - widest, 1.0 + widest, 401)
+    title = f"Shapers for {frequency:.4g} Hz, damping ratio {damping_ratio:.2g}"
+    figure, axes = new_plot((8.0, 5.0), xlabel="frequency of the robot [Hz]", ylabel="vibration that is left [%]", title=title)
+    for number, (kind, shaper) in enumerate(zip(SHAPERS, made, strict=True)):
+        style = line_style(number) | {"marker": None}
+        label = f"{kind.upper()}, {shaper.duration:.3g} s longer"
+        axes.plot(real, 100.0 * residual_vibration(shaper, real, damping_ratio), lw=2.0, label=label, **style)
+    axes.axhline(100.0 * tolerance, color="0.45", lw=0.8)
+    axes.annotate(f"{100.0 * tolerance:g} %", (real[0], 100.0 * tolerance), (4, 4), textcoords="offset points", fontsize=9)
+    axes.axvline(frequency, color="0.45", lw=0.8, ls=":")
+    axes.set(xlim=(real[0], real[-1]), ylim=(0.0, None))
+    axes.legend(fontsize=9, loc="upper center")
+    return figure
