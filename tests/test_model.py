@@ -316,3 +316,38 @@ def test_unknown_frames_are_refused_with_the_known_ones(arm: sr.SoftModel) -> No
     with pytest.raises(sr.NameNotFound, match=r"'tipp' \(did you mean 'tip'\?\); available: .*hinge_1") as caught:
         arm.frame_id("tipp")
     assert caught.value.available[-1] == "tip"
+
+
+def test_drives_of_motors_are_those_of_the_file() -> None:
+    """Rotor, viscous and dry friction, largest torque; through URDF, MJCF and SDF; without effect on statics."""
+    robot = sr.InflatableArm(rotor_inertia=0.05, motor_effort=40.0)
+    urdf = robot.urdf().replace('damping="0.0" friction="0.0"', 'damping="0.25" friction="0.5"', 1)
+    model = sr.load_model(urdf)
+    drives = model.actuators.drives
+    assert drives.rotor_inertia.tolist() == [0.05] * 3
+    assert drives.damping.tolist() == [0.25, 0.0, 0.0]
+    assert drives.friction.tolist() == [0.5, 0.0, 0.0]
+    assert drives.effort.tolist() == [40.0] * 3
+    load = ((0.3, 0.6, -0.8), (0, 10, -15))
+    plain = sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), *load)
+    assert np.array_equal(sr.solve_equilibrium(model, *load).q_springs, plain.q_springs)
+    assert sr.load_model(urdf.replace('effort="40.0"', 'effort="0.0"', 1)).actuators.drives.effort[0] == np.inf
+    muscles = sr.load_model(sr.PccArm())
+    assert muscles.actuators.drives.effort.tolist() == [tag.strongest for tag in muscles.muscles]
+    with pytest.raises(sr.DescriptionError, match="rotor of joint motor_1"):
+        sr.load_model(robot.urdf().replace('rotor inertia="0.05"', 'rotor inertia="-1"', 1))
+
+
+@pytest.mark.parametrize(("write", "module"), [("to_mjcf", "mujoco"), ("to_sdf", "pydrake")])
+def test_rotors_and_friction_pass_through_other_formats(write: str, module: str) -> None:
+    tool = pytest.importorskip(module)
+    urdf = sr.InflatableArm(rotor_inertia=0.05).urdf().replace('friction="0.0"', 'friction="0.5"', 1)
+    text = getattr(sr.export, write)(sr.load_model(urdf), damping="file")
+    drives = sr.load_model(text).actuators.drives
+    assert drives.rotor_inertia == pytest.approx([0.05] * 3, rel=1e-15)
+    if module == "mujoco":  # Drake drops dry friction
+        assert drives.friction.tolist() == [0.5, 0.0, 0.0]
+        spec = tool.MjModel.from_xml_string(text)
+        assert sorted(spec.dof_armature.tolist()) == [0.0] * 4 + [0.05] * 3
+    else:
+        assert "<friction>0.5</friction>" in text

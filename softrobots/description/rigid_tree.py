@@ -131,6 +131,10 @@ class Joint:
     """Largest speed [rad/s or m/s]."""
     damping: float
     """Viscous damping [N m s/rad or N s/m]."""
+    friction: float = 0.0
+    """Dry friction [N m or N]."""
+    rotor_inertia: float = 0.0
+    """Inertia of the rotor of a motor at the joint [kg m^2 or kg]."""
 
     @property
     def movable(self) -> bool:

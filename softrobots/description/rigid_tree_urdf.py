@@ -144,6 +144,8 @@ def _joint(element: Element) -> Joint:
         float(_numbers(limit, "effort", "inf")[0]),
         float(_numbers(limit, "velocity", "inf")[0]),
         float(_numbers(dynamics, "damping", "0")[0]),
+        float(_numbers(dynamics, "friction", "0")[0]),
+        float(_numbers(element.find(f"{{{NAMESPACE}}}rotor"), "inertia", "0")[0]),
     )
 
 
@@ -195,8 +197,10 @@ def _write_joint(element: Element, joint: Joint, spring: SpringTag | None) -> No
         low, high = np.clip(joint.limits, -LARGEST, LARGEST)
         limit |= {"lower": repr(float(low)), "upper": repr(float(high))}
     SubElement(element, "limit", limit)
-    SubElement(element, "dynamics", {"damping": repr(float(joint.damping)), "friction": "0.0"})
+    SubElement(element, "dynamics", {"damping": repr(float(joint.damping)), "friction": repr(float(joint.friction))})
     SubElement(element, f"{{{NAMESPACE}}}role", {"value": "spring" if spring else "motor"})
+    if joint.rotor_inertia > 0.0:
+        SubElement(element, f"{{{NAMESPACE}}}rotor", {"inertia": repr(float(joint.rotor_inertia))})
     if spring:
         numbers = {"stiffness": repr(float(spring.stiffness)), "rest": repr(float(spring.rest))}
         SubElement(element, f"{{{NAMESPACE}}}spring", numbers)

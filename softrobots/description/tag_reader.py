@@ -41,8 +41,9 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         )
     springs: dict[str, SpringTag] = {}
     roles: dict[str, str] = {}
+    rotors: dict[str, float] = {}
     for joint in root.findall("joint"):
-        _read_joint(joint, source, springs, roles)
+        _read_joint(joint, source, springs, roles, rotors)
     sections = tuple(_section(element, source, roles) for element in _ours(root, "section"))
     elastic = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in COORDINATES)]
     tags = RobotTags(
@@ -55,6 +56,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         lines=tuple(_line(element, source) for element in _ours(root, "line")),
         mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
         tip=_tip(root, source),
+        rotors=rotors,
     )
     _check_together(tags, source)
     check_structure(root, source)
@@ -65,14 +67,18 @@ def _ours(element: ElementTree.Element, name: str) -> list[ElementTree.Element]:
     return element.findall(f"{{{NAMESPACE}}}{name}")
 
 
-def _read_joint(joint: ElementTree.Element, source: str, springs: dict[str, SpringTag], roles: dict[str, str]) -> None:
+def _read_joint(
+    joint: ElementTree.Element, source: str, springs: dict[str, SpringTag], roles: dict[str, str], rotors: dict[str, float]
+) -> None:
     name = joint.get("name", "")
-    for tag_name in ("spring", "role"):
+    for tag_name in ("spring", "role", "rotor"):
         if len(_ours(joint, tag_name)) > 1:
             raise DescriptionError(f"joint {name} in {source} has more than one {tag_name}; one is required")
     for spring in _ours(joint, "spring"):
         where = f"the spring of joint {name} in {source}"
         springs[name] = SpringTag(_positive(spring, "stiffness", where), _number(spring, "rest", where))
+    for rotor in _ours(joint, "rotor"):
+        rotors[name] = _positive(rotor, "inertia", f"the rotor of joint {name} in {source}")
     for role in _ours(joint, "role"):
         value = role.get("value", "")
         if value not in ROLES:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 NAMESPACE = "urn:softrobots:urdf"
 """XML namespace of the tags."""
@@ -138,3 +138,5 @@ class RobotTags:
     """Names of the joints that mimic another joint."""
     tip: str | None = None
     """Name of the link that is the tip by default; None if the file names none."""
+    rotors: Mapping[str, float] = field(default_factory=dict)
+    """Inertia of the rotor of a motor at its joint [kg m^2, or kg at a prismatic joint] by joint name."""

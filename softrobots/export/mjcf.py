@@ -144,6 +144,9 @@ class _Bodies:
         damping = self._damping.get(joint.name, joint.damping)
         if damping > 0.0:
             attributes["damping"] = repr(damping)
+        for name, value in (("frictionloss", joint.friction if spring is None else 0.0), ("armature", joint.rotor_inertia)):
+            if value > 0.0:
+                attributes[name] = repr(value)
         ElementTree.SubElement(element, "joint", attributes)
 
     def _geom(self, element: ElementTree.Element, shape: Shape, file: Path | None, options: dict[str, str]) -> None:

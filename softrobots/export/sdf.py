@@ -174,10 +174,15 @@ class _Model:
         spring = self._robot.tree.springs.get(joint.name)
         bounded = bool(np.all(np.isfinite(joint.limits))) and (self._limits or spring is None)
         kind = joint.kind if joint.kind == "prismatic" else "revolute" if bounded else "continuous"
-        axis = ElementTree.SubElement(self._joint(joint.name, kind, joint.parent, joint.child), "axis")
+        element = self._joint(joint.name, kind, joint.parent, joint.child)
+        axis = ElementTree.SubElement(element, "axis")
         ElementTree.SubElement(axis, "xyz").text = number_text(joint.axis)
         dynamics = ElementTree.SubElement(axis, "dynamics")
         _write_number(dynamics, "damping", joint.damping)
+        if joint.friction > 0.0 and spring is None:
+            _write_number(dynamics, "friction", joint.friction)
+        if joint.rotor_inertia > 0.0 and spring is None:
+            _write_number(element, f"{{{DRAKE}}}rotor_inertia", joint.rotor_inertia)
         if spring is not None:
             _write_number(dynamics, "spring_stiffness", spring.stiffness)
             _write_number(dynamics, "spring_reference", spring.rest)

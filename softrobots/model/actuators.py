@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,19 @@ from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.muscle_lengths import MuscleLengths
+
+
+class Drives(NamedTuple):
+    """What actuators add to the motion of their coordinates, arrays of shape (n_motors,); statics does not use it."""
+
+    rotor_inertia: FloatArray
+    """Inertia of the rotor at the joint, behind the gears [kg m^2, or kg for a slide]; 0 for muscles."""
+    damping: FloatArray
+    """Viscous friction [N m s/rad or N s/m]; 0 for muscles."""
+    friction: FloatArray
+    """Dry friction [N m or N]; 0 for muscles."""
+    effort: FloatArray
+    """Largest torque, force or tension [N m or N]; infinite where the file states none, or 0."""
 
 
 class Actuators:
@@ -24,6 +37,7 @@ class Actuators:
         muscles: Sequence[MuscleTag],
         softness: FloatArray,
         lengths: MuscleLengths | None,
+        drives: FloatArray,
     ) -> None:
         """Collect names, limits and scales.
 
@@ -34,6 +48,7 @@ class Actuators:
             muscles: The muscles.
             softness: Bending of the segment of each muscle per moment at its end, shape (n,) [rad/(N m)].
             lengths: The constraint of given muscle lengths; None if tensions are given or there are no muscles.
+            drives: The rows of `Drives` for the joints, shape (4, m).
         """
         self._lengths = lengths
         distance = np.array([muscle.distance for muscle in muscles])
@@ -41,6 +56,10 @@ class Actuators:
         """Limits of the muscle lengths, shape (n_muscles, 2) [m]."""
         self.muscle_forces = read_only(np.array([(-m.strongest, m.strongest) for m in muscles]).reshape(-1, 2))
         """Limits of the muscle tensions, shape (n_muscles, 2) [N]."""
+        strongest = np.array([muscle.strongest for muscle in muscles])
+        of_muscles = np.concatenate([np.zeros((3, len(muscles))), strongest[None]])
+        self.drives = Drives(*map(read_only, np.concatenate([drives, of_muscles], axis=1)))
+        """Rotors, friction and largest torques."""
         self.names = (*joints, *(muscle.name for muscle in muscles))
         """Name of each."""
         self.limits = read_only(np.concatenate([joint_limits, self.muscle_forces if lengths is None else self.muscle_lengths]))

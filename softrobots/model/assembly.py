@@ -104,6 +104,7 @@ def assemble(
         tags.muscles,
         np.array([float((1.0 / strain_springs.stiffness[list(segments[m.segment]["bend_x"])]).sum()) for m in tags.muscles]),
         given_lengths,
+        _drives(rigid, motor_joints, tags.rotors),
     )
     data = PinocchioData(rigid) if like is None else like.data
     inside = {joint for row in rows for joint in row.joint_names}
@@ -181,6 +182,15 @@ def _joint_limits(rigid: Any, names: Sequence[str]) -> FloatArray:
         limits[row] = (-np.inf, np.inf) if joint.nq == 2 else (rigid.lowerPositionLimit[place], rigid.upperPositionLimit[place])
     limits[limits <= -LARGEST], limits[limits >= LARGEST] = -np.inf, np.inf  # URDF has no slide without limits
     return read_only(limits)
+
+
+def _drives(rigid: Any, names: Sequence[str], rotors: Mapping[str, float]) -> FloatArray:
+    """Rotor inertia, viscous and dry friction, and largest torque of motor joints, shape (4, n); no torque stated: infinite."""
+    places = velocity_indices(rigid, names)
+    effort = np.array(rigid.upperEffortLimit)[places]
+    effort[(effort <= 0.0) | (effort >= LARGEST)] = np.inf
+    inertia = [rotors.get(name, 0.0) for name in names]
+    return np.array([inertia, rigid.damping[places], rigid.upperDryFrictionLimit[places], effort])
 
 
 def _section_rows(tags: Sequence[SectionTag], first: int) -> list[SectionRow]:

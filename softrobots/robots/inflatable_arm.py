@@ -42,6 +42,13 @@ class InflatableArm(InflatedLinks):
     )
     motor_effort: float = parameter(50.0, "N m", "Largest torque of a motor", "assumed; above the paper's 17.51 N m", above=0.0)
     motor_velocity: float = parameter(2.0, "rad/s", "Largest speed of a motor", "assumed", above=0.0)
+    rotor_inertia: float = parameter(
+        0.0,
+        "kg m^2",
+        "Inertia of the rotor of each motor at its joint: its own times the square of the gear ratio",
+        "assumed; has no effect on the statics",
+        at_least=0.0,
+    )
     base_mass: float = parameter(
         2.0, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
     )

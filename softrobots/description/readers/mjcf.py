@@ -33,8 +33,8 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     or site called `tip`, or the only moving body at an end of the tree. Visible boxes, cylinders, spheres and mesh files are
     read, and capsules as cylinders.
 
-    Features without effect on a loaded robot at rest are ignored: contacts, damping polynomials, armature, sensors, actuators
-    with zero control, and position actuators of joints without stiffness, which are motors.
+    Features without effect on a loaded robot at rest are ignored: contacts, damping polynomials, sensors, armature of joints
+    with stiffness, actuators with zero control, and position actuators of joints without stiffness, which are motors.
 
     The arguments are those of `softrobots.description.readers.to_urdf`.
 
@@ -105,6 +105,8 @@ def _joints(mujoco: Any, model: Any, body: int, source: str, parent: str) -> tup
                 _effort(mujoco, model, joint),
                 np.inf,
                 float(model.dof_damping[dof]),
+                float(model.dof_frictionloss[dof]),
+                float(model.dof_armature[dof]) if model.jnt_stiffness[joint] == 0.0 else 0.0,
             )
         )
         place = Placement(-anchor)

@@ -84,12 +84,12 @@ def _tree(plant: Any, source: str, frames: set[str], shapes: dict[str, list[Any]
     names[plant.world_body().index()] = "world"
     joints = {edge.joint.index(): _name(plant, edge.joint, model) for edge in edges if edge.joint.num_velocities()}
     by_joint, actuators = _springs(plant), map(plant.get_joint_actuator, plant.GetJointActuatorIndices())
-    efforts = {actuator.joint().index(): float(actuator.effort_limit()) for actuator in actuators}
+    drives = {one.joint().index(): (float(one.effort_limit()), float(one.default_reflected_inertia())) for one in actuators}
     springs = {name: by_joint[index] for index, name in joints.items() if index in by_joint}
     builder = TreeBuilder(model, source, names.values(), joints.values(), springs)
     for edge in edges:
         ends = names[edge.parent.index()], names[edge.child.index()]
-        moving, end = _joints(edge, joints.get(edge.joint.index(), ""), ends, efforts)
+        moving, end = _joints(edge, joints.get(edge.joint.index(), ""), ends, drives)
         builder.add(_body(edge.child, ends[1], shapes), ends[0], moving, end)
     for frame in _items(plant.get_frame, "FrameIndex", plant.num_frames()):
         if frame.name() in frames and not frame.is_body_frame():
@@ -148,7 +148,9 @@ def _not_supported(plant: Any) -> Iterator[str]:
         yield f"{plant.num_constraints()} constraints (loops and couplings are not supported)"
 
 
-def _joints(edge: _Edge, name: str, ends: tuple[str, str], efforts: dict[Any, float]) -> tuple[list[Joint], Placement]:
+def _joints(
+    edge: _Edge, name: str, ends: tuple[str, str], drives: dict[Any, tuple[float, float]]
+) -> tuple[list[Joint], Placement]:
     """The joint of an edge, if it moves, and the pose of its child in the joint, or in the parent."""
     joint = edge.joint
     start = placement_of(joint.frame_on_parent().GetFixedPoseInBodyFrame())
@@ -159,6 +161,7 @@ def _joints(edge: _Edge, name: str, ends: tuple[str, str], efforts: dict[Any, fl
     axis = np.array(joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis())
     if edge.reversed:  # the same motion with parent and child exchanged
         start, end, axis = end, start, -axis
+    effort, rotor_inertia = drives.get(joint.index(), (np.inf, 0.0))
     moving = Joint(
         name,
         _KINDS[joint.type_name()],
@@ -166,9 +169,10 @@ def _joints(edge: _Edge, name: str, ends: tuple[str, str], efforts: dict[Any, fl
         start,
         axis,
         (float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])),
-        efforts.get(joint.index(), np.inf),
+        effort,
         float(joint.velocity_upper_limits()[0]),
         float(joint.default_damping_vector()[0]),
+        rotor_inertia=rotor_inertia,
     )
     return [moving], end.inverse
 

@@ -81,7 +81,7 @@ class TreeBuilder:
         for joint in joints:
             bounds = np.array([bound for bound in joint.limits if not np.isinf(bound)])
             self._check(f"the joint {joint.name}", joint.placement.position, joint.placement.rotation, joint.axis, bounds)
-            self._check(f"the joint {joint.name}", joint.damping)
+            self._check(f"the joint {joint.name}", joint.damping, joint.friction, joint.rotor_inertia)
             if not abs(np.linalg.norm(joint.axis) - 1.0) <= _UNIT:
                 raise DescriptionError(
                     f"{self._source}: the joint {joint.name} has the axis {joint.axis.tolist()}; a direction is required"
