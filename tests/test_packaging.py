@@ -28,12 +28,13 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
     assert "pinocchio" in loaded
     heavy = {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "tqdm"}
     heavy |= {"mujoco", "pydrake", "pybullet", "urchin", "ikpy", "roboticstoolbox", "viser", "distributed", "dask"}
-    heavy |= {"playwright", "PIL", "shtab", "IPython", "example_robot_data"}
+    heavy |= {"playwright", "PIL", "shtab", "IPython", "example_robot_data", "control"}
     assert not loaded & (heavy | {"urllib.request"})  # brings http, ssl and email along, an eighth of the whole
 
 
 PUBLIC = """
 EARTH_GRAVITY ROBOTS AssumedStiffnessWarning ClusterError DescriptionError Equilibrium EquilibriumBranch EquilibriumNotFound
+<<<<<<< HEAD
 FileFormatError HelixTube IkSolution ImposedDisplacement InflatableArm InputShaper LinkLimits LoadEstimate LoadNotFound
 MissingDependency NameNotFound NeutralEquilibrium NoCriticalLoad NotConverged OutputError OutputExists ParameterError Path3D
 PccArm SelfIntersection ShapedTrajectory SoftModel SoftRobotsError SpringGroup Stability StraightTube TargetUnreachable
@@ -41,6 +42,16 @@ Trajectory Viewer ViewerError Workspace __version__ compliance constant_curvatur
 elastostatic_jacobian estimate_load export follow_trajectory grown_coordinates helix inflated_beam input_shaper load_model
 load_result mount post_buckling_branches quintic read_waypoints residual_vibration sample_workspace save_csv save_result
 shape_input solve_equilibrium solve_ik solve_imposed_displacement straight_line view waypoints with_springs
+=======
+FileFormatError HelixTube IkSolution ImposedDisplacement InflatableArm LinearModel LinkLimits LoadEstimate LoadNotFound
+MissingDependency NameNotFound NeutralEquilibrium NoCriticalLoad NotConverged OutputError OutputExists ParameterError Path3D
+PccArm SelfIntersection SoftModel SoftRobotsError SpringGroup Stability StraightTube TargetUnreachable Trajectory
+VibrationModes Viewer ViewerError Workspace __version__ compliance constant_curvature critical_load
+damping_time_from_decrement distributed_force elastostatic_jacobian estimate_load export follow_trajectory grown_coordinates
+helix inflated_beam linearize load_model load_result measured_decay mount post_buckling_branches quintic read_waypoints
+sample_workspace save_csv save_result solve_equilibrium solve_ik solve_imposed_displacement straight_line vibration_modes view
+waypoints with_springs
+>>>>>>> 60f7efb (Vibration modes and linear models of a robot about any loaded equilibrium, with exact tangent, mass and damping)
 """
 """What users import from `softrobots`: a name is added here on purpose, and none disappears unnoticed."""
 

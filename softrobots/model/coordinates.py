@@ -57,6 +57,12 @@ class Point(Protocol):
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Split a matrix of columns per joint, shape (m, nv), into columns per actuator and per elastic coordinate."""
 
+    def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the load on each actuator by actuators and by elastic coordinates.
+
+        Shapes (n_motors, n_motors) and (n_motors, n_elastic); zero for given tensions, which nothing changes.
+        """
+
 
 class Coordinates(Protocol):
     """A map from actuator and elastic coordinates to joint positions."""
@@ -98,10 +104,13 @@ class DirectPoint(NamedTuple):
         rows, n = load.derivative(c.entries), len(c.motor_indices)
         return ReducedLoad(torque[c.motor_indices], torque[c.elastic_indices], rows[:, n:], rows[:, :n], 0.0, 0.0)
 
-    def motor_derivative(self, load: JointLoad) -> FloatArray:
-        """Derivative of the load on each motor with respect to the motors, shape (n_motors, n_motors)."""
-        c = self.coordinates
-        return load.derivative(Entries.of(c.motor_indices, c.motor_indices, len(self.joints)))
+    def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
+        """Select the rows and columns of the derivative that belong to motors, and to motors and elastic coordinates."""
+        c, n = self.coordinates, len(self.joints)
+        by_motors, by_elastic = (
+            load.derivative(Entries.of(c.motor_indices, columns, n)) for columns in (c.motor_indices, c.elastic_indices)
+        )
+        return by_motors, by_elastic
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Select the columns of actuators and of elastic coordinates."""
@@ -177,10 +186,11 @@ class SectionPoint:
         n = len(c.motor_indices)
         return ReducedLoad(load.torque[c.motor_indices], elastic, derivative[n:, n:], derivative[n:, :n], 0.0, 0.0)
 
-    def motor_derivative(self, load: JointLoad) -> FloatArray:
-        """Derivative of the load on each motor with respect to the motors, shape (n_motors, n_motors)."""
+    def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the load on each motor, by motors and by springs and section coordinates."""
         n = len(self._c.motor_indices)
-        return self._derivative(load)[:n, :n]
+        rows = self._derivative(load)[:n]
+        return rows[:, :n], rows[:, n:]
 
     def _derivative(self, load: JointLoad) -> FloatArray:
         """Derivative of a load on motors, springs and sections with respect to them, shape (n, n).

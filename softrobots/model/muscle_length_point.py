@@ -51,8 +51,7 @@ class MuscleLengthPoint(MusclePoint):
         """
         load, held, paths = self.inner.reduce(joints), self.held, self.paths
         by_lengths, by_free = self._sum_slopes
-        springs, stiffness = held.strain_springs, held.sum_stiffness
-        tensions = (load.elastic - springs.stiffness * (self.strains - springs.rest)) @ held.shares @ by_lengths
+        stiffness, tensions = held.sum_stiffness, self._tensions(load)
         to_free, to_lengths = held.free + held.shares @ by_free, held.shares @ by_lengths
         half = to_free.T @ (load.derivative - paths.curvature(tensions))
         stiff = stiffness[:, None] * by_free
@@ -72,3 +71,26 @@ class MuscleLengthPoint(MusclePoint):
         by_lengths, by_free = self._sum_slopes
         by_sums = elastic @ self.held.shares
         return np.concatenate([motors, by_sums @ by_lengths], axis=1), elastic @ self.held.free + by_sums @ by_free
+
+    def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
+        r"""Derivatives of the loads on motors and of the tensions, by motors and lengths and by free coordinates.
+
+        That of the tensions is :math:`-z_l^T (K - w_z + \sum t_m l_m'') (z_l, z_y)`.
+        """
+        inner, held, paths = self.inner.reduce(load), self.held, self.paths
+        by_motors, by_strains = self.inner.motor_derivatives(load)
+        by_lengths, by_free = self._sum_slopes
+        to_lengths, to_free = held.shares @ by_lengths, held.free + held.shares @ by_free
+        stiffness = np.diag(held.strain_springs.stiffness)
+        stiffening = to_lengths.T @ (inner.derivative - paths.curvature(self._tensions(inner)) - stiffness)
+        return (
+            np.block([[by_motors, by_strains @ to_lengths], [to_lengths.T @ inner.coupling, stiffening @ to_lengths]]),
+            np.concatenate([by_strains @ to_free, stiffening @ to_free]),
+        )
+
+    def _tensions(self, load: ReducedLoad) -> FloatArray:
+        """Tension of each muscle under a load on the robot without muscles, shape (n_muscles,) [N]."""
+        springs = self.held.strain_springs
+        return np.asarray(
+            (load.elastic - springs.stiffness * (self.strains - springs.rest)) @ self.held.shares @ self._sum_slopes[0]
+        )

@@ -76,3 +76,9 @@ class MuscleForcePoint(MusclePoint):
         """Columns of the tensions are zero: at fixed elastic coordinates they move no joint."""
         motors, elastic = self.inner.columns(jacobian)
         return np.concatenate([motors, np.zeros((len(jacobian), len(self.tensions)))], axis=1), elastic
+
+    def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
+        """Those of the robot without muscles; zero for the tensions, which nothing changes."""
+        by_motors, by_elastic = self.inner.motor_derivatives(load)
+        count = len(self.tensions)
+        return np.pad(by_motors, (0, count)), np.pad(by_elastic, ((0, count), (0, 0)))

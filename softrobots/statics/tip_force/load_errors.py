@@ -74,8 +74,7 @@ class MeasurementErrors(NamedTuple):
             bent = model.springs.at(state.q_springs)[2] * (self.stiffness_std * (state.q_springs - model.rest))
             parts["stiffness"] = coupling.T @ inverse_stiffness(model, state.tangent) @ bent @ _shared(model)
         if self.motor_angle_std is not None:
-            point: Any = state.point
-            direct = point.motor_derivative(AppliedLoad(model, load).at(state.q))
+            direct, _ = state.point.motor_derivatives(AppliedLoad(model, load).at(state.q))
             followed = coupling.T @ inverse_stiffness(model, state.tangent) @ coupling
             parts["motor_angles"] = -(direct + followed) * self.motor_angle_std
         return parts

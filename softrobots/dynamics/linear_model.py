@@ -1,0 +1,185 @@
+r"""Linear models of a robot about an equilibrium, :math:`\dot x = A x + B u, \; y = C x + D u`, for controllers.
+
+All quantities are deviations from the equilibrium; the matrices are the derivatives of the equations of motion there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray, choice, read_only
+from softrobots.core.errors import DescriptionError, MissingDependency, ParameterError
+from softrobots.dynamics.small_motion import SmallMotion, small_motion
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium, check_same_model
+
+MOTORS = ("prescribed", "torque")
+"""What drives the motors of a linear model: given accelerations, or torques."""
+
+_TIP = ("tip_x", "tip_y", "tip_z", "tip_turn_x", "tip_turn_y", "tip_turn_z")
+_TIP_UNITS = ("m",) * 3 + ("rad",) * 3
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """A linear model of a robot; made by `linearize`. `A, B, C, D = linear`, and `control.ss(*linear)` takes it as it is."""
+
+    equilibrium: Equilibrium
+    """The equilibrium from which all quantities deviate."""
+    motors: str
+    """What drives the motors, one of `MOTORS`."""
+    A: FloatArray
+    """Rates of the states by states, shape (n, n)."""
+    B: FloatArray
+    """Rates of the states by inputs, shape (n, m)."""
+    C: FloatArray
+    """Outputs by states, shape (p, n)."""
+    D: FloatArray
+    """Outputs by inputs, shape (p, m)."""
+    state_names: tuple[str, ...]
+    """Actuators and elastic coordinates, then `<name>_rate` of each."""
+    state_units: tuple[str, ...]
+    """Unit of each."""
+    input_names: tuple[str, ...]
+    """`<motor>_acceleration` or `<motor>_torque`, `<muscle>_tension` of muscles of given tension, `tip_force_x`, `_y`, `_z`."""
+    input_units: tuple[str, ...]
+    """Unit of each."""
+    output_names: tuple[str, ...]
+    """`tip_x`, `_y`, `_z`, `tip_turn_x`, `_y`, `_z`, `<motor>_torque`; driven by torques `<motor>`, `<motor>_rate`."""
+    output_units: tuple[str, ...]
+    """Unit of each."""
+
+    def __iter__(self) -> Iterator[FloatArray]:
+        """A, B, C, D."""
+        return iter((self.A, self.B, self.C, self.D))
+
+    def state_space(self) -> Any:
+        """Return it as a `control.StateSpace` of python-control, with the names of states, inputs and outputs.
+
+        Raises:
+            MissingDependency: If python-control is not installed (extra `control`).
+        """
+        with MissingDependency.of_imports("control", "control"):
+            import control
+        names = {"states": list(self.state_names), "inputs": list(self.input_names), "outputs": list(self.output_names)}
+        return control.ss(*self, **names)
+
+
+def linearize(
+    model: SoftModel,
+    equilibrium: Equilibrium,
+    *,
+    motors: str = "prescribed",
+    damping_time: float | None = None,
+    mass_damping: float = 0.0,
+    rotor_inertia: Any = 0.0,
+) -> LinearModel:
+    r"""Linearise the equations of motion about an equilibrium, stable or not, under any load.
+
+    With the mass, damping and stiffness matrices of `softrobots.dynamics.small_motion`, actuators u and elastic coordinates y:
+
+    - "prescribed": the motors go where they are told. States are u, y and their rates, inputs the accelerations of the
+      motors, :math:`M_{yy} \ddot y = -M_{yu} \ddot u - D \dot y - K_{yu} u - K_{yy} y + J_y^T f`. Outputs are the motion of the
+      tip and the torques that the motors carry, as `Equilibrium.motor_torques`.
+    - "torque": inputs are the torques that the motors exert, positive along their coordinates,
+      :math:`M \ddot x = -D \dot x - K x + (\tau, 0) + J^T f`. Outputs are the motion of the tip, and coordinates and rates of
+      the motors.
+
+    The force at the tip is an input of both. Turns of the tip are small, about the axes of the world. A muscle of given length
+    is a motor, and what it exerts along its length is minus its tension; a muscle of given tension is an input.
+
+    Args:
+        model: The robot.
+        equilibrium: An equilibrium of it.
+        motors: "prescribed" or "torque".
+        damping_time: Damping over stiffness near rest [s]; None: the damping of the file.
+        mass_damping: Damping over mass, Rayleigh's other term [1/s].
+        rotor_inertia: Inertia of the rotor of each motor seen at its joint, or one for all [kg m^2 or kg].
+
+    Returns:
+        The linear model.
+
+    Raises:
+        ParameterError: If an argument is out of range, the equilibrium belongs to another model, or torques are to drive
+            muscles whose lengths depend on each other.
+        DescriptionError: If the description has no masses, or the robot more joints than Pinocchio supports.
+    """
+    check_same_model(model, equilibrium)
+    driven = choice("motors", motors, MOTORS) == "torque"
+    if driven and not model.actuators.independent:
+        raise ParameterError("motors", motors, "'prescribed': more than three muscles of a segment have no independent lengths")
+    small = small_motion(model, equilibrium, damping_time=damping_time, mass_damping=mass_damping, rotor_inertia=rotor_inertia)
+    with one_blas_thread(2 * len(small.mass)):
+        matrices = _driven(model, small) if driven else _prescribed(model, small)
+    names, units = model.motor_joints[: small.n_placed], model.actuators.units[: small.n_placed]
+    coordinates = (*units, *("rad" if turns else "m" for turns in model.springs.turning))
+    torques = tuple("N m" if unit == "rad" else "N" for unit in units)
+    torque_names, rates = tuple(f"{name}_torque" for name in names), tuple(f"{unit}/s" for unit in units)
+    accelerations = tuple(f"{name}_acceleration" for name in names), tuple(f"{unit}/s^2" for unit in units)
+    moving, moving_units = (torque_names, torques) if driven else accelerations
+    told = (*names, *(f"{name}_rate" for name in names)), (*units, *rates)
+    felt, felt_units = told if driven else (torque_names, torques)
+    tensions = tuple(f"{name}_tension" for name in model.motor_joints[small.n_placed :])
+    states = (*names, *model.spring_joints)
+    a, b, c, d = map(read_only, matrices)
+    return LinearModel(
+        equilibrium=equilibrium,
+        motors=motors,
+        A=a,
+        B=b,
+        C=c,
+        D=d,
+        state_names=(*states, *(f"{name}_rate" for name in states)),
+        state_units=(*coordinates, *(f"{unit}/s" for unit in coordinates)),
+        input_names=(*moving, *tensions, *(f"tip_force_{axis}" for axis in "xyz")),
+        input_units=(*moving_units, *("N" for _ in tensions), *("N" for _ in "xyz")),
+        output_names=(*_TIP, *felt),
+        output_units=(*_TIP_UNITS, *felt_units),
+    )
+
+
+def _driven(model: SoftModel, small: SmallMotion) -> tuple[FloatArray, ...]:
+    """A, B, C, D of motors that exert torques."""
+    m, n = small.n_placed, len(small.mass)
+    forces = np.hstack([np.eye(n, m), small.by_tension, small.tip[:3].T])
+    a, b = _first_order(_solved(model, small.mass, np.hstack([-small.stiffness, -small.damping, forces])), n)
+    told = np.zeros((2 * m, 2 * n))
+    told[:m, :m] = told[m:, n : n + m] = np.eye(m)
+    c = np.vstack([np.hstack([small.tip, np.zeros((6, n))]), told])
+    return a, b, c, np.zeros((len(c), b.shape[1]))
+
+
+def _prescribed(model: SoftModel, small: SmallMotion) -> tuple[FloatArray, ...]:
+    """A, B, C, D of motors that go where they are told."""
+    m, n = small.n_placed, len(small.mass)
+    unforced = np.hstack([-small.stiffness, -small.damping])
+    forces = np.hstack([small.by_tension, small.tip[:3].T])
+    elastic = np.hstack([unforced[m:], -small.mass[m:, :m], forces[m:]])
+    moved = np.zeros((n, 2 * n + m + forces.shape[1]))  # accelerations by states and inputs
+    moved[:m, 2 * n : 2 * n + m] = np.eye(m)
+    moved[m:] = _solved(model, small.mass[m:, m:], elastic)
+    carried = np.hstack([unforced[:m], np.zeros((m, m)), forces[:m]]) - small.mass[:m] @ moved
+    a, b = _first_order(moved, n)
+    tip = np.hstack([small.tip, np.zeros((6, n + b.shape[1]))])
+    c, d = np.hsplit(np.vstack([tip, carried]), [2 * n])
+    return a, b, c, d
+
+
+def _first_order(accelerations: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
+    """A and B of n coordinates and their rates, from the accelerations by those 2 n states and by inputs."""
+    rates = np.hstack([np.zeros((n, n)), np.eye(n), np.zeros((n, accelerations.shape[1] - 2 * n))])
+    a, b = np.hsplit(np.vstack([rates, accelerations]), [2 * n])
+    return a, b
+
+
+def _solved(model: SoftModel, mass: FloatArray, right: FloatArray) -> FloatArray:
+    try:
+        np.linalg.cholesky(mass)
+    except np.linalg.LinAlgError:
+        raise DescriptionError(f"a coordinate of {model.pinocchio.name} moves no mass; give its links mass") from None
+    return np.asarray(np.linalg.solve(mass, right))

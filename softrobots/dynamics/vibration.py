@@ -1,0 +1,244 @@
+r"""Vibration modes: frequencies and shapes of the small free vibrations about a loaded equilibrium.
+
+With the tangent stiffness `K` and the mass matrix `M` of the equilibrium,
+
+.. math:: K \phi_i = \omega_i^2 M \phi_i, \qquad \phi_i^T M \phi_j = \delta_{ij}
+
+Both are factorised, :math:`K = L L^T` and :math:`M = R^T R`, and the singular values of :math:`R L^{-T}` are the
+:math:`1 / \omega_i`: the slow modes, which matter, are exact to rounding beside modes ten thousand times as fast.
+
+Damping `D` does not change the modes: with :math:`d_{ij} = \phi_i^T D \phi_j` the damping ratio of a mode is :math:`\zeta_i =
+d_{ii} / 2 \omega_i`. That is exact if damping does not couple the modes (a `damping_time` without load, `mass_damping` always),
+and wrong by terms of second order in the coupling otherwise (Rayleigh, The Theory of Sound, 1894, section 102);
+`VibrationModes.eigenvalues` are exact for any damping.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray, finite_number, positive_integer, read_only
+from softrobots.core.errors import DescriptionError, NeutralEquilibrium, ParameterError
+from softrobots.dynamics.small_motion import one_each, small_motion
+from softrobots.model.soft_model import SoftModel
+from softrobots.model.springs import POSITIVE
+from softrobots.statics.elastic_state import scaled
+from softrobots.statics.equilibrium import Equilibrium, check_same_model
+
+_SAME = 1e-9  # frequencies this close, relative, are one: a round robot vibrates in any direction across itself
+_NO_MOTION = 1e-6  # of the largest motion of the tip
+
+
+@dataclass(frozen=True, eq=False)
+class VibrationModes:
+    """The vibration modes of an equilibrium, slowest first; made by `vibration_modes`, saved by `softrobots.save_result`.
+
+    The sign of a mode is that with which the largest of the tip's ways along x, y and z is positive; if it only turns, of its
+    turns about them. Of modes with one frequency, those of a round robot, the first moves the tip along the first axis along
+    which any does, and the others do not.
+    """
+
+    equilibrium: Equilibrium
+    """The equilibrium."""
+    frequencies: FloatArray
+    """Natural frequencies without damping, ascending, shape (n,) [Hz]."""
+    shapes: FloatArray
+    r"""Elastic coordinates of each mode per modal coordinate, a column a mode, mass-normalised, shape (n_springs, n)
+    [rad/(sqrt(kg) m) or 1/sqrt(kg)]."""
+    motor_shapes: FloatArray
+    """Actuators of each mode in the same scale, shape (n_motors, n); zeros if they are held."""
+    tip_shapes: FloatArray
+    """Motion of the tip in each mode in the same scale, world axes: translation, then turn, shape (6, n)."""
+    damping_ratios: FloatArray
+    """Damping ratio of each mode, shape (n,) [-]; see `softrobots.vibration_modes`."""
+    mass_matrix: FloatArray
+    """Mass matrix of the elastic coordinates, actuators before them if they take part, shape (n, n) [kg m^2, kg m, kg]."""
+    damping_matrix: FloatArray
+    """Damping of the same coordinates, shape (n, n)."""
+    stiffness_matrix: FloatArray
+    """Stiffness of the same coordinates: the tangent stiffness, and that of the servos, shape (n, n)."""
+    participation: FloatArray
+    """Momentum per modal rate, and angular momentum about the world's origin, shape (6, n) [sqrt(kg), sqrt(kg) m]."""
+    settings: dict[str, Any]
+    """The arguments `damping_time`, `mass_damping`, `servo_stiffness` and `rotor_inertia`."""
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self.equilibrium.model
+
+    @property
+    def effective_masses(self) -> FloatArray:
+        """Part of each mode in a shaking of the base along x, y, z, and about them, shape (n, 6) [kg, kg m^2].
+
+        The square of its momentum. Their sum over the modes is the mass that shakes: all moving mass if the robot can give way
+        as a whole in that direction, otherwise less.
+        """
+        return np.asarray(self.participation.T**2)
+
+    @cached_property
+    def eigenvalues(self) -> Any:
+        r"""Exact eigenvalues of the damped vibrations :math:`e^{s t}`, complex, by size, shape (2 n,) [1/s].
+
+        A pair of conjugates has the frequency `|s| / 2 pi` and the damping ratio `-Re s / |s|`; two real ones are an overdamped
+        mode.
+        """
+        omega, n = 2.0 * math.pi * self.frequencies, len(self.frequencies)
+        modes = np.concatenate([self.motor_shapes[: n - len(self.shapes)], self.shapes])
+        state = np.block([[np.zeros((n, n)), np.diag(omega)], [-np.diag(omega), -modes.T @ self.damping_matrix @ modes]])
+        with one_blas_thread(2 * n):
+            values: Any = np.linalg.eigvals(state)
+        return read_only(values[np.argsort(np.abs(values), kind="stable")])
+
+    def swing(self, mode: int, size: float) -> tuple[FloatArray, FloatArray]:
+        """The robot at the end of a swing in one mode, for pictures: the linear motion of the mode, taken as far as `size`.
+
+        Args:
+            mode: Number of the mode, from 1.
+            size: Largest motion of the tip or a coordinate, of angles it times the reach; negative: the other end [m].
+
+        Returns:
+            Actuator coordinates, shape (n_motors,), and elastic coordinates, shape (n_springs,) [rad or m].
+
+        Raises:
+            ParameterError: If there is no such mode, or the size is not finite.
+        """
+        place = positive_integer("mode", mode, len(self.frequencies)) - 1
+        model, reach = self.model, self.model.reach
+        turning = np.concatenate([np.repeat([False, True], 3), model.actuators.turning, model.springs.turning])
+        moved = np.concatenate([one[:, place] for one in (self.tip_shapes, self.motor_shapes, self.shapes)])
+        scale = finite_number("size", size, "m") / float(np.abs(moved * np.where(turning, reach, 1.0)).max())
+        motors, springs = scale * self.motor_shapes[:, place], scale * self.shapes[:, place]
+        return self.equilibrium.q_motors + motors, self.equilibrium.q_springs + springs
+
+
+def vibration_modes(
+    model: SoftModel,
+    equilibrium: Equilibrium,
+    *,
+    damping_time: float | None = None,
+    mass_damping: float = 0.0,
+    servo_stiffness: Any = None,
+    rotor_inertia: Any = 0.0,
+) -> VibrationModes:
+    """Find the natural frequencies, shapes and damping ratios of a robot about a stable equilibrium under any load.
+
+    Stiffness is the exact tangent with load and gravity, and the mass matrix that of the bent shape. The load does not change
+    while the robot vibrates.
+
+    Args:
+        model: The robot.
+        equilibrium: An equilibrium of it, certified stable, under a load that has a potential (forces and gravity).
+        damping_time: Damping over stiffness near rest [s]; None: the damping of the file (see `damping_time_from_decrement`).
+        mass_damping: Damping over mass, Rayleigh's other term [1/s].
+        servo_stiffness: Stiffness with which each actuator holds its place, or one for all [N m/rad or N/m]: their coordinates
+            take part then, with the damping that the file has at their joints. None: they are held exactly. Muscles of given
+            tension keep their tension.
+        rotor_inertia: Inertia of the rotor of each actuator seen at its joint, or one for all [kg m^2 or kg]; needs a servo.
+
+    Returns:
+        The modes.
+
+    Raises:
+        ParameterError: If an argument is out of range, the equilibrium belongs to another model, its load has a moment (under
+            which modes are not orthogonal; `linearize` takes it), or it is unstable, with its servos.
+        NeutralEquilibrium: If the stiffness is singular.
+        DescriptionError: If the description has no masses, or the robot more joints than Pinocchio supports.
+    """
+    check_same_model(model, equilibrium)
+    if not equilibrium.conservative:
+        raise ParameterError(
+            "equilibrium",
+            equilibrium.load,
+            "one under forces and gravity: under a world-fixed moment modes are not orthogonal (linearize takes such loads)",
+        )
+    small = small_motion(model, equilibrium, damping_time=damping_time, mass_damping=mass_damping, rotor_inertia=rotor_inertia)
+    first, servos = small.n_placed, np.zeros(small.n_placed)
+    if servo_stiffness is not None:
+        first, servos = 0, one_each("servo_stiffness", servo_stiffness, small.n_placed, "N m/rad or N/m")
+        if not model.actuators.independent:
+            requirement = "None: the lengths of more than three muscles along a segment depend on each other"
+            raise ParameterError("servo_stiffness", servo_stiffness, requirement)
+    elif np.any(np.asarray(rotor_inertia) != 0.0):
+        raise ParameterError("rotor_inertia", rotor_inertia, "left out without servo_stiffness: actuators are held")
+    with one_blas_thread(model.n_springs + small.n_placed - first):
+        stiffness = small.stiffness + np.diag(np.concatenate([servos, np.zeros(model.n_springs)]))
+        _refuse_unstable(model, stiffness[first:, first:], servos[first:])
+        frequencies, modes = _modes(0.5 * (stiffness + stiffness.T)[first:, first:], small.mass[first:, first:], model)
+        modes = _signed(model, small.tip[:, first:], frequencies, modes)
+    tip, momentum, damping = small.tip[:, first:], small.momentum[:, first:], small.damping[first:, first:]
+    motors = np.zeros((model.n_motors, len(frequencies)))
+    motors[: small.n_placed - first] = modes[: small.n_placed - first]
+    along = np.einsum("ji,jk,ki->i", modes, damping, modes)
+    return VibrationModes(
+        equilibrium=equilibrium,
+        frequencies=read_only(frequencies / (2.0 * math.pi)),
+        shapes=read_only(modes[small.n_placed - first :]),
+        motor_shapes=read_only(motors),
+        tip_shapes=read_only(tip @ modes),
+        damping_ratios=read_only(along / (2.0 * frequencies)),
+        mass_matrix=read_only(small.mass[first:, first:]),
+        damping_matrix=read_only(damping),
+        stiffness_matrix=read_only(stiffness[first:, first:]),
+        participation=read_only(momentum @ modes),
+        settings={
+            "damping_time": damping_time,
+            "mass_damping": mass_damping,
+            "servo_stiffness": servo_stiffness,
+            "rotor_inertia": rotor_inertia,
+        },
+    )
+
+
+def _refuse_unstable(model: SoftModel, stiffness: FloatArray, servos: FloatArray) -> None:
+    """Refuse a stiffness that is not positive definite in coordinates in which springs and servos have stiffness 1."""
+    own = np.concatenate([np.where(servos > 0.0, servos, model.stiffest or 1.0), model.stiffness])
+    softest = float(np.linalg.eigvalsh(scaled(0.5 * (stiffness + stiffness.T), own)).min(initial=1.0))
+    if softest <= -POSITIVE:
+        raise ParameterError(
+            "equilibrium", f"softest stiffness {softest:.3g} of the springs'", "stable, with its servos: it does not vibrate"
+        )
+    if softest <= POSITIVE:
+        raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has a mode without frequency")
+
+
+def _modes(stiffness: FloatArray, mass: FloatArray, model: SoftModel) -> tuple[FloatArray, FloatArray]:
+    """Angular frequencies, ascending [rad/s], and mass-normalised modes, a column each."""
+    lower: Any = np.linalg.cholesky(stiffness)
+    try:
+        upper: Any = np.linalg.cholesky(mass).T
+    except np.linalg.LinAlgError:
+        raise DescriptionError(
+            f"an elastic coordinate of {model.pinocchio.name} moves no mass, so that it has no natural frequency; give its "
+            "links mass"
+        ) from None
+    _, periods, vectors = np.linalg.svd(np.linalg.solve(lower, upper.T).T)
+    frequencies = 1.0 / periods
+    return frequencies, np.asarray(np.linalg.solve(lower.T, vectors.T) * frequencies)
+
+
+def _signed(model: SoftModel, tip: FloatArray, frequencies: FloatArray, modes: FloatArray) -> FloatArray:
+    """The modes in the directions and with the signs that `VibrationModes` states; `tip` is the Jacobian of the tip."""
+    tip, start = tip / np.repeat([1.0, 1.0 / model.reach], 3)[:, None], 0
+    while start < len(frequencies):
+        end = start + int(np.count_nonzero(frequencies[start:] - frequencies[start] <= _SAME * frequencies[start]))
+        for first in range(start, end - 1):  # turn those that are left so that only one of them moves the tip along an axis
+            moved = tip @ modes[:, first:end]
+            sizes = np.linalg.norm(moved, axis=1)
+            axis = int(np.argmax(sizes > _NO_MOTION * sizes.max()))
+            if sizes[axis] > 0.0:
+                turn: Any = np.linalg.qr(np.column_stack([moved[axis], np.eye(end - first)]))[0]
+                modes[:, first:end] = modes[:, first:end] @ turn
+        start = end
+    moved = tip @ modes
+    moved[3:, np.abs(moved[:3]).max(axis=0) > _NO_MOTION * np.abs(moved).max(axis=0)] = 0.0
+    sizes = np.abs(moved)
+    largest = np.argmax(sizes > (1.0 - _NO_MOTION) * sizes.max(axis=0), axis=0)
+    signs = np.sign(np.take_along_axis(moved, largest[None], axis=0)[0])
+    return np.asarray(modes * np.where(signs == 0.0, 1.0, signs))
