@@ -26,13 +26,10 @@ from softrobots.core.errors import (
 )
 from softrobots.core.result_file import load_result, save_csv, save_result
 from softrobots.description.composition import mount
-<<<<<<< HEAD
-from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
-=======
 from softrobots.dynamics.damping import damping_time_from_decrement, measured_decay
+from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
 from softrobots.dynamics.linear_model import LinearModel, linearize
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
->>>>>>> 60f7efb (Vibration modes and linear models of a robot about any loaded equilibrium, with exact tangent, mass and damping)
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
@@ -72,11 +69,8 @@ __all__ = [
     "IkSolution",
     "ImposedDisplacement",
     "InflatableArm",
-<<<<<<< HEAD
     "InputShaper",
-=======
     "LinearModel",
->>>>>>> 60f7efb (Vibration modes and linear models of a robot about any loaded equilibrium, with exact tangent, mass and damping)
     "LinkLimits",
     "LoadEstimate",
     "LoadNotFound",
@@ -116,11 +110,8 @@ __all__ = [
     "grown_coordinates",
     "helix",
     "inflated_beam",
-<<<<<<< HEAD
     "input_shaper",
-=======
     "linearize",
->>>>>>> 60f7efb (Vibration modes and linear models of a robot about any loaded equilibrium, with exact tangent, mass and damping)
     "load_model",
     "load_result",
     "measured_decay",

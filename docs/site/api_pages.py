@@ -71,20 +71,14 @@ PAGES = {
             *_top("Path3D", "quintic", "straight_line", "waypoints", "read_waypoints", "sample_workspace", "Workspace"),
         ),
     ),
-<<<<<<< HEAD
-    "input_shaping": ApiPage(
-        "Input shaping",
-        "Motor paths that leave no vibration behind.",
-        _top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),
-=======
     "motion": ApiPage(
         "Motion",
-        "Vibration modes, linear models for controllers, damping.",
+        "Vibration modes, linear models for controllers, damping, and motor paths that leave no vibration behind.",
         (
             *_top("vibration_modes", "VibrationModes", "linearize", "LinearModel"),
             *_top("damping_time_from_decrement", "measured_decay"),
+            *_top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),
         ),
->>>>>>> 60f7efb (Vibration modes and linear models of a robot about any loaded equilibrium, with exact tangent, mass and damping)
     ),
     "inflated_beam": ApiPage("inflated_beam", "One inflated link as a beam.", _top("inflated_beam")),
     "constant_curvature": ApiPage(
