@@ -29,6 +29,8 @@ from softrobots.description.composition import mount
 from softrobots.dynamics.damping import damping_time_from_decrement, measured_decay
 from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
 from softrobots.dynamics.linear_model import LinearModel, linearize
+from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
@@ -75,6 +77,7 @@ __all__ = [
     "LoadEstimate",
     "LoadNotFound",
     "MissingDependency",
+    "Motion",
     "NameNotFound",
     "NeutralEquilibrium",
     "NoCriticalLoad",
@@ -124,6 +127,7 @@ __all__ = [
     "save_csv",
     "save_result",
     "shape_input",
+    "simulate",
     "solve_equilibrium",
     "solve_ik",
     "solve_imposed_displacement",

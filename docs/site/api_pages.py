@@ -73,8 +73,9 @@ PAGES = {
     ),
     "motion": ApiPage(
         "Motion",
-        "Vibration modes, linear models for controllers, damping, and motor paths that leave no vibration behind.",
+        "Simulation, vibration modes, linear models for controllers, damping, and motor paths that leave no vibration behind.",
         (
+            *_top("simulate", "Motion", "dynamics.motion.MotionEnergy", "dynamics.motion.MotionState"),
             *_top("vibration_modes", "VibrationModes", "linearize", "LinearModel"),
             *_top("damping_time_from_decrement", "measured_decay"),
             *_top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),

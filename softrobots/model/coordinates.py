@@ -63,6 +63,15 @@ class Point(Protocol):
         Shapes (n_motors, n_motors) and (n_motors, n_elastic); zero for given tensions, which nothing changes.
         """
 
+    def loads(self, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Load on each actuator and each elastic coordinate of a torque on the joints, shape (nv,); see `ReducedLoad`."""
+
+    def velocity(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Joint rates, shape (nv,) [rad/s or m/s], at rates of actuators and elastic coordinates: `Q xd` with `Q = dq/dx`."""
+
+    def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Joint accelerations, shape (nv,), at the same rates, while they stay constant: `Qdot xd`."""
+
 
 class Coordinates(Protocol):
     """A map from actuator and elastic coordinates to joint positions."""
@@ -100,9 +109,8 @@ class DirectPoint(NamedTuple):
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
         """Select the rows and columns of the load that belong to the coordinates."""
-        c, torque = self.coordinates, load.torque
-        rows, n = load.derivative(c.entries), len(c.motor_indices)
-        return ReducedLoad(torque[c.motor_indices], torque[c.elastic_indices], rows[:, n:], rows[:, :n], 0.0, 0.0)
+        rows, n = load.derivative(self.coordinates.entries), len(self.coordinates.motor_indices)
+        return ReducedLoad(*self.loads(load.torque), rows[:, n:], rows[:, :n], 0.0, 0.0)
 
     def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
         """Select the rows and columns of the derivative that belong to motors, and to motors and elastic coordinates."""
@@ -116,6 +124,18 @@ class DirectPoint(NamedTuple):
         """Select the columns of actuators and of elastic coordinates."""
         c = self.coordinates
         return jacobian.take(c.motor_indices, axis=1), jacobian.take(c.elastic_indices, axis=1)
+
+    def loads(self, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Select the torques on actuators and on elastic coordinates."""
+        return torque[self.coordinates.motor_indices], torque[self.coordinates.elastic_indices]
+
+    def velocity(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Put the rates to their joints."""
+        return self.coordinates.at(motors, elastic).joints
+
+    def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Zero: the joints are the coordinates."""
+        return np.zeros_like(self.joints)
 
 
 def rest_coordinates(tags: Sequence[SectionTag | LumpedSectionTag]) -> FloatArray:
@@ -180,11 +200,31 @@ class SectionPoint:
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
         """Transform a joint load by the chain rule."""
-        c, derivative = self._c, self._derivative(load)
-        at_sections = load.torque[c.section_indices]
-        elastic = np.concatenate([load.torque[c.spring_indices], (at_sections[:, None, :] @ self._chain.first).ravel()])
-        n = len(c.motor_indices)
-        return ReducedLoad(load.torque[c.motor_indices], elastic, derivative[n:, n:], derivative[n:, :n], 0.0, 0.0)
+        derivative, n = self._derivative(load), len(self._c.motor_indices)
+        return ReducedLoad(*self.loads(load.torque), derivative[n:, n:], derivative[n:, :n], 0.0, 0.0)
+
+    def loads(self, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Loads on motors, and on springs and section coordinates."""
+        at_sections = torque[self._c.section_indices]
+        by_section = (at_sections[:, None, :] @ self._chain.first).ravel()
+        return torque[self._c.motor_indices], np.concatenate([torque[self._c.spring_indices], by_section])
+
+    def velocity(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Joint rates at rates of motors, springs and section coordinates."""
+        rates: FloatArray = np.zeros(self._c.count)
+        n = len(self._c.spring_indices)
+        rates[self._c.motor_indices], rates[self._c.spring_indices] = motors, elastic[:n]
+        rates[self._c.section_indices] = (self._chain.first @ elastic[n:].reshape(-1, 4, 1))[..., 0]
+        return rates
+
+    def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Second derivative of the map of each section along its rates."""
+        strain_rates = elastic[len(self._c.spring_indices) :].reshape(-1, 1, 4)
+        second = self._chain.curvature(np.broadcast_to(np.eye(6)[:, None, :], (6, len(strain_rates), 6)))
+        accelerations: FloatArray = np.zeros(self._c.count)
+        along = (strain_rates @ second @ np.swapaxes(strain_rates, -1, -2))[..., 0, 0]
+        accelerations[self._c.section_indices] = along.T
+        return accelerations
 
     def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
         """Derivatives of the load on each motor, by motors and by springs and section coordinates."""

@@ -51,7 +51,7 @@ class MuscleLengthPoint(MusclePoint):
         """
         load, held, paths = self.inner.reduce(joints), self.held, self.paths
         by_lengths, by_free = self._sum_slopes
-        stiffness, tensions = held.sum_stiffness, self._tensions(load)
+        stiffness, tensions = held.sum_stiffness, self._tensions(load.elastic)
         to_free, to_lengths = held.free + held.shares @ by_free, held.shares @ by_lengths
         half = to_free.T @ (load.derivative - paths.curvature(tensions))
         stiff = stiffness[:, None] * by_free
@@ -82,15 +82,37 @@ class MuscleLengthPoint(MusclePoint):
         by_lengths, by_free = self._sum_slopes
         to_lengths, to_free = held.shares @ by_lengths, held.free + held.shares @ by_free
         stiffness = np.diag(held.strain_springs.stiffness)
-        stiffening = to_lengths.T @ (inner.derivative - paths.curvature(self._tensions(inner)) - stiffness)
+        stiffening = to_lengths.T @ (inner.derivative - paths.curvature(self._tensions(inner.elastic)) - stiffness)
         return (
             np.block([[by_motors, by_strains @ to_lengths], [to_lengths.T @ inner.coupling, stiffening @ to_lengths]]),
             np.concatenate([by_strains @ to_free, stiffening @ to_free]),
         )
 
-    def _tensions(self, load: ReducedLoad) -> FloatArray:
-        """Tension of each muscle under a load on the robot without muscles, shape (n_muscles,) [N]."""
+    def _tensions(self, strains: FloatArray) -> FloatArray:
+        """Tension of each muscle under a load on the strains of the robot without muscles, shape (n_muscles,) [N]."""
         springs = self.held.strain_springs
-        return np.asarray(
-            (load.elastic - springs.stiffness * (self.strains - springs.rest)) @ self.held.shares @ self._sum_slopes[0]
-        )
+        carried = strains - springs.stiffness * (self.strains - springs.rest)
+        return np.asarray(carried @ self.held.shares @ self._sum_slopes[0])
+
+    def loads(self, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Loads on motors and lengths, and on the free coordinates, see `reduce`."""
+        motors, strains = self.inner.loads(torque)
+        tensions = self._tensions(strains)
+        return np.concatenate([motors, tensions]), (strains - tensions @ self.paths.slopes) @ self.held.free
+
+    def velocity(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Joint rates at rates of motors, lengths and free coordinates."""
+        return self.inner.velocity(*self._inner_rates(motors, elastic))
+
+    def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Joint accelerations, with those of the sums that keep the rates of the lengths, `A Sdd = -P zd^T c_zz zd`."""
+        inner, rates = self._inner_rates(motors, elastic)
+        strains = -self.held.shares @ (self._sum_slopes[0] @ self.paths.second(rates))
+        return self.inner.velocity_product(inner, rates) + self.inner.velocity(np.zeros_like(inner), strains)
+
+    def _inner_rates(self, motors: FloatArray, elastic: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rates of the motors and of the strains."""
+        count = len(motors) - self.held.slopes.shape[1]
+        by_lengths, by_free = self._sum_slopes
+        strains = self.held.free @ elastic + self.held.shares @ (by_lengths @ motors[count:] + by_free @ elastic)
+        return motors[:count], strains

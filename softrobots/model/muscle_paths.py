@@ -132,10 +132,22 @@ class MusclePathsAt:
 
         That of one path is the square of the change of `(A, d t)` across the path, over its length.
         """
-        paths, size = self._paths, self._size
-        across = np.zeros_like(paths.arms) if paths.lumped else paths.arms * (-self._across / size)[:, None]
-        across[:, _TWIST] = paths.distance * (1.0 if paths.lumped else self._along / size)
-        blocks = across[:, :, None] * (across * (tensions[paths.muscle] / size)[:, None])[:, None, :]
+        paths, across = self._paths, self._turning
+        blocks = across[:, :, None] * (across * (tensions[paths.muscle] / self._size)[:, None])[:, None, :]
         total = np.zeros((paths.count + 1, paths.count + 1))
         np.add.at(total, (paths.places[:, :, None], paths.places[:, None, :]), blocks)
         return total[: paths.count, : paths.count]
+
+    def second(self, rates: FloatArray) -> FloatArray:
+        """Return the second derivatives of the lengths along rates of the strains, shape (count,), shape (n_muscles,)."""
+        paths = self._paths
+        each = (self._turning * np.append(rates, 0.0)[paths.places]).sum(axis=-1) ** 2 / self._size
+        return np.asarray(np.add.reduceat(each, paths.starts)) if len(paths.starts) else np.zeros(0)
+
+    @property
+    def _turning(self) -> FloatArray:
+        """Change of `(A, d t)` across each path per section coordinate, shape (n_paths, 4)."""
+        paths, size = self._paths, self._size
+        across = np.zeros_like(paths.arms) if paths.lumped else paths.arms * (-self._across / size)[:, None]
+        across[:, _TWIST] = paths.distance * (1.0 if paths.lumped else self._along / size)
+        return across

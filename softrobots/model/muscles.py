@@ -64,8 +64,7 @@ class MuscleForcePoint(MusclePoint):
         """Add the tensions to the load; the load on a muscle is its tension."""
         load, arms = self.inner.reduce(joints), self.paths.arms
         return ReducedLoad(
-            np.concatenate([load.motors, self.tensions]),
-            load.elastic - self.tensions @ arms,
+            *self.loads(joints.torque),
             load.derivative - self.paths.curvature(self.tensions),
             np.concatenate([load.coupling, -arms.T], axis=1),
             load.potential + float(self.tensions @ self.paths.change),
@@ -82,3 +81,16 @@ class MuscleForcePoint(MusclePoint):
         by_motors, by_elastic = self.inner.motor_derivatives(load)
         count = len(self.tensions)
         return np.pad(by_motors, (0, count)), np.pad(by_elastic, ((0, count), (0, 0)))
+
+    def loads(self, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Add the tensions to the loads; the load on a muscle is its tension."""
+        motors, elastic = self.inner.loads(torque)
+        return np.concatenate([motors, self.tensions]), elastic - self.tensions @ self.paths.arms
+
+    def velocity(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Joint rates; those of the tensions move no joint."""
+        return self.inner.velocity(motors[: len(motors) - len(self.tensions)], elastic)
+
+    def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Joint accelerations of the robot without muscles."""
+        return self.inner.velocity_product(motors[: len(motors) - len(self.tensions)], elastic)

@@ -1,0 +1,164 @@
+r"""Equations of motion of a robot in actuator and elastic coordinates `x = (u, y)`.
+
+With joint positions `q(x)` and :math:`Q = \partial q / \partial x` the joints move with
+
+.. math:: \dot q = Q \dot x, \qquad \ddot q = Q \ddot x + \dot Q \dot x
+
+and the power of any motion gives (theory 5; Featherstone, Rigid Body Dynamics Algorithms, 2008, section 3.2)
+
+.. math:: r(x, \dot x, \ddot x) = Q^T \bigl(\mathrm{ID}(q, \dot q, \ddot q) - J^T w\bigr) + \partial V / \partial x
+          + D \dot x + A \ddot x
+
+with the inverse dynamics `ID` of the rigid bodies and their weight, the elastic energy `V`, a constant damping `D` and the
+inertia `A` of rotors. `r` is what has to act on each coordinate from outside: zero on an elastic coordinate, the force of the
+actuator on an actuator. A muscle whose tension is given has the tension as its coordinate, which moves nothing by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray
+from softrobots.model.coordinates import Point
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.loads import AppliedLoad, Load
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class EquationsOfMotion:
+    """Equations of motion of one robot; belongs to the thread that created it."""
+
+    def __init__(
+        self,
+        model: SoftModel,
+        gravity: tuple[float, float, float] | None = None,
+        damping: FloatArray | None = None,
+        rotor_inertia: FloatArray | None = None,
+    ) -> None:
+        """Take the robot and what acts on all of it.
+
+        Args:
+            model: The robot.
+            gravity: Gravity, world axes [m/s^2]; None: weightless.
+            damping: `D`, of the elastic coordinates, shape (n_springs, n_springs), or of all, shape (n, n); None: none.
+            rotor_inertia: Diagonal of `A`, shape (n,) [kg m^2 or kg]; None: none.
+        """
+        self.model, self.gravity = model, gravity
+        self.n_motors, self.n = model.n_motors, model.n_motors + model.n_springs
+        self._pinocchio, self._data = model.workspace(gravity)
+        if gravity is None:
+            self._pinocchio, self._data = model.workspace((0.0, 0.0, 0.0))  # Pinocchio's own model has gravity
+        self.damping: FloatArray = np.zeros((self.n, self.n))
+        """`D` of all coordinates, shape (n, n)."""
+        if damping is not None:
+            first = self.n - len(damping)
+            self.damping[first:, first:] = damping
+        self.rotor_inertia: FloatArray = np.zeros(self.n) if rotor_inertia is None else rotor_inertia
+        """`A` of all coordinates, shape (n,)."""
+        self._undamped, self._rotorless = not self.damping.any(), not self.rotor_inertia.any()
+        given = model.muscles and model.muscle_input == "forces"
+        self._tensions = slice(self.n_motors - len(model.muscles), self.n_motors) if given else slice(0, 0)
+        self._applied: tuple[Any, AppliedLoad] | None = None
+
+    def point(self, x: FloatArray) -> Point:
+        """The robot at coordinates, shape (n,)."""
+        return self.model.coordinates.at(x[: self.n_motors], x[self.n_motors :])
+
+    def balance(self, x: FloatArray, rates: FloatArray, accelerations: FloatArray, wrenches: Mapping[str, FloatArray]) -> Any:
+        """What has to act on each coordinate from outside; see the module.
+
+        Args:
+            x: Actuators, then elastic coordinates, shape (n,) [rad, m or N].
+            rates: Their rates, shape (n,).
+            accelerations: Their accelerations, shape (n,).
+            wrenches: Dead wrench by frame, shape (6,) [N, N m], world axes.
+
+        Returns:
+            Forces, shape (n,) [N m or N]; NaN where a section is out of range.
+        """
+        m, point = self.n_motors, self.point(x)
+        if not point.valid:
+            return np.full(self.n, np.nan)
+        joint_rates = point.velocity(rates[:m], rates[m:])
+        joint_accelerations = point.velocity(accelerations[:m], accelerations[m:])
+        joint_accelerations += point.velocity_product(rates[:m], rates[m:])
+        q = self.model.embed(point.joints)
+        torque = -pin.rnea(self._pinocchio, self._data, q, joint_rates, joint_accelerations)
+        for frame, wrench in wrenches.items():
+            torque += wrench.dot(self._jacobian(q, frame))
+        forces: FloatArray = np.concatenate(point.loads(torque))
+        np.negative(forces, out=forces)
+        forces[m:] += self.model.springs.at(x[m:])[1]
+        if not self._undamped:
+            forces += self.damping.dot(rates)
+        if not self._rotorless:
+            forces += self.rotor_inertia * accelerations
+        return forces
+
+    def load(self, x: FloatArray, wrenches: Mapping[str, FloatArray]) -> FloatArray:
+        """Wrenches on each coordinate, `Q^T J^T w`, shape (n,) [N m or N]: their power is that times the rates."""
+        point = self.point(x)
+        q = self.model.embed(point.joints)
+        torque: FloatArray = np.zeros(len(point.joints))
+        for frame, wrench in wrenches.items():
+            torque += wrench.dot(self._jacobian(q, frame))
+        return np.asarray(np.concatenate(point.columns(torque[None]), axis=1)[0])
+
+    def mass_matrix(self, x: FloatArray) -> FloatArray:
+        r"""Mass matrix :math:`Q^T M_q Q + A`, shape (n, n)."""
+        point = self.point(x)
+        rows = np.concatenate(point.columns(self.model.data.mass_matrix(self.model.embed(point.joints))), axis=1)
+        mass: FloatArray = np.concatenate(point.columns(np.ascontiguousarray(rows.T)), axis=1)
+        return mass if self._rotorless else mass + np.diag(self.rotor_inertia)
+
+    def stiffness(self, x: FloatArray, wrenches: Mapping[str, FloatArray]) -> FloatArray:
+        """Derivative of `balance` at rest with respect to the coordinates, shape (n, n).
+
+        Rows of actuators that are muscles are those of their columns: it is meant for coordinates that are free.
+        """
+        m, point = self.n_motors, self.point(x)
+        load = self._load_of(wrenches).at(self.model.embed(point.joints))
+        reduced = point.reduce(load)
+        stiffness: FloatArray = np.zeros((self.n, self.n))
+        stiffness[m:, m:] = self.model.springs.at(x[m:])[2] - reduced.derivative
+        stiffness[m:, :m] = -reduced.coupling
+        stiffness[:m, m:] = -reduced.coupling.T
+        return stiffness
+
+    def energies(self, x: FloatArray, rates: FloatArray) -> tuple[float, float, float]:
+        """Kinetic energy, elastic energy, and potential energy of the weight [J]."""
+        m, point = self.n_motors, self.point(x)
+        q = self.model.embed(point.joints)
+        moving = pin.computeKineticEnergy(self._pinocchio, self._data, q, point.velocity(rates[:m], rates[m:]))
+        potential = 0.0 if self.gravity is None else pin.computePotentialEnergy(self._pinocchio, self._data, q)
+        kinetic = float(moving) + 0.5 * float(self.rotor_inertia.dot(rates * rates))
+        springs, structure = self.model.springs, self.model.structure
+        elastic = springs.at(x[m:])[0]
+        if structure.muscle_lengths is not None:  # the sums that the lengths fix store energy, too
+            stretch = x[m:] - springs.rest
+            strains = structure.strain_springs.at(structure.strains(x[:m], x[m:]))[0]
+            elastic += strains - 0.5 * float(springs.stiffness.dot(stretch * stretch))
+        return kinetic, elastic, float(potential)
+
+    def actuator_rates(self, x: FloatArray, rates: FloatArray) -> FloatArray:
+        """Rates with which actuators move, shape (n_motors,): those of the lengths where tensions are given [rad/s, m/s]."""
+        moving = np.array(rates[: self.n_motors])
+        if self._tensions.stop:
+            moving[self._tensions] = self.model.structure.muscle_paths.at(x[self.n_motors :]).arms @ rates[self.n_motors :]
+        return moving
+
+    def _jacobian(self, q: FloatArray, frame: str) -> Any:
+        """Jacobian of a frame, shape (6, nv), in world axes."""
+        jacobian = pin.computeFrameJacobian(self._pinocchio, self._data, q, self.model.frame_id(frame), _AXES)
+        return jacobian.reshape(6, -1)
+
+    def _load_of(self, wrenches: Mapping[str, FloatArray]) -> AppliedLoad:
+        """The load of wrenches, kept while they stay the same object."""
+        if self._applied is None or self._applied[0] is not wrenches:
+            self._applied = wrenches, AppliedLoad(self.model, Load(wrenches, self.gravity))
+        return self._applied[1]

@@ -1,0 +1,176 @@
+r"""The step of time: the implicit midpoint rule for free coordinates next to prescribed ones.
+
+With the unknown acceleration `a` in the middle of a step of length `h`
+
+.. math:: y_m = y_0 + \tfrac h2 v_0 + \tfrac{h^2}4 a, \quad v_m = v_0 + \tfrac h2 a, \quad r(y_m, v_m, a, t_m) = 0, \quad
+          y_1 = y_0 + h v_0 + \tfrac{h^2}2 a, \quad v_1 = v_0 + h a
+
+It is of second order, symmetric in time, and keeps every quadratic energy exactly: it damps nothing that is not damped (Hairer,
+Lubich and Wanner, Geometric Numerical Integration, 2006, sections II.1.3 and IV.2.1). Prescribed coordinates `u(t)` enter with
+
+.. math:: u_m = u(t_m), \quad \dot u_m = (u_1 - u_0) / h, \quad \ddot u_m = 4 (u_1 - 2 u_m + u_0) / h^2
+
+`a` is found by Newton's method with the matrix :math:`M + \tfrac h2 D + \tfrac{h^2}4 K`, factorised once in a step; what it
+leaves out (the derivatives of centrifugal and inertial forces) is small with the step, so that each iteration gains digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.dynamics.equations import EquationsOfMotion
+
+_CHANGE = 1e-13  # of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step
+_ROUNDED = 1e-9  # the same, below which an iteration that no longer shrinks has reached rounding
+_ITERATIONS = 30
+_RENEWED = 8  # iteration after which the matrix is computed again
+
+Wrenches = Mapping[str, FloatArray]
+"""Dead wrench by frame, shape (6,) [N, N m], world axes."""
+
+
+class State(NamedTuple):
+    """A robot in motion."""
+
+    time: float
+    """Time [s]."""
+    x: FloatArray
+    """Actuators, then elastic coordinates, shape (n,) [rad, m or N]."""
+    rates: FloatArray
+    """Their rates, shape (n,)."""
+
+
+class Step(NamedTuple):
+    """One step of time."""
+
+    start: State
+    """State at its start."""
+    end: State
+    """State at its end."""
+    middle: State
+    """State in the middle."""
+    accelerations: FloatArray
+    """Accelerations of all coordinates in the middle, shape (n,)."""
+    actuator_forces: FloatArray
+    """What actuators exert in the middle, shape (n_motors,) [N m or N]."""
+    wrenches: Wrenches
+    """Load in the middle."""
+    iterations: int
+    """Evaluations of the equations of motion."""
+
+    @property
+    def length(self) -> float:
+        """Length of the step [s]."""
+        return self.end.time - self.start.time
+
+    def at(self, time: float) -> tuple[FloatArray, FloatArray]:
+        """Coordinates and rates within the step, each shape (n,): the cubic through both ends and its slope."""
+        h = self.length
+        s = (time - self.start.time) / h
+        change, first, last = self.end.x - self.start.x, h * self.start.rates, h * self.end.rates
+        second, third = 3.0 * change - 2.0 * first - last, first + last - 2.0 * change
+        x = self.start.x + s * (first + s * (second + s * third))
+        return x, (first + s * (2.0 * second + 3.0 * s * third)) / h
+
+
+class MidpointRule:
+    """Steps of time of one robot under given inputs; keeps what the next step can use."""
+
+    def __init__(
+        self,
+        equations: EquationsOfMotion,
+        path: Callable[[float], FloatArray],
+        load: Callable[[float], Wrenches],
+        free: Any = None,
+        applied: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
+    ) -> None:
+        """Take the equations of motion and what drives them.
+
+        Args:
+            equations: Equations of motion.
+            path: Actuators at a time, shape (n_motors,) [rad, m or N]; the entries of free ones are not used.
+            load: Load at a time; the same object while it is the same.
+            free: Places of the coordinates that move freely; by default the elastic ones.
+            applied: Force on each coordinate at a time, coordinates and rates, shape (n,); that on prescribed ones is not used.
+        """
+        self.equations, self.path, self.load, self._applied = equations, path, load, applied
+        n, m = equations.n, equations.n_motors
+        self.free = np.arange(m, n) if free is None else np.asarray(free, dtype=np.intp)
+        """Places of the free coordinates."""
+        self.prescribed = np.setdiff1d(np.arange(m), self.free)
+        """Places of the prescribed coordinates."""
+        self._block = np.ix_(self.free, self.free)
+        self._damping = equations.damping[self._block]
+        self._past: list[tuple[float, FloatArray]] = []
+        self._known: tuple[float, FloatArray] | None = None
+
+    def forget(self) -> None:
+        """Forget the last accelerations, which predict the next: the load jumps."""
+        self._past = []
+
+    def step(self, start: State, end_time: float) -> Step | None:
+        """Return the step from a state to a time; None if its equations could not be solved."""
+        equations, free = self.equations, self.free
+        m, n = equations.n_motors, equations.n
+        h, middle_time = end_time - start.time, 0.5 * (start.time + end_time)
+        wrenches = self.load(middle_time)
+        before, middle, after = self._path(start.time), self.path(middle_time), self.path(end_time)
+        x, rates, accelerations = np.zeros(n), np.zeros(n), np.zeros(n)
+        x[:m], rates[:m], accelerations[:m] = middle, (after - before) / h, (after - 2.0 * middle + before) * (4.0 / (h * h))
+        y0, v0 = start.x[free], start.rates[free]
+        a = self._predicted(middle_time, len(free))
+        solve, last = None, np.inf
+        for iteration in range(1, _ITERATIONS + 1):
+            x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
+            forces = equations.balance(x, rates, accelerations, wrenches)
+            residual = forces[free]
+            if self._applied is not None:
+                residual = residual - self._applied(middle_time, x, rates)[free]
+            if not np.isfinite(residual).all():
+                return None
+            if solve is None or iteration == _RENEWED:
+                solve = self._factorised(x, wrenches, h)
+            change = solve(residual)
+            a = a - change
+            moved = 0.25 * h * h * float(np.abs(change).max(initial=0.0)) / max(1.0, float(np.abs(x[free]).max(initial=0.0)))
+            if moved <= _CHANGE or (moved >= 0.5 * last and last <= _ROUNDED):
+                break
+            if not moved < 1e3 * last:
+                return None
+            last = moved
+        else:
+            return None
+        x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
+        ends, end_rates = np.zeros(n), np.zeros(n)
+        ends[:m], end_rates[:m] = after, rates[:m] + 0.5 * h * accelerations[:m]
+        ends[free], end_rates[free] = y0 + h * v0 + 0.5 * h * h * a, v0 + h * a
+        self._past = [*self._past[-1:], (middle_time, a)]
+        self._known = end_time, after
+        end = State(end_time, ends, end_rates)
+        return Step(start, end, State(middle_time, x, rates), accelerations, forces[:m], wrenches, iteration)
+
+    def _path(self, time: float) -> FloatArray:
+        """Actuators at a time, which may be the end of the last step."""
+        return self._known[1] if self._known is not None and self._known[0] == time else self.path(time)
+
+    def _predicted(self, time: float, count: int) -> FloatArray:
+        """Acceleration extrapolated from the last two steps."""
+        if len(self._past) < 2:
+            return self._past[-1][1] if self._past else np.zeros(count)
+        (t0, a0), (t1, a1) = self._past
+        return a1 + (a1 - a0) * min((time - t1) / (t1 - t0), 1.5)
+
+    def _factorised(self, x: FloatArray, wrenches: Wrenches, h: float) -> Callable[[FloatArray], FloatArray]:
+        """Solver of the equations with the matrix of Newton's method."""
+        from scipy.linalg.lapack import dgetrf, dgetrs
+
+        matrix = self.equations.mass_matrix(x)[self._block]
+        matrix += 0.5 * h * self._damping + 0.25 * h * h * self.equations.stiffness(x, wrenches)[self._block]
+        if len(matrix) == 0:
+            return lambda residual: residual
+        factors, pivots, _ = dgetrf(matrix, overwrite_a=True)
+        return lambda residual: np.asarray(dgetrs(factors, pivots, residual)[0])

@@ -1,0 +1,127 @@
+"""A robot in motion: what `simulate` returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.model.soft_model import SoftModel
+
+
+@dataclass(frozen=True, eq=False)
+class MotionEnergy:
+    """Energies of a robot in motion, and what went in and out since the start, each shape (n,) [J]."""
+
+    kinetic: FloatArray
+    """Kinetic energy, of rotors too."""
+    elastic: FloatArray
+    """Energy of the springs and sections."""
+    potential: FloatArray
+    """Potential energy of the weight."""
+    dissipated: FloatArray
+    """What dampers have taken."""
+    load_work: FloatArray
+    """Work of forces and wrenches."""
+    motor_work: FloatArray
+    """Work of motors and muscles."""
+
+    @cached_property
+    def balance(self) -> FloatArray:
+        """Energy that the scheme has made, minus its first value: zero to the order of the scheme, shape (n,) [J]."""
+        kept = self.kinetic + self.elastic + self.potential
+        total = kept + self.dissipated - self.load_work - self.motor_work
+        return read_only(total - total[0])
+
+
+@dataclass(frozen=True, eq=False)
+class MotionState:
+    """State of a robot in motion, from which `simulate` can start."""
+
+    model: SoftModel
+    """The robot."""
+    time: float
+    """Time in the motion that it is taken from [s]."""
+    q_motors: FloatArray
+    """Actuators, shape (n_motors,) [rad, m or N]."""
+    motor_velocities: FloatArray
+    """Their rates, shape (n_motors,)."""
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n_springs,) [rad or m]."""
+    velocities: FloatArray
+    """Their rates, shape (n_springs,) [rad/s or m/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A simulated motion, a row for each time."""
+
+    model: SoftModel
+    """The robot."""
+    time: FloatArray
+    """Times of the rows, shape (n,) [s]."""
+    q_motors: FloatArray
+    """Actuators, shape (n, n_motors) [rad, m or N]."""
+    motor_velocities: FloatArray
+    """Their rates, shape (n, n_motors) [rad/s, m/s or N/s]."""
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n, n_springs) [rad or m]."""
+    velocities: FloatArray
+    """Their rates, shape (n, n_springs) [rad/s or m/s]."""
+    motor_torques: FloatArray
+    """Load that each actuator carries, with that of the accelerated masses, shape (n, n_motors) [N m or N]."""
+    forces: FloatArray
+    """Force on the tip, shape (n, 3) [N]."""
+    gravity: tuple[float, float, float] | None
+    """Gravity [m/s^2]; None: weightless."""
+    damping_time: float | None
+    """Damping over stiffness [s]; None: the damping of the description."""
+    energy: MotionEnergy
+    """Energies and their balance."""
+    steps: FloatArray
+    """Times at the ends of all steps that were taken, the first included, shape (m,) [s]."""
+    tip_error: float | None = None
+    """Measured error of the tip position, the largest of all steps [m]; None for fixed steps, where it is not measured."""
+    tolerance: float | None = None
+    """Largest `tip_error` that was asked for [m]; None for fixed steps."""
+    interrupted: bool = False
+    """Whether Ctrl-C ended it early; the rows end before the duration then, or their steps miss the tolerance."""
+
+    def configuration(self, row: int) -> FloatArray:
+        """Pinocchio's configuration in a row, shape (nq,)."""
+        point = self.model.coordinates.at(self.q_motors[row], self.q_springs[row])
+        return self.model.embed(point.joints)
+
+    def transforms(self, frame: str | None = None) -> FloatArray:
+        """Pose of a frame in the world in each row, shape (n, 4, 4) [m]; by default that of the tip.
+
+        Raises:
+            NameNotFound: If there is no such frame.
+        """
+        number = self.model.frame_id(self.model.tip if frame is None else frame)
+        pin_model, data = self.model.workspace(None)
+        poses: FloatArray = np.zeros((len(self.time), 4, 4))
+        for row in range(len(self.time)):
+            pin.forwardKinematics(pin_model, data, self.configuration(row))
+            poses[row] = pin.updateFramePlacement(pin_model, data, number).homogeneous
+        return poses
+
+    @cached_property
+    def tip_position(self) -> FloatArray:
+        """Position of the tip in the world, shape (n, 3) [m]."""
+        return read_only(np.ascontiguousarray(self.transforms()[:, :3, 3]))
+
+    @property
+    def end(self) -> MotionState:
+        """The last state; `simulate(start=...)` takes it, and the motion itself."""
+        return MotionState(
+            self.model,
+            float(self.time[-1]),
+            self.q_motors[-1],
+            self.motor_velocities[-1],
+            self.q_springs[-1],
+            self.velocities[-1],
+        )

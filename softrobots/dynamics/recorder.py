@@ -1,0 +1,102 @@
+"""What a run of the simulation leaves: rows at the output times, energies, and what went in and out at each step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.dynamics.midpoint import MidpointRule, State, Step
+from softrobots.dynamics.motion import Motion, MotionEnergy
+
+
+class Recorder:
+    """Collects the steps of one run."""
+
+    def __init__(self, rule: MidpointRule, start: State, rows: FloatArray) -> None:
+        """Take the rule, the first state, and the times of the rows, shape (n,) [s]."""
+        self._rule, self._equations, self._times = rule, rule.equations, rows
+        self.state = start
+        """The state reached."""
+        self._x, self._rates = np.zeros((len(rows), len(start.x))), np.zeros((len(rows), len(start.x)))
+        self.rows = 0
+        """Number of rows so far."""
+        self.times, self.tips = [start.time], [self.tip(start.x)]
+        """Times of the steps, and positions of the tip then, shape (3,) [m]."""
+        self._middles: list[float] = []
+        self._exerted: list[FloatArray] = []
+        self._works = [(0.0, 0.0, 0.0)]
+
+    def tip(self, x: FloatArray) -> FloatArray:
+        """Position of the tip, shape (3,) [m]."""
+        model = self._equations.model
+        pin_model, data = model.workspace(None)
+        pin.forwardKinematics(pin_model, data, model.embed(self._equations.point(x).joints))
+        return np.array(pin.updateFramePlacement(pin_model, data, model.frame_id(model.tip)).translation)
+
+    def add(self, step: Step) -> None:
+        """Take a step."""
+        equations, middle, h = self._equations, step.middle, step.length
+        dissipated, load_work, motor_work = self._works[-1]
+        dissipated += h * float(middle.rates @ equations.damping @ middle.rates)
+        if step.wrenches:
+            load_work += h * float(equations.load(middle.x, step.wrenches) @ middle.rates)
+        motor_work += h * float(step.actuator_forces @ equations.actuator_rates(middle.x, middle.rates))
+        self._works.append((dissipated, load_work, motor_work))
+        self._middles.append(middle.time)
+        self._exerted.append(step.actuator_forces)
+        prescribed = self._rule.prescribed
+        last = (
+            len(self._times) if step.end.time >= self._times[-1] else int(np.searchsorted(self._times, step.end.time, "right"))
+        )
+        for row in range(self.rows, last):
+            time = float(self._times[row])
+            x, rates = step.at(time)
+            if len(prescribed):
+                x[prescribed] = self._rule.path(time)[prescribed]
+                rates[prescribed] = (middle.rates + (time - middle.time) * step.accelerations)[prescribed]
+            self._x[row], self._rates[row] = x, rates
+        self.rows = max(self.rows, last)
+        self.state = step.end
+        self.times.append(step.end.time)
+        self.tips.append(self.tip(step.end.x))
+
+    def motion(self, **facts: Any) -> Motion:
+        """Return the motion of the rows so far, with more of its fields."""
+        equations, n = self._equations, self.rows
+        m, times = equations.n_motors, self._times[:n]
+        if n == 0:  # interrupted before the end of the first step
+            times, n = self._times[:1], 1
+            self._x[0], self._rates[0] = self.state.x, self.state.rates
+        x, rates = self._x[:n], self._rates[:n]
+        kept = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
+        works = np.array(self._works)
+        flown = np.column_stack([np.interp(times, self.times, work) for work in works.T])
+        load, tip = self._rule.load, equations.model.tip
+        forces = np.array([load(float(time)).get(tip, np.zeros(6))[:3] for time in times])
+        columns = [read_only(np.ascontiguousarray(column)) for column in np.concatenate([kept, flown], axis=1).T]
+        return Motion(
+            model=equations.model,
+            time=read_only(np.array(times)),
+            q_motors=read_only(np.array(x[:, :m])),
+            motor_velocities=read_only(np.array(rates[:, :m])),
+            q_springs=read_only(np.array(x[:, m:])),
+            velocities=read_only(np.array(rates[:, m:])),
+            motor_torques=read_only(-self._at_rows(times, m)),
+            forces=read_only(forces),
+            gravity=equations.gravity,
+            energy=MotionEnergy(*columns),
+            steps=read_only(np.array(self.times)),
+            **facts,
+        )
+
+    def _at_rows(self, times: FloatArray, m: int) -> FloatArray:
+        """What actuators exert at the rows, from the middles of the steps, shape (n, m)."""
+        if len(self._exerted) < 2:
+            return np.tile(self._exerted[0] if self._exerted else np.zeros(m), (len(times), 1))
+        middles, exerted = np.array(self._middles), np.array(self._exerted)
+        place = np.clip(np.searchsorted(middles, times) - 1, 0, len(middles) - 2)
+        share = ((times - middles[place]) / (middles[place + 1] - middles[place]))[:, None]
+        return np.asarray(exerted[place] + share * (exerted[place + 1] - exerted[place]))

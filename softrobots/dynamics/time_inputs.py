@@ -1,0 +1,176 @@
+"""Inputs of a motion over time: paths of motors, and loads, each constant, a table or a function of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, refuse_where
+from softrobots.core.errors import ParameterError
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.trajectory import Trajectory
+
+_SAMPLES = 1000  # of a function of time, among which its jumps are searched
+_KINKS = 200  # rows up to which steps end at each row of a table
+
+Signal = Callable[[float], FloatArray]
+
+
+class MotorPath:
+    """Positions of the actuators over time."""
+
+    def __init__(self, model: SoftModel, q_motors: Any, duration: float) -> None:
+        """Take constants, a `Trajectory` (through its waypoints by a cubic spline, at rest at both ends), or a function.
+
+        Raises:
+            ParameterError: If a value has the wrong shape, is not finite, is one that the robot cannot have, or jumps.
+        """
+        self.breaks: FloatArray = np.zeros(0)
+        """Times at which the path has a kink [s]."""
+        self.constant = False
+        """Whether nothing moves."""
+        if isinstance(q_motors, Trajectory):
+            if q_motors.model != model:
+                raise ParameterError("q_motors", q_motors.model, f"a Trajectory of the model given, {model!r}")
+            self._signal, self.breaks = _spline(q_motors)
+        elif callable(q_motors):
+            self._signal = checked_function("q_motors", q_motors, (model.n_motors,), "rad")
+            for time in np.linspace(0.0, duration, 21).tolist():
+                model.checked_motors(self._signal(time), f"q_motors(t={time:.6g})")
+            jumps = find_jumps(self._signal, duration)
+            for time in jumps[:1].tolist():
+                raise ParameterError("q_motors", q_motors, f"a continuous function of time; it jumps at {time:.6g} s")
+        else:
+            values = model.checked_motors(q_motors)
+            self.constant, self._signal = True, lambda _: values
+
+    def __call__(self, time: float) -> FloatArray:
+        """Return the positions, shape (n_motors,) [rad, m or N]."""
+        return self._signal(time)
+
+
+class TimeLoad:
+    """Dead wrenches by frame over time."""
+
+    def __init__(self, model: SoftModel, force: Any, wrench: Any, duration: float) -> None:
+        """Take a force on the tip and a wrench, or one by frame; each constant, a table `(times, values)`, or a function.
+
+        Raises:
+            ParameterError: If a value has the wrong shape or is not finite.
+            NameNotFound: If a frame does not exist.
+        """
+        given = [] if force is None else [("force", model.tip, force, 3)]
+        if isinstance(wrench, Mapping):
+            given += [(f"wrench[{frame!r}]", frame, value, 6) for frame, value in wrench.items()]
+        elif wrench is not None:
+            given.append(("wrench", model.tip, wrench, 6))
+        self._constant: dict[str, FloatArray] = {}
+        self._moving: list[tuple[str, int, Signal]] = []
+        breaks = [np.zeros(0)]
+        for name, frame, value, size in given:
+            model.frame_id(frame)
+            if callable(value):
+                signal = checked_function(name, value, (size,), "N")
+                breaks.append(find_jumps(signal, duration))
+                self._moving.append((frame, size, signal))
+            elif isinstance(value, tuple | list) and len(value) == 2:
+                signal, kinks = _table(name, value, size)
+                breaks.append(kinks)
+                self._moving.append((frame, size, signal))
+            else:
+                self._add(self._constant, frame, finite_array(name, value, (size,), "N"))
+        self.breaks: FloatArray = np.concatenate(breaks)
+        """Times at which the load jumps or has a kink [s]."""
+        self.constant = not self._moving
+        """Whether the load stays the same."""
+        self._last: dict[str, FloatArray] = self._constant
+
+    def __call__(self, time: float) -> dict[str, FloatArray]:
+        """Return the wrench by frame, shape (6,) [N, N m]; the same object as last time if nothing has changed."""
+        if self.constant:
+            return self._constant
+        wrenches = dict(self._constant)
+        for frame, _, signal in self._moving:
+            self._add(wrenches, frame, signal(time))
+        if wrenches.keys() != self._last.keys() or any(not np.array_equal(w, self._last[f]) for f, w in wrenches.items()):
+            self._last = wrenches
+        return self._last
+
+    @staticmethod
+    def _add(wrenches: dict[str, FloatArray], frame: str, value: FloatArray) -> None:
+        total = np.array(wrenches.get(frame, np.zeros(6)))
+        total[: len(value)] += value
+        wrenches[frame] = total
+
+
+def checked_function(name: str, function: Callable[[float], Any], shape: tuple[int, ...], unit: str) -> Signal:
+    """Return a function of time whose values are checked; an error names the time.
+
+    Raises:
+        ParameterError: By the function returned, if a value has the wrong shape or is not finite.
+    """
+
+    def checked(time: float) -> FloatArray:
+        return finite_array(f"{name}(t={time:.6g})", function(time), shape, unit)
+
+    checked(0.0)
+    return checked
+
+
+def find_jumps(signal: Signal, duration: float) -> FloatArray:
+    """Times at which a function of time jumps, found among 1000 samples and located by bisection, shape (n,) [s]."""
+    times = np.linspace(0.0, duration, _SAMPLES + 1).tolist()
+    values = np.array([signal(time) for time in times])
+    changes = np.abs(np.diff(values, axis=0)).max(axis=1, initial=0.0)
+    jumps = []
+    for place in np.flatnonzero(changes > 1e-6 * np.ptp(values, axis=0).max(initial=0.0)).tolist():
+        before, after = times[place], times[place + 1]
+        low, high = values[place], values[place + 1]
+        rounds = 0
+        while after - before > 4e-16 * duration and rounds < 60:
+            middle = 0.5 * (before + after)
+            if not before < middle < after:
+                break
+            value = signal(middle)
+            if np.abs(value - low).max() >= np.abs(high - value).max():
+                after, high = middle, value
+            else:
+                before, low = middle, value
+            rounds += 1
+            if np.abs(high - low).max() < 0.5 * changes[place] * 0.7**rounds + 1e-12 * changes[place]:
+                break
+        if np.abs(high - low).max() > 0.3 * changes[place]:
+            jumps.append(after)
+    return np.array(jumps)
+
+
+def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
+    """A table of values over time, linear between its rows and constant beyond; two rows at one time are a jump."""
+    times = finite_array(f"times of {name}", value[0], (None,), "s")
+    values = finite_array(f"values of {name}", value[1], (len(times), size), "N")
+    if len(times) == 0:
+        raise ParameterError(f"times of {name}", times, "at least one [s]")
+    refuse_where(f"times of {name}", times[1:], np.diff(times) < 0.0, "not before the row above [s]")
+
+    def signal(time: float) -> FloatArray:
+        row = int(np.searchsorted(times, time, side="right"))
+        if row == 0 or row == len(times):
+            return np.asarray(values[min(row, len(times) - 1)])
+        share = (time - times[row - 1]) / (times[row] - times[row - 1])
+        return np.asarray(values[row - 1] + share * (values[row] - values[row - 1]))
+
+    return signal, times if len(times) <= _KINKS else times[1:][np.diff(times) == 0.0]
+
+
+def _spline(trajectory: Trajectory) -> tuple[Signal, FloatArray]:
+    """The path through the waypoints of a trajectory, and the times at which it starts and ends."""
+    times = trajectory.times - trajectory.times[0]
+    values, last = trajectory.q_motors, float(times[-1])
+    if len(times) == 1:
+        return lambda _: values[0], np.zeros(0)
+    from scipy.interpolate import CubicSpline
+
+    spline: Any = CubicSpline(times, values, bc_type="clamped")
+    return lambda time: np.asarray(spline(min(max(time, 0.0), last))), np.array([last])
