@@ -7,9 +7,7 @@ from functools import cached_property
 
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.unknowns import Unknowns
-
-HISTORY = 4
-"""Number of earlier accelerations from which that of the next step is extrapolated."""
+from softrobots.compiled.motion_settings import KEPT_STEPS
 
 _COUNTS = ("unknowns", "full_damping", "prepared")  # no places for callers
 
@@ -59,28 +57,45 @@ class MotionLayout:
     begin_velocity: int = field(init=False)
     """Their velocities there (n)."""
     history: int = field(init=False)
-    """Accelerations of the steps before, the last one first (`HISTORY`, n)."""
+    """Accelerations of the steps before, the last one first (`KEPT_STEPS`, n)."""
+    weights: int = field(init=False)
+    """Weights of those in the extrapolation (`KEPT_STEPS`)."""
     n_history: int = field(init=False)
     """Number of those that are of equal steps."""
+    last_step: int = field(init=False)
+    """Length of these steps [s]."""
     motors_begin: int = field(init=False)
-    """Motors at the beginning of the step (m)."""
+    """Motors at the beginning of the step (m) [rad or m]."""
     motors_middle: int = field(init=False)
     """Motors in its middle (m)."""
     motors_end: int = field(init=False)
     """Motors at its end (m)."""
+    whole_step: int = field(init=False)
+    """Length of the step that these are of, of which `time_step` may be a part [s]."""
+    share: int = field(init=False)
+    """A moment of that step: 0 at its beginning, 1 at its end."""
     change: int = field(init=False)
     """Largest change of an unknown in the middle of the step by the last correction, relative to 1 or its size."""
+    last_change: int = field(init=False)
+    """The same of the correction before."""
+    settled: int = field(init=False)
+    """1 where the corrections have converged, 0 where they have not; of a lane."""
+    failed: int = field(init=False)
+    """1 for a lane that has not converged in some step."""
     prepared: int = field(init=False)
     """Values that do not depend on the unknowns, factors, records: as many places as the code needs."""
 
     def __post_init__(self) -> None:
         """Compute the places."""
         m, n = self.motors, self.unknowns
-        given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3, damping=n * n if self.full_damping else n)
+        damping = n * n if self.full_damping else n
+        given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3, damping=damping)
         middle = dict(time_step=1, unknown=n, rate=n, acceleration=n, correction=n, tip=3)
-        state = dict(position=n, velocity=n, begin_position=n, begin_velocity=n, history=HISTORY * n, n_history=1)
-        path = dict(motors_begin=m, motors_middle=m, motors_end=m)
-        assign_places(self, m, **given, **middle, **state, **path, change=1, prepared=0)
+        state = dict(position=n, velocity=n, begin_position=n, begin_velocity=n)
+        before = dict(history=KEPT_STEPS * n, weights=KEPT_STEPS, n_history=1, last_step=1)
+        path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
+        search = dict(change=1, last_change=1, settled=1, failed=1)
+        assign_places(self, m, **given, **middle, **state, **before, **path, **search, prepared=0)
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""

@@ -65,6 +65,29 @@ TORQUES: int
 TURNED: int
 UNKNOWN: int
 
+# Places in the workspace of motion, see `softrobots.compiled.chain.motion_layout`.
+ACCELERATION: int
+BEGIN_POSITION: int
+BEGIN_VELOCITY: int
+CHANGE: int
+FAILED: int
+LAST_CHANGE: int
+LAST_STEP: int
+MOTORS: int
+MOTORS_BEGIN: int
+MOTORS_END: int
+MOTORS_MIDDLE: int
+N_HISTORY: int
+POSITION: int
+RATE: int
+SETTLED: int
+SHARE: int
+TIME_STEP: int
+TIP: int
+VELOCITY: int
+WEIGHTS: int
+WHOLE_STEP: int
+
 # Numbers of the robot: spring rounding [N m], reach [m], tables by unknown, motor or muscle.
 GROUP: tuple[int, ...]
 LOWER: tuple[float, ...]
@@ -93,3 +116,23 @@ prepare: Callable[[Array], None]
 prepare_force: Callable[[Array], None]
 target_pass_lanes: Callable[[Array], None]
 target_step: Callable[[Array], None]
+
+# Straight-line functions of motion.
+apply_correction: Callable[[Array, int], None]
+apply_correction_lanes: Callable[[Array, int], None]
+finish_unknown: Callable[[Array, int], None]
+finish_unknown_lanes: Callable[[Array, int], None]
+guess_unknown: Callable[[Array, int], None]
+guess_unknown_lanes: Callable[[Array, int], None]
+interpolate_unknown: Callable[[Array, int], None]
+interpolate_unknown_lanes: Callable[[Array, int], None]
+motion_correct: Callable[[Array], None]
+motion_correct_lanes: Callable[[Array], None]
+motion_factor: Callable[[Array], None]
+motion_factor_lanes: Callable[[Array], None]
+motion_prepare: Callable[[Array], None]
+motion_prepare_lanes: Callable[[Array], None]
+motion_tip: Callable[[Array], None]
+motion_tip_lanes: Callable[[Array], None]
+place_motor: Callable[[Array, int], None]
+place_motor_lanes: Callable[[Array, int], None]

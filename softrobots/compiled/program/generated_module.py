@@ -31,8 +31,8 @@ class Program:
     """Its text."""
     lane_text: str
     """Text that is appended to it for batches."""
-    layout: Layout
-    """Places in the workspace."""
+    layout: Any
+    """Places in the workspace: `Layout`, or `MotionLayout`."""
     size: int
     """Size of the workspace of one case."""
     tip: TipLayout | None
@@ -79,18 +79,18 @@ def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False) -> Pr
     text = "\n\n\n".join(
         [
             title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
-            *map(_text, functions_of(trigonometry)),
+            *map(text_of, functions_of(trigonometry)),
             *(block.text() for block in blocks),
             *loops,
-            *map(_text, functions),
+            *map(text_of, functions),
         ]
     )
     lane_texts = [replace(block, name=f"{block.name}_lanes").text(lanes=True) for block in lanes]
-    lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *map(_text, lane_functions)])
+    lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *map(text_of, lane_functions)])
     return Program(text + "\n", lane_text + "\n", layout, size, tip, (*entries, *names))
 
 
-def _lanes(size: int) -> int:
+def lane_count(size: int) -> int:
     """Return the number of cases side by side, such that their workspaces fit in the cache of a core."""
     count = settings.MAX_LANES
     while count > settings.MIN_LANES and count * size * 8 > settings.LANE_MEMORY:
@@ -107,7 +107,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
     values |= {
         "WORKSPACE_SIZE": size,
         "LANE_SIZE": lane_size,
-        "LANES": _lanes(lane_size),
+        "LANES": lane_count(lane_size),
         "N_CONSTRAINTS": len(chain.constrained),
         **{status.name: status.value for status in Status},
         "REACH": float(chain.reach),
@@ -146,5 +146,6 @@ def functions_of(module: ModuleType) -> list[Callable[..., Any]]:
     return [one for one in vars(module).values() if inspect.isfunction(one) and one.__module__ == module.__name__]
 
 
-def _text(function: Callable[..., Any]) -> str:
+def text_of(function: Callable[..., Any]) -> str:
+    """Return the text of a function."""
     return inspect.getsource(function).rstrip()

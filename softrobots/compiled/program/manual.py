@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from softrobots.compiled.chain.layout import TipLayout
@@ -32,26 +33,32 @@ def manual(plan: Plan, tip: TipLayout | None) -> tuple[str, list[str]]:
     places = layout.constants() | ({} if tip is None else tip.constants())
     given, found = _inputs(plan), _results(plan, tip)
     lines = [
-        f"Statics of {_on_a_line(unknowns.chain.name)}{', with gravity' if plan.weight else ', weightless'}: generated code.",
+        f"Statics of {on_a_line(unknowns.chain.name)}{', with gravity' if plan.weight else ', weightless'}: generated code.",
         "",
         "Functions work on an array of WORKSPACE_SIZE numbers, initially zero, which may be used for several cases.",
         "settle, settle_from, estimate and reach return a status; the results are valid only if it is 0:",
         "",
         *(f"    {status.value}  {status.name:<14} {status.explanation}" for status in Status),
     ]
+    return "\n".join([*lines, *place_table(given, found, places)]), list(dict.fromkeys(row.name for row in (*given, *found)))
+
+
+def place_table(given: Sequence[Place], found: Sequence[Place], places: Mapping[str, int]) -> list[str]:
+    """Return lines that tell inputs and results and where they stand."""
+    lines = []
     for title, rows in (("Inputs", given), ("Results", found)):
         lines += ["", f"{title}: name, first place, number of places, meaning.", ""]
         for row in rows:
             head = f"    {row.name:<13} {places[row.name]:>5} {row.size:>5}  "
             lines += textwrap.wrap(head + row.meaning, _WIDTH, subsequent_indent=" " * len(head), break_on_hyphens=False)
-    return "\n".join(lines), list(dict.fromkeys(row.name for row in (*given, *found)))
+    return lines
 
 
 def _inputs(plan: Plan) -> list[Place]:
     """Return the inputs."""
     unknowns, layout = plan.unknowns, plan.layout
     n, searches = layout.unknowns, unknowns.moved_by_motors
-    places = [Place("MOTORS", layout.motors, f"motor joints [rad or m]: {_motors(unknowns)}")] if layout.motors else []
+    places = [Place("MOTORS", layout.motors, f"motor joints [rad or m]: {motor_names(unknowns)}")] if layout.motors else []
     places.append(Place("FORCE", 3, "force on the tip [N], world axes"))
     if plan.weight:
         places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
@@ -74,7 +81,7 @@ def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
     """Return the results."""
     unknowns, n, m = plan.unknowns, plan.layout.unknowns, plan.layout.motors
     places = [
-        Place("UNKNOWN", n, f"the unknowns [rad or m]: {_strains(unknowns)}"),
+        Place("UNKNOWN", n, f"the unknowns [rad or m]: {strain_names(unknowns)}"),
         Place("TIP", 3, "the loaded tip [m], world axes"),
         Place("ERROR", 1, "square of the out-of-balance torque [N^2 m^2]"),
     ]
@@ -104,12 +111,14 @@ def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
     return places
 
 
-def _motors(unknowns: Unknowns) -> str:
+def motor_names(unknowns: Unknowns) -> str:
+    """Return the names of the motor joints."""
     joints = [one for one in unknowns.chain.elements if isinstance(one, ChainJoint) and one.motor is not None]
     return _listed([one.name for one in sorted(joints, key=lambda one: one.motor or 0)])
 
 
-def _strains(unknowns: Unknowns) -> str:
+def strain_names(unknowns: Unknowns) -> str:
+    """Return the names of the unknowns."""
     names: dict[int, str] = {}
     for element in unknowns.chain.elements:
         if isinstance(element, ChainSection):
@@ -121,9 +130,9 @@ def _strains(unknowns: Unknowns) -> str:
 
 def _listed(names: list[str]) -> str:
     """Return all of a few names; of many the first eight and the last."""
-    return ", ".join(map(_on_a_line, names if len(names) <= 12 else [*names[:8], "...", names[-1]]))
+    return ", ".join(map(on_a_line, names if len(names) <= 12 else [*names[:8], "...", names[-1]]))
 
 
-def _on_a_line(name: str) -> str:
+def on_a_line(name: str) -> str:
     """Return a name from a file with escapes for characters that cannot be printed."""
     return name if name.isprintable() else name.encode("unicode_escape").decode()

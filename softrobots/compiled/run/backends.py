@@ -22,6 +22,7 @@ import numpy as np
 
 from softrobots.compiled.drivers import intrinsics
 from softrobots.compiled.program.generated_module import Program
+from softrobots.compiled.run.motion_batches import MotionBatches
 from softrobots.compiled.run.numpy_batches import NumpyBatches
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import MissingDependency, OutputError
@@ -64,8 +65,18 @@ class Run:
     def __init__(self, program: Program, functions: Any) -> None:
         """Look up the functions; those that the program lacks are None."""
         self.program, self.layout = program, program.layout
-        single = ("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip")
-        for name in (*single, "settle_batch", "estimate_batch", "reach_batch"):
+        single = (
+            "settle",
+            "settle_from",
+            "estimate",
+            "reach",
+            "follow",
+            "look_at_tip",
+            "motion_step",
+            "motion_run",
+            "place_at",
+        )
+        for name in (*single, "settle_batch", "estimate_batch", "reach_batch", "motion_batch"):
             setattr(self, name, getattr(functions, name, None))
 
     def workspace(self) -> Any:
@@ -95,10 +106,13 @@ class PythonRun(Run):
         in_numpy = {"sqrt": np.sqrt, "floor": np.floor, "sine": np.sin, "cosine": np.cos}
         careful = _module_of(code, **in_numpy)
         vectorised = _module_of(code, **in_numpy, where=np.where, fabs=np.abs)
-        for name in ("settle", "settle_from", "estimate", "reach", "follow"):
+        for name in ("settle", "settle_from", "estimate", "reach", "follow", "motion_step", "motion_run"):
             if hasattr(module, name):
                 setattr(module, name, _guarded(getattr(module, name), getattr(careful, name)))
         super().__init__(program, module)
+        if hasattr(module, "motion_step"):
+            self.motion_batch = MotionBatches(module, vectorised, program).motion_batch
+            return
         batches = NumpyBatches(module, vectorised, program)
         for name in ("settle_batch", "estimate_batch", "reach_batch"):
             setattr(self, name, getattr(batches, name))

@@ -1,0 +1,92 @@
+r"""The implicit midpoint rule, traced: functions of one unknown or one motor.
+
+With the acceleration `a` in the middle of a step of length `h`
+
+.. math:: y_m = y_0 + \tfrac h 2 v_0 + \tfrac{h^2}{4} a, \quad v_m = v_0 + \tfrac h 2 a, \quad
+    y_1 = y_0 + h v_0 + \tfrac{h^2}{2} a, \quad v_1 = v_0 + h a
+
+Motors move along the parabola through their positions at the beginning, in the middle and at the end of the whole step.
+"""
+
+from __future__ import annotations
+
+from softrobots.compiled.chain.motion_layout import MotionLayout
+from softrobots.compiled.motion_settings import KEPT_STEPS
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
+
+
+def step_blocks(layout: MotionLayout) -> list[Block]:
+    """Return the functions of an unknown `i`, and that of a motor `i`."""
+    return [
+        _guess(layout, Block("guess_unknown", "Extrapolate an acceleration; place its unknown in the middle.", ("i",))),
+        _apply(layout, Block("apply_correction", "Correct an acceleration, and its unknown in the middle.", ("i",))),
+        _finish(layout, Block("finish_unknown", "Go to the end of the step, and remember the acceleration.", ("i",))),
+        _interpolate(layout, Block("interpolate_unknown", "Place an unknown at `SHARE` of the step taken last.", ("i",))),
+        _place_motor(layout, Block("place_motor", "Place a motor at `SHARE` of the whole step.", ("i",))),
+    ]
+
+
+def _guess(layout: MotionLayout, block: Block) -> Block:
+    acceleration: Scalar = 0.0
+    for place in range(KEPT_STEPS):
+        earlier = block.load(layout.history + place * layout.unknowns, "i")
+        acceleration = acceleration + earlier * block.load(layout.weights + place)
+    block.store(layout.acceleration, acceleration, "i")
+    return _place_middle(layout, block, acceleration)
+
+
+def _apply(layout: MotionLayout, block: Block) -> Block:
+    correction, h = block.load(layout.correction, "i"), block.load(layout.time_step)
+    acceleration = block.load(layout.acceleration, "i") + correction
+    block.store(layout.acceleration, acceleration, "i")
+    size = larger(absolute(block.load(layout.unknown, "i")), 1.0)
+    change = absolute(correction) * (h * h * 0.25) / size
+    finite = if_less(change, 1e300, change, 1e300)  # also of NaN
+    block.store(layout.change, larger(block.load(layout.change), finite))
+    return _place_middle(layout, block, acceleration)
+
+
+def _place_middle(layout: MotionLayout, block: Block, acceleration: Scalar) -> Block:
+    half, velocity = block.load(layout.time_step) * 0.5, block.load(layout.velocity, "i")
+    rate = velocity + half * acceleration
+    block.store(layout.rate, rate, "i")
+    middle = block.load(layout.position, "i") + half * (velocity + half * acceleration)
+    block.store(layout.unknown, middle, "i")
+    return block
+
+
+def _finish(layout: MotionLayout, block: Block) -> Block:
+    h, n = block.load(layout.time_step), layout.unknowns
+    position, velocity, acceleration = (
+        block.load(place, "i") for place in (layout.position, layout.velocity, layout.acceleration)
+    )
+    block.store(layout.position, position + h * (velocity + h * 0.5 * acceleration), "i")
+    block.store(layout.velocity, velocity + h * acceleration, "i")
+    block.store(layout.history, acceleration, "i")
+    for place in range(1, KEPT_STEPS):
+        block.store(layout.history + place * n, block.load(layout.history + (place - 1) * n, "i"), "i")
+    return block
+
+
+def _interpolate(layout: MotionLayout, block: Block) -> Block:
+    """By the cubic of Hermite, with s and r = 1 - s."""
+    s, h = block.load(layout.share), block.load(layout.whole_step)
+    r = 1.0 - s
+    y0, y1 = block.load(layout.begin_position, "i"), block.load(layout.position, "i")
+    v0, v1 = block.load(layout.begin_velocity, "i"), block.load(layout.velocity, "i")
+    ends = y0 * (r * r * (1.0 + 2.0 * s)) + y1 * (s * s * (1.0 + 2.0 * r))
+    block.store(layout.unknown, ends + h * s * r * (r * v0 - s * v1), "i")
+    slopes = v0 * (r * (r - 2.0 * s)) + v1 * (s * (s - 2.0 * r))
+    block.store(layout.rate, slopes + (y1 - y0) * (6.0 * s * r / h), "i")
+    return block
+
+
+def _place_motor(layout: MotionLayout, block: Block) -> Block:
+    h, offset = block.load(layout.whole_step), block.load(layout.share) - 0.5
+    begin, middle, end = (block.load(place, "i") for place in (layout.motors_begin, layout.motors_middle, layout.motors_end))
+    speed, bend = end - begin, (begin + end - middle * 2.0) * 4.0
+    block.store(0, middle + offset * (speed + offset * 0.5 * bend), "i")
+    block.store(layout.motor_velocities, (speed + offset * bend) / h, "i")
+    block.store(layout.motor_accelerations, bend / (h * h), "i")
+    return block

@@ -1,0 +1,146 @@
+"""Steps of time by the implicit midpoint rule, and runs of many.
+
+Functions in the kernel language, see `softrobots.compiled.drivers.equilibrium_drivers`; the equations of a step are in
+`softrobots.compiled.chain.time_step` and `softrobots.compiled.program.motion_parts`.
+"""
+
+from __future__ import annotations
+
+from softrobots.compiled.drivers.generated_names import *
+from softrobots.compiled.drivers.intrinsics import Array, fabs
+from softrobots.compiled.motion_settings import *
+
+
+def has_settled(change: float, last: float) -> bool:
+    """Tell whether the corrections have converged: by the last one, by what the next would be, or as far as rounding lets."""
+    if change <= MOTION_TOLERANCE or (change < 0.1 * last and last < 1.0 and change * change <= MOTION_TOLERANCE * last):
+        return True
+    return change > 0.5 * last and change <= MOTION_ROUNDING
+
+
+def weigh_history(w: Array) -> None:
+    """Set the weights of the extrapolation; accelerations of steps of another length do not count."""
+    if fabs(w[TIME_STEP] - w[LAST_STEP]) > 1e-9 * w[TIME_STEP]:
+        w[N_HISTORY] = 0.0
+    row = 0
+    for k in range(KEPT_STEPS):
+        if w[N_HISTORY] > k + 0.5:
+            row += KEPT_STEPS
+    for k in range(KEPT_STEPS):
+        w[WEIGHTS + k] = EXTRAPOLATION[row + k]
+    w[LAST_STEP] = w[TIME_STEP]
+
+
+def settle_middle(w: Array) -> bool:
+    """Find the accelerations of a step; tell whether the corrections converge."""
+    for i in range(N):
+        guess_unknown(w, i)
+    motion_factor(w)
+    last = 1e300
+    for _ in range(MOTION_CORRECTIONS):
+        w[CHANGE] = 0.0
+        for i in range(N):
+            apply_correction(w, i)
+        if has_settled(w[CHANGE], last):
+            return True
+        if w[CHANGE] > 0.9 * last:
+            return False
+        last = w[CHANGE]
+        motion_correct(w)
+    return False
+
+
+def motion_step(w: Array) -> int:
+    """Move the robot by one step of time: POSITION and VELOCITY become those at its end.
+
+    MOTORS_BEGIN, MOTORS_MIDDLE and MOTORS_END are the motors at its beginning, in its middle and at its end; FORCE acts in its
+    middle. A step whose corrections do not converge is halved. Returns CERTIFIED, or UNSETTLED, where even the smallest part of
+    the step does not converge.
+    """
+    whole = w[TIME_STEP]
+    w[WHOLE_STEP] = whole
+    for i in range(N):
+        w[BEGIN_POSITION + i] = w[POSITION + i]
+        w[BEGIN_VELOCITY + i] = w[VELOCITY + i]
+    done = 0.0
+    part = 1.0
+    while done < 1.0:
+        w[TIME_STEP] = part * whole
+        w[SHARE] = done + 0.5 * part
+        for i in range(N_MOTORS):
+            place_motor(w, i)
+        motion_prepare(w)
+        weigh_history(w)
+        if settle_middle(w):
+            for i in range(N):
+                finish_unknown(w, i)
+            w[N_HISTORY] += 1.0
+            done += part
+        else:
+            part *= 0.5
+            w[LAST_STEP] = 0.0
+            if part < LEAST_PART:
+                w[TIME_STEP] = whole
+                return UNSETTLED
+    w[TIME_STEP] = whole
+    return CERTIFIED
+
+
+def place_at(w: Array, share: float) -> None:
+    """Write UNKNOWN, RATE, motors and TIP at a share of the step that was taken last."""
+    w[SHARE] = share
+    for i in range(N):
+        interpolate_unknown(w, i)
+    for i in range(N_MOTORS):
+        place_motor(w, i)
+    motion_tip(w)
+
+
+def motion_run(
+    w: Array,
+    motors: Array,
+    motor_rows: int,
+    forces: Array,
+    force_rows: int,
+    grid: Array,
+    n_steps: int,
+    times: Array,
+    n_times: int,
+    out: Array,
+) -> int:
+    """Take many steps, and write the motion at given times; return the status of the last step.
+
+    `motors` are the motors at the beginning, in the middle and at the end of the steps, one row after the other, shape
+    (2 n_steps + 1, N_MOTORS), or one row for all (`motor_rows` is 1); `forces` those in the middle, (n_steps, 3), or one row;
+    `grid` the ends of the steps, (n_steps + 1); `times` ascend from the first to the last of them. A row of `out` is UNKNOWN,
+    RATE and TIP at one of them, (n_times, 2 N + 3).
+    """
+    by_step = 0
+    if motor_rows > 1:
+        by_step = N_MOTORS
+    row = 0
+    for step in range(n_steps):
+        for i in range(N_MOTORS):
+            w[MOTORS_BEGIN + i] = motors[2 * step * by_step + i]
+            w[MOTORS_MIDDLE + i] = motors[(2 * step + 1) * by_step + i]
+            w[MOTORS_END + i] = motors[(2 * step + 2) * by_step + i]
+        if force_rows > 1 or step == 0:
+            for i in range(3):
+                w[FORCE + i] = forces[3 * step + i]
+        length = grid[step + 1] - grid[step]
+        w[TIME_STEP] = length
+        status = motion_step(w)
+        if status != CERTIFIED:
+            return status
+        while row < n_times and (times[row] <= grid[step + 1] or step == n_steps - 1):
+            share = (times[row] - grid[step]) / length
+            if share > 1.0 - 1e-9:
+                share = 1.0
+            place_at(w, share)
+            for i in range(N):
+                out[row * (2 * N + 3) + i] = w[UNKNOWN + i]
+                out[row * (2 * N + 3) + N + i] = w[RATE + i]
+            for i in range(3):
+                out[row * (2 * N + 3) + 2 * N + i] = w[TIP + i]
+            row += 1
+    return CERTIFIED

@@ -1,0 +1,21 @@
+"""Tolerances and limits of compiled motion."""
+
+from __future__ import annotations
+
+MOTION_TOLERANCE = 1e-13
+"""Change of an unknown in the middle of a step of time that ends the corrections, relative to 1 rad or m or its size."""
+
+MOTION_ROUNDING = 1e-10
+"""Change that may be left where corrections no longer shrink."""
+
+MOTION_CORRECTIONS = 30
+"""Largest number of corrections of a step of time; then it is halved."""
+
+LEAST_PART = 2.0**-12
+"""Smallest part of a step of time."""
+
+KEPT_STEPS = 4
+"""Number of earlier accelerations from which that of the next step is extrapolated."""
+
+EXTRAPOLATION = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0, -1.0, 0.0, 0.0, 3.0, -3.0, 1.0, 0.0, 4.0, -6.0, 4.0, -1.0)
+"""Their weights, the last one first: a row for each number of accelerations of equal steps, from none on."""
