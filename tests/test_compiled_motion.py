@@ -45,7 +45,7 @@ def out_of_balance(
     torques = pin.rnea(whole, data, q, joints(rates, v), joints(changes, a))
     tip = model.frame_id(model.tip)
     jacobian = pin.computeFrameJacobian(whole, data, q, tip, pin.LOCAL_WORLD_ALIGNED)[:3]
-    return (torques - jacobian.T @ force)[springs] + model.springs.at(y)[1] + D @ v
+    return (torques - jacobian.T @ force)[springs] + model.springs.at(y)[1] + damping @ v
 
 
 @pytest.mark.parametrize("full", [False, True], ids=["diagonal", "full"])

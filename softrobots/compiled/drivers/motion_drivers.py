@@ -13,7 +13,7 @@ from softrobots.compiled.motion_settings import *
 
 def has_settled(change: float, last: float) -> bool:
     """Tell whether the corrections have converged: by the last one, by what the next would be, or as far as rounding lets."""
-    if change <= MOTION_TOLERANCE or (change < 0.1 * last and last < 1.0 and change * change <= MOTION_TOLERANCE * last):
+    if change <= MOTION_TOLERANCE or (change < 0.01 * last and last < 1.0 and change * change <= MOTION_TOLERANCE * last):
         return True
     return change > 0.5 * last and change <= MOTION_ROUNDING
 
@@ -43,7 +43,7 @@ def settle_middle(w: Array) -> bool:
             apply_correction(w, i)
         if has_settled(w[CHANGE], last):
             return True
-        if w[CHANGE] > 0.9 * last:
+        if w[CHANGE] > 1e3 * last:
             return False
         last = w[CHANGE]
         motion_correct(w)
