@@ -27,7 +27,7 @@ def out_of_balance(
     a: np.ndarray,
     h: float,
     force: np.ndarray,
-    D: np.ndarray,
+    damping: np.ndarray,
 ) -> np.ndarray:
     """The residual of a step of length h by Pinocchio; `path`: motors at its beginning, middle and end, shape (3, m)."""
     whole, data = model.workspace(tuple(GRAVITY.tolist()))
