@@ -370,6 +370,8 @@ def test_malformed_tags_are_refused(text: str, message: str) -> None:
         ({"density": 0.0}, "density"),
         ({"cap_mass": -0.1}, "cap_mass"),
         ({"spring_damping": -1.0}, "spring_damping"),
+        ({"damping_time": -1.0}, "damping_time"),
+        ({"damping_time": 0.1, "spring_damping": 2.0}, "spring_damping"),
         ({"rgba": (1.0, 0.0, 0.0)}, "rgba"),
         ({"rgba": (1.0, 0.0, 0.0, 2.0)}, "rgba"),
         ({"rgba": "red"}, "rgba"),

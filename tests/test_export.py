@@ -230,7 +230,7 @@ def spring_load(case: Case, found: sr.Equilibrium) -> float:
 
 
 def test_mjcf_has_the_kinematics_and_the_mass_matrix_of_the_robot(tool: Tool, case: Case) -> None:
-    robot = InMujoco(tool("mujoco"), to_mjcf(case.model, damping="file") if not case.model.muscles else welded_mjcf(case))
+    robot = InMujoco(tool("mujoco"), to_mjcf(case.model) if not case.model.muscles else welded_mjcf(case))
     names = list(case.model.pinocchio.names)[1:]
     dofs = robot.dofs(names)
     assert robot.model.nv == case.model.pinocchio.nv
@@ -245,7 +245,7 @@ def test_mjcf_has_the_kinematics_and_the_mass_matrix_of_the_robot(tool: Tool, ca
 
 def test_sdf_has_the_kinematics_and_the_mass_matrix_of_the_robot(tool: Tool, case: Case) -> None:
     tool("pydrake")
-    robot = InDrake(to_sdf(case.model, damping="file") if not case.model.muscles else welded_sdf(case))
+    robot = InDrake(to_sdf(case.model) if not case.model.muscles else welded_sdf(case))
     dofs = robot.dofs(list(case.model.pinocchio.names)[1:])
     assert robot.plant.num_velocities() == case.model.pinocchio.nv
     for q in random_configurations(case.model, 3):
@@ -310,7 +310,7 @@ def test_driven_motors_settle_where_our_statics_says(tool: Tool) -> None:
     After a step of a radian that saturates them. 1e-9: what 8 s leave of modes that decay at 12/s or faster.
     """
     case = case_of("arm")
-    robot = InMujoco(tool("mujoco"), to_mjcf(case.model, case.motors, gravity=case.gravity))
+    robot = InMujoco(tool("mujoco"), to_mjcf(case.model, case.motors, damping="critical", gravity=case.gravity))
     robot.mujoco.mj_resetDataKeyframe(robot.model, robot.data, 0)
     home = robot.data.qpos[robot.dofs(list(case.model.motor_joints))]
     assert home.tolist() == list(case.motors) == robot.data.ctrl.tolist()
@@ -333,7 +333,7 @@ def test_driven_muscles_settle_where_our_statics_says(tool: Tool, given: str) ->
     """
     model = _pcc(muscles=given)
     motors = (0.5, 0.55, 0.52, 0.53, 0.5, 0.5) if given == "lengths" else (20.0, 5.0, -10.0, 30.0, 3.0, 0.0)
-    robot = InMujoco(tool("mujoco"), to_mjcf(model, motors, gravity=sr.EARTH_GRAVITY))
+    robot = InMujoco(tool("mujoco"), to_mjcf(model, motors, damping="critical", gravity=sr.EARTH_GRAVITY))
     robot.mujoco.mj_resetDataKeyframe(robot.model, robot.data, 0)
     robot.mujoco.mj_forward(robot.model, robot.data)
     rest = np.array([tag.rest_length for tag in model.muscles])
@@ -426,17 +426,18 @@ def test_the_text_is_always_the_same() -> None:
 
 def test_a_file_says_what_it_is() -> None:
     case = case_of("tensions")
-    head = re.sub(r"\s+", " ", to_mjcf(case.model, case.motors, actuators="welded").split("-->")[0])
+    head = re.sub(r"\s+", " ", to_mjcf(case.model, case.motors, actuators="welded", damping="critical").split("-->")[0])
     frequency = re.search(r"w1 = (\S+) rad/s", head)
     assert frequency is not None
     assert "pcc_arm, for MuJoCo" in head
     assert "their tensions are in the springs" in head
     assert "muscle_1_3 -10.0" in head
-    arm = re.sub(r"\s+", " ", to_sdf(case_of("arm").model, damping="file").split("-->")[0])
+    arm = re.sub(r"\s+", " ", to_sdf(case_of("arm").model).split("-->")[0])
     assert "Motors are driven" in arm
     assert "that of the description" in arm
     assert "wrinkle" in arm
     assert "Gravity is not in this file" in arm
+    assert "Damping of the springs is 0.25 s times their stiffness" in to_mjcf(case_of("arm").model, damping=0.25)
     odd = sr.load_model(BRANCHED.replace('name="foreign"', 'name="a--b"'), springs=SPRINGS, tip="finger")
     for text in (to_mjcf(odd), to_sdf(odd)):
         assert ElementTree.fromstring(text) is not None  # a comment may not hold two hyphens
@@ -450,7 +451,7 @@ def test_the_slowest_mode_is_critically_damped_and_none_is_slower_than_half_of_i
     """The frequencies with MuJoCo's mass matrix and SciPy; the decay from the eigenvalues of the damped motion itself."""
     eigh = tool("scipy.linalg").eigh
     case = case_of(name)
-    robot = InMujoco(tool("mujoco"), welded_mjcf(case))
+    robot = InMujoco(tool("mujoco"), welded_mjcf(case, damping="critical"))
     robot.put({joint: rest for joint, (_, rest) in case.model.spring_table.items()})
     mass, stiffness = robot.mass(), np.ravel(robot.model.jnt_stiffness.reshape(robot.model.njnt, -1)[:, 0])
     lowest = float(np.sqrt(eigh(np.diag(stiffness), mass, eigvals_only=True)[0]))
@@ -476,22 +477,27 @@ def test_damping_of_a_pendulum_in_closed_form() -> None:
     )
     for kind, stiffness, inertia in (("revolute", 7.0, 0.01 + 0.5 * 0.3**2), ("prismatic", 7.0, 0.5)):
         model = sr.load_model(urdf.replace('"revolute"', f'"{kind}"'), springs={"turn": stiffness})
-        element = next(ElementTree.fromstring(to_mjcf(model)).iter("joint"))
+        element = next(ElementTree.fromstring(to_mjcf(model, damping="critical")).iter("joint"))
         assert float(element.get("damping", "nan")) == pytest.approx(2.0 * np.sqrt(stiffness * inertia), rel=1e-14)
 
 
 def test_damping_of_the_description(tool: Tool) -> None:
     model = sr.load_model(sr.InflatableArm(spring_damping=(0.7, 0.9)))
-    robot = InMujoco(tool("mujoco"), to_mjcf(model, damping="file"))
+    robot = InMujoco(tool("mujoco"), to_mjcf(model))
     told = {name: float(robot.model.dof_damping[robot.dofs([name])[0]]) for name in (*model.motor_joints, *model.spring_joints)}
     assert told == {"motor_1": 0, "motor_2": 0, "motor_3": 0, "spring_1_side": 0.7, "spring_1_up": 0.7,
                     "spring_2_side": 0.9, "spring_2_up": 0.9}  # fmt: skip
+    timed = InMujoco(tool("mujoco"), to_mjcf(model, damping=0.01))
+    springs = timed.dofs(list(model.spring_joints))
+    assert np.allclose(timed.model.dof_damping[springs], 0.01 * model.stiffness, rtol=1e-15, atol=0)
+    by_time = InMujoco(tool("mujoco"), to_mjcf(sr.load_model(sr.InflatableArm(damping_time=0.01))))
+    assert np.allclose(by_time.model.dof_damping, timed.model.dof_damping, rtol=1e-15, atol=0)
 
 
 def test_servos_by_their_rule(tool: Tool) -> None:
     """All the torque at 0.01 rad; damped critically with what the motor carries, from MuJoCo's mass matrix at home."""
     case = case_of("arm")
-    robot = InMujoco(tool("mujoco"), to_mjcf(case.model, case.motors))
+    robot = InMujoco(tool("mujoco"), to_mjcf(case.model, case.motors, damping="critical"))
     robot.mujoco.mj_resetDataKeyframe(robot.model, robot.data, 0)
     robot.mujoco.mj_forward(robot.model, robot.data)
     dofs = robot.dofs(list(case.model.motor_joints))
@@ -638,8 +644,8 @@ def test_meshes_that_are_not_there(tmp_path: Path) -> None:
 def test_export_model_writes_a_file_in_the_format_of_its_suffix(tmp_path: Path, arm: sr.SoftModel) -> None:
     path = export_model(arm, tmp_path / "new" / "arm.xml", q_motors=(0.1, 0.2, 0.3), actuators="welded")
     assert path.read_text(encoding="utf-8") == to_mjcf(arm, (0.1, 0.2, 0.3), actuators="welded")
-    path = export_model(sr.InflatableArm(), tmp_path / "arm.SDF", damping="file")
-    assert path.read_text(encoding="utf-8") == to_sdf(arm, damping="file")
+    path = export_model(sr.InflatableArm(), tmp_path / "arm.SDF", damping="critical")
+    assert path.read_text(encoding="utf-8") == to_sdf(arm, damping="critical")
     path = export_model(arm.urdf, tmp_path / "arm.txt", "mjcf", limits=False)
     assert path.read_text(encoding="utf-8") == to_mjcf(arm, limits=False)
     with pytest.raises(sr.OutputExists):
@@ -666,8 +672,10 @@ def test_what_cannot_be_exported_is_refused(tmp_path: Path, arm: sr.SoftModel) -
             write(sr.InflatableArm())
         with pytest.raises(sr.ParameterError, match="one of 'driven', 'welded'"):
             write(arm, actuators="free")
-        with pytest.raises(sr.ParameterError, match="one of 'critical', 'file'"):
-            write(arm, damping=0.3)
+        with pytest.raises(sr.ParameterError, match=r"'file' or 'critical', or a damping time \[s\]"):
+            write(arm, damping="none")
+        with pytest.raises(sr.ParameterError, match="zero or positive"):
+            write(arm, damping=-0.1)
         with pytest.raises(sr.ParameterError, match=r"shape \(3,\)"):
             write(arm, (0.1, 0.2))
         with pytest.raises(sr.ParameterError, match="finite"):
@@ -707,7 +715,7 @@ def test_a_spring_that_moves_no_mass_is_refused() -> None:
     urdf = f'<robot name="a"><link name="base"/>{joint("turn", "base", "end", "0 0 1")}</robot>'
     point = '<inertial><mass value="1"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>'
     with pytest.raises(sr.DescriptionError, match="move no mass"):
-        to_mjcf(sr.load_model(urdf.replace(INERTIAL, point), springs={"turn": 1.0}))
+        to_mjcf(sr.load_model(urdf.replace(INERTIAL, point), springs={"turn": 1.0}), damping="critical")
 
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], arm: sr.SoftModel) -> None:
@@ -721,10 +729,10 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], arm: s
     assert cli.main([*words, "--overwrite"]) == 0
     made = tmp_path / "made.urdf"
     made.write_text(sr.InflatableArm(stiffness=200).urdf(), encoding="utf-8")
-    assert cli.main(["export", str(made), "--format", "sdf", "-o", str(tmp_path / "a"), "--damping", "file"]) == 0
-    assert (tmp_path / "a").read_text(encoding="utf-8") == to_sdf(sr.load_model(made), damping="file")
+    assert cli.main(["export", str(made), "--format", "sdf", "-o", str(tmp_path / "a"), "--damping", "critical"]) == 0
+    assert (tmp_path / "a").read_text(encoding="utf-8") == to_sdf(sr.load_model(made), damping="critical")
     changed = ["--set", "stiffness=200"]
-    assert cli.main(["export", "inflatable_arm", *changed, "-o", str(tmp_path / "b.sdf"), "--damping", "file"]) == 0
+    assert cli.main(["export", "inflatable_arm", *changed, "-o", str(tmp_path / "b.sdf"), "--damping", "critical"]) == 0
     assert (tmp_path / "b.sdf").read_bytes() == (tmp_path / "a").read_bytes()
     for refused, told in (
         (["helix_tube", "-o", "h.xml"], 'chain="lumped"'),

@@ -10,7 +10,6 @@ from softrobots.cli.options.command_line import add_gravity, gravity_of
 from softrobots.cli.options.robot_argument import add_model, add_motors, model_of, motors_of, source_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.files import new_file
-from softrobots.export.damping import DAMPING
 from softrobots.export.formats import FORMATS, export_model, guess_format
 from softrobots.robots import XacroRobot
 
@@ -40,8 +39,11 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--welded", action="store_true", help="fix the motors where they are, put tensions of muscles into the springs"
     )
-    help_text = "damping of the springs: critical for the slowest mode, or that of the file (critical)"
-    parser.add_argument("--damping", choices=DAMPING, help=help_text)
+    help_text = (
+        "damping of the springs: that of the file; a time [s], by which their stiffness is multiplied; or critical, for the "
+        "slowest mode, which settles without swinging (file)"
+    )
+    parser.add_argument("--damping", metavar="file|TIME|critical", help=help_text)
     add_gravity(parser)
     parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
@@ -53,7 +55,7 @@ def run(arguments: argparse.Namespace) -> None:
     name = arguments.format or guess_format(arguments.output)
     chosen = {
         "actuators": "welded" if arguments.welded else None,
-        "damping": arguments.damping,
+        "damping": _damping(arguments.damping),
         "gravity": gravity_of(arguments),
     }
     options = {option: value for option, value in chosen.items() if value is not None}
@@ -72,3 +74,11 @@ def run(arguments: argparse.Namespace) -> None:
     sections = f"{counts['sections']} sections, " if counts["sections"] else ""
     kept = f"{sections}{counts['springs']} springs, {model.n_motors}{' welded' if arguments.welded else ''} actuators"
     print_answer(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])
+
+
+def _damping(word: str | None) -> str | float | None:
+    """A word as it is, a number as a number."""
+    try:
+        return None if word is None else float(word)
+    except ValueError:
+        return word

@@ -77,7 +77,7 @@ def linearize(
     motors: str = "prescribed",
     damping_time: float | None = None,
     mass_damping: float = 0.0,
-    rotor_inertia: Any = 0.0,
+    rotor_inertia: Any = None,
 ) -> LinearModel:
     r"""Linearise the equations of motion about an equilibrium, stable or not, under any load.
 
@@ -99,7 +99,7 @@ def linearize(
         motors: "prescribed" or "torque".
         damping_time: Damping over stiffness near rest [s]; None: the damping of the file.
         mass_damping: Damping over mass, Rayleigh's other term [1/s].
-        rotor_inertia: Inertia of the rotor of each motor seen at its joint, or one for all [kg m^2 or kg].
+        rotor_inertia: Inertia of the rotor of each motor at its joint, or one for all [kg m^2 or kg]; None: that of the file.
 
     Returns:
         The linear model.

@@ -55,7 +55,7 @@ def small_motion(
         equilibrium: An equilibrium of it.
         damping_time: See `damping_matrix`.
         mass_damping: See `damping_matrix`; it multiplies the mass matrix of the elastic coordinates in the equilibrium.
-        rotor_inertia: Inertia of the rotor of each placed actuator seen at its joint, or one for all [kg m^2 or kg].
+        rotor_inertia: Inertia of the rotor of each placed actuator, or one for all [kg m^2 or kg]; None: of the file.
 
     Raises:
         ParameterError: If a number is negative or not finite, or a shape differs.
@@ -64,7 +64,9 @@ def small_motion(
     n_tensions = len(model.muscles) if model.muscle_input == "forces" else 0
     placed = model.n_motors - n_tensions
     kept = np.r_[:placed, model.n_motors : model.n_motors + model.n_springs]
-    rotors = one_each("rotor_inertia", rotor_inertia, placed, "kg m^2 or kg")
+    drives = model.actuators.drives
+    given = drives.rotor_inertia[:placed] if rotor_inertia is None else rotor_inertia
+    rotors = one_each("rotor_inertia", given, placed, "kg m^2 or kg")
     q, point = equilibrium.q, model.coordinates.at(equilibrium.q_motors, equilibrium.q_springs)
 
     def columns(by_joint: FloatArray) -> FloatArray:
@@ -77,8 +79,7 @@ def small_motion(
     rows = np.hstack([by_motors[:placed, :placed], by_elastic[:placed]])
     stiffness = np.vstack([-rows, np.hstack([-equilibrium.coupling[:, :placed], equilibrium.tangent_stiffness])])
     damping = np.zeros_like(mass)
-    joints = len(model.structure.motor_joints)
-    damping[:joints, :joints] = np.diag(np.array(model.pinocchio.damping)[model.motor_indices])
+    damping[:placed, :placed] = np.diag(drives.damping[:placed])
     damping[placed:, placed:] = damping_matrix(model, damping_time, mass_damping, mass[placed:, placed:])
     by_tension = np.concatenate([np.zeros((placed, n_tensions)), equilibrium.coupling[:, placed:]])
     return SmallMotion(

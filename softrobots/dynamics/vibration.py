@@ -125,7 +125,7 @@ def vibration_modes(
     damping_time: float | None = None,
     mass_damping: float = 0.0,
     servo_stiffness: Any = None,
-    rotor_inertia: Any = 0.0,
+    rotor_inertia: Any = None,
 ) -> VibrationModes:
     """Find the natural frequencies, shapes and damping ratios of a robot about a stable equilibrium under any load.
 
@@ -140,7 +140,8 @@ def vibration_modes(
         servo_stiffness: Stiffness with which each actuator holds its place, or one for all [N m/rad or N/m]: their coordinates
             take part then, with the damping that the file has at their joints. None: they are held exactly. Muscles of given
             tension keep their tension.
-        rotor_inertia: Inertia of the rotor of each actuator seen at its joint, or one for all [kg m^2 or kg]; needs a servo.
+        rotor_inertia: Inertia of the rotor of each actuator at its joint, or one for all [kg m^2 or kg], which take part with a
+            servo; None: that of the file.
 
     Returns:
         The modes.
@@ -165,7 +166,7 @@ def vibration_modes(
         if not model.actuators.independent:
             requirement = "None: the lengths of more than three muscles along a segment depend on each other"
             raise ParameterError("servo_stiffness", servo_stiffness, requirement)
-    elif np.any(np.asarray(rotor_inertia) != 0.0):
+    elif rotor_inertia is not None:
         raise ParameterError("rotor_inertia", rotor_inertia, "left out without servo_stiffness: actuators are held")
     with one_blas_thread(model.n_springs + small.n_placed - first):
         stiffness = small.stiffness + np.diag(np.concatenate([servos, np.zeros(model.n_springs)]))

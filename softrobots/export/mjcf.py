@@ -28,7 +28,7 @@ def to_mjcf(
     q_motors: Any = None,
     *,
     actuators: str = "driven",
-    damping: str = "critical",
+    damping: str | float = "file",
     gravity: Any = None,
     limits: bool = True,
 ) -> str:
@@ -39,7 +39,7 @@ def to_mjcf(
     and OBJ are named by their whole path, others are left out.
 
     Driven motors are position actuators (`softrobots.export.servos`), whose joints have the damping at which the motor just
-    reaches its largest speed under its largest torque, unless `damping` is "file". Muscles are fixed tendons, whose `length` is
+    reaches its largest speed under its largest torque, if `damping` is "critical". Muscles are fixed tendons, whose `length` is
     the muscle's less its rest length, linear in the joints; with a motor each if tensions are given, or a position actuator if
     lengths are. The keyframe `home` holds the relaxed springs and these actuators.
 
@@ -47,7 +47,8 @@ def to_mjcf(
         model: The robot.
         q_motors: Motor joints, then muscles, shape (n_motors,) [rad, m or N]; relaxed by default.
         actuators: "driven", or "welded": motor joints become fixed, tensions become part of the springs.
-        damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
+        damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
+            without swinging (`softrobots.export.damping`).
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
 

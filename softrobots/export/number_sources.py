@@ -134,6 +134,8 @@ def _inflatable_arm(robot: InflatableArm) -> Rules:
             rules[joint, "rest"] = rest
             rules[joint, "lower"], rules[joint, "upper"] = _BEND
             rules[joint, "damping"] = f"spring_damping[{i}]"
+            if robot.damping_time is not None:
+                rules[joint, "damping"] = f"damping_time[{i}] * {rules[joint, 'stiffness']}"
         link = " ".join(bending)
         rules |= {(link, name): f"{name}[{i}]" for name in ("radius", "pressure", "max_moment")}
         rules[link, "wrinkling_moment"] = f"pi**2 / 4 * pressure[{i}] * radius[{i}]**3"

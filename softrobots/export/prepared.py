@@ -16,7 +16,7 @@ from softrobots.core.checks import FloatArray, choice, finite_array
 from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
-from softrobots.export.damping import DAMPING, damped, lowest_frequency, mass_matrix, rule_text
+from softrobots.export.damping import checked_damping, damped, lowest_frequency, mass_matrix, rule_text
 from softrobots.export.held import ACTUATORS, check_linear, hold, pulled_springs, weld
 from softrobots.export.servos import Motor, Muscle, motors_of, muscles_of
 from softrobots.model.soft_model import SoftModel
@@ -39,19 +39,19 @@ class PreparedRobot:
     home: Mapping[str, float]
     """Position of every movable joint with the springs relaxed [rad or m]."""
     frequency: float | None
-    """Lowest frequency at rest [rad/s], which sets the damping; None if the damping is that of the description."""
+    """Lowest frequency at rest [rad/s], if it sets the damping; else None."""
     remarks: tuple[str, ...]
     """Remarks on motors, muscles and damping for the head of the file."""
 
 
-def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damping: str = "critical") -> PreparedRobot:
+def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damping: str | float = "file") -> PreparedRobot:
     """Fix or drive the actuators, put muscle tensions into the springs, choose damping and servos.
 
     Args:
         model: The robot.
         q_motors: Motor joints, then muscles, shape (n_motors,) [rad, m or N]; relaxed by default.
         actuators: "driven" or "welded".
-        damping: "critical" or "file", see `softrobots.export.damping`.
+        damping: "file", "critical" or a damping time [s], see `softrobots.export.damping`.
 
     Raises:
         ParameterError: If `check_linear` refuses the model; a choice is unknown; `q_motors` does not fit the robot or, driven,
@@ -60,7 +60,7 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
     """
     checked = check_linear(model)
     choice("actuators", actuators, ACTUATORS)
-    choice("damping", damping, DAMPING)
+    rule = checked_damping(damping)
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     structure, tree = checked.structure, read_rigid_tree(checked.urdf)
     positions = dict(zip(structure.motor_joints, values.tolist(), strict=False))
@@ -74,15 +74,16 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
     tree = weld(tree, fixed)
     _refuse_massless(tree)
     mass = mass_matrix(checked, values)
-    frequency = lowest_frequency(checked, mass) if damping == "critical" and springs else None
+    frequency = lowest_frequency(checked, mass) if rule == "critical" and springs else None
+    time = rule if isinstance(rule, float) else None if frequency is None else 2.0 / frequency
     return PreparedRobot(
-        tree=replace(damped(tree, springs, frequency), springs=springs),
+        tree=replace(damped(tree, springs, time), springs=springs),
         tip=tip_body(tree, checked.tip),
         motors=() if welded else motors_of(checked, tree.joints, positions, mass),
         muscles=() if welded else muscles_of(checked, values[len(positions) :], mass),
         home=_home(checked, tree, values),
         frequency=frequency,
-        remarks=_remarks(checked, values, welded, frequency),
+        remarks=(*_remarks(checked, values, welded), rule_text(rule, frequency)),
     )
 
 
@@ -162,7 +163,7 @@ def _home(model: SoftModel, tree: RigidTree, motors: FloatArray) -> dict[str, fl
     return {joint.name: joints[chain.joints[chain.getJointId(joint.name)].idx_v] for joint in tree.joints if joint.movable}
 
 
-def _remarks(model: SoftModel, motors: FloatArray, welded: bool, frequency: float | None) -> tuple[str, ...]:
+def _remarks(model: SoftModel, motors: FloatArray, welded: bool) -> tuple[str, ...]:
     remarks = []
     if model.structure.motor_joints:
         remarks.append("Motors are welded: their joints are fixed." if welded else "Motors are driven: their joints move.")
@@ -174,7 +175,6 @@ def _remarks(model: SoftModel, motors: FloatArray, welded: bool, frequency: floa
     if model.n_motors:
         at = ", ".join(f"{name} {value!r}" for name, value in zip(model.motor_joints, motors.tolist(), strict=True))
         remarks.append(f"{'Held' if welded else 'Home'} at [rad, m or N]: {at}.")
-    remarks.append("Damping of the joints is that of the description." if frequency is None else rule_text(frequency))
     if model.spring_groups:
         remarks.append("Inflated links wrinkle beyond a moment; the springs here do not.")
     return tuple(remarks)

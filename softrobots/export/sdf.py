@@ -31,7 +31,7 @@ def to_sdf(
     q_motors: Any = None,
     *,
     actuators: str = "driven",
-    damping: str = "critical",
+    damping: str | float = "file",
     limits: bool = True,
 ) -> str:
     """Write a robot as a model of SDF 1.9.
@@ -53,7 +53,8 @@ def to_sdf(
         q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. For driven
             motors, they only affect the frequency that sets the damping.
         actuators: "driven", or "welded": motor joints become fixed, tensions become part of the springs.
-        damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
+        damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
+            without swinging (`softrobots.export.damping`).
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
 
     Returns:

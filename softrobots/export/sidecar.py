@@ -39,7 +39,7 @@ _CONVENTIONS = {
     "section (follows the coordinates of a section), locked (held at zero)",
     "springs": "torque = stiffness (q - rest), the load that the spring carries, minus what it exerts; in equilibrium "
     "stiffness (q - rest) = J^T f - g(q), with dead forces f and the gravity torques g",
-    "damping": "for simulators only; statics does not use it",
+    "damping": "of motion; statics does not use it",
     "wrinkling_moment": "moment at the first wrinkle of an inflated link [Troise 2021] (3); the springs are good below it",
     "max_moment": "moment of an inflated link never above this, along its bend: min(stiffness |s|, max_moment) s / |s|, with "
     "s = q - rest of its springs",

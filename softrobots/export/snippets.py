@@ -41,7 +41,7 @@ def to_pybullet(
     q_motors: Any = None,
     *,
     actuators: str = "driven",
-    damping: str = "critical",
+    damping: str | float = "file",
     gravity: Any = None,
     limits: bool = True,
 ) -> str:
@@ -56,7 +56,8 @@ def to_pybullet(
         q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Tensions become part
             of the springs.
         actuators: "driven": PyBullet's position control holds the motors, whatever the load; "welded": their joints are fixed.
-        damping: Of the spring joints, "critical" (`softrobots.export.damping`) or "file", that of the description.
+        damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
+            without swinging (`softrobots.export.damping`).
         gravity: Gravity, shape (3,) [m/s^2], world axes, used when the file is run as a script; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
 
@@ -203,7 +204,7 @@ def _with_mass(body: Body) -> Body:
     return body if body.mass > 0.0 else replace(body, mass=_TINY_MASS, inertia=_TINY_INERTIA * np.eye(3))
 
 
-def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, frequency: float, limits: bool) -> list[str]:
+def _pybullet_lines(held: HeldRobot, actuators: str, damping: str | float, frequency: float, limits: bool) -> list[str]:
     lines = []
     if actuators == "welded" and held.motors:
         at = ", ".join(f"{name} {position!r}" for name, position in held.motors.items())
@@ -213,7 +214,7 @@ def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, frequency: fl
     if held.tensions:
         pulls = ", ".join(f"{name} {tension!r}" for name, tension in held.tensions.items())
         lines.append(f"Muscles pull with [N]: {pulls}. That stands in the springs, exactly.")
-    lines.append(rule_text(frequency) if damping == "critical" else "Damping of the springs is that of the description.")
+    lines.append(rule_text(damping, frequency))
     if not limits:
         lines.append("The springs have no limits.")
     if held.locked:

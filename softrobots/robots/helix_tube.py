@@ -130,7 +130,7 @@ class HelixTube(XacroRobot):
         (0.30, 0.55, 0.75, 1.0), "", "Colour: red, green, blue, opacity in 0 to 1", form="colour"
     )
     damping_time: float = parameter(
-        0.05, "s", "Damping of each joint over its stiffness, for simulators only", "assumed", at_least=0.0
+        0.05, "s", "Damping of each joint over its stiffness; has no effect on the statics", "assumed", at_least=0.0
     )
     base_mass: float = parameter(
         0.5, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6

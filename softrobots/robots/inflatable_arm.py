@@ -35,7 +35,14 @@ class InflatableArm(InflatedLinks):
         (0.95, 0.62, 0.22, 1.0), "", "Colour of a link: red, green, blue, opacity in 0 to 1", form="colour"
     )
     spring_damping: PerPart = per_part(
-        1.0, "N m s/rad", "Damping of each spring joint, for simulators only", "assumed", at_least=0.0
+        1.0, "N m s/rad", "Damping of each spring joint; has no effect on the statics", "assumed", at_least=0.0
+    )
+    damping_time: PerPart | None = per_part(
+        None,
+        "s",
+        "Damping of each spring joint over its stiffness, in place of spring_damping; the decay of a vibration tells it, "
+        "damping_time_from_decrement",
+        at_least=0.0,
     )
     motor_limit: float = parameter(
         math.pi, "rad", "Motors turn between minus and plus this angle", "assumed, half a turn each way", above=0.0
@@ -96,6 +103,8 @@ class InflatableArm(InflatedLinks):
         object.__setattr__(self, "wrist_limits", limits)
         if self.wrist is None:
             refuse_given(self, ("wrist_mass", "wrist_limits"), "without a wrist")
+        if self.damping_time is not None:
+            refuse_given(self, ("spring_damping",), "where damping_time is given")
         if self.payload is not None:
             object.__setattr__(self, "payload", self._checked_payload(self.payload))
 
