@@ -68,8 +68,8 @@ class ShapedTrajectory:
     """The impulses."""
     numbers: tuple[int, ...]
     """Numbers of the modes that it is shaped for, from 0."""
-    path: Callable[[float], FloatArray]
-    """The given path as a function of time."""
+    path: Callable[[FloatArray], FloatArray]
+    """The given path: positions, shape (n, n_motors), at times, shape (n,) [s]."""
 
     def __call__(self, time: float) -> FloatArray:
         """Return the motor coordinates at a time [s], shape (n_motors,) [rad, m or N].
@@ -78,7 +78,7 @@ class ShapedTrajectory:
             ParameterError: If the time is not finite.
         """
         now = finite_number("time", time, "s")
-        return np.asarray(sum(a * self.path(now - t) for t, a in zip(self.shaper.times, self.shaper.amplitudes, strict=True)))
+        return np.asarray(self.shaper.amplitudes @ self.path(now - self.shaper.times))
 
 
 def input_shaper(frequencies: Any, damping_ratios: Any = 0.0, *, shaper: str = "zv", tolerance: float = 0.05) -> InputShaper:
