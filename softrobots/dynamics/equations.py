@@ -23,6 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.model.actuators import Drives
 from softrobots.model.coordinates import Point
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.loads import AppliedLoad, Load
@@ -38,7 +39,7 @@ class EquationsOfMotion:
         model: SoftModel,
         gravity: tuple[float, float, float] | None = None,
         damping: FloatArray | None = None,
-        rotor_inertia: FloatArray | None = None,
+        drives: Drives | None = None,
     ) -> None:
         """Take the robot and what acts on all of it.
 
@@ -46,7 +47,7 @@ class EquationsOfMotion:
             model: The robot.
             gravity: Gravity, world axes [m/s^2]; None: weightless.
             damping: `D`, of the elastic coordinates, shape (n_springs, n_springs), or of all, shape (n, n); None: none.
-            rotor_inertia: Diagonal of `A`, shape (n,) [kg m^2 or kg]; None: none.
+            drives: Rotors, `A`, and viscous friction of the actuators, where they move by their force; None: neither acts.
         """
         self.model, self.gravity = model, gravity
         self.n_motors, self.n = model.n_motors, model.n_motors + model.n_springs
@@ -58,8 +59,11 @@ class EquationsOfMotion:
         if damping is not None:
             first = self.n - len(damping)
             self.damping[first:, first:] = damping
-        self.rotor_inertia: FloatArray = np.zeros(self.n) if rotor_inertia is None else rotor_inertia
-        """`A` of all coordinates, shape (n,)."""
+        self.rotor_inertia: FloatArray = np.zeros(self.n)
+        """Diagonal of `A` of all coordinates, shape (n,)."""
+        if drives is not None:
+            self.rotor_inertia[: self.n_motors] = drives.rotor_inertia
+            self.damping[: self.n_motors, : self.n_motors] += np.diag(drives.damping)
         self._undamped, self._rotorless = not self.damping.any(), not self.rotor_inertia.any()
         given = model.muscles and model.muscle_input == "forces"
         self._tensions = slice(self.n_motors - len(model.muscles), self.n_motors) if given else slice(0, 0)

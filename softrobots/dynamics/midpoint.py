@@ -17,16 +17,18 @@ leaves out (the derivatives of centrifugal and inertial forces) is small with th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.motor_torque import MotorTorque
 
 _CHANGE = 1e-13  # of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step
 _ROUNDED = 1e-9  # the same, below which an iteration that no longer shrinks has reached rounding
 _ITERATIONS = 30
+_SLOW = 0.1  # share of the last change, above which the matrix is computed again for motors that move by their torque
 _RENEWED = 8  # iteration after which the matrix is computed again
 
 Wrenches = Mapping[str, FloatArray]
@@ -61,6 +63,8 @@ class Step(NamedTuple):
     """Load in the middle."""
     iterations: int
     """Evaluations of the equations of motion."""
+    friction_power: float = 0.0
+    """Power that dry friction takes in the middle [W]."""
 
     @property
     def length(self) -> float:
@@ -85,8 +89,7 @@ class MidpointRule:
         equations: EquationsOfMotion,
         path: Callable[[float], FloatArray],
         load: Callable[[float], Wrenches],
-        free: Any = None,
-        applied: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
+        torque: MotorTorque | None = None,
     ) -> None:
         """Take the equations of motion and what drives them.
 
@@ -94,12 +97,11 @@ class MidpointRule:
             equations: Equations of motion.
             path: Actuators at a time, shape (n_motors,) [rad, m or N]; the entries of free ones are not used.
             load: Load at a time; the same object while it is the same.
-            free: Places of the coordinates that move freely; by default the elastic ones.
-            applied: Force on each coordinate at a time, coordinates and rates, shape (n,); that on prescribed ones is not used.
+            torque: What acts on the motor joints, which are free then; None: they are prescribed.
         """
-        self.equations, self.path, self.load, self._applied = equations, path, load, applied
+        self.equations, self.path, self.load, self.torque = equations, path, load, torque
         n, m = equations.n, equations.n_motors
-        self.free = np.arange(m, n) if free is None else np.asarray(free, dtype=np.intp)
+        self.free = np.concatenate([np.arange(torque.count if torque else 0), np.arange(m, n)])
         """Places of the free coordinates."""
         self.prescribed = np.setdiff1d(np.arange(m), self.free)
         """Places of the prescribed coordinates."""
@@ -122,18 +124,21 @@ class MidpointRule:
         x, rates, accelerations = np.zeros(n), np.zeros(n), np.zeros(n)
         x[:m], rates[:m], accelerations[:m] = middle, (after - before) / h, (after - 2.0 * middle + before) * (4.0 / (h * h))
         y0, v0 = start.x[free], start.rates[free]
+        torque = self.torque
+        if torque is not None:
+            torque.begin(start.time, start.x, start.rates)
         a = self._predicted(middle_time, len(free))
-        solve, last = None, np.inf
+        solve, last, shrinking = None, np.inf, 0.0
         for iteration in range(1, _ITERATIONS + 1):
             x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
             forces = equations.balance(x, rates, accelerations, wrenches)
             residual = forces[free]
-            if self._applied is not None:
-                residual = residual - self._applied(middle_time, x, rates)[free]
+            if torque is not None:
+                residual[: torque.count] += torque.friction(rates) - torque.exerted(middle_time, x, rates)
             if not np.isfinite(residual).all():
                 return None
-            if solve is None or iteration == _RENEWED:
-                solve = self._factorised(x, wrenches, h)
+            if solve is None or iteration == _RENEWED or (torque is not None and shrinking > _SLOW):
+                solve = self._factorised(middle_time, x, rates, wrenches, h)
             change = solve(residual)
             a = a - change
             moved = 0.25 * h * h * float(np.abs(change).max(initial=0.0)) / max(1.0, float(np.abs(x[free]).max(initial=0.0)))
@@ -141,7 +146,7 @@ class MidpointRule:
                 break
             if not moved < 1e3 * last:
                 return None
-            last = moved
+            shrinking, last = moved / last, moved
         else:
             return None
         x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
@@ -150,8 +155,11 @@ class MidpointRule:
         ends[free], end_rates[free] = y0 + h * v0 + 0.5 * h * h * a, v0 + h * a
         self._past = [*self._past[-1:], (middle_time, a)]
         self._known = end_time, after
-        end = State(end_time, ends, end_rates)
-        return Step(start, end, State(middle_time, x, rates), accelerations, forces[:m], wrenches, iteration)
+        middle_state, lost = State(middle_time, x, rates), 0.0
+        if torque is not None:
+            forces[: torque.count] = torque.exerted(*middle_state)
+            lost = float(torque.friction(rates) @ rates[: torque.count])
+        return Step(start, State(end_time, ends, end_rates), middle_state, accelerations, forces[:m], wrenches, iteration, lost)
 
     def _path(self, time: float) -> FloatArray:
         """Actuators at a time, which may be the end of the last step."""
@@ -164,12 +172,17 @@ class MidpointRule:
         (t0, a0), (t1, a1) = self._past
         return a1 + (a1 - a0) * min((time - t1) / (t1 - t0), 1.5)
 
-    def _factorised(self, x: FloatArray, wrenches: Wrenches, h: float) -> Callable[[FloatArray], FloatArray]:
+    def _factorised(
+        self, time: float, x: FloatArray, rates: FloatArray, wrenches: Wrenches, h: float
+    ) -> Callable[[FloatArray], FloatArray]:
         """Solver of the equations with the matrix of Newton's method."""
         from scipy.linalg.lapack import dgetrf, dgetrs
 
         matrix = self.equations.mass_matrix(x)[self._block]
         matrix += 0.5 * h * self._damping + 0.25 * h * h * self.equations.stiffness(x, wrenches)[self._block]
+        if self.torque is not None:
+            by_x, by_rates = self.torque.slopes(time, x, rates)
+            matrix[: len(by_x), : len(by_x)] -= 0.25 * h * h * by_x + 0.5 * h * by_rates
         if len(matrix) == 0:
             return lambda residual: residual
         factors, pivots, _ = dgetrf(matrix, overwrite_a=True)

@@ -40,7 +40,7 @@ class Recorder:
         """Take a step."""
         equations, middle, h = self._equations, step.middle, step.length
         dissipated, load_work, motor_work = self._works[-1]
-        dissipated += h * float(middle.rates @ equations.damping @ middle.rates)
+        dissipated += h * (float(middle.rates @ equations.damping @ middle.rates) + step.friction_power)
         if step.wrenches:
             load_work += h * float(equations.load(middle.x, step.wrenches) @ middle.rates)
         motor_work += h * float(step.actuator_forces @ equations.actuator_rates(middle.x, middle.rates))

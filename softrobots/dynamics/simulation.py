@@ -16,6 +16,7 @@ from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.midpoint import MidpointRule, State
 from softrobots.dynamics.motion import Motion, MotionState
+from softrobots.dynamics.motor_torque import MotorTorque
 from softrobots.dynamics.recorder import Recorder
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
@@ -44,6 +45,7 @@ def simulate(
     tolerance: Any = None,
     motors: str = "prescribed",
     torque: Any = None,
+    sample_time: Any = None,
     progress: bool | str = False,
 ) -> Motion:
     """Simulate the motion of a robot by the implicit midpoint rule (`softrobots.dynamics.midpoint`).
@@ -64,8 +66,12 @@ def simulate(
         time_step: Length of each step [s]; by default 1 ms.
         output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
         tolerance: Largest error of the tip [m]; not used by fixed steps.
-        motors: "prescribed": they move as `q_motors` says.
-        torque: For motors that move by their torque.
+        motors: "prescribed": they move as `q_motors` says; "torque": motor joints move by `torque`, from where `start` has
+            them, or else from where `q_motors` begins; it may be None after a start. Muscles follow `q_motors`.
+        torque: Controller for motors="torque": a function of time, and positions and velocities of the motor joints, each shape
+            (n,), that returns their torques, shape (n,) [N m or N], e.g. `softrobots.PD`; or constant torques. The motors have
+            rotor inertia, friction and largest torque of the file (`softrobots.dynamics.motor_torque`), and no end stops.
+        sample_time: Time between two evaluations of `torque`, which is held in between [s]; None: it acts continuously.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
@@ -79,18 +85,27 @@ def simulate(
     check_model(model)
     end = positive_number("duration", duration, "s")
     choice("motors", motors, MOTORS)
+    drive = MotorTorque(model, torque, sample_time) if motors == "torque" else None
+    for name, value in (("torque", torque), ("sample_time", sample_time)):
+        if drive is None and value is not None:
+            raise ParameterError(name, value, "left out unless motors='torque'")
+    if drive is not None and q_motors is None and isinstance(start, Equilibrium | Motion | MotionState):
+        q_motors = start.end.q_motors if isinstance(start, Motion) else start.q_motors
     path, load = MotorPath(model, q_motors, end), TimeLoad(model, force, wrench, end)
     weight = None if gravity is None else tuple(finite_array("gravity", gravity, (3,), "m/s^2").tolist())
     alpha = non_negative_number("mass_damping", mass_damping, "1/s")
     beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
-    first = _first_state(model, start, path)
+    first = _first_state(model, start, path, 0 if drive is None else drive.count)
     h = 1e-3 if time_step is None else positive_number("time_step", time_step, "s")
     grid = np.append(h * np.arange(math.ceil(end / h - 1e-9)), end)
+    if drive is not None:
+        grid = drive.with_samples(grid)
     between = h * math.ceil(end / h / _ROWS) if output_step is None else positive_number("output_step", output_step, "s")
     rows = np.append(between * np.arange(math.ceil(end / between - 1e-9)), end)
     with one_blas_thread(model.n_springs):
-        equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, alpha))
-        rule = MidpointRule(equations, path, load)
+        drives = None if drive is None else model.actuators.drives
+        equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, alpha), drives)
+        rule = MidpointRule(equations, path, load, drive)
         recorder = Recorder(rule, first, rows)
         interrupted = False
         try:
@@ -129,7 +144,8 @@ def _follow(rule: MidpointRule, recorder: Recorder, grid: FloatArray) -> Iterato
         done = recorder.rows
 
 
-def _first_state(model: SoftModel, start: Any, path: MotorPath) -> State:
+def _first_state(model: SoftModel, start: Any, path: MotorPath, free: int) -> State:
+    """The state at time zero; the first `free` actuators are where `start` has them, the others where the path begins."""
     motors, springs, rates = path(0.0), model.rest, np.zeros(model.n_motors + model.n_springs)
     if start is not None:
         if isinstance(start, Motion):
@@ -138,7 +154,8 @@ def _first_state(model: SoftModel, start: Any, path: MotorPath) -> State:
             raise ParameterError("start", start, "an Equilibrium, a Motion, a MotionState, or None (relaxed, at rest)")
         if start.model != model:
             raise ParameterError("start", start.model, f"a state of the model given, {model!r}")
-        springs = start.q_springs
+        springs, motors = start.q_springs, np.concatenate([start.q_motors[:free], motors[free:]])
         if isinstance(start, MotionState):
+            rates[:free] = start.motor_velocities[:free]
             rates[model.n_motors :] = start.velocities
     return State(0.0, np.concatenate([motors, springs]), rates)

@@ -1,0 +1,104 @@
+r"""Motors that move by their torque: a controller's, within the effort of the file, less the friction of the joint.
+
+A motor joint then is a free coordinate, with its rotor in the mass matrix and its viscous friction in the damping:
+
+.. math:: \tau = \mathrm{clip}(\tau_c(t, u, \dot u), -\tau_{max}, \tau_{max}) - f \tanh(\dot u / v_f)
+
+with the dry friction `f` and `v_f` = `CREEP`: a joint that sticks creeps, at most so fast. (A step function has no derivative,
+and the implicit step needs one.) A continuous controller is evaluated in the middle of each step, so that the scheme keeps its
+order; a sampled one at its instants, at which steps end, and its torque is held until the next (zero-order hold).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, positive_number
+from softrobots.core.errors import ParameterError
+from softrobots.model.soft_model import SoftModel
+
+CREEP = 1e-4
+"""Speed at which a joint under three quarters of its dry friction creeps [rad/s or m/s]."""
+
+_DIFFERENCE = 1e-6  # of the derivatives of a controller, in its arguments
+_ON_TIME = 1e-9  # of a sampling interval
+
+Torque = Callable[[float, FloatArray, FloatArray], Any]
+"""A controller: torques of the motor joints, shape (n,) [N m or N], of time [s], their positions and velocities, each shape (n,)."""
+
+
+class MotorTorque:
+    """What acts on the motor joints of a robot, the first of its coordinates."""
+
+    def __init__(self, model: SoftModel, torque: Torque | Any, sample_time: Any = None) -> None:
+        """Take a controller.
+
+        Args:
+            model: The robot, with at least one motor joint.
+            torque: Function of time, positions and velocities of the motor joints, or constant torques, shape (n,) [N m or N].
+            sample_time: Time between two evaluations [s]; None: continuous.
+
+        Raises:
+            ParameterError: If the robot has no motor joint, or an argument is of another kind or out of range.
+        """
+        self.count = len(model.structure.motor_joints)
+        """Number of motor joints."""
+        if self.count == 0:
+            raise ParameterError("motors", "torque", f"'prescribed' for a robot without motor joints, {model!r}")
+        if not callable(torque):
+            constant = finite_array("torque", torque, (self.count,), "N m")
+            torque = lambda *_: constant  # noqa: E731
+        self._torque: Torque = torque
+        self._n = model.n_motors + model.n_springs
+        self.sample_time = None if sample_time is None else positive_number("sample_time", sample_time, "s")
+        """Time between two evaluations [s]; None: continuous."""
+        drives = model.actuators.drives
+        self._effort, self._friction = drives.effort[: self.count], drives.friction[: self.count]
+        self._held, self._sample = np.zeros(self.count), -1
+
+    def with_samples(self, grid: FloatArray) -> FloatArray:
+        """Return the times of steps with the instants at which a sampled controller is evaluated, shape (n,) [s]."""
+        if self.sample_time is None:
+            return grid
+        instants = self.sample_time * np.arange(math.ceil(grid[-1] / self.sample_time - _ON_TIME))
+        every = np.unique(np.concatenate([grid, instants]))
+        return np.asarray(every[np.append(np.diff(every) > _ON_TIME * self.sample_time, True)])
+
+    def begin(self, time: float, x: FloatArray, rates: FloatArray) -> None:
+        """Start a step at a time and state, each shape (n,): a sampled controller is evaluated if its time has come."""
+        if self.sample_time is None:
+            return
+        sample = math.floor(time / self.sample_time + _ON_TIME)
+        if sample != self._sample:
+            self._held, self._sample = self._evaluated(time, x, rates), sample
+
+    def exerted(self, time: float, x: FloatArray, rates: FloatArray) -> FloatArray:
+        """Torque of the motors, shape (n,) of the motor joints [N m or N]."""
+        return self._evaluated(time, x, rates) if self.sample_time is None else self._held
+
+    def friction(self, rates: FloatArray) -> FloatArray:
+        """Dry friction against the motion of the motor joints, shape (n,) [N m or N]."""
+        return np.asarray(self._friction * np.tanh(rates[: self.count] / CREEP))
+
+    def slopes(self, time: float, x: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of torque less friction by the positions and velocities of the motor joints, each shape (n, n)."""
+        m = self.count
+        by_x, by_rates = np.zeros((m, m)), np.diag(-self._friction / CREEP * (1.0 - np.tanh(rates[:m] / CREEP) ** 2))
+        if self.sample_time is None:
+            here = self._evaluated(time, x, rates)
+            for joint in range(m):
+                for matrix, arguments in ((by_x, (x.copy(), rates)), (by_rates, (x, rates.copy()))):
+                    moved = arguments[0] if matrix is by_x else arguments[1]
+                    step = _DIFFERENCE * max(1.0, abs(moved[joint]))
+                    moved[joint] += step
+                    matrix[:, joint] += (self._evaluated(time, *arguments) - here) / step
+        return by_x, by_rates
+
+    def _evaluated(self, time: float, x: FloatArray, rates: FloatArray) -> FloatArray:
+        value = self._torque(time, x[: self.count].copy(), rates[: self.count].copy())
+        torque = finite_array(f"torque(t={time:.6g}, ...)", value, (self.count,), "N m")
+        return np.clip(torque, -self._effort, self._effort)
