@@ -28,7 +28,7 @@ _DIFFERENCE = 1e-6  # of the derivatives of a controller, in its arguments
 _ON_TIME = 1e-9  # of a sampling interval
 
 Torque = Callable[[float, FloatArray, FloatArray], Any]
-"""A controller: torques of the motor joints, shape (n,) [N m or N], of time [s], their positions and velocities, each shape (n,)."""
+"""A controller: torques of the motor joints, shape (n,) [N m or N], from time [s], positions, velocities, each shape (n,)."""
 
 
 class MotorTorque:
