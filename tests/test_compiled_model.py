@@ -162,6 +162,11 @@ def test_gravity(solver: CompiledModel, gravity: np.ndarray, rng: np.random.Gene
         expected = sr.solve_equilibrium(solver.model, motors[row], forces[row], gravity=gravity, tolerance=1e-13)
         assert apart(found.q_springs[row], expected.q_springs) < 1e-10
         assert apart(found.tip_positions[row], expected.tip_position) < 1e-10
+    for given in [gravity, tuple(gravity.tolist()), gravity.tolist()] * 2:  # all kinds of numbers, twice in a row
+        one = solver.equilibrium(motors[0], forces[0], gravity=given)
+        expected = sr.solve_equilibrium(solver.model, motors[0], forces[0], gravity=gravity, tolerance=1e-13)
+        np.testing.assert_allclose(one.q_springs, expected.q_springs, rtol=0, atol=1e-9)  # as above
+        assert one.stable
 
 
 def test_no_gravity_is_gravity_of_zero(plain: CompiledModel, rng: np.random.Generator) -> None:
@@ -607,6 +612,7 @@ def test_a_first_waypoint_out_of_reach(solver: CompiledModel) -> None:
         (lambda c: c.equilibrium(np.zeros(3), (1.0, 2.0)), "force"),
         (lambda c: c.equilibrium(np.zeros(3), "up"), "force"),
         (lambda c: c.equilibrium(np.zeros(3), gravity=(0.0, np.nan, 0.0)), "gravity"),
+        (lambda c: c.equilibrium(np.zeros(3), gravity=np.array([0.0, np.nan, 0.0])), "gravity"),
         (lambda c: c.equilibrium(np.zeros(3), q_springs0=(0.0, 0.0)), "q_springs0"),
         (lambda c: c.equilibrium(np.zeros(3), q_springs0=(0.0, 0.0, 0.0, np.inf)), "q_springs0"),
         (lambda c: c.equilibria(np.zeros((4, 2)), np.zeros(3)), "q_motors"),

@@ -14,7 +14,7 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import finite_array, read_only
+from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel
 
@@ -42,6 +42,8 @@ class CompiledStatics:
         self._motors = model.n_motors
         run = self._run(False)
         self._settle, self._size, self._layout = run.settle, run.program.size, run.layout
+        self._heavy: Any = None  # the same of the code with weight, once it is made
+        self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
         self._plain = len(self._chain.muscle_paths.rest) == 0 and backend == "numba"
 
@@ -115,7 +117,6 @@ class CompiledStatics:
         """
         if (
             self._plain
-            and gravity is None
             and q_springs0 is None
             and type(q_motors) is np.ndarray
             and type(force) is np.ndarray
@@ -124,12 +125,37 @@ class CompiledStatics:
             and q_motors.shape == self._shape
             and force.shape == _THREE
         ):
-            w = np.zeros(self._size)
-            w[: self._motors] = q_motors
-            w[self._motors : self._motors + 3] = force
-            if self._settle(w) == 0:
-                return CompiledEquilibrium(w, self._layout, self._actuation)
+            motors = self._motors
+            if gravity is None:
+                w = np.zeros(self._size)
+                w[:motors] = q_motors
+                w[motors : motors + 3] = force
+                if self._settle(w) == 0:
+                    return CompiledEquilibrium(w, self._layout, self._actuation)
+            elif (down := self._plain_gravity(gravity)) is not None:
+                settle, size, layout = self._heavy
+                w = np.zeros(size)
+                w[:motors] = q_motors
+                w[motors : motors + 3] = force
+                w[motors + 3 : motors + 6] = down
+                if settle(w) == 0:
+                    return CompiledEquilibrium(w, layout, self._actuation)
         return self._checked_equilibrium(q_motors, force, gravity, q_springs0)
+
+    def _plain_gravity(self, gravity: Any) -> FloatArray | None:
+        """Return gravity that needs no check but that of the generated code: an array, or the tuple of the last call."""
+        known, vector = self._known_gravity
+        if gravity is known:
+            return vector
+        if self._heavy is None:
+            run = self._run(True)
+            self._heavy = run.settle, run.program.size, run.layout
+        if type(gravity) is np.ndarray and gravity.dtype is DOUBLE and gravity.shape == _THREE:
+            return gravity
+        if type(gravity) is tuple and all(type(one) is float for one in gravity):
+            self._known_gravity = gravity, gravity_vector(gravity)
+            return self._known_gravity[1]
+        return None
 
     def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:
         run = self._run(gravity is not None)
