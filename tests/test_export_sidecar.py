@@ -95,7 +95,7 @@ lengths = st.lists(st.floats(0.1, 1.0), min_size=1, max_size=2)
 
 @settings(max_examples=5)
 @given(
-    lengths=lengths, hinges=st.integers(1, 3), rule=st.sampled_from(["corrected", "midpoint"]), stiffness=st.floats(0.1, 9.0)
+    lengths=lengths, hinges=st.integers(1, 6), rule=st.sampled_from(["corrected", "midpoint"]), stiffness=st.floats(0.1, 9.0)
 )
 def test_sources_of_other_lumped_arms(lengths: list[float], hinges: int, rule: str, stiffness: float) -> None:
     robot = sr.PccArm(

@@ -27,6 +27,7 @@ from tests.support.helix_rods import (
     solve_helix_rod,
     tip_compliance,
 )
+from tests.support.hinge_places import hinge_places
 from tests.support.mujoco_balance import assert_mujoco_balances
 
 FIELDS: dict[str, Any] = {"length": 0.5, "bending_stiffness": 0.02, "torsional_stiffness": 0.012, "axial_stiffness": 100.0}
@@ -212,9 +213,7 @@ def test_compliance_of_sections_is_that_of_piecewise_constant_strain_exactly(han
 def test_compliance_of_hinges_is_that_of_springs_on_the_helix_exactly(fields: dict) -> None:
     robot, arm = tube(6, chain="lumped", **fields), model(6, chain="lumped", **fields)
     one = rod(robot)
-    each, shares = one.length / 6, np.arange(6) + 0.5
-    if robot.hinge_rule == "corrected":
-        shares += np.array([-1, 0, 0, 0, 0, 1]) / 24
+    each, shares = one.length / 6, hinge_places(6, robot.hinge_rule)
     carried = load_carried(one, shares * each)
     soft = each * one.softness * [1.0, 1.0, robot.torsion, robot.extension]
     expected = np.einsum("nai,a,naj->ij", carried, soft, carried)

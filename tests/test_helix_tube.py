@@ -33,6 +33,7 @@ from softrobots.robots import HelixTube
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.body import body_at
 from tests.support.helix_rods import actuator_frames, gauss
+from tests.support.hinge_places import hinge_places
 from tests.support.laws import law
 from tests.support.tables import each_row
 from tests.support.urdf_reading import changed, check_portable, edited, gazebo_numbers, link_masses, link_poses, within_joint
@@ -98,17 +99,14 @@ def centre_length(robot: HelixTube) -> Any:
 
 
 def places(robot: HelixTube) -> dict[str, Any]:
-    """How far along the centre line each frame stands: at ends of sections, hinges at middles, the outer ones 1/24 further."""
+    """How far along the centre line each frame stands: at ends of sections, or hinges."""
     whole = centre_length(robot)
     count = robot.elastic_sections if robot.chain == "sections" else robot.hinges
     with mp.workdps(50):
         if robot.chain == "sections":
             shares = [mp.mpf(j) for j in range(1, count + 1)]
         else:
-            shares = [j - mp.mpf(1) / 2 for j in range(1, count + 1)]
-            if robot.hinge_rule == "corrected" and count > 1:
-                shares[0] -= mp.mpf(1) / 24
-                shares[-1] += mp.mpf(1) / 24
+            shares = [mp.mpf(place) for place in hinge_places(count, robot.hinge_rule).tolist()]
         made = {f"section_1_{j}": share * whole / count for j, share in enumerate(shares, start=1)}
     return made | {"segment_1": whole, "tip": whole}
 

@@ -281,6 +281,11 @@ def between_hinges(robot: PccArm, segment: int) -> list[float]:
     return [gap / section for gap in (*gaps, height(f"segment_{segment}_fixed"))]
 
 
+OUTER, NEXT = (47 - math.sqrt(671)) / 48, 2 * math.sqrt(671) / 48
+THIRD = 2.5 - OUTER - NEXT
+"""From an end to the first hinge, to the second and to the third [sections]: (47 -+ sqrt(671)) / 48 and 5/2."""
+
+
 @pytest.mark.parametrize(
     ("rule", "hinges", "expected"),
     [
@@ -290,8 +295,9 @@ def between_hinges(robot: PccArm, segment: int) -> list[float]:
         ("corrected", 1, [1 / 2, 1 / 2]),
         ("corrected", 2, [11 / 24, 26 / 24, 11 / 24]),
         ("corrected", 3, [11 / 24, 25 / 24, 25 / 24, 11 / 24]),
-        ("corrected", 4, [11 / 24, 25 / 24, 1, 25 / 24, 11 / 24]),
-        ("corrected", 6, [11 / 24, 25 / 24, 1, 1, 1, 25 / 24, 11 / 24]),
+        ("corrected", 4, [OUTER, NEXT, 4 - 2 * (OUTER + NEXT), NEXT, OUTER]),
+        ("corrected", 5, [OUTER, NEXT, THIRD, THIRD, NEXT, OUTER]),
+        ("corrected", 6, [OUTER, NEXT, THIRD, 1, THIRD, NEXT, OUTER]),
     ],
 )
 def test_lengths_of_the_sub_links(rule: str, hinges: int, expected: list[float]) -> None:

@@ -18,6 +18,7 @@ from softrobots.constant_curvature import arc_from_muscles, chain_transform
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
+from tests.support.hinge_places import hinge_places
 from tests.support.oracles import central_difference
 from tests.support.rods import Rod, elastica_moment_tip, elastica_tip, random_wrenches, rod_tip, steel_rod
 from tests.support.tables import each_row
@@ -133,15 +134,12 @@ class Oracle:
             end[:3, 3] += length * pose[:3, 2]
             return end
 
-        shift = 1 / 24 if self.arm.hinge_rule == "corrected" and self.n > 1 else 0.0
         pose, frames, weights = np.eye(4), {}, []
         for segment in range(self.arm.n_segments):
             pose = pose.copy()
             pose[:3, :3] = pose[:3, :3] @ turn_z(self.arm.offset[segment])
             h = self.arm.segment_lengths[segment] / self.n
-            heights = h * (np.arange(self.n) + 0.5)
-            heights[0] -= shift * h
-            heights[-1] += shift * h
+            heights = h * hinge_places(self.n, self.arm.hinge_rule)
             ends = [*heights[1:], self.arm.segment_lengths[segment]]
             pose = link(pose, heights[0], segment)
             for place in range(self.n):

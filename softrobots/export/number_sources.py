@@ -178,11 +178,16 @@ def _chain(robot: PccArm | HelixTube, segment: int, names: Mapping[str, str]) ->
     else:
         count, travel = robot.elastic_sections, {"c": (f"-0.9 * {chord}", chord), "r3": ("-pi", "pi")}
         kinds = {kind: {"c": "EA", "r3": "GJ"}.get(kind, "EI") for kind in JOINTS}
+    place_of: dict[int, str] = {}  # of a hinge in its section, if not in the middle
+    if robot.hinge_rule == "corrected" and count > 3:
+        first, second = "(47 - sqrt(671)) / 48", "(sqrt(671) - 1) / 48"
+        place_of = {1: first, 2: second, count - 1: f"1 - {second}", count: f"1 - {first}"}
+    elif robot.hinge_rule == "corrected" and count > 1:
+        place_of = {1: "11 / 24", count: "13 / 24"}
     for j in range(1, count + 1):
         section = f"section_{segment}_{j}"
         rules |= {(section, name): names[name] for name in ("length", "rest", "radius", "EI", "GJ", "EA")}
-        shift = 0 if robot.hinge_rule == "midpoint" or count == 1 else (j == count) - (j == 1)
-        rules[section, "hinge"] = f"{length} * (1 / 2{('', ' + 1 / 24', ' - 1 / 24')[shift]})"
+        rules[section, "hinge"] = f"{length} * ({place_of.get(j, '1 / 2')})"
         for kind, tag in kinds.items():
             joint, stiffness = f"{section}_{kind}", f"{names[tag]} / {length}"
             rules[joint, "stiffness"], rules[joint, "rest"] = stiffness, "0.0"

@@ -120,8 +120,8 @@ class HelixTube(XacroRobot):
     hinge_rule: str = parameter(
         "corrected",
         "",
-        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the first and "
-        "the last 1/24 section nearer to the ends)",
+        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the outer ones "
+        "moved so that the error of the midpoint rule at the ends vanishes)",
         options=HINGE_RULES,
     )
     torsion: bool = parameter(True, "", "Whether a lumped tube can twist: a torsional spring a hinge")

@@ -33,7 +33,8 @@ class PccArm(XacroRobot):
     - "sections": `elastic_sections` sections of constant strain a segment, each six joints that follow four section
       coordinates. Exact arcs. Other tools load the geometry; only this package knows how the joints are coupled.
     - "lumped": `hinges` pairs of orthogonal spring joints a segment. An approximation of second order that keeps its springs in
-      every tool that knows joint springs; `hinge_rule="corrected"` removes the boundary term of the midpoint rule's error.
+      every tool that knows joint springs; `hinge_rule="corrected"` removes the boundary terms of the midpoint rule's error,
+      which leaves an error of fourth order while it bends little.
 
     Every per-segment field accepts one number for all segments or one for each, and is stored as a tuple.
 
@@ -101,8 +102,8 @@ class PccArm(XacroRobot):
     hinge_rule: str = parameter(
         "corrected",
         "",
-        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the first and "
-        "the last of a segment 1/24 section nearer to its ends)",
+        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the outer ones "
+        "of a segment moved so that it bends exactly under an end load and its own weight)",
         options=HINGE_RULES,
     )
     torsion: bool = parameter(True, "", "Whether a lumped segment can twist: a torsional spring a hinge")

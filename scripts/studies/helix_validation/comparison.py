@@ -32,10 +32,12 @@ def boundaries(tube: HelixTube) -> dict[str, float]:
     count, whole = tube.n_sections, tube.centre_length
     if tube.chain == "sections":
         shares = np.arange(1.0, count + 1.0)
-    else:  # in the middle of the sections, the outer ones 1/24 of a section nearer to the ends if corrected
+    else:  # in the middle of the sections, the outer ones moved if corrected
         shares = np.arange(count) + 0.5
         if tube.hinge_rule == "corrected" and count > 1:
-            shares[[0, -1]] += np.array([-1.0, 1.0]) / 24.0
+            moved = (np.array([23.0, -25.0]) - [math.sqrt(671), -math.sqrt(671)]) / 48 if count > 3 else np.array([-1 / 24])
+            shares[: len(moved)] += moved
+            shares[count - len(moved) :] -= moved[::-1]
     result = {f"section_1_{number}": float(share) * whole / count for number, share in enumerate(shares, start=1)}
     return result | {"segment_1": whole, "tip": whole}
 
