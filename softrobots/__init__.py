@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-import softrobots.statics.saved_results  # noqa: F401  (adds the kinds of results that can be saved)
+import softrobots.dynamics.saved_motion  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.core.errors import (
     ClusterError,

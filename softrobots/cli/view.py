@@ -20,6 +20,7 @@ from softrobots.core.checks import finite_number
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
 from softrobots.core.result_file import load_result
+from softrobots.dynamics.motion import Motion
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
@@ -52,8 +53,13 @@ _NOT_WITH = {
     "--sliders": ("--live",),
     "--live": ("--json",),
 }
-_SWITCHES = "motors target result branch growth live sliders html picture at overwrite open port json"
-_ONLY_WITH = {"--branch": ("--result",), "--overwrite": ("--html", "--picture"), "--at": ("--picture",)}
+_SWITCHES = "motors target result branch growth live sliders html picture at speed overwrite open port json"
+_ONLY_WITH = {
+    "--branch": ("--result",),
+    "--speed": ("--result",),
+    "--overwrite": ("--html", "--picture"),
+    "--at": ("--picture",),
+}
 
 
 def add_parser(subparsers: Any) -> None:
@@ -70,7 +76,7 @@ def add_parser(subparsers: Any) -> None:
     add_motors(parser, help_text)
     add_loads(parser)
     add_numbers(parser, "--target", "X Y Z", "move the loaded tip to this position by inverse kinematics [m] (no target)")
-    help_text = "show a saved result, e.g. of `softrobots solve -o` or `ik -o`, in place of ROBOT (none)"
+    help_text = "show a saved result, e.g. of `softrobots solve -o`, `ik -o` or `simulate -o`, in place of ROBOT (none)"
     parser.add_argument("--result", type=Path, metavar="FILE.npz", help=help_text)
     help_text = "the branch of a --result of `softrobots branches`, as --branch=LABEL: its last stable point (its only one)"
     parser.add_argument("--branch", metavar="LABEL", help=help_text)
@@ -85,6 +91,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--html", type=Path, metavar="FILE", help="write the page instead of serving it (served)")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="take a picture of the page with Chromium (served)")
     add_numbers(parser, "--at", "SHARE", "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)")
+    add_numbers(parser, "--speed", "S", "how fast a trajectory or motion is played, relative to real time [-] (1)")
     parser.add_argument("--overwrite", action="store_true", help="allow --html and --picture to replace files")
     parser.add_argument("--open", action="store_true", help="open the page in the browser of this machine")
     parser.add_argument("--port", type=int, metavar="N", help="port of the page (the first free one from 7000; sliders: 8080)")
@@ -106,14 +113,18 @@ def run(arguments: argparse.Namespace) -> None:
         _grow(arguments)
         return
     result = _result(arguments)
-    if isinstance(result, Trajectory):
+    if isinstance(result, Trajectory | Motion):
         if arguments.live is not None or arguments.sliders:
             raise ParameterError(
-                "--result", str(arguments.result), "no trajectory with --live or --sliders, which move the robot"
+                "--result", str(arguments.result), "no trajectory or motion with --live or --sliders, which move the robot"
             )
-        with view(result.model, result, port=arguments.port) as viewer:
-            _show(arguments, viewer, result.model, f"a trajectory of {len(result.times)} waypoints")
+        with Viewer(result.model, port=arguments.port) as viewer:
+            viewer.animate(result, speed=arguments.speed)
+            told = f"of {result.time[-1]:g} s" if isinstance(result, Motion) else f"of {len(result.times)} waypoints"
+            _show(arguments, viewer, result.model, f"a {type(result).__name__.lower()} {told}")
         return
+    if arguments.speed is not None:
+        raise ParameterError("--speed", arguments.speed, "given with the --result of a trajectory or a motion")
     equilibrium = result.equilibrium if isinstance(result, IkSolution) else result
     if arguments.live is not None or arguments.sliders:
         tip_force(equilibrium)  # refused before the work
@@ -127,7 +138,7 @@ def run(arguments: argparse.Namespace) -> None:
             _follow(arguments, viewer, LiveView(viewer, result))
 
 
-def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Trajectory:
+def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Trajectory | Motion:
     """The saved result, or the solution for the load or target of the arguments."""
     if arguments.result is None:
         model = model_of(arguments)
@@ -145,11 +156,13 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Traject
         raise ParameterError("--branch", arguments.branch, "left out: the result has no branches")
     if isinstance(result, ImposedDisplacement | LoadEstimate):
         return result.equilibrium
-    if isinstance(result, Equilibrium | IkSolution | Trajectory):
+    if isinstance(result, Equilibrium | IkSolution | Trajectory | Motion):
         return result
     kind = type(result).__name__
     raise ParameterError(
-        "--result", str(arguments.result), f"an equilibrium, a solution, an estimate, branches or a trajectory, not a {kind}"
+        "--result",
+        str(arguments.result),
+        f"an equilibrium, a solution, an estimate, branches, a trajectory or a motion, not a {kind}",
     )
 
 

@@ -1,4 +1,4 @@
-"""Frames of an animation: waypoints of a trajectory, evenly spaced interpolated states, a growing tube."""
+"""Frames of an animation: waypoints of a trajectory, evenly spaced interpolated states, a motion, a growing tube."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_number, non_negative_number, positive_number
 from softrobots.core.errors import ParameterError
+from softrobots.dynamics.motion import Motion
+from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.robots.growth import SHORTEST, grown_coordinates
 from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
 
 FRAME_RATE = 30
 """Frames a second."""
 
 _MOST_BODIES = 90  # shapes of a continuous body in one animation
+_MOST_INSTANTS = (600, 60)  # of a motion of rigid links, and of a body that bends: pages of about a megabyte at most
 _MOST_FRAMES = 2**31 - 1  # a browser's largest frame number
 
 
@@ -30,9 +34,32 @@ class Frame(NamedTuple):
     q_springs: FloatArray
     """Elastic coordinates."""
     equilibrium: Equilibrium | None
-    """The nearest waypoint; None without load."""
+    """The nearest waypoint; None without load, and of a motion."""
     grown: float | None = None
     """Share of a growing tube that has everted; None if the robot does not grow."""
+    load: Load | None = None
+    """Gravity and the force on the tip in a motion; None otherwise."""
+    tensions: FloatArray = np.zeros(0)
+    """Tension of each muscle in a motion, shape (n_muscles,) [N]."""
+
+
+def playing_time(model: SoftModel, movement: Trajectory | Motion, duration: float | None, speed: float | None) -> float:
+    """Return how long an animation of a model lasts [s]; the other arguments are those of `Viewer.animate`.
+
+    Raises:
+        ParameterError: If there is nothing to play, it is of another robot, duration or speed is not positive, or both are
+            given.
+    """
+    if not isinstance(movement, Trajectory | Motion):
+        raise ParameterError("movement", movement, "a Trajectory or a Motion")
+    if movement.model != model:
+        raise ParameterError("movement", movement.model, f"a movement of the model given, {model!r}")
+    if duration is not None and speed is not None:
+        raise ParameterError("speed", speed, "left out where a duration is given")
+    if duration is not None:
+        return positive_number("duration", duration, "s")
+    times = movement.time if isinstance(movement, Motion) else movement.times
+    return (float(times[-1] - times[0]) or 1.0) / (1.0 if speed is None else positive_number("speed", speed))
 
 
 def waypoint_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
@@ -61,6 +88,30 @@ def even_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
     return frames
 
 
+def motion_frames(motion: Motion, seconds: float) -> list[Frame]:
+    """Return evenly spaced frames of a motion, interpolated by the cubics that its velocities tell.
+
+    There are as many as the frame rate asks for, but at most 600, or 60 of a body that bends.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    model, rows = motion.model, motion.time
+    numbers, total = _spread(seconds, _MOST_INSTANTS[bool(model.structure.section_table)])
+    times = rows[0] + (rows[-1] - rows[0]) * numbers / total
+    paths = ((motion.q_motors, motion.motor_velocities), (motion.q_springs, motion.velocities))
+    motors, springs = (CubicHermiteSpline(rows, *path)(times) if len(rows) > 1 else path[0] for path in paths)
+    tensions = motion.motor_torques[:, model.n_motors - len(model.muscles) :]
+    forces, tensions = (
+        np.array([np.interp(times, rows, column) for column in columns.T]).reshape(-1, len(times)).T
+        for columns in (motion.forces, tensions)
+    )
+    frames = []
+    for row, number in enumerate(numbers.tolist() if len(rows) > 1 else [0]):
+        load = Load({model.tip: np.append(forces[row], np.zeros(3))}, motion.gravity)
+        frames.append(Frame(number, motors[row], springs[row], None, load=load, tensions=tensions[row]))
+    return frames
+
+
 def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) -> list[Frame]:
     """Return frames of a tube that grows at constant speed and is then held; see `robots.growth.grown_coordinates`.
 
@@ -86,7 +137,7 @@ def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) ->
     ]
 
 
-def _spread(seconds: float) -> tuple[FloatArray, int]:
-    """Evenly spaced frame numbers over a duration [s], and the last number."""
+def _spread(seconds: float, most: int = _MOST_BODIES) -> tuple[FloatArray, int]:
+    """Evenly spaced frame numbers over a duration [s], at most so many, and the last number."""
     total = max(round(min(seconds * FRAME_RATE, _MOST_FRAMES)), 1)
-    return np.unique(np.rint(np.linspace(0, total, min(_MOST_BODIES, total + 1))).astype(int)), total
+    return np.unique(np.rint(np.linspace(0, total, min(most, total + 1))).astype(int)), total

@@ -96,7 +96,7 @@ def legend(
     Args:
         shapes: The shapes of the robot.
         scene: What is shown.
-        animated: The scenes of an animation whose bodies are drawn.
+        animated: The scenes of an animation.
         path: Whether the path of the tip is drawn.
         target: Whether a target is drawn.
     """
@@ -105,13 +105,14 @@ def legend(
     if all(shape.inflated_link is None for shape in shapes):
         entries += [(shape.colour, "equivalent rigid chain") for shape in shapes if shape.of_section][:1]
     body: dict[str, Colour] = {}
-    for state in (scene, *animated):
+    states = (scene, *animated)
+    for state in states:
         body |= {part.meaning: part.colour for part in body_parts(state)}
         if state.segments and state.grown is not None and state.grown < 1.0:
             body["wall that has not come out"] = TAIL_COLOUR
     entries += [(colour, meaning) for meaning, colour in body.items()]
     entries += [(PATH_COLOUR, "path of the tip")] * path + [(PATH_COLOUR, "target (cross)")] * target
-    entries += [(FORCE_COLOUR, "force")] * bool(scene.arrows)
+    entries += [(FORCE_COLOUR, "force")] * any(state.arrows for state in states)
     above = 1.0
     for least, rgb in WRINKLING_COLOURS if scene.wrinkling else ():
         text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"

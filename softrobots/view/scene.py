@@ -10,12 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.dynamics.motion import Motion
+from softrobots.model.link_limits import link_limits
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone, frame_placement
+from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
-from softrobots.view.animation_frames import Frame, even_frames, growth_frames, waypoint_frames
+from softrobots.view.animation_frames import Frame, even_frames, growth_frames, motion_frames, waypoint_frames
 from softrobots.view.body import SegmentBody, body_at
 from softrobots.view.robot_shapes import RobotShapes
 
@@ -30,6 +33,7 @@ WRINKLING_COLOURS = (
 """Colours of an inflated link by the least remaining share of its wrinkling moment; the last one is wrinkled. Ordered in
 lightness too, for grey prints and colour-blind readers."""
 
+_RINGS = 16  # of a body in each frame of a motion; two a section at least
 _NO_FORCE = 1e-12  # [N], forces below have no arrow
 
 
@@ -124,10 +128,19 @@ class SceneBuilder:
         poses = self.robot.transforms(q)
         return Scene(poses, poses, self._reference())
 
-    def trajectory(self, trajectory: Trajectory, seconds: float) -> dict[int, Scene]:
-        """Return the scenes of an animation by number of frame: waypoints, or, of a body that bends, evenly spaced shapes."""
-        frames = even_frames if self._model.structure.section_table else waypoint_frames
-        return {frame.number: self._scene(frame, 4) for frame in frames(trajectory, seconds)}
+    def movement(self, movement: Trajectory | Motion, seconds: float) -> dict[int, Scene]:
+        """Return the scenes of an animation by number of frame.
+
+        They are waypoints; evenly spaced shapes of a body that bends; or those of a motion, see `motion_frames`.
+        """
+        sections = len(self._model.structure.section_table)
+        if isinstance(movement, Motion):
+            return {
+                frame.number: self._scene(frame, max(_RINGS // max(sections, 1), 2))
+                for frame in motion_frames(movement, seconds)
+            }
+        frames = (even_frames if sections else waypoint_frames)(movement, seconds)
+        return {frame.number: self._scene(frame, 4) for frame in frames}
 
     def growth(self, tube: HelixTube, seconds: float, front: float, hold: float) -> dict[int, Scene]:
         """Return the scenes of a growing tube by number of frame; see `growth_frames`.
@@ -149,15 +162,26 @@ class SceneBuilder:
             segments=body_at(model, frame.q_motors, frame.q_springs, points),
             grown=frame.grown,
         )
-        if equilibrium is None:
+        load = frame.load if equilibrium is None else equilibrium.load
+        if load is None:
             return scene
-        muscles = zip(model.muscles, equilibrium.muscle_forces, strict=True)
+        muscles = zip(model.muscles, frame.tensions if equilibrium is None else equilibrium.muscle_forces, strict=True)
         return dataclasses.replace(
             scene,
-            wrinkling=[wrinkling_level(equilibrium, link) for link in range(len(model.spring_groups))],
+            wrinkling=self._moving_levels(frame, load, q)
+            if equilibrium is None
+            else [wrinkling_level(equilibrium, link) for link in range(len(model.spring_groups))],
             pushing=frozenset(muscle.name for muscle, tension in muscles if tension < 0.0),
-            arrows=_arrows(equilibrium, q),
+            arrows=_arrows(model, load, q),
         )
+
+    def _moving_levels(self, frame: Frame, load: Load, q: FloatArray) -> list[int]:
+        """Places in `WRINKLING_COLOURS` of the links of a robot in motion, whose axial forces are those without inertia."""
+        springs, groups = self._model.springs, self._model.spring_groups
+        torques, beyond = springs.at(frame.q_springs)[1], springs.saturated(frame.q_springs)
+        limits = link_limits(self._model, load.wrenches, load.gravity, q=q, torques=torques, tensions=frame.tensions)
+        flat = [not beyond.isdisjoint(group.springs) for group in groups]
+        return [_level(left, one) for left, one in zip(limits.wrinkling_margins.tolist(), flat, strict=True)]
 
     def _reference(self) -> str:
         model = self._model
@@ -168,16 +192,20 @@ class SceneBuilder:
 
 def wrinkling_level(equilibrium: Equilibrium, link: int) -> int:
     """Return the place in `WRINKLING_COLOURS` of an inflated link, numbered from 0; the last one means wrinkled."""
-    left = float(equilibrium.link_limits.wrinkling_margins[link])
-    if left <= 0.0 or equilibrium.saturated[link]:
+    return _level(float(equilibrium.link_limits.wrinkling_margins[link]), equilibrium.saturated[link])
+
+
+def _level(left: float, saturated: bool) -> int:
+    """The place of a link with a share of its wrinkling moment left, or on its plateau."""
+    if left <= 0.0 or saturated:
         return len(WRINKLING_COLOURS) - 1
     return next(level for level, (least, _) in enumerate(WRINKLING_COLOURS) if left >= least)
 
 
-def _arrows(equilibrium: Equilibrium, q: FloatArray) -> dict[str, Arrow]:
+def _arrows(model: SoftModel, load: Load, q: FloatArray) -> dict[str, Arrow]:
     """Forces of a load by frame, at a configuration, shape (nq,)."""
     arrows = {}
-    for frame, wrench in equilibrium.load.wrenches.items():
+    for frame, wrench in load.wrenches.items():
         force = wrench[:3]
         size = float(np.linalg.norm(force))
         if size <= _NO_FORCE:
@@ -187,6 +215,6 @@ def _arrows(equilibrium: Equilibrium, q: FloatArray) -> dict[str, Arrow]:
         across /= np.linalg.norm(across)
         pose = np.eye(4)
         pose[:3, :3] = np.column_stack([across, along, np.cross(across, along)])
-        pose[:3, 3] = frame_placement(equilibrium.model, q, frame).translation
+        pose[:3, 3] = frame_placement(model, q, frame).translation
         arrows[frame] = Arrow(pose, size)
     return arrows

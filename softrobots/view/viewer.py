@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, instance_of, positive_integer, positive_number
+from softrobots.core.checks import FloatArray, finite_array, positive_integer
 from softrobots.core.errors import ParameterError, ViewerError
 from softrobots.core.files import new_file, write_text
+from softrobots.dynamics.motion import Motion
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.trajectory import Trajectory
+from softrobots.view.animation_frames import playing_time
 from softrobots.view.meshcat_page.page_text import InlinePage, legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
 from softrobots.view.meshcat_page.server import connect, end_server, send_html, start_server
@@ -74,7 +76,8 @@ class Viewer(ServedPage):
             ParameterError: If it belongs to another robot.
             ViewerError: If the viewer is closed.
         """
-        self._check(equilibrium)
+        check_same_model(self._model, equilibrium)
+        self._check_open()
         self._robot.show(self._scenes.loaded(equilibrium))
         self._show_legend()
 
@@ -117,28 +120,36 @@ class Viewer(ServedPage):
         self._robot.mark(None if target is None else finite_array("target", target, (3,), "m"))
         self._show_legend()
 
-    def animate(self, trajectory: Trajectory, *, duration: float | None = None, repetitions: int = 1000) -> None:
-        """Play a trajectory as a meshcat animation, path and forces included; it starts by itself and can be scrubbed.
+    def animate(
+        self,
+        movement: Trajectory | Motion,
+        *,
+        duration: float | None = None,
+        speed: float | None = None,
+        repetitions: int = 1000,
+    ) -> None:
+        """Play a trajectory or a motion as a meshcat animation, path and forces included; it starts by itself, can be scrubbed.
+
+        Links of a motion are coloured by the moments of their springs, and axial forces without inertia.
 
         Args:
-            trajectory: A trajectory of the viewer's robot.
-            duration: Time of the animation [s]; the time of the trajectory by default.
-            repetitions: Number of repetitions; many by default, because meshcat mixes start and end when the slider is moved
-                after the last one.
+            movement: A trajectory or a motion of the viewer's robot.
+            duration: Time of the animation [s]; real time by default.
+            speed: How fast it is played, relative to real time [-], e.g. 0.1; in place of `duration`.
+            repetitions: How often; many, because meshcat mixes start and end when it is scrubbed after the last one.
 
         Raises:
-            ParameterError: If it belongs to another robot, or the duration is not positive.
+            ParameterError: If it belongs to another robot, duration or speed is not positive, or both are given.
         """
-        instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
-        self._check(trajectory.equilibria[0])
-        span = float(trajectory.times[-1] - trajectory.times[0])
-        seconds = (span or 1.0) if duration is None else positive_number("duration", duration, "s")
+        seconds = playing_time(self._model, movement, duration, speed)
         positive_integer("repetitions", repetitions)
-        self.look_at(trajectory.tip_positions.mean(axis=0))
-        self._robot.show(self._scenes.loaded(trajectory.equilibria[0]))
-        self._robot.trace(trajectory.tip_positions)
-        animation = self._robot.animate(self._scenes.trajectory(trajectory, seconds))
-        self._page.set_animation(animation, play=True, repetitions=repetitions)
+        self._check_open()
+        scenes = self._scenes.movement(movement, seconds)
+        path = movement.tip_position if isinstance(movement, Motion) else movement.tip_positions
+        self.look_at(path.mean(axis=0))
+        self._robot.show(next(iter(scenes.values())))
+        self._robot.trace(path)
+        self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=repetitions)
         self._show_legend()
 
     def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
@@ -249,22 +260,20 @@ class Viewer(ServedPage):
             send_html(self._page, "legend", rows)
             self._legend = rows
 
-    def _check(self, equilibrium: Any) -> None:
-        check_same_model(self._model, equilibrium)
-        self._check_open()
-
     def _check_open(self) -> None:
         if not self.serving:
             raise ViewerError("the viewer is closed, or its server has ended; open a new one")
 
 
-def view(model: SoftModel, result: Equilibrium | IkSolution | Trajectory | None = None, *, port: int | None = None) -> Viewer:
+def view(
+    model: SoftModel, result: Equilibrium | IkSolution | Trajectory | Motion | None = None, *, port: int | None = None
+) -> Viewer:
     """Open a viewer and show a result in it.
 
     Args:
         model: The robot.
-        result: An equilibrium to show, a solution of the inverse kinematics to show with its target, or a trajectory to play;
-            the robot at rest by default.
+        result: An equilibrium to show, a solution of the inverse kinematics to show with its target, or a trajectory or motion
+            to play; the robot at rest by default.
         port: Port of the page; by default the first free one from 7000.
 
     Returns:
@@ -276,7 +285,7 @@ def view(model: SoftModel, result: Equilibrium | IkSolution | Trajectory | None 
     """
     viewer = Viewer(model, port=port)
     try:
-        if isinstance(result, Trajectory):
+        if isinstance(result, Trajectory | Motion):
             viewer.animate(result)
         elif result is not None:
             shown = result.equilibrium if isinstance(result, IkSolution) else result

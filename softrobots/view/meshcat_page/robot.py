@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from softrobots.view.meshcat_page.shapes import material, meshcat_geometry
 from softrobots.view.robot_shapes import RobotShapes, Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Arrow, Scene
 
+_NO_ARROW = 1e-6  # scale of an arrow without a force: a browser turns nothing that has no size
 _CROSS = (0.16, 0.006)  # length and width of the mark of a target, of the size of the robot
 
 
@@ -81,6 +82,7 @@ class RobotDrawing:
 
         animation = meshcat.animation.Animation(default_framerate=FRAME_RATE)
         numbers = list(scenes)
+        self._arrows.draw_largest(scenes.values())
         for (number, scene), following in zip(scenes.items(), (*numbers[1:], numbers[-1]), strict=True):
             self._add_frame(animation, number, scene)
             # A body changes in steps, and so must the chain inside; that of a growing tube is hidden.
@@ -88,7 +90,7 @@ class RobotDrawing:
                 self._add_frame(animation, following - 1, scene)
         if any(scene.segments for scene in scenes.values()):
             self._body.animate(animation, scenes)
-            self._animated = tuple(scenes.values())
+        self._animated = tuple(scenes.values())
         return animation
 
     def legend(self) -> list[appearance.LegendEntry]:
@@ -171,16 +173,25 @@ class ArrowDrawing:
     def __init__(self, root: Any, size: float) -> None:
         """Draw under `root` for a robot of a size [m]; the unit force is the largest of each load."""
         self._root, self._size = root, size
-        self._names: tuple[str, ...] = ()
+        self._drawn: dict[str, float] = {}
+        self._changing: set[str] = set()
+
+    def draw_largest(self, scenes: Iterable[Scene]) -> None:
+        """Draw for an animation of scenes the largest arrow of each frame, which is scaled where its force changes."""
+        arrows = [scene.arrows for scene in scenes]
+        names = dict.fromkeys(name for some in arrows for name in some)
+        forces = {name: [some[name].force if name in some else 0.0 for some in arrows] for name in names}
+        self.draw({name: arrows[int(np.argmax(forces[name]))][name] for name in names})
+        self._changing = {name for name in names if min(forces[name]) < max(forces[name])}
 
     def draw(self, arrows: Mapping[str, Arrow]) -> None:
         """Replace the arrows."""
         import meshcat.geometry as geometry
 
-        for name in self._names:
+        for name in self._drawn:
             if name not in arrows:
                 self._root[name].delete()
-        self._names = tuple(arrows)
+        self._drawn = {name: arrow.force for name, arrow in arrows.items()}
         unit = max((arrow.force for arrow in arrows.values()), default=1.0)
         for name, arrow in arrows.items():
             length = appearance.ARROW_LENGTH * self._size * arrow.force / unit
@@ -198,7 +209,11 @@ class ArrowDrawing:
             node.set_transform(arrow.pose)
 
     def add_frame(self, animation: Any, number: int, arrows: Mapping[str, Arrow]) -> None:
-        """Move the arrows that are drawn to their places at a frame of an animation."""
-        for name in self._names:
+        """Move the arrows that are drawn to their places at a frame of an animation, as long as their forces are there."""
+        for name, force in self._drawn.items():
+            at_frame = animation.at_frame(self._root[name], number)
             if name in arrows:
-                animation.at_frame(self._root[name], number).set_transform(arrows[name].pose)
+                at_frame.set_transform(arrows[name].pose)
+            if name in self._changing:
+                share = arrows[name].force / force if name in arrows else 0.0
+                at_frame.set_property("scale", "vector3", [max(share, _NO_ARROW)] * 3)

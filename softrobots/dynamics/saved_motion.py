@@ -1,0 +1,94 @@
+"""Serialisation of motions: named arrays for result files, and columns of CSV tables with their units.
+
+A file holds the robot (URDF and springs), coordinates, velocities, loads and energies over time. Poses are computed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields as fields_of
+from typing import Any
+
+from softrobots.core.checks import FloatArray, finite_array, finite_number, increasing, read_only
+from softrobots.core.errors import FileFormatError
+from softrobots.core.result_file import KINDS, Kind
+from softrobots.dynamics.motion import Motion, MotionEnergy
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.loads import Load
+from softrobots.statics.saved_results import pack_model, unpack_model
+
+_NUMBERS = ("damping_time", "tip_error", "tolerance")
+_RATES = {"rad": "rad/s", "m": "m/s", "N": "N/s"}
+_LOADS = {"rad": "N m", "m": "N", "N": "N"}
+
+
+def _columns(model: SoftModel) -> dict[str, int]:
+    """Arrays with one row an instant, and their number of columns."""
+    springs, motors = model.n_springs, model.n_motors
+    widths = {"q_motors": motors, "q_springs": springs, "velocities": springs, "motor_velocities": motors}
+    return widths | {"motor_torques": motors, "forces": 3}
+
+
+def _pack(motion: Motion) -> dict[str, Any]:
+    arrays = {name: getattr(motion, name) for name in ("time", *_columns(motion.model), "steps", *_NUMBERS, "interrupted")}
+    energies = {one.name: getattr(motion.energy, one.name) for one in fields_of(MotionEnergy)}
+    return pack_model(motion.model, Load({}, motion.gravity)) | arrays | energies
+
+
+def _unpack(fields: Mapping[str, Any]) -> Motion:
+    model, load = unpack_model(fields)
+    time = finite_array("time", fields["time"], (None,), "s")
+    if len(time) == 0 or fields["interrupted"].dtype != bool or fields["interrupted"].shape:
+        raise FileFormatError("it must have at least one instant, and say whether it was interrupted")
+    widths = _columns(model)
+    columns = {name: read_only(finite_array(name, fields[name], (len(time), width))) for name, width in widths.items()}
+    names = [one.name for one in fields_of(MotionEnergy)]
+    energies = {name: read_only(finite_array(name, fields[name], (len(time),), "J")) for name in names}
+    for motors in columns["q_motors"]:
+        model.checked_motors(motors)
+    for motors, springs in zip(columns["q_motors"], columns["q_springs"], strict=True):
+        if not model.coordinates.at(motors, springs).valid:
+            raise FileFormatError("a section is out of its range")
+    numbers = {name: finite_number(name, fields[name]) if name in fields else None for name in _NUMBERS}
+    steps = finite_array("steps", fields["steps"], (None,), "s")
+    return Motion(
+        model=model,
+        time=read_only(increasing("time", time, "s")),
+        q_motors=columns["q_motors"],
+        motor_velocities=columns["motor_velocities"],
+        q_springs=columns["q_springs"],
+        velocities=columns["velocities"],
+        motor_torques=columns["motor_torques"],
+        forces=columns["forces"],
+        damping_time=numbers["damping_time"],
+        tip_error=numbers["tip_error"],
+        tolerance=numbers["tolerance"],
+        gravity=load.gravity,
+        energy=MotionEnergy(**energies),
+        steps=read_only(increasing("steps", steps, "s")),
+        interrupted=bool(fields["interrupted"]),
+    )
+
+
+def _table(motion: Motion) -> dict[str, FloatArray]:
+    """Columns of a CSV file of a motion, each name with its unit."""
+    model = motion.model
+    motors = list(zip(model.motor_joints, model.actuators.units, strict=True))
+    springs = [(name, "rad" if turns else "m") for name, turns in zip(model.spring_joints, model.springs.turning, strict=True)]
+    blocks: list[tuple[list[str], Any]] = [
+        ([f"{name} [{unit}]" for name, unit in motors], motion.q_motors),
+        ([f"{name} [{unit}]" for name, unit in springs], motion.q_springs),
+        ([f"{name} velocity [{_RATES[unit]}]" for name, unit in motors], motion.motor_velocities),
+        ([f"{name} velocity [{_RATES[unit]}]" for name, unit in springs], motion.velocities),
+        ([f"{name} load [{_LOADS[unit]}]" for name, unit in motors], motion.motor_torques),
+        ([f"tip {axis} [m]" for axis in "xyz"], motion.tip_position),
+        ([f"force {axis} [N]" for axis in "xyz"], motion.forces),
+    ]
+    energies = {one.name: getattr(motion.energy, one.name) for one in fields_of(MotionEnergy)}
+    table = {"time [s]": motion.time}
+    for names, values in blocks:
+        table |= dict(zip(names, values.T, strict=True))
+    return table | {f"{name.replace('_', ' ')} [J]": values for name, values in energies.items()}
+
+
+KINDS["motion"] = Kind(Motion, _pack, _unpack, many=True, to_table=_table)
