@@ -515,6 +515,8 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("branches", {"ends": np.array(["\n", "lost"])}, "ends must be 1 to 80 printable"),
         ("branches", {"n_crossings": np.array([-1, 2])}, "must be an array of non-negative integers"),
         ("branches", {"frame": np.array("nowhere")}, "nowhere"),
+        ("motion", {"interrupted": np.array(2)}, "say whether it was interrupted"),
+        ("motion", {"q_springs": np.full((3, 4), 1e200)}, "at most 1e"),
         ("ik_solution", {"steps": np.array(2.5)}, "must be an array of non-negative integers"),
     ],
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import zipfile
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.core.files import write_atomically
+from tests.support.saved_files import altered, same
 
 FORCE = (0.0, 10.0, -15.0)
 
@@ -30,30 +30,6 @@ def results(arm: sr.SoftModel) -> dict[str, object]:
         "trajectory": sr.follow_trajectory(arm, path.positions, FORCE, times=path.times),
         "branches": sr.post_buckling_branches(arm, (0, 0, 0), (-1, 0, 0), largest_step=0.2),
     }
-
-
-def same(one: object, other: object, path: str = "") -> None:
-    """Compare two results field by field; arrays to the last bit, the model by its URDF and springs."""
-    assert type(one) is type(other), path
-    if isinstance(one, sr.SoftModel):
-        assert (one.urdf, one.spring_table, one.motor_joints, one.tip) == (
-            other.urdf, other.spring_table, other.motor_joints, other.tip,
-        )  # fmt: skip
-    elif isinstance(one, np.ndarray):
-        assert np.array_equal(one, other), path
-    elif isinstance(one, tuple):
-        assert len(one) == len(other)
-        for number, (a, b) in enumerate(zip(one, other, strict=True)):
-            same(a, b, f"{path}[{number}]")
-    elif isinstance(one, Mapping):
-        assert one.keys() == other.keys()
-        for key in one:
-            same(one[key], other[key], f"{path}[{key}]")
-    elif hasattr(one, "__dataclass_fields__"):
-        for name in one.__dataclass_fields__:
-            same(getattr(one, name), getattr(other, name), f"{path}.{name}")
-    else:
-        assert one == other, path
 
 
 @pytest.mark.parametrize("kind", ["equilibrium", "ik_solution", "load_estimate", "trajectory", "branches"])
@@ -180,13 +156,6 @@ def test_joints_called_like_columns_do_not_hide_the_targets(tmp_path: Path) -> N
     file = sr.save_csv(found, tmp_path / "a.csv")
     assert np.array_equal(sr.read_waypoints(file).positions, found.targets)
     assert "joint_x" in file.read_text(encoding="utf-8").splitlines()[0]
-
-
-def altered(file: Path, target: Path, **changes: np.ndarray) -> Path:
-    with np.load(file) as data:
-        fields = dict(data) | changes
-    np.savez(target, **fields)
-    return target
 
 
 def test_files_that_do_not_hold_what_they_claim_are_refused(results: dict, tmp_path: Path) -> None:

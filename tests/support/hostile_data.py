@@ -235,6 +235,9 @@ def results() -> dict[str, Any]:
         "workspace": sr.sample_workspace(model, 5, force=(0, 0, -5)),
         "workspace_map": map_workspace(model, grid, (0.0, 5.0), backend="python"),
         "branches": sr.post_buckling_branches(model, (0, 0, 0), (-1, 0, 0), max_force=115.0, largest_step=0.5)[:2],
+        "motion": sr.simulate(
+            model, 0.02, (0.3, 0.6, -0.8), start=held, gravity=(0, 0, -9.81), time_step=0.01, output_step=0.01
+        ),
     }
 
 
@@ -258,6 +261,9 @@ def read_result(file: Path) -> None:
     result: Any = sr.load_result(file)
     if isinstance(result, inflated_beam.Characterisation):
         finite(result.stiffness, result.stiffness_std, result.stiffness_interval, result.angle_offset, result.wrinkling_moment)
+        return
+    if isinstance(result, sr.Motion):
+        finite(result.time, result.q_springs, result.velocities, result.tip_position, result.energy.balance)
         return
     if isinstance(result, WorkspaceMap):
         finite(result.payload, result.q_motors, result.q_springs)
