@@ -11,8 +11,14 @@ from scipy.integrate import solve_ivp
 
 import softrobots as sr
 from softrobots.core.checks import FloatArray
+from softrobots.dynamics.equations import EquationsOfMotion
 from tests.support.laws import law
 
+ROBOTS = (
+    sr.load_model(sr.InflatableArm()),
+    sr.load_model(sr.PccArm(elastic_sections=2)),
+    sr.load_model(sr.PccArm(elastic_sections=2), muscles="forces"),
+)
 LENGTH, MASS = 0.5, 0.3  # of each link of the pendulums
 
 
@@ -91,3 +97,36 @@ def test_a_motion_runs_backwards_to_its_start() -> None:
     assert np.abs(there.q_springs[-1] - start.q_springs).max() > 0.1
     assert np.abs(back.q_springs[-1] - start.q_springs).max() < 1e-8
     assert np.abs(back.velocities[-1]).max() < 1e-7
+
+
+@given(st.integers(0, 2), st.randoms(use_true_random=False))
+def test_the_equations_are_those_of_lagrange(number: int, random: Any) -> None:
+    """`r = d/dt (M xd) - d(T - V)/dx`, by central differences of mass matrix and energies along a path."""
+    model = ROBOTS[number]
+    draw = np.random.default_rng(random.randrange(2**32))
+    turning = np.concatenate([np.full(model.n_motors, 0.01), np.where(model.springs.turning, 0.2, 0.004)])
+    x, rates, accelerations = (scale * draw.uniform(-turning, turning) for scale in (1.0, 5.0, 5.0))
+    x += np.concatenate([model.relaxed_motors, model.rest])
+    if model.muscles and model.muscle_input == "forces":
+        rates[-model.n_springs - len(model.muscles) : -model.n_springs] = 0.0
+    equations = EquationsOfMotion(model, (1.0, -2.0, -9.81))
+    wrench = {model.tip: draw.standard_normal(6)}
+    exact = equations.balance(x, rates, accelerations, wrench)
+    h = 1e-4
+
+    def momentum(t: float) -> FloatArray:
+        return equations.mass_matrix(x + t * rates + 0.5 * t * t * accelerations) @ (rates + t * accelerations)
+
+    def lagrangian(place: int, change: float) -> float:
+        moved = x.copy()
+        moved[place] += change
+        kinetic, elastic, potential = equations.energies(moved, rates)
+        return kinetic - elastic - potential
+
+    slopes = [(lagrangian(place, h) - lagrangian(place, -h)) / (2 * h) for place in range(len(x))]
+    expected = (momentum(h) - momentum(-h)) / (2 * h) - slopes - equations.load(x, wrench)
+    free = slice(model.n_motors if model.muscle_input == "forces" and model.muscles else 0, None)
+    if free.start:  # tensions pull
+        tensions, strains = x[: model.n_motors], x[model.n_motors :]
+        expected[free] += tensions @ model.structure.muscle_paths.at(strains).arms
+    assert np.abs(exact[free] - expected[free]).max() < 1e-5 * max(1.0, np.abs(exact).max())

@@ -17,12 +17,17 @@ class Recorder:
 
     def __init__(self, rule: MidpointRule, start: State, rows: FloatArray) -> None:
         """Take the rule, the first state, and the times of the rows, shape (n,) [s]."""
-        self._rule, self._equations, self._times = rule, rule.equations, rows
+        self.rule, self._equations, self._times = rule, rule.equations, rows
+        self.count = len(rows)
+        """Number of rows in the end."""
+        self.duration = float(rows[-1])
+        """Time of the last row [s]."""
         self.state = start
         """The state reached."""
         self._x, self._rates = np.zeros((len(rows), len(start.x))), np.zeros((len(rows), len(start.x)))
         self.rows = 0
         """Number of rows so far."""
+        self._most = 0
         self.times, self.tips = [start.time], [self.tip(start.x)]
         """Times of the steps, and positions of the tip then, shape (3,) [m]."""
         self._middles: list[float] = []
@@ -36,8 +41,8 @@ class Recorder:
         pin.forwardKinematics(pin_model, data, model.embed(self._equations.point(x).joints))
         return np.array(pin.updateFramePlacement(pin_model, data, model.frame_id(model.tip)).translation)
 
-    def add(self, step: Step) -> None:
-        """Take a step."""
+    def add(self, step: Step) -> int:
+        """Take a step; return how many rows there are more than ever before."""
         equations, middle, h = self._equations, step.middle, step.length
         dissipated, load_work, motor_work = self._works[-1]
         dissipated += h * (float(middle.rates @ equations.damping @ middle.rates) + step.friction_power)
@@ -47,7 +52,7 @@ class Recorder:
         self._works.append((dissipated, load_work, motor_work))
         self._middles.append(middle.time)
         self._exerted.append(step.actuator_forces)
-        prescribed = self._rule.prescribed
+        prescribed = self.rule.prescribed
         last = (
             len(self._times) if step.end.time >= self._times[-1] else int(np.searchsorted(self._times, step.end.time, "right"))
         )
@@ -55,13 +60,26 @@ class Recorder:
             time = float(self._times[row])
             x, rates = step.at(time)
             if len(prescribed):
-                x[prescribed] = self._rule.path(time)[prescribed]
+                x[prescribed] = self.rule.path(time)[prescribed]
                 rates[prescribed] = (middle.rates + (time - middle.time) * step.accelerations)[prescribed]
             self._x[row], self._rates[row] = x, rates
-        self.rows = max(self.rows, last)
+        self.rows, more = last, max(last - self._most, 0)
+        self._most += more
         self.state = step.end
         self.times.append(step.end.time)
         self.tips.append(self.tip(step.end.x))
+        return more
+
+    def mark(self) -> tuple[State, int, int]:
+        """What `reset` needs to return to here."""
+        return self.state, self.rows, len(self._middles)
+
+    def reset(self, mark: tuple[State, int, int]) -> None:
+        """Forget the steps since a mark."""
+        self.state, self.rows, steps = mark
+        del self._middles[steps:], self._exerted[steps:]
+        del self.times[steps + 1 :], self.tips[steps + 1 :], self._works[steps + 1 :]
+        self.rule.forget()
 
     def motion(self, **facts: Any) -> Motion:
         """Return the motion of the rows so far, with more of its fields."""
@@ -74,7 +92,7 @@ class Recorder:
         kept = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
         works = np.array(self._works)
         flown = np.column_stack([np.interp(times, self.times, work) for work in works.T])
-        load, tip = self._rule.load, equations.model.tip
+        load, tip = self.rule.load, equations.model.tip
         forces = np.array([load(float(time)).get(tip, np.zeros(6))[:3] for time in times])
         columns = [read_only(np.ascontiguousarray(column)) for column in np.concatenate([kept, flown], axis=1).T]
         return Motion(

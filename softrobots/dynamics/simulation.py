@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from softrobots.dynamics.midpoint import MidpointRule, State
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MotorTorque
 from softrobots.dynamics.recorder import Recorder
+from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_errors
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
@@ -26,7 +27,13 @@ MOTORS = ("prescribed", "torque")
 """How motors move."""
 
 _ROWS = 200  # of a motion, if no output step is given
-_HALVINGS = 30  # of a step that fails
+_STALLED = 4  # runs in which the error of the tip is to halve at least once
+
+TIP_TOLERANCE = 5e-4
+"""Default of the largest error of the tip, relative to the reach of the robot."""
+
+MOST_STEPS = 400_000
+"""Most steps of one run that is refined for a tolerance."""
 
 
 def simulate(
@@ -63,9 +70,11 @@ def simulate(
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
         mass_damping: Rayleigh's factor of the mass [1/s].
-        time_step: Length of each step [s]; by default 1 ms.
-        output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
-        tolerance: Largest error of the tip [m]; not used by fixed steps.
+        time_step: Length of each step [s]; None: chosen so that the tip stays within the tolerance, see
+            `softrobots.dynamics.step_control`.
+        output_step: Time between two rows of the result [s]; by default 200 rows or a few less.
+        tolerance: Largest error of the tip at any time of the run [m], by default 5e-4 of the robot's reach. It is measured:
+            the run is repeated with every step halved until the difference says that it is met, see `Motion.tip_error`.
         motors: "prescribed": they move as `q_motors` says; "torque": motor joints move by `torque`, from where `start` has
             them, or else from where `q_motors` begins; it may be None after a start. Muscles follow `q_motors`.
         torque: Controller for motors="torque": a function of time, and positions and velocities of the motor joints, each shape
@@ -75,12 +84,14 @@ def simulate(
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
-        The motion; the first row is the start, the last one the end.
+        The motion; the first row is the start, the last one the end. Ctrl-C ends the simulation early with what there is
+        (`Motion.interrupted`).
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range.
         NameNotFound: If a frame does not exist.
-        NotConverged: If no step from a state succeeds, however small; `best` is the motion up to there.
+        NotConverged: If no step from a state succeeds, however short, or the tolerance cannot be met; `best` is the motion that
+            was reached.
     """
     check_model(model)
     end = positive_number("duration", duration, "s")
@@ -96,52 +107,88 @@ def simulate(
     alpha = non_negative_number("mass_damping", mass_damping, "1/s")
     beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
     first = _first_state(model, start, path, 0 if drive is None else drive.count)
-    h = 1e-3 if time_step is None else positive_number("time_step", time_step, "s")
-    grid = np.append(h * np.arange(math.ceil(end / h - 1e-9)), end)
-    if drive is not None:
-        grid = drive.with_samples(grid)
-    between = h * math.ceil(end / h / _ROWS) if output_step is None else positive_number("output_step", output_step, "s")
-    rows = np.append(between * np.arange(math.ceil(end / between - 1e-9)), end)
+    h = None if time_step is None else positive_number("time_step", time_step, "s")
+    if h is not None and tolerance is not None:
+        raise ParameterError("tolerance", tolerance, "None with a given time_step, whose error is not measured")
+    largest = TIP_TOLERANCE * model.reach if tolerance is None else positive_number("tolerance", tolerance, "m")
+    between = end / _ROWS if h is None else h * math.ceil(end / h / _ROWS - 1e-9)
+    between = between if output_step is None else positive_number("output_step", output_step, "s")
     with one_blas_thread(model.n_springs):
         drives = None if drive is None else model.actuators.drives
         equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, alpha), drives)
-        rule = MidpointRule(equations, path, load, drive)
-        recorder = Recorder(rule, first, rows)
-        interrupted = False
-        try:
-            for _ in with_progress(_follow(rule, recorder, grid), progress, label="motion", unit="row", total=len(rows)):
-                pass
-        except KeyboardInterrupt:
-            interrupted = True
-        except _NoStep as error:
-            raise NotConverged(
-                str(error), best=recorder.motion(damping_time=beta), residual=math.inf, iterations=len(recorder.times) - 1
-            ) from None
-        return recorder.motion(damping_time=beta, interrupted=interrupted)
+
+        def new_run() -> Recorder:
+            controller = None if drive is None else MotorTorque(model, torque, sample_time)
+            return Recorder(MidpointRule(equations, path, load, controller), first, _grid(end, between))
+
+        if h is not None:
+            return _fixed(new_run(), _grid(end, h) if drive is None else drive.with_samples(_grid(end, h)), beta, progress)
+        breaks = np.unique(np.concatenate([[end], path.breaks, load.breaks]))
+        return _controlled(new_run, breaks if drive is None else drive.with_samples(breaks), largest, beta, progress)
 
 
-class _NoStep(Exception):
-    """No step succeeds from a state."""
+def _fixed(run: Recorder, grid: FloatArray, damping_time: float | None, progress: bool | str) -> Motion:
+    """Motion with given steps."""
+    interrupted = _go(run, follow(run, grid), damping_time, progress, "motion")
+    return run.motion(damping_time=damping_time, interrupted=interrupted)
 
 
-def _follow(rule: MidpointRule, recorder: Recorder, grid: FloatArray) -> Iterator[int]:
-    """Step through a grid of times; yield after each row of the output."""
-    done = 0
-    for time in grid[1:].tolist():
-        targets = [time]
-        while targets:
-            step = rule.step(recorder.state, targets[-1])
-            if step is not None:
-                recorder.add(step)
-                targets.pop()
-            elif len(targets) > _HALVINGS:
-                now, least = recorder.state.time, targets[-1] - recorder.state.time
-                raise _NoStep(f"no step from t = {now:.6g} s succeeds, down to {least:.3g} s")
-            else:
-                rule.forget()
-                targets.append(0.5 * (recorder.state.time + targets[-1]))
-        yield from range(done, recorder.rows)
-        done = recorder.rows
+def _controlled(
+    new_run: Callable[[], Recorder], breaks: FloatArray, tolerance: float, damping_time: float | None, progress: bool | str
+) -> Motion:
+    """Motion with steps for a tolerance of the tip."""
+    facts: dict[str, Any] = {"damping_time": damping_time, "tolerance": tolerance, "tip_error": None}
+    run, history = new_run(), [math.inf]
+    if _go(run, choose(run, breaks, tolerance), damping_time, progress, "motion"):
+        return run.motion(**facts, interrupted=True)
+    while True:
+        finer = new_run()
+        grid = halved(np.array(run.times))
+        if _go(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps"):
+            return run.motion(**facts, interrupted=True)
+        errors = tip_errors(run, finer)
+        history.append(float(errors.max()))
+        facts["tip_error"] = history[-1]
+        if history[-1] <= tolerance:
+            return finer.motion(**facts)
+        if len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]:
+            why = "halving the steps brings the runs no closer, as in chaotic motion"
+        elif (needed := len(finer.times) * 2 ** math.ceil(0.5 * math.log2(history[-1] / tolerance))) > MOST_STEPS:
+            why = f"about {needed} would be needed, {MOST_STEPS} are the most"
+        else:
+            run = finer
+            continue
+        within = float(run.times[int(np.argmax(errors > tolerance)) - 1])
+        raise NotConverged(
+            f"the tip is known to {history[-1]:.3g} m, required {tolerance:.3g} m, with {len(finer.times) - 1} steps: {why}. "
+            f"It is within the tolerance until t = {within:.4g} s of {run.duration:.4g} s. A shorter duration, a larger "
+            f"tolerance or more damping may help, or a given time_step; `best` is the last run",
+            best=finer.motion(**facts),
+            residual=history[-1],
+            iterations=len(history),
+        )
+
+
+def _go(run: Recorder, steps: Iterable[int], damping_time: float | None, progress: bool | str, label: str) -> bool:
+    """Take all steps of a run; return whether Ctrl-C ended it.
+
+    Raises:
+        NotConverged: If no step from a state succeeds; `best` is the motion up to there.
+    """
+    try:
+        for _ in with_progress(steps, progress, label=label, unit="row", total=run.count):
+            pass
+    except KeyboardInterrupt:
+        return True
+    except NoStep as error:
+        best = run.motion(damping_time=damping_time)
+        raise NotConverged(str(error), best=best, residual=math.inf, iterations=len(run.times) - 1) from None
+    return False
+
+
+def _grid(end: float, step: float) -> FloatArray:
+    """Times from zero to the end, `step` apart, the last one nearer if need be, shape (n,) [s]."""
+    return np.append(step * np.arange(math.ceil(end / step - 1e-9)), end)
 
 
 def _first_state(model: SoftModel, start: Any, path: MotorPath, free: int) -> State:

@@ -1,0 +1,148 @@
+r"""Lengths of the steps of a simulation: given, or chosen so that the tip stays within a tolerance over the whole run.
+
+*The first grid.* Midpoint steps turn a vibration of frequency :math:`\omega` too slowly, by the phase
+:math:`\omega^3 h^2 t / 12` over a time t (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2006, section I.1.4). On
+the path p of the tip that is a drift of :math:`h^2 |p'''| / 12` per time. Steps come in blocks of equal length, after which it
+is measured from third differences; a block that drifts too fast is taken again with shorter steps. The path is smoothed by (1,
+2, 1) / 4 first, which removes what alternates from step to step: vibrations far above the frequency of the steps, which move
+the tip by no more than their small amplitude. Steps end where loads jump or motors stop, and where a spring is at a knee of
+its law.
+
+*The certificate.* The run is repeated with every step halved. As the scheme is of second order, the finer run has a third of
+the difference of both tip paths as its error. That is repeated until the error is within the tolerance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import SoftRobotsError
+from softrobots.dynamics.midpoint import Step
+from softrobots.dynamics.recorder import Recorder
+
+_BLOCK = 6  # steps between two measurements of the drift
+_LONGEST = 1 / 200  # of the duration: no first step is longer
+_SHORTEST = 1 / 200_000  # of the duration: none is chosen shorter
+_QUIET = 2e-5  # of the tolerance: a block with less drift than this in each step is fine enough
+_COARSER = 4.0  # error of the first run over the tolerance, which that of half its steps meets
+_FADING = 0.9  # of the measured drift, from block to block
+_HALVINGS = 30  # of a step that fails
+
+
+class NoStep(SoftRobotsError):
+    """No step from a state succeeds, however short."""
+
+
+def follow(recorder: Recorder, grid: FloatArray) -> Iterator[int]:
+    """Step through a grid of times; yield once for each row of the output.
+
+    Raises:
+        NoStep: If no step succeeds.
+    """
+    for time in grid[1:].tolist():
+        yield from _advance(recorder, time)
+
+
+def choose(recorder: Recorder, breaks: FloatArray, tolerance: float) -> Iterator[int]:
+    """Step to the last row with steps for a tolerance of the tip [m], see the module; yield once for each row.
+
+    Args:
+        recorder: The run, at its start.
+        breaks: Times at which inputs have a jump or a kink, ascending, shape (n,) [s].
+        tolerance: Largest drift of the tip over the whole run [m].
+
+    Raises:
+        NoStep: If no step succeeds.
+    """
+    duration, now = recorder.duration, recorder.state.time
+    h, drift = _LONGEST * duration / 8.0, 0.0
+    for stop in [*(time for time in breaks.tolist() if 0.0 < time < duration), duration]:
+        recorder.rule.forget()
+        while now < stop:
+            mark, steps = recorder.mark(), math.ceil((stop - now) / h - 1e-9)
+            if steps > _BLOCK:
+                steps = _BLOCK * math.ceil(steps / _BLOCK)
+            length, taken = (stop - now) / steps, min(steps, _BLOCK)
+            for number in range(1, taken + 1):
+                end = stop if number == steps else now + number * length
+                yield from _advance(recorder, end, to_knees=True)
+                if recorder.state.time < end:  # at a knee
+                    break
+            measured = _drift(recorder)
+            allowed = _COARSER * tolerance * max(length / duration, _QUIET)
+            if measured is not None and measured > 2.0 * allowed and length > _SHORTEST * duration:
+                h = length * max(0.125, 0.5 ** math.ceil(0.5 * math.log2(measured / allowed)))
+                if taken == _BLOCK:
+                    recorder.reset(mark)
+                    continue
+            elif measured is not None:
+                drift = max(_FADING * drift, measured / length**3)
+                if 8.0 * drift * length**3 < allowed and length > 0.5 * h:
+                    h = min(2.0 * h, _LONGEST * duration)
+            now = recorder.state.time
+
+
+def halved(grid: FloatArray) -> FloatArray:
+    """The grid with the middle of each step added, shape (2 n - 1,)."""
+    finer: FloatArray = np.zeros(2 * len(grid) - 1)
+    finer[::2], finer[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
+    return finer
+
+
+def tip_errors(coarse: Recorder, fine: Recorder) -> FloatArray:
+    """Error of the tip in the finer of two runs at the steps of the coarser one, shape (n,) [m]."""
+    places = np.searchsorted(fine.times, coarse.times)
+    return np.asarray(np.linalg.norm(np.array(coarse.tips) - np.array(fine.tips)[places], axis=1) / 3.0)
+
+
+def _advance(recorder: Recorder, end: float, *, to_knees: bool = False) -> Iterator[int]:
+    """Take a step to a time, or several shorter ones if it fails; or to the first knee before that time."""
+    targets = [end]
+    while targets:
+        step = recorder.rule.step(recorder.state, targets[-1])
+        knee = _first_knee(recorder, step) if to_knees and step is not None else None
+        if step is not None and knee is None:
+            yield from range(recorder.add(step))
+            targets.pop()
+        elif len(targets) > _HALVINGS:
+            now = recorder.state.time
+            raise NoStep(f"no step from t = {now:.6g} s succeeds, down to a length of {targets[-1] - now:.3g} s")
+        elif knee is not None:
+            targets = [knee]
+        else:
+            recorder.rule.forget()
+            targets.append(0.5 * (recorder.state.time + targets[-1]))
+
+
+def _first_knee(recorder: Recorder, step: Step) -> float | None:
+    """First time well within a step at which a spring reaches or leaves the plateau of its law [s]; None: none does."""
+    equations = recorder.rule.equations
+    springs, m = equations.model.springs, equations.n_motors
+    if not springs.has_plateaus:
+        return None
+    before, after = (springs.beyond_plateaus(state.x[m:]) for state in (step.start, step.end))
+    times = [step.end.time]
+    for hinge in np.flatnonzero((before < 0.0) != (after < 0.0)).tolist():
+        low, high = step.start.time, step.end.time
+        while high - low > 1e-3 * step.length:
+            middle = 0.5 * (low + high)
+            same = (springs.beyond_plateaus(step.at(middle)[0][m:])[hinge] < 0.0) == (before[hinge] < 0.0)
+            low, high = (middle, high) if same else (low, middle)
+        if low > step.start.time + 0.01 * step.length:
+            times.append(high)
+    first = min(times)
+    return first if first < step.end.time - 0.01 * step.length else None
+
+
+def _drift(recorder: Recorder) -> float | None:
+    """Drift of the tip in each of the last steps [m], from third differences; None if they are not equally long."""
+    lengths = np.diff(recorder.times[-_BLOCK - 1 :])
+    if len(lengths) < _BLOCK or np.ptp(lengths) > 1e-6 * lengths.max():
+        return None
+    tips = np.array(recorder.tips[-_BLOCK - 1 :])
+    smoothed = 0.25 * (tips[:-2] + 2.0 * tips[1:-1] + tips[2:])
+    return float(np.linalg.norm(np.diff(smoothed, 3, axis=0), axis=1).max()) / 12.0
