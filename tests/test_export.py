@@ -5,6 +5,7 @@ Oracles are MuJoCo's and Drake's own kinematics, mass matrices and static torque
 
 from __future__ import annotations
 
+import importlib
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
@@ -441,6 +442,71 @@ def test_a_file_says_what_it_is() -> None:
     odd = sr.load_model(BRANCHED.replace('name="foreign"', 'name="a--b"'), springs=SPRINGS, tip="finger")
     for text in (to_mjcf(odd), to_sdf(odd)):
         assert ElementTree.fromstring(text) is not None  # a comment may not hold two hyphens
+
+
+# --- Vibration
+
+
+def slopes(balance: Callable[[np.ndarray], np.ndarray], at: np.ndarray) -> np.ndarray:
+    """Derivative of forces, column by column: central differences of sixth order, 1e-12 of the largest by steps of 0.01."""
+
+    def column(way: np.ndarray) -> np.ndarray:
+        parts = ((45.0, 1), (-9.0, 2), (1.0, 3))
+        return sum(c * (balance(at + n * way) - balance(at - n * way)) for c, n in parts) / 60.0
+
+    return np.array([column(0.01 * unit) / 0.01 for unit in np.eye(len(at))]).T
+
+
+def assert_same_modes(modes: sr.VibrationModes, mass: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> None:
+    """Frequencies, and eigenvalues of the damped motion, of another tool's matrices in the order of our springs, to 1e-8."""
+    eigh = importlib.import_module("scipy.linalg").eigh
+    squares = eigh(0.5 * (stiffness + stiffness.T), mass, eigvals_only=True)
+    assert np.allclose(2.0 * np.pi * modes.frequencies, np.sqrt(squares), rtol=1e-8, atol=0)
+    assert np.allclose(modes.mass_matrix, mass, rtol=0, atol=1e-10 * np.abs(mass).max())
+    assert np.allclose(modes.stiffness_matrix, stiffness, rtol=0, atol=1e-8 * np.abs(stiffness).max())
+    count = len(mass)
+    motion = np.block([
+        [np.zeros((count, count)), np.eye(count)],
+        [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)],
+    ])  # fmt: skip
+    theirs, ours = np.linalg.eigvals(motion), modes.eigenvalues
+    if count < 10:  # eigenvalues of larger matrices like this one are less exact
+        assert max(np.abs(theirs - one).min() / abs(one) for one in ours) < 1e-8
+
+
+def test_mujocos_linearisation_has_the_same_modes(tool: Tool, case: Case) -> None:
+    """Its mass matrix, differences of its forces and its damping."""
+    robot, found = InMujoco(tool("mujoco"), welded_mjcf(case)), equilibrium(case)
+    names = list(case.model.spring_joints)
+    dofs, force = robot.dofs(names), np.array(case.force, dtype=float)
+
+    def balance(springs: np.ndarray) -> np.ndarray:
+        robot.put(dict(zip(names, springs.tolist(), strict=True)))
+        forces = robot.data.qfrc_bias - robot.data.qfrc_passive - robot.jacobian(case.model.tip).T @ force
+        return np.asarray(forces[dofs])
+
+    stiffness = slopes(balance, found.q_springs)
+    balance(found.q_springs)
+    damping = np.diag(robot.model.dof_damping[dofs])
+    assert_same_modes(sr.vibration_modes(case.model, found), robot.mass()[np.ix_(dofs, dofs)], stiffness, damping)
+
+
+@pytest.mark.parametrize("name", ["arm", "tensions"])
+def test_drakes_linearisation_has_the_same_modes(tool: Tool, name: str) -> None:
+    tool("pydrake")
+    case = case_of(name)
+    robot, found = InDrake(welded_sdf(case), case.gravity), equilibrium(case)
+    names = list(case.model.spring_joints)
+    dofs, force = robot.dofs(names), np.array(case.force, dtype=float)
+
+    def balance(springs: np.ndarray) -> np.ndarray:
+        robot.put(dict(zip(names, springs.tolist(), strict=True)))
+        return -robot.balance(case.model.tip, force)[dofs]
+
+    stiffness = slopes(balance, found.q_springs)
+    balance(found.q_springs)
+    damping = np.diag([float(robot.plant.GetJointByName(joint).default_damping_vector()[0]) for joint in names])
+    assert_same_modes(sr.vibration_modes(case.model, found), robot.mass()[np.ix_(dofs, dofs)], stiffness, damping)
 
 
 # --- Damping

@@ -31,7 +31,7 @@ from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 
-_SAME = 1e-9  # frequencies this close, relative, are one: a round robot vibrates in any direction across itself
+_SAME = 1e-7  # frequencies this close, relative, are one: robots are round but for their tiny links
 _NO_MOTION = 1e-6  # of the largest motion of the tip
 
 

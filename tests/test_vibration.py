@@ -1,0 +1,243 @@
+"""Vibration modes and linear models, against closed forms, the full equations of motion, and python-control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import softrobots as sr
+from softrobots.dynamics.damping import damping_matrix
+from softrobots.dynamics.equations import EquationsOfMotion
+from tests.support.law_robots import model
+
+LENGTH, BENDING, DENSITY = 0.6, 0.8, 0.3  # [m], [N m^2], [kg/m]
+
+
+def rod(sections: int, chain: str, tip_mass: float = 0.0) -> sr.SoftModel:
+    """A thin rod, so that turning its sections takes no part, and one that does not stretch; clamped, upright."""
+    made = sr.PccArm(
+        segment_lengths=(LENGTH,),
+        muscle_azimuths=(),
+        bending_stiffness=BENDING,
+        torsional_stiffness=0.5,
+        axial_stiffness=1e5,
+        linear_density=DENSITY,
+        radius=1e-3,
+        chain=chain,
+        elastic_sections=sections,
+        hinges=sections,
+        damping_time=0.01,
+    )
+    ball = (
+        '<joint name="ball_joint" type="fixed"><parent link="tip"/><child link="ball"/></joint><link name="ball"><inertial>'
+        f'<mass value="{tip_mass}"/><inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    )
+    text = made.urdf()
+    return sr.load_model(text.replace("</robot>", f"{ball}</robot>") if tip_mass else text, tip="tip")
+
+
+def rod_frequencies(tip_mass: float) -> np.ndarray:
+    """First three of a clamped rod with a mass at its end: `1 + cos b cosh b + mu b (cos b sinh b - sin b cosh b) = 0` [Hz].
+
+    Blevins, Formulas for Natural Frequency and Mode Shape, 1979, tables 8-1 and 8-8.
+    """
+    share = tip_mass / (DENSITY * LENGTH)
+
+    def closed_form(b: float) -> float:  # over cosh b
+        return float(1.0 / np.cosh(b) + np.cos(b) + share * b * (np.cos(b) * np.tanh(b) - np.sin(b)))
+
+    grid = np.linspace(0.2, 9.0, 200)
+    signs = [closed_form(b) for b in grid]
+    roots = [brentq(closed_form, grid[i], grid[i + 1]) for i in range(199) if signs[i] * signs[i + 1] < 0.0]
+    return np.array(roots[:3]) ** 2 * np.sqrt(BENDING / (DENSITY * LENGTH**4)) / (2.0 * np.pi)
+
+
+@pytest.mark.parametrize("tip_mass", [0.0, 0.09])
+def test_a_clamped_rod_without_a_mass_has_the_roots_of_the_textbook(tip_mass: float) -> None:
+    roots = 2.0 * np.pi * rod_frequencies(0.0) * np.sqrt(DENSITY * LENGTH**4 / BENDING)
+    assert np.sqrt(roots) == pytest.approx([1.8751, 4.6941, 7.8548], abs=5e-5)
+    assert np.all(rod_frequencies(tip_mass) <= rod_frequencies(0.0))
+
+
+@pytest.mark.parametrize("tip_mass", [0.0, 0.09])
+@pytest.mark.parametrize(("chain", "largest"), [("sections", 0.05), ("lumped", 5e-4)])
+def test_a_clamped_rod_rings_at_its_closed_form_frequencies(chain: str, largest: float, tip_mass: float) -> None:
+    """Three frequencies, each twice, at 16 sections; errors of both signs fall with their length."""
+    exact, errors = np.repeat(rod_frequencies(tip_mass), 2), []
+    for sections in (8, 16):
+        robot = rod(sections, chain, tip_mass)
+        modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, ()))
+        across = np.linalg.norm(modes.tip_shapes[:2], axis=0)
+        bending = modes.frequencies[across > 1e3 * np.abs(modes.tip_shapes[2])][:6]
+        errors.append(np.abs(bending / exact - 1.0).max())
+        plain = modes.damping_ratios[:4] / (0.01 * np.pi * modes.frequencies[:4])
+        assert plain == pytest.approx(1.0, rel=1e-7)  # zeta = beta omega / 2 of a material with one damping time
+    assert errors[1] < largest
+    assert errors[0] / errors[1] > 2.0
+
+
+def test_modes_of_a_round_rod_come_in_pairs_along_its_axes() -> None:
+    robot = rod(6, "sections")
+    modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, (), gravity=sr.EARTH_GRAVITY))
+    for first in (0, 2):
+        assert modes.frequencies[first] == pytest.approx(modes.frequencies[first + 1], rel=1e-7)  # but for its tiny links
+        one, other = modes.tip_shapes[:3, first], modes.tip_shapes[:3, first + 1]
+        assert min(one[0], other[1]) > 0.0
+        assert np.abs([one[1], one[2], other[0], other[2]]).max() < 1e-6 * one[0]
+
+
+@pytest.mark.parametrize(
+    ("motors", "expected"), [((0, 0, 0), (3.504, 3.504, 18.66, 18.66)), ((0.3, 0.6, -0.8), (3.715, 3.869, 15.23, 16.82))]
+)
+def test_the_arm_of_the_paper(motors: tuple[float, ...], expected: tuple[float, ...]) -> None:
+    """Frequencies of an independent prototype, to the digits that it printed."""
+    arm = model("arm")
+    modes = sr.vibration_modes(arm, sr.solve_equilibrium(arm, motors, gravity=sr.EARTH_GRAVITY))
+    assert modes.frequencies == pytest.approx(expected, rel=4e-4)
+    assert modes.damping_ratios == pytest.approx(
+        np.einsum("ij,ij->j", modes.shapes, modes.shapes) / (4 * np.pi * modes.frequencies)
+    )
+
+
+SPRINGS = {"s0": 100.0, "s1": 200.0, "s2": 300.0}
+
+
+def slides(body: str) -> str:
+    """A body on three slides along x, y and z, with `SPRINGS`."""
+    parts = []
+    for i, axis in enumerate(("1 0 0", "0 1 0", "0 0 1")):
+        parts.append(
+            f'<link name="l{i + 1}"/><joint name="s{i}" type="prismatic"><parent link="l{i}"/><child link="l{i + 1}"/>'
+        )
+        parts.append(f'<axis xyz="{axis}"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>')
+    fixed = '<joint name="f" type="fixed"><parent link="l3"/><child link="body"/></joint>'
+    return f'<robot name="slides"><link name="l0"/>{"".join(parts)}{body}{fixed}</robot>'
+
+
+def test_effective_masses_sum_to_the_mass_that_shakes() -> None:
+    """A body on three slides gives way as a whole: its mass, in each direction; a rod on end: what does not move is missing."""
+    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    body = f'<link name="body"><inertial><origin xyz="0.1 0.2 0.3"/><mass value="1.7"/>{inertia}</inertial></link>'
+    robot = sr.load_model(slides(body), springs=SPRINGS, tip="body")
+    modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, ()))
+    assert np.allclose(modes.effective_masses[:, :3], 1.7 * np.eye(3), rtol=1e-12, atol=1e-15)
+    assert modes.frequencies == pytest.approx(np.sqrt(np.array([100.0, 200.0, 300.0]) / 1.7) / (2.0 * np.pi), rel=1e-13)
+    shares = []
+    for sections in (8, 32):
+        upright = rod(sections, "sections")
+        made = sr.vibration_modes(upright, sr.solve_equilibrium(upright, ())).effective_masses
+        first = made[:2, :2].sum() / (2.0 * DENSITY * LENGTH)
+        assert first == pytest.approx(0.6131, rel=0.3 / sections**2 + 2e-4)  # of the first bending mode, Blevins table 8-1
+        shares.append(1.0 - made[:, 0].sum() / (DENSITY * LENGTH))
+    assert 0.0 < shares[1] < 0.3 * shares[0] < 0.05
+
+
+def test_stiff_servos_hold_and_soft_ones_do_not() -> None:
+    """One motor, one spring, in closed form: two inertias on two springs, `det(K - w^2 M) = 0`."""
+    arm = model("arm")
+    found = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY)
+    held = sr.vibration_modes(arm, found)
+    stiff = sr.vibration_modes(arm, found, servo_stiffness=1e9)
+    assert stiff.frequencies[:4] == pytest.approx(held.frequencies, rel=1e-6)
+    soft = sr.vibration_modes(arm, found, servo_stiffness=(500.0, 1000.0, 2000.0), rotor_inertia=0.02)
+    assert (soft.shapes.shape, soft.motor_shapes.shape) == ((4, 7), (3, 7))
+    assert np.all(soft.frequencies[:4] < held.frequencies)
+    moved = np.concatenate([soft.motor_shapes, soft.shapes])
+    assert np.allclose(moved.T @ soft.mass_matrix @ moved, np.eye(7), atol=1e-12)
+    assert np.allclose(soft.stiffness_matrix[3:, 3:], found.tangent_stiffness)
+    bare = sr.vibration_modes(arm, found, servo_stiffness=(500.0, 1000.0, 2000.0), rotor_inertia=0.0)
+    assert np.allclose(soft.mass_matrix - bare.mass_matrix, np.diag([0.02] * 3 + [0.0] * 4), atol=1e-15)
+
+
+REFUSED: list[tuple[dict[str, Any], dict[str, Any], type[Exception], str]] = [
+    ({"wrench": (0, 0, 0, 1, 0, 0)}, {}, sr.ParameterError, "world-fixed moment modes are not orthogonal"),
+    ({}, {"servo_stiffness": (1.0, 2.0)}, sr.ParameterError, r"shape \(3,\)"),
+    ({}, {"servo_stiffness": -1.0}, sr.ParameterError, "zero or positive"),
+    ({}, {"rotor_inertia": 1.0}, sr.ParameterError, "left out without servo_stiffness"),
+    ({}, {"damping_time": -1.0}, sr.ParameterError, "zero or positive"),
+    ({}, {"mass_damping": np.nan}, sr.ParameterError, "finite"),
+    ({}, {"servo_stiffness": 0.0}, sr.NeutralEquilibrium, "mode without frequency"),
+]
+
+
+@pytest.mark.parametrize(("load", "options", "error", "told"), REFUSED)
+def test_what_has_no_modes_is_refused(load: dict[str, Any], options: dict[str, Any], error: type[Exception], told: str) -> None:
+    arm = model("arm")
+    found = sr.solve_equilibrium(arm, (0.1, 0.2, 0.3), **load)
+    with pytest.raises(error, match=told):
+        sr.vibration_modes(arm, found, **options)
+
+
+def test_an_unstable_equilibrium_and_massless_springs_are_refused_but_can_be_linearised() -> None:
+    robot = rod(4, "sections")
+    pushed = sr.solve_equilibrium(robot, (), (0, 0, -2.0 * BENDING * np.pi**2 / (4 * LENGTH**2)), method="fixed_point")
+    assert not pushed.stable
+    with pytest.raises(sr.ParameterError, match="stable, with its servos"):
+        sr.vibration_modes(robot, pushed)
+    assert np.linalg.eigvals(sr.linearize(robot, pushed).A).real.max() > 1.0
+    bare = sr.load_model(slides('<link name="body"/>'), springs=SPRINGS, tip="body")
+    for ask in (sr.vibration_modes, sr.linearize):
+        with pytest.raises(sr.DescriptionError, match="moves no mass"):
+            ask(bare, sr.solve_equilibrium(bare, ()))
+
+
+# --- Linear models
+
+
+@pytest.mark.parametrize("kind", ["arm", "pcc", "pulled", "pcc_lumped", "helix", "mounted"])
+def test_a_linear_model_is_the_derivative_of_the_full_equations_of_motion(kind: str) -> None:
+    """Central differences of `EquationsOfMotion.balance` in positions, rates and accelerations; 1e-7 of its largest entry."""
+    robot, random = model(kind), np.random.default_rng(5)
+    found = sr.solve_equilibrium(robot, robot.relaxed_motors, (0.3, 0.1, -0.2), gravity=sr.EARTH_GRAVITY)
+    equations = EquationsOfMotion(robot, sr.EARTH_GRAVITY, damping_matrix(robot, 0.02))
+    wrenches = {robot.tip: np.array([0.3, 0.1, -0.2, 0.0, 0.0, 0.0])}
+    at, count = np.concatenate([found.q_motors, found.q_springs]), robot.n_motors + robot.n_springs
+    scale = np.concatenate([robot.motor_scale, np.ones(robot.n_springs)])
+    placed = robot.n_motors - (len(robot.muscles) if robot.muscle_input == "forces" else 0)
+    for driven in ("prescribed", "torque"):
+        linear = sr.linearize(robot, found, motors=driven, damping_time=0.02)
+        way, rates = random.normal(size=count) * scale, random.normal(size=count) * scale
+        rates[placed : robot.n_motors] = 0.0
+        kept = np.r_[:placed, robot.n_motors : count]
+        inputs = np.concatenate([random.normal(size=placed), way[placed : robot.n_motors], np.zeros(3)])
+        states = np.concatenate([way[kept], rates[kept]])
+        accelerations = np.zeros(count)
+        accelerations[kept] = (linear.A @ states + linear.B @ inputs)[len(kept) :]
+        sides = [equations.balance(at + step * way, step * rates, step * accelerations, wrenches) for step in (1e-6, -1e-6)]
+        slope = (sides[0] - sides[1]) / 2e-6
+        size = np.abs(robot.stiffness).max() * np.abs(way).max() + np.abs(accelerations).max()
+        assert np.abs(slope[robot.n_motors :]).max() < 1e-7 * size
+        outputs = linear.C @ states + linear.D @ inputs
+        exerted = inputs[:placed] if driven == "torque" else -outputs[6:]
+        assert np.abs(slope[:placed] - exerted).max(initial=0.0) < 1e-7 * size
+
+
+def test_python_control_takes_it_and_steps_as_the_simulation(tool: Callable[[str], ModuleType]) -> None:
+    """A force of 1 mN on the tip: the step response, linear, and the full motion by steps of 1 ms differ by its square."""
+    control = tool("control")
+    arm = model("arm")
+    found = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY)
+    linear = sr.linearize(arm, found)
+    system = linear.state_space()
+    assert system.input_labels == list(linear.input_names)
+    assert system.state_labels == list(linear.state_names)
+    plain = control.ss(*linear)
+    assert np.array_equal(plain.A, linear.A)
+    assert np.array_equal(plain.D, linear.D)
+    time = np.linspace(0.0, 0.5, 251)
+    force = 1e-3
+    place = linear.input_names.index("tip_force_z")
+    moved = sr.simulate(
+        arm, 0.5, (0.3, 0.6, -0.8), start=found, force=(0, 0, force), gravity=sr.EARTH_GRAVITY, time_step=1e-3, output_step=2e-3
+    )
+    response = control.step_response(system, T=time, input=place)
+    expected = force * np.asarray(response.outputs).reshape(len(linear.C), -1)
+    tip = (moved.tip_position - found.tip_position).T
+    assert np.abs(tip - expected[:3]).max() < 2e-3 * np.abs(expected[:3]).max()  # the scheme at 1 ms: (omega h)^2 / 12
+    torques = (moved.motor_torques - found.motor_torques).T
+    assert np.abs(torques - expected[6:])[:, 1:].max() < 2e-2 * np.abs(expected[6:]).max()
