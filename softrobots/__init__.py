@@ -26,6 +26,7 @@ from softrobots.core.errors import (
 )
 from softrobots.core.result_file import load_result, save_csv, save_result
 from softrobots.description.composition import mount
+from softrobots.dynamics.controllers import PD, ClosedLoop
 from softrobots.dynamics.damping import damping_time_from_decrement, measured_decay
 from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
 from softrobots.dynamics.linear_model import LinearModel, linearize
@@ -59,8 +60,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "EARTH_GRAVITY",
+    "PD",
     "ROBOTS",
     "AssumedStiffnessWarning",
+    "ClosedLoop",
     "ClusterError",
     "DescriptionError",
     "Equilibrium",

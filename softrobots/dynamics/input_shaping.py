@@ -30,6 +30,7 @@ from softrobots.core.checks import (
     refuse_where,
 )
 from softrobots.core.errors import ParameterError
+from softrobots.dynamics.time_inputs import curve
 
 SHAPERS = ("zv", "zvd", "ei")
 """Kinds of shapers: zero vibration, zero vibration and derivative, extra insensitive."""
@@ -161,7 +162,7 @@ def shape_input(
 
     Args:
         trajectory: A `Trajectory`, or anything with `times`, shape (n,) [s], and `q_motors`, shape (n, n_motors); between its
-            waypoints the motors follow cubic splines that begin and end at rest.
+            waypoints the motors follow cubic splines that begin and end at rest. The shaped path begins at time zero.
         modes: The modes, `VibrationModes`, or anything with `frequencies`, shape (n,) [Hz], and `damping_ratios`, shape (n,).
         shaper: "zv", "zvd" or "ei"; see `input_shaper`.
         numbers: Numbers of the modes to shape for, from 0. By default the lowest that matter: from the lowest upwards those in
@@ -175,7 +176,14 @@ def shape_input(
     Raises:
         ParameterError: If an argument is of another kind or out of range.
     """
-    path, times, motors = motor_path(trajectory)
+    times = increasing(
+        "trajectory.times", finite_array("trajectory.times", getattr(trajectory, "times", None), (None,), "s"), "s"
+    )
+    motors = finite_array("trajectory.q_motors", getattr(trajectory, "q_motors", None), (len(times), None), "rad")
+    if len(times) < 2:
+        raise ParameterError("trajectory.times", times, "at least two times")
+    times = times - times[0]
+    path = curve(times, motors)
     frequencies = finite_array("modes.frequencies", getattr(modes, "frequencies", None), (None,), "Hz")
     ratios = finite_array("modes.damping_ratios", getattr(modes, "damping_ratios", None), (len(frequencies),))
     if numbers is None:
@@ -197,30 +205,6 @@ def shape_input(
     delayed = [path(samples - t) for t in impulses.times]
     shaped = np.tensordot(impulses.amplitudes, delayed, axes=1).reshape(len(samples), motors.shape[1])
     return ShapedTrajectory(read_only(samples), read_only(shaped), impulses, chosen, path)
-
-
-def motor_path(trajectory: Any) -> tuple[Callable[[Any], FloatArray], FloatArray, FloatArray]:
-    """Return a trajectory as a function of time, cubic splines that begin and end at rest, with its times and motors.
-
-    Args:
-        trajectory: Anything with `times`, shape (n,) [s], and `q_motors`, shape (n, n_motors) [rad, m or N].
-
-    Returns:
-        The function, constant before and after; times, shape (n,) [s]; motor coordinates, shape (n, n_motors).
-
-    Raises:
-        ParameterError: If it has not both, fewer than two times, or times that do not increase.
-    """
-    from scipy.interpolate import CubicSpline
-
-    times = increasing(
-        "trajectory.times", finite_array("trajectory.times", getattr(trajectory, "times", None), (None,), "s"), "s"
-    )
-    motors = finite_array("trajectory.q_motors", getattr(trajectory, "q_motors", None), (len(times), None), "rad")
-    if len(times) < 2:
-        raise ParameterError("trajectory.times", times, "at least two times")
-    spline = CubicSpline(times, motors, bc_type="clamped")
-    return (lambda time: np.asarray(spline(np.clip(time, times[0], times[-1])))), times, motors
 
 
 def _modes(frequency: Any, damping_ratio: Any) -> tuple[FloatArray, FloatArray]:

@@ -34,7 +34,8 @@ class MotorPath:
         if isinstance(q_motors, Trajectory):
             if q_motors.model != model:
                 raise ParameterError("q_motors", q_motors.model, f"a Trajectory of the model given, {model!r}")
-            self._signal, self.breaks = _spline(q_motors)
+            times = q_motors.times - q_motors.times[0]
+            self._signal, self.breaks = curve(times, q_motors.q_motors), times[-1:]
         elif callable(q_motors):
             self._signal = checked_function("q_motors", q_motors, (model.n_motors,), "rad")
             for time in np.linspace(0.0, duration, 21).tolist():
@@ -164,13 +165,14 @@ def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
     return signal, times if len(times) <= _KINKS else times[1:][np.diff(times) == 0.0]
 
 
-def _spline(trajectory: Trajectory) -> tuple[Signal, FloatArray]:
-    """The path through the waypoints of a trajectory, and the times at which it starts and ends."""
-    times = trajectory.times - trajectory.times[0]
-    values, last = trajectory.q_motors, float(times[-1])
+def curve(times: FloatArray, values: FloatArray) -> Callable[[Any], FloatArray]:
+    """Return the cubic spline through values, shape (n, m), at times, shape (n,), at rest at both ends and constant beyond.
+
+    It takes a time, or several, shape (k,), and returns shape (m,), or (k, m).
+    """
     if len(times) == 1:
-        return lambda _: values[0], np.zeros(0)
+        return lambda time: np.broadcast_to(values[0], (*np.shape(time), values.shape[1]))
     from scipy.interpolate import CubicSpline
 
-    spline: Any = CubicSpline(times, values, bc_type="clamped")
-    return lambda time: np.asarray(spline(min(max(time, 0.0), last))), np.array([last])
+    spline = CubicSpline(times, values, bc_type="clamped")
+    return lambda time: np.asarray(spline(np.clip(time, times[0], times[-1])))
