@@ -78,7 +78,7 @@ PAGES = {
             *_top("simulate", "Motion", "dynamics.motion.MotionEnergy", "dynamics.motion.MotionState"),
             *_top("vibration_modes", "VibrationModes", "linearize", "LinearModel"),
             *_top("damping_time_from_decrement", "measured_decay"),
-            *_top("PD", "ClosedLoop", "dynamics.motor_torque"),
+            *_top("PD", "ClosedLoop"),
             *_top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),
         ),
     ),
