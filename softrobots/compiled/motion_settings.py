@@ -14,8 +14,8 @@ MOTION_CORRECTIONS = 30
 LEAST_PART = 2.0**-12
 """Smallest part of a step of time."""
 
-KEPT_STEPS = 4
-"""Number of earlier accelerations from which that of the next step is extrapolated."""
+KEPT_STEPS = 3
+"""Number of earlier middles of steps from which that of the next step is extrapolated."""
 
-EXTRAPOLATION = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0, -1.0, 0.0, 0.0, 3.0, -3.0, 1.0, 0.0, 4.0, -6.0, 4.0, -1.0)
-"""Their weights, the last one first: a row for each number of accelerations of equal steps, from none on."""
+EXTRAPOLATION = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, -1.0, 0.0, 3.0, -3.0, 1.0)
+"""Their weights, the last one first: a row for each number of equal steps before, from none on."""

@@ -195,6 +195,33 @@ class Screw:
         slopes = slopes + outer(w, vector([0.0, 0.0, c[3]])) + constants(np.eye(3)) * (w[2] * c[3])
         return np.concatenate([slopes * length, self._direction.reshape(3, 1)], axis=1)
 
+    def slopes(self) -> tuple[Vector, Vector]:
+        """Return velocity and angular velocity of the end per rate of a coordinate, in the axes of the start, shapes (3, 4)."""
+        return self._slopes(), np.concatenate([self._twists, constants(np.zeros((3, 1)))], axis=1)
+
+    def accelerations(self, rates: Sequence[Scalar]) -> tuple[Vector, Vector]:
+        """Return acceleration and angular acceleration of the end at constant rates, in the axes of the start, shapes (3,).
+
+        With `s = w . v` the Stumpff functions change by `d_k s`, and that by `e_k s^2 + d_k v . v`.
+        """
+        w, c, v = self._w, self._c, vector(rates[:3])
+        orders = range(3) if _is_zero(w[2]) else range(4)
+        d = [k * c[k + 2] - c[k + 1] for k in range(len(orders) + 2)]
+        slopes = [d[k] * (w @ v) for k in orders]
+        bends = [(k * d[k + 2] - d[k + 1]) * ((w @ v) * (w @ v)) + d[k] * (v @ v) for k in orders]
+        across, across_rate = vector([w[1], -w[0], 0.0]), vector([v[1], -v[0], 0.0])
+        first = vector([0.0, 0.0, slopes[1]]) + across * slopes[2] + across_rate * c[2]
+        second = vector([0.0, 0.0, bends[1]]) + across * bends[2] + across_rate * (slopes[2] * 2.0)
+        swing = cross(w, v)
+        turning = swing * slopes[2] + cross(v, swing) * c[3]
+        slope = d[3] * (w @ v)
+        turning = turning + cross(w, swing) * slope
+        if len(orders) == 4:
+            mixed = w * v[2] + v * w[2]
+            first = first + w * (w[2] * slope) + mixed * c[3]
+            second = second + w * (w[2] * bends[3]) + mixed * (slope * 2.0) + v * (v[2] * c[3] * 2.0)
+        return first * (rates[3] * 2.0) + second * self._length, turning
+
     def _curvature(self, local: Sequence[tuple[Vector, Vector, Scalar]]) -> Vector:
         r"""Second derivatives of `sum F . u` with respect to the section coordinates, shape (4, 4).
 

@@ -83,11 +83,11 @@ def element_kinds(plan: Plan) -> list[Kind]:
     unknowns = plan.unknowns
     groups: dict[Any, list[int]] = {}
     for row in range(unknowns.leading_motors, len(unknowns.chain.elements)):
-        groups.setdefault(_signature(unknowns, row), []).append(row)
+        groups.setdefault(element_signature(unknowns, row), []).append(row)
     return [_trace_kind(number, rows, plan) for number, rows in enumerate(groups.values())]
 
 
-def _signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
+def element_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     """Return the properties that elements with the same code share."""
     one = unknowns.traced(row)
     zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
@@ -214,14 +214,25 @@ def _store_tip_step(
 
 def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) -> TracedElement:
     """Return an element of a kind, with table entries for the numbers in which its elements differ."""
-    unknowns, layout = plan.unknowns, plan.layout
-    ones = [unknowns.traced(row) for row in rows]
-    first = ones[0]
-    unknown = iter(block.loads(0, max(len(first.moving), 1), "q"))
+    ones = [plan.unknowns.traced(row) for row in rows]
+    unknown = iter(block.loads(0, max(len(ones[0].moving), 1), "q"))
     coordinates = [
-        next(unknown) if place in first.moving or not first.moving else columns.entry([one.coordinates[place] for one in ones])
-        for place in range(len(first.coordinates))
+        next(unknown)
+        if place in ones[0].moving or not ones[0].moving
+        else columns.entry([one.coordinates[place] for one in ones])
+        for place in range(len(ones[0].coordinates))
     ]
+    return replace(
+        table_element(ones, columns),
+        mass_beyond=columns.entry([one.mass_beyond for one in ones]),
+        coordinates=coordinates,
+        rest=_relaxed(ones, block, plan.layout, columns),
+    )
+
+
+def table_element(ones: Sequence[TracedElement], columns: TableColumns) -> TracedElement:
+    """Return the first of the elements of a kind, with table entries for the numbers in which they differ."""
+    first = ones[0]
     return replace(
         first,
         rotation=columns.entries([one.rotation for one in ones]),
@@ -230,10 +241,7 @@ def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) ->
             (columns.entry([one.bodies[place][0] for one in ones]), columns.entries([one.bodies[place][1] for one in ones]))
             for place in range(len(first.bodies))
         ],
-        mass_beyond=columns.entry([one.mass_beyond for one in ones]),
-        coordinates=coordinates,
         stiffness=columns.entries([one.stiffness for one in ones]).tolist(),
-        rest=_relaxed(ones, block, layout, columns),
         muscles=[_muscle([one.muscles[place] for one in ones], columns) for place in range(len(first.muscles))],
         length=columns.entry([one.length for one in ones]),
     )

@@ -16,12 +16,12 @@ _COUNTS = ("unknowns", "full_damping", "prepared")  # no places for callers
 class MotionLayout:
     """Places in the workspace of a step of time, in this order.
 
-    `n` unknowns, `m` motor joints. Straight-line functions read motors, force, gravity, damping, time step, `unknown`, `rate`
+    `n` unknowns, `m` actuators. Straight-line functions read motors, force, gravity, damping, time step, `unknown`, `rate`
     and `acceleration`, and write `correction` and `tip`; all else is for the drivers.
     """
 
     motors: int
-    """Number of motor joints, whose positions in the middle of the step come first (m) [rad or m]."""
+    """Number of actuators, motor joints and then muscles; their coordinates in the middle of the step come first (m)."""
     unknowns: int
     """Number of unknown strains."""
     full_damping: bool = False
@@ -57,7 +57,7 @@ class MotionLayout:
     begin_velocity: int = field(init=False)
     """Their velocities there (n)."""
     history: int = field(init=False)
-    """Accelerations of the steps before, the last one first (`KEPT_STEPS`, n)."""
+    """The unknowns in the middle of the steps before, the last one first (`KEPT_STEPS`, n)."""
     weights: int = field(init=False)
     """Weights of those in the extrapolation (`KEPT_STEPS`)."""
     n_history: int = field(init=False)
@@ -115,4 +115,4 @@ class MotionPlan:
     @cached_property
     def layout(self) -> MotionLayout:
         """Places of the numbers of a case."""
-        return MotionLayout(self.unknowns.chain.n_motors, len(self.unknowns.strains), self.full_damping)
+        return MotionLayout(len(self.unknowns.chain.limits), len(self.unknowns.strains), self.full_damping)

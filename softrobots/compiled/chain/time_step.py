@@ -19,19 +19,23 @@ from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, lar
 def step_blocks(layout: MotionLayout) -> list[Block]:
     """Return the functions of an unknown `i`, and that of a motor `i`."""
     return [
-        _guess(layout, Block("guess_unknown", "Extrapolate an acceleration; place its unknown in the middle.", ("i",))),
+        _guess(layout, Block("guess_unknown", "Extrapolate the middle of an unknown, and its acceleration.", ("i",))),
         _apply(layout, Block("apply_correction", "Correct an acceleration, and its unknown in the middle.", ("i",))),
-        _finish(layout, Block("finish_unknown", "Go to the end of the step, and remember the acceleration.", ("i",))),
+        _finish(layout, Block("finish_unknown", "Go to the end of the step, and remember the middle.", ("i",))),
         _interpolate(layout, Block("interpolate_unknown", "Place an unknown at `SHARE` of the step taken last.", ("i",))),
         _place_motor(layout, Block("place_motor", "Place a motor at `SHARE` of the whole step.", ("i",))),
     ]
 
 
 def _guess(layout: MotionLayout, block: Block) -> Block:
-    acceleration: Scalar = 0.0
+    """Extrapolate the middle: accelerations of stiff springs change their sign from step to step, middles hardly change."""
+    h, velocity = block.load(layout.time_step), block.load(layout.velocity, "i")
+    coasting = block.load(layout.position, "i") + h * 0.5 * velocity
+    beyond: Scalar = 0.0
     for place in range(KEPT_STEPS):
         earlier = block.load(layout.history + place * layout.unknowns, "i")
-        acceleration = acceleration + earlier * block.load(layout.weights + place)
+        beyond = beyond + (earlier - coasting) * block.load(layout.weights + place)
+    acceleration = beyond * 4.0 / (h * h)
     block.store(layout.acceleration, acceleration, "i")
     return _place_middle(layout, block, acceleration)
 
@@ -63,7 +67,7 @@ def _finish(layout: MotionLayout, block: Block) -> Block:
     )
     block.store(layout.position, position + h * (velocity + h * 0.5 * acceleration), "i")
     block.store(layout.velocity, velocity + h * acceleration, "i")
-    block.store(layout.history, acceleration, "i")
+    block.store(layout.history, block.load(layout.unknown, "i"), "i")
     for place in range(1, KEPT_STEPS):
         block.store(layout.history + place * n, block.load(layout.history + (place - 1) * n, "i"), "i")
     return block

@@ -19,7 +19,7 @@ def has_settled(change: float, last: float) -> bool:
 
 
 def weigh_history(w: Array) -> None:
-    """Set the weights of the extrapolation; accelerations of steps of another length do not count."""
+    """Set the weights of the extrapolation; steps of another length do not count."""
     if fabs(w[TIME_STEP] - w[LAST_STEP]) > 1e-9 * w[TIME_STEP]:
         w[N_HISTORY] = 0.0
     row = 0
@@ -32,12 +32,19 @@ def weigh_history(w: Array) -> None:
 
 
 def settle_middle(w: Array) -> bool:
-    """Find the accelerations of a step; tell whether the corrections converge."""
+    """Find the accelerations of a step; tell whether the corrections converge.
+
+    The first correction takes the factors of the step before: those of the extrapolated point would have its forces, which are
+    wrong where stiff springs ring.
+    """
     for i in range(N):
         guess_unknown(w, i)
-    motion_factor(w)
+    if w[N_HISTORY] < 0.5:
+        motion_factor(w)
+    else:
+        motion_correct(w)
     last = 1e300
-    for _ in range(MOTION_CORRECTIONS):
+    for step in range(MOTION_CORRECTIONS):
         w[CHANGE] = 0.0
         for i in range(N):
             apply_correction(w, i)
@@ -46,7 +53,10 @@ def settle_middle(w: Array) -> bool:
         if w[CHANGE] > 1e3 * last:
             return False
         last = w[CHANGE]
-        motion_correct(w)
+        if step == 0:
+            motion_factor(w)
+        else:
+            motion_correct(w)
     return False
 
 

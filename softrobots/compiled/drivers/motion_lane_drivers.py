@@ -32,14 +32,15 @@ def lanes_to_settle(w: Array) -> float:
     return count
 
 
-def settle_middle_lanes(w: Array) -> None:
+def settle_middle_lanes(w: Array, n_history: int) -> None:
     """Find the accelerations of a step; mark the lanes that fail."""
     for i in range(N):
         guess_unknown_lanes(w, i)
-    motion_factor_lanes(w)
     fill_lanes(w, LAST_CHANGE, 1e300)
     for step in range(MOTION_CORRECTIONS):
-        if step > 0:
+        if step == 1 or step + n_history == 0:
+            motion_factor_lanes(w)
+        else:
             motion_correct_lanes(w)
         fill_lanes(w, CHANGE, 0.0)
         for i in range(N):
@@ -64,7 +65,7 @@ def motion_step_lanes(w: Array, length: float, n_history: int) -> None:
     for i in range(N_MOTORS):
         place_motor_lanes(w, i)
     motion_prepare_lanes(w)
-    settle_middle_lanes(w)
+    settle_middle_lanes(w, n_history)
     for i in range(N):
         finish_unknown_lanes(w, i)
 

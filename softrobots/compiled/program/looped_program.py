@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from softrobots.compiled.chain.constrained_segments import segment_blocks
@@ -41,21 +42,28 @@ class LoopedProgram:
         return "\n\n\n".join(texts if suffix else [*texts, TIP_CONTROL])
 
     def _loop(self, name: str, suffix: str) -> str:
-        # The bounds come from the workspace: compilers would unroll a loop whose length they know, for minutes.
-        place = " * LANES" if suffix else ""
         back = name.startswith("inward")
-        lines = [
-            f"def {name}_all{suffix}(w: Array) -> None:",
-            f'    """{_PASSES[name.removesuffix("_tip")]}"""',
-            "    i = N_ELEMENTS - 1" if back else "    i = 0",
-            f"    while i {'>=' if back else '<'} w[{'FIRST' if back else 'COUNT'}{place}]:",
-            "        kind = KIND[i]",
-        ]
-        word = "if"
-        for kind, call in self.calls[name]:
-            lines += [f"        {word} kind == {kind}:", f"            {call.replace('(', suffix + '(', 1)}"]
-            word = "elif"
-        return "\n".join([*lines, f"        i {'-' if back else '+'}= 1"])
+        return loop_text(name, _PASSES[name.removesuffix("_tip")], self.calls[name], back=back, suffix=suffix)
+
+
+def loop_text(name: str, purpose: str, calls: Sequence[tuple[int, str]], *, back: bool, suffix: str = "") -> str:
+    """Return the function of a pass: a loop over the elements that calls the function of the kind of each.
+
+    The bounds come from the workspace: compilers would unroll a loop whose length they know, for minutes.
+    """
+    place = " * LANES" if suffix else ""
+    lines = [
+        f"def {name}_all{suffix}(w: Array) -> None:",
+        f'    """{purpose}"""',
+        "    i = N_ELEMENTS - 1" if back else "    i = 0",
+        f"    while i {'>=' if back else '<'} w[{'FIRST' if back else 'COUNT'}{place}]:",
+        "        kind = KIND[i]",
+    ]
+    word = "if"
+    for kind, call in calls:
+        lines += [f"        {word} kind == {kind}:", f"            {call.replace('(', suffix + '(', 1)}"]
+        word = "elif"
+    return "\n".join([*lines, f"        i {'-' if back else '+'}= 1"])
 
 
 _PASSES = {

@@ -13,18 +13,23 @@ from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers, trigonometry
 from softrobots.compiled.drivers.lane_drivers import load_block, load_case
 from softrobots.compiled.program.generated_module import Program, functions_of, lane_count, text_of
+from softrobots.compiled.program.looped_motion_program import looped_motion
 from softrobots.compiled.program.manual import Place, motor_names, on_a_line, place_table, strain_names
 from softrobots.compiled.program.motion_parts import unrolled_motion
 from softrobots.compiled.statuses import Status
+from softrobots.core.errors import ParameterError
 
 _STATUSES = (Status.CERTIFIED, Status.UNSETTLED)
 
 
 def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False) -> Program:
     """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix."""
+    if unknowns.chain.constrained or (full_damping and not unknowns.is_unrolled):
+        what = "given muscle lengths" if unknowns.chain.constrained else "a damping matrix (mass_damping)"
+        raise ParameterError("model", unknowns.chain.name, f"a robot without {what}, to have its motion compiled")
     plan = MotionPlan(unknowns, full_damping)
     layout = plan.layout
-    parts = unrolled_motion(plan)
+    parts = unrolled_motion(plan) if unknowns.is_unrolled else looped_motion(plan)
     blocks = [*parts.blocks, *step_blocks(layout)]
     docstring, places = _manual(plan)
     docstring = docstring.replace("\\", "\\\\").replace('"""', r"\"\"\"")  # a name could end the text

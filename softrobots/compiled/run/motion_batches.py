@@ -75,7 +75,7 @@ class MotionBatches:
                     w[place : place + m] = list(motors[:, min(2 * step + k, motors.shape[1] - 1)].T)
                 w[layout.force : layout.force + 3] = list(forces[:, min(step, forces.shape[1] - 1)].T)
                 w[layout.begin_position : layout.begin_velocity + n] = w[layout.position : layout.velocity + n]
-                failed |= ~self._step(w, failed)
+                failed |= ~self._step(w, failed, n_history)
                 n_history += 1
                 while row < len(times) and (times[row] <= grid[step + 1] or step == len(grid) - 2):
                     share = (times[row] - grid[step]) / length
@@ -90,7 +90,7 @@ class MotionBatches:
                     row += 1
         return failed
 
-    def _step(self, w: list[Any], failed: Any) -> Any:
+    def _step(self, w: list[Any], failed: Any, n_history: int) -> Any:
         """Take a step; return the mask of the cases whose corrections have converged."""
         layout, functions = self._layout, self._functions
         for i in range(layout.motors):
@@ -98,10 +98,11 @@ class MotionBatches:
         functions.motion_prepare(w)
         for i in range(layout.unknowns):
             functions.guess_unknown(w, i)
-        functions.motion_factor(w)
         last = np.full(len(failed), 1e300)
         for correction in range(MOTION_CORRECTIONS):
-            if correction:
+            if correction == 1 or correction + n_history == 0:
+                functions.motion_factor(w)
+            else:
                 functions.motion_correct(w)
             w[layout.change] = np.zeros(len(failed))
             for i in range(layout.unknowns):

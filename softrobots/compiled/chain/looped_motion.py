@@ -1,0 +1,214 @@
+"""Code of the motion of a looped chain: functions for each kind of group of elements, called in loops over the groups.
+
+Four passes, each a loop: outward with the motion of the bodies, inward with the factors
+(`softrobots.compiled.chain.articulated`), inward with the residual, outward with the correction. Numbers in which groups of a
+kind differ stand in a table; values for a later pass in the record of the group in the workspace.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.compiled.chain.articulated import (
+    UPPER,
+    ArticulatedGroup,
+    JointLine,
+    Pull,
+    articulate,
+    carried_inward,
+    carried_outward,
+    moved_wrench,
+    symmetric,
+)
+from softrobots.compiled.chain.elements import Screw, Vector, constants, turned, vector
+from softrobots.compiled.chain.elimination import Eliminated
+from softrobots.compiled.chain.layout import assign_places
+from softrobots.compiled.chain.looped_chain import Kind, TableColumns
+from softrobots.compiled.chain.motion_groups import MovingGroup, group_signature, motion_groups
+from softrobots.compiled.chain.motion_layout import MotionPlan
+from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Expression, Scalar
+
+
+@dataclass(frozen=True)
+class GroupLayout:
+    """Places of what groups hand on, behind the numbers of the case."""
+
+    first: int
+    """First of the places."""
+    frame: int = field(init=False)
+    """Axes, angular velocity, angular acceleration and acceleration behind the last group of the outward pass (18)."""
+    origin: int = field(init=False)
+    """Position of its origin, where the tip is asked for [m] (3)."""
+    inertia: int = field(init=False)
+    """Articulated inertia, upper triangle by columns (21)."""
+    pull: int = field(init=False)
+    """Forces on all beyond: their sum, and the products of levers and forces (12)."""
+    wrench: int = field(init=False)
+    """Moment and force that all bodies beyond need (6)."""
+    sums: int = field(init=False)
+    """`s` of the elimination (6)."""
+    answer: int = field(init=False)
+    """Angular and linear acceleration that the corrections so far add up to (6)."""
+    base: int = field(init=False)
+    """Frame behind the leading motors (18)."""
+    bounds: int = field(init=False)
+    """First and last bound of the loops (2)."""
+    end: int = field(init=False)
+    """The first place behind."""
+
+    def __post_init__(self) -> None:
+        """Compute the places."""
+        sizes = dict(frame=18, origin=3, inertia=len(UPPER), pull=12, wrench=6, sums=6, answer=6, base=18, bounds=2, end=0)
+        assign_places(self, self.first, **sizes)
+
+
+class _Record:
+    """Values of a group for later passes, in the workspace from `at` on."""
+
+    def __init__(self) -> None:
+        """Begin without values."""
+        self.size = 0
+        self._kept: dict[int, Expression] = {}
+
+    def keep(self, block: Block, values: Any) -> Any:
+        """Write values at the end of a function; return what reads them, of the same shape. Constants stay constants."""
+        array = np.asarray(values, dtype=object)
+        kept = array.copy()
+        for index in np.ndindex(*array.shape):
+            kept[index] = self._one(block, array.item(*index))
+        return kept
+
+    def _one(self, block: Block, value: Scalar) -> Scalar:
+        if not isinstance(value, Expression):
+            return value
+        if value.operation == "neg":
+            return -self._one(block, value.arguments[0])
+        if value.number not in self._kept:
+            block.store(self.size, value, "at")
+            self._kept[value.number] = block.load(self.size, "at")
+            self.size += 1
+        return self._kept[value.number]
+
+
+def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
+    """Trace the code of every kind of group; `rows` of a kind are the first elements of its groups."""
+    kinds: dict[Any, list[tuple[int, ...]]] = {}
+    for group in motion_groups(plan.unknowns):
+        kinds.setdefault(tuple(group_signature(plan.unknowns, row) for row in group), []).append(group)
+    return [_trace_kind(number, groups, plan, places) for number, groups in enumerate(kinds.values())]
+
+
+def _trace_kind(number: int, groups: list[tuple[int, ...]], plan: MotionPlan, places: GroupLayout) -> Kind:
+    names = ("at", "row", "q")
+    out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names)
+    factor, back, step, place = (
+        Block(f"{name}_{number}", purpose, names, out.trace)
+        for name, purpose in (
+            ("articulate", "Inward pass: articulated inertia and factors."),
+            ("resist", "Inward pass: torques out of balance."),
+            ("correct", "Outward pass: correction of the accelerations."),
+            ("place", "Outward pass with positions alone."),
+        )
+    )
+    columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), _Record()
+    group = MovingGroup(plan, out, groups, columns)
+    moving = _trace_move(out, record, places, group)
+    factors = _trace_factors(factor, record, plan, places, group, moving)
+
+    total, loads = vector(back.loads(places.wrench, 6)), []
+    for joint, own in zip(moving.joints[::-1], moving.wrenches[::-1], strict=True):
+        total = total + own
+        loads.append(joint.load(total))
+        total = total if joint.shift is None else moved_wrench(total, joint.shift)
+    back.store_all(places.wrench, moved_wrench(total, moving.base).tolist())
+    gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
+    reduced, sums = carried_inward(factors, gradient, vector(back.loads(places.sums, 6)))
+    back.store_all(places.sums, sums.tolist())
+
+    kept = record.keep(back, vector(reduced)).tolist()
+    steps, answer = carried_outward(factors, kept, vector(step.loads(places.answer, 6)))
+    step.store_all(plan.layout.correction, steps.tolist(), "q")
+    step.store_all(places.answer, answer.tolist())
+    _trace_place(place, places, group)
+    return Kind(number, [group[0] for group in groups], [out, factor, back, step, place], columns, record.size)
+
+
+class _Moving(NamedTuple):
+    """What the outward pass of a group leaves in its record."""
+
+    joints: list[JointLine]
+    """Its joints, base to tip; axes of their frames are not kept."""
+    wrenches: list[Vector]
+    """Moment and force that move the body behind each joint, shape (6,)."""
+    base: Vector
+    """From the end of the group before to its first joint [m]."""
+    slopes: Any
+    """Derivatives of the joint positions by the unknowns, shape (n, k)."""
+    torques: Any
+    """Torque of spring, damper and muscles on each unknown (k)."""
+
+
+def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingGroup) -> _Moving:
+    frame = load_frame(out, places.frame)
+    base = frame.axes @ group.elements[0].translation
+    frame = frame.shifted(base)
+    states, slopes = group.joints()
+    turns = {place: element.rotation for place, element in enumerate(group.elements)}
+    joints, wrenches = [], []
+    for place, (state, body) in enumerate(zip(states, group.bodies, strict=True)):
+        if place in turns:
+            frame = replace(frame, axes=frame.axes @ turns[place])
+        frame, axis, shift = moved(frame, state)
+        wrenches.append(record.keep(out, np.concatenate(wrench(frame, body)[::-1])))
+        kept_shift = None if shift is None else record.keep(out, shift)
+        axes, needed = constants(np.zeros((3, 3))), body.needed_axes
+        axes[:, needed] = record.keep(out, frame.axes[:, needed])
+        joints.append(JointLine(record.keep(out, axis), kept_shift, axes, body, wrenches[-1][3:]))
+    store_frame(out, places.frame, frame)
+    return _Moving(joints, wrenches, *(record.keep(out, one) for one in (base, slopes, vector(group.torques))))
+
+
+def _trace_factors(
+    factor: Block, record: _Record, plan: MotionPlan, places: GroupLayout, group: MovingGroup, moving: _Moving
+) -> ArticulatedGroup:
+    """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
+    h, pulls = factor.load(plan.layout.time_step), vector(factor.loads(places.pull, 12))
+    inertia, pull = symmetric(factor.loads(places.inertia, len(UPPER))), Pull(pulls[:3], pulls[3:].reshape(3, 3))
+    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.base, moving.slopes, group.own, h * h * 0.25)
+    factor.store_all(places.inertia, [inertia[index] for index in UPPER])
+    factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
+    one = found.eliminated
+    lower, inverses, coupling = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots, one.coupling))
+    eliminated = Eliminated(lower, inverses.tolist(), coupling, [])
+    return ArticulatedGroup(eliminated, record.keep(factor, found.motions), record.keep(factor, found.shift))
+
+
+def _trace_place(block: Block, places: GroupLayout, group: MovingGroup) -> None:
+    axes, origin = vector(block.loads(places.frame, 9)).reshape(3, 3), vector(block.loads(places.origin, 3))
+    for element in group.elements:
+        origin, axes = origin + axes @ element.translation, axes @ element.rotation
+        if element.kind == "section":
+            screw = Screw(element.coordinates, element.length)
+            origin, axes = origin + axes @ screw.position, axes @ screw.rotation
+        elif element.kind == "slide":
+            origin = origin + axes[:, 2] * element.coordinates[0]
+        else:
+            axes = turned(axes, element.coordinates[0])
+    block.store_all(places.frame, axes.ravel().tolist())
+    block.store_all(places.origin, origin.tolist())
+
+
+def load_frame(block: Block, place: int) -> MovingFrame:
+    """Read a frame."""
+    values = vector(block.loads(place, 18))
+    return MovingFrame(values[:9].reshape(3, 3), values[9:12], values[12:15], values[15:])
+
+
+def store_frame(block: Block, place: int, frame: MovingFrame) -> None:
+    """Write a frame."""
+    block.store_all(place, [*frame.axes.ravel().tolist(), *frame.spin, *frame.turning, *frame.lift])

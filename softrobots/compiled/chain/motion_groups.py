@@ -1,0 +1,128 @@
+"""Groups of elements of a chain whose motion is traced together: a section, a motor, or spring joints at one point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import constants
+from softrobots.compiled.chain.looped_chain import TableColumns, element_signature, table_element
+from softrobots.compiled.chain.motion_layout import MotionPlan
+from softrobots.compiled.chain.moving_joints import JointState, RigidBody, SectionState, joint_state, round_part
+from softrobots.compiled.chain.muscle_terms import pulls_on
+from softrobots.compiled.chain.recursion import TracedElement
+from softrobots.compiled.chain.unknowns import Unknowns, bodies_of
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import Scalar
+from softrobots.model.serial_chain import ChainBody
+
+_MOST_JOINTS = 4  # of a group: its cost grows with their square
+
+
+class MovingGroup:
+    """Inputs of the groups of a kind: table entries for the numbers in which they differ, loads from the workspace."""
+
+    def __init__(self, plan: MotionPlan, block: Block, groups: Sequence[tuple[int, ...]], columns: TableColumns) -> None:
+        """Read the elements of the groups, base to tip; `q` is the place of the first unknown, or of the motor."""
+        unknowns, layout = plan.unknowns, plan.layout
+        self.elements: list[TracedElement] = []
+        """The elements, with their coordinates."""
+        self.bodies: list[RigidBody] = []
+        """The bodies of all of them."""
+        self.rates: list[list[Scalar]] = []
+        """Velocities of the coordinates of each element."""
+        self.changes: list[list[Scalar]] = []
+        """Their accelerations."""
+        self.own: list[Scalar] = []
+        """`h/2 D + h^2/4 K` of each unknown."""
+        self.torques: list[Scalar] = []
+        """Torque of spring, damper and muscles on each unknown."""
+        h, place = block.load(layout.time_step), 0
+        for rows in zip(*groups, strict=True):
+            ones = [unknowns.traced(row) for row in rows]
+            element = table_element(ones, columns)
+            rest = columns.entries([one.rest for one in ones])
+            coordinates = [columns.entry([one.coordinates[axis] for one in ones]) for axis in range(len(element.coordinates))]
+            rates: list[Scalar] = [0.0] * len(coordinates)
+            changes: list[Scalar] = [0.0] * len(coordinates)
+            if unknowns.motor(rows[0]) is not None:
+                coordinates[0], rates[0], changes[0] = (
+                    block.load(first, "q") for first in (0, layout.motor_velocities, layout.motor_accelerations)
+                )
+            for number, axis in enumerate(element.moving):
+                coordinates[axis], rates[axis], changes[axis], damping = (
+                    block.load(first + place, "q")
+                    for first in (layout.unknown, layout.rate, layout.acceleration, layout.damping)
+                )
+                place += 1
+                stiffness = element.stiffness[number]
+                self.own.append(h * 0.5 * damping + h * h * 0.25 * stiffness)
+                self.torques.append((coordinates[axis] - rest[number]) * stiffness + damping * rates[axis])
+            segment = unknowns.segment_at(rows[0])
+            if segment is not None:
+                tensions = [block.load(unknowns.chain.n_motors + muscle) for muscle in segment.muscles]
+                pulls = pulls_on(element.muscles, coordinates, tensions, [], 0)
+                for number, axis in enumerate(element.moving):
+                    self.torques[number - len(element.moving)] += pulls.load[axis]
+            self.elements.append(replace(element, coordinates=coordinates))
+            self.rates.append(rates)
+            self.changes.append(changes)
+            for number in range(len(element.bodies)):
+                bodies = [bodies_of(unknowns.chain.elements[row])[number] for row in rows]
+                self.bodies.append(_body(bodies, columns))
+
+    def joints(self) -> tuple[list[JointState], Any]:
+        """Return the joints, and the derivatives of their positions by the coordinates, shape (n, k)."""
+        first = self.elements[0]
+        if first.kind == "section":
+            section = SectionState(first.coordinates, self.rates[0], self.changes[0], first.length)
+            return section.joints, section.slopes[:, list(first.moving)]
+        joints = [
+            joint_state(element.kind == "slide", element.coordinates[0], rates[0], changes[0])
+            for element, rates, changes in zip(self.elements, self.rates, self.changes, strict=True)
+        ]
+        return joints, constants(np.eye(len(joints), len(self.own)))
+
+
+def _body(bodies: Sequence[ChainBody], columns: TableColumns) -> RigidBody:
+    """Return the body of the elements of a kind; all are round about the same axis, or none is."""
+    parts = [round_part(body.inertia) for body in bodies]
+    others = [np.zeros((3, 3)) if across else body.inertia for body, (_, across, _) in zip(bodies, parts, strict=True)]
+    return RigidBody(
+        mass=columns.entry([float(body.mass) for body in bodies]),
+        moment=columns.entries([body.first_moment for body in bodies]),
+        inertia=columns.entries(others),
+        round_axis=parts[0][0],
+        across=columns.entry([across for _, across, _ in parts]),
+        along=columns.entry([along for _, _, along in parts]),
+        centre=columns.entries([body.first_moment / (body.mass or 1.0) for body in bodies]),
+    )
+
+
+def motion_groups(unknowns: Unknowns) -> list[tuple[int, ...]]:
+    """Return the elements of each group behind the leading motors, base to tip."""
+    groups: list[tuple[int, ...]] = []
+    before = -2  # place of the spring joint before, if it is one
+    for row in range(unknowns.leading_motors, len(unknowns.chain.elements)):
+        one = unknowns.traced(row)
+        spring = one.kind != "section" and unknowns.motor(row) is None
+        place = unknowns.place[unknowns.moving(row)[0]] if spring else -2
+        if spring and place == before + 1 and not np.any(one.translation != 0.0) and len(groups[-1]) < _MOST_JOINTS:
+            groups[-1] = (*groups[-1], row)
+        else:
+            groups.append((row,))
+        before = place
+    return groups
+
+
+def group_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
+    """Return the properties that elements with the same code share."""
+    rounds = [
+        (axis, across == 0.0)
+        for axis, across, _ in (round_part(body.inertia) for body in bodies_of(unknowns.chain.elements[row]))
+    ]
+    segment = unknowns.segment_at(row)
+    return (*element_signature(unknowns, row), str(rounds), segment and segment.muscles)

@@ -1,0 +1,217 @@
+r"""Motion of joints and sections with the bodies on them, traced: outward kinematics, forces of the bodies.
+
+All vectors are in one set of axes that do not turn, with the origin of a frame as the point of reference: accelerations by
+the recursion of Luh, Walker and Paul (1980, J. Dyn. Sys. Meas. Control 102, 69), gravity as an upward
+acceleration of the base.
+
+A section of constant strain moves as its six joints (`softrobots.constant_curvature.strain_chain`), whose rates follow from the
+velocity of the chord and the angular velocity of the end. With the section coordinates `z`, the screw motion gives both as
+`S(z) zd` and the accelerations as `S zdd + b(z, zd)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.compiled.chain.elements import Screw, Vector, constants, cross, matrix, vector
+from softrobots.compiled.trace.expressions import Scalar, cosine, sine, square_root
+
+SECTION_AXES = (0, 1, 2, 0, 1, 2)
+"""Axis of each joint of a section: x, y, z."""
+
+SECTION_CHORD = 2
+"""The joint of a section that slides."""
+
+
+class RigidBody(NamedTuple):
+    """A rigid body fixed to a frame; numbers are constants or table entries."""
+
+    mass: Scalar
+    """Mass [kg]."""
+    moment: Vector
+    """First moment in the axes of the frame, shape (3,) [kg m]."""
+    inertia: Any
+    """Rotational inertia about the origin in these axes, less the round part, shape (3, 3) [kg m^2]."""
+    round_axis: int
+    """Axis of the frame about which the round part is."""
+    across: Scalar
+    """Its inertia about the other axes [kg m^2]."""
+    along: Scalar
+    """How much larger it is about that axis [kg m^2]."""
+    centre: Vector
+    """Centre of mass in the axes of the frame, shape (3,) [m]; zero without mass."""
+
+    def turned(self, axes: Any) -> Any:
+        """Return the rotational inertia in the axes in which those of the frame are given, shape (3, 3)."""
+        n = axes[:, self.round_axis]
+        whole = constants(np.eye(3)) * self.across + np.multiply.outer(n, n * self.along)
+        return whole + axes @ self.inertia @ axes.T
+
+    def times(self, axes: Any, spin: Vector) -> Vector:
+        """Return that inertia times a vector."""
+        n = axes[:, self.round_axis]
+        return spin * self.across + n * ((n @ spin) * self.along) + axes @ (self.inertia @ (axes.T @ spin))
+
+    @property
+    def needed_axes(self) -> list[int]:
+        """The axes of the frame that matter."""
+        if any(not _is_zero(one) for one in self.inertia.ravel()):
+            return [0, 1, 2]
+        return [
+            axis
+            for axis in range(3)
+            if not _is_zero(self.moment[axis]) or (axis == self.round_axis and not _is_zero(self.along))
+        ]
+
+
+def round_part(inertia: Any) -> tuple[int, float, float]:
+    """Return axis, inertia across it, and how much more there is about it; zeros for a body that is not round."""
+    diagonal = np.diag(inertia)
+    small = 1e-14 * float(np.abs(diagonal).max())
+    if np.abs(inertia - np.diag(diagonal)).max() <= small:
+        for axis in range(3):
+            across, other = diagonal[axis - 1], diagonal[axis - 2]
+            if abs(across - other) <= small:
+                return axis, float(across), float(diagonal[axis] - across)
+    return 0, 0.0, 0.0
+
+
+def _is_zero(value: Scalar) -> bool:
+    return isinstance(value, float) and value == 0.0
+
+
+@dataclass
+class MovingFrame:
+    """A frame that moves, in axes that do not turn."""
+
+    axes: Any
+    """Its axes, shape (3, 3)."""
+    spin: Vector
+    """Its angular velocity [rad/s]."""
+    turning: Vector
+    """Its angular acceleration [rad/s^2]."""
+    lift: Vector
+    """Acceleration of its origin, less gravity [m/s^2]."""
+
+    def shifted(self, by: Vector) -> MovingFrame:
+        """Return the same axes at another origin that moves with them, `by` from this one."""
+        return replace(self, lift=self.lift + cross(self.turning, by) + cross(self.spin, cross(self.spin, by)))
+
+
+class JointState(NamedTuple):
+    """A joint at its coordinate, before its frame: about or along an axis of the frame."""
+
+    axis: int
+    """Number of the axis: x, y or z."""
+    offset: Scalar | None
+    """How far it slides [m]; None if it turns."""
+    cosine: Scalar
+    """Cosine of its angle."""
+    sine: Scalar
+    """Sine of its angle."""
+    rate: Scalar
+    """Its velocity."""
+    change: Scalar
+    """Its acceleration."""
+
+
+def joint_state(slides: bool, coordinate: Scalar, rate: Scalar, change: Scalar) -> JointState:
+    """Return the state of a joint about, or along, the z axis of its frame."""
+    if slides:
+        return JointState(2, coordinate, 1.0, 0.0, rate, change)
+    return JointState(2, None, cosine(coordinate), sine(coordinate), rate, change)
+
+
+def moved(frame: MovingFrame, joint: JointState) -> tuple[MovingFrame, Vector, Vector | None]:
+    """Return the frame behind a joint, the axis of the joint, and how far the joint moves the origin (None: it turns)."""
+    axis = frame.axes[:, joint.axis]
+    velocity = axis * joint.rate
+    swing = cross(frame.spin, velocity)
+    if joint.offset is not None:
+        shift = axis * joint.offset
+        behind = frame.shifted(shift)
+        return replace(behind, lift=behind.lift + swing * 2.0 + axis * joint.change), axis, shift
+    one, other = (joint.axis + 1) % 3, (joint.axis + 2) % 3
+    axes = frame.axes.copy()
+    axes[:, one] = frame.axes[:, one] * joint.cosine + frame.axes[:, other] * joint.sine
+    axes[:, other] = frame.axes[:, other] * joint.cosine - frame.axes[:, one] * joint.sine
+    return MovingFrame(axes, frame.spin + velocity, frame.turning + swing + axis * joint.change, frame.lift), axis, None
+
+
+def wrench(frame: MovingFrame, body: RigidBody) -> tuple[Vector, Vector]:
+    """Return force and moment about the origin that move a body as its frame moves [N], [N m]."""
+    moment = frame.axes @ body.moment
+    force = frame.lift * body.mass + cross(frame.turning, moment) + cross(frame.spin, cross(frame.spin, moment))
+    turn = body.times(frame.axes, frame.turning) + cross(frame.spin, body.times(frame.axes, frame.spin))
+    return force, turn + cross(moment, frame.lift)
+
+
+class SectionState:
+    """The six joints of a section at section coordinates, with their rates."""
+
+    def __init__(self, z: Sequence[Scalar], rates: Sequence[Scalar], changes: Sequence[Scalar], length: Scalar) -> None:
+        """Evaluate the joints at section coordinates, velocities and accelerations (4), and rest length [m]."""
+        motion = Screw(z, length)
+        self._chord_axes(motion)
+        lift, turning = motion.accelerations(rates)
+        back = self._chord.T
+        slopes, twists = motion.slopes()
+        self.slopes = np.array([self._rates(back @ slopes[:, j], back @ twists[:, j]) for j in range(4)], dtype=object).T
+        """Derivatives of the joint positions by the section coordinates, shape (6, 4)."""
+        joint_rates = self.slopes @ vector(rates)
+        own_lift, own_turning = self._own_accelerations(joint_rates)
+        bias = self._rates(back @ lift - own_lift, back @ turning - own_turning)
+        self.joints = [
+            JointState(axis, offset, cosine_, sine_, rate, change)
+            for axis, offset, (cosine_, sine_), rate, change in zip(
+                SECTION_AXES,
+                (None, None, self._size, None, None, None),
+                self._angles,
+                joint_rates,
+                self.slopes @ vector(changes) + bias,
+                strict=True,
+            )
+        ]
+        """The joints, base to tip."""
+
+    def _chord_axes(self, motion: Screw) -> None:
+        """Cosine and sine of each joint from the pose of the end."""
+        x, y, z = motion.position
+        across = square_root(y * y + z * z)
+        self._size = size = square_root(x * x + y * y + z * z)
+        aside, over = 1.0 / across, 1.0 / size
+        first, second = (z * aside, -y * aside), (across * over, x * over)
+        (c1, s1), (c2, s2) = first, second
+        self._chord = matrix([[c2, 0.0, s2], [s1 * s2, c1, -s1 * c2], [-c1 * s2, s1, c1 * c2]])
+        ball = self._chord.T @ motion.rotation
+        flat = square_root(ball[1, 2] * ball[1, 2] + ball[2, 2] * ball[2, 2])
+        low = 1.0 / flat
+        third = (ball[2, 2] * low, -ball[1, 2] * low)
+        self._angles = [first, second, (1.0, 0.0), third, (flat, ball[0, 2]), (ball[0, 0] * low, -ball[0, 1] * low)]
+
+    def _rates(self, velocity: Vector, spin: Vector) -> Vector:
+        """Rates of the joints from the velocity of the end and its angular velocity, in the axes of the chord, shape (6,)."""
+        _, (c2, s2), _, (c4, s4), (c5, s5), _ = self._angles
+        over = 1.0 / self._size
+        u1, u2 = -velocity[1] * (over / c2), velocity[0] * over
+        x, y, z = spin - vector([u1 * c2, u2, u1 * s2])
+        tilt = (z * c4 - y * s4) * (1.0 / c5)
+        return vector([u1, u2, velocity[2], x - s5 * tilt, y * c4 + z * s4, tilt])
+
+    def _own_accelerations(self, rates: Vector) -> tuple[Vector, Vector]:
+        """Accelerations of the end at constant rates of the joints, in the axes of the chord: linear, angular."""
+        _, (c2, s2), _, (c4, s4), (c5, s5), _ = self._angles
+        u1, u2, slide, *ball = rates
+        spin = vector([u1 * c2, u2, u1 * s2])
+        turning = vector([-s2, 0.0, c2]) * (u1 * u2)
+        chord = vector([0.0, 0.0, self._size])
+        lift = cross(spin, vector([0.0, 0.0, slide * 2.0])) + cross(turning, chord) + cross(spin, cross(spin, chord))
+        for axis, rate in zip(([1.0, 0.0, 0.0], [0.0, c4, s4], [s5, -s4 * c5, c4 * c5]), ball, strict=True):
+            own = vector(axis) * rate
+            turning = turning + cross(spin, own)
+            spin = spin + own
+        return lift, turning

@@ -1,0 +1,150 @@
+"""Functions of the motion of a looped chain: straight-line functions of the groups, and loops over them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softrobots.compiled.chain.articulated import UPPER
+from softrobots.compiled.chain.elements import Vector, constants, cross, outer, vector
+from softrobots.compiled.chain.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
+from softrobots.compiled.chain.motion_groups import motion_groups
+from softrobots.compiled.chain.motion_layout import MotionPlan
+from softrobots.compiled.chain.moving_joints import MovingFrame, joint_state, moved
+from softrobots.compiled.chain.unrolled_chain import place_base
+from softrobots.compiled.program.looped_program import loop_text
+from softrobots.compiled.program.motion_parts import MotionParts
+from softrobots.compiled.trace.blocks import Block
+
+_PASSES = {
+    "move": "Outward pass: motion of the bodies.",
+    "articulate": "Inward pass: articulated inertias and factors.",
+    "resist": "Inward pass: torques out of balance.",
+    "correct": "Outward pass: correction of the accelerations.",
+    "place": "Outward pass with positions alone.",
+}
+_INWARD = ("articulate", "resist")
+
+_CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
+    """Evaluate and factor; write the correction."""
+    start_move_SUFFIX(w)
+    move_all_SUFFIX(w)
+    start_articulate_SUFFIX(w)
+    articulate_all_SUFFIX(w)
+    start_resist_SUFFIX(w)
+    resist_all_SUFFIX(w)
+    correct_all_SUFFIX(w)
+
+
+def motion_correct_SUFFIX(w: Array) -> None:
+    """Evaluate; write the correction with the factors that are there."""
+    start_move_SUFFIX(w)
+    move_all_SUFFIX(w)
+    start_resist_SUFFIX(w)
+    resist_all_SUFFIX(w)
+    correct_all_SUFFIX(w)
+
+
+def motion_tip_SUFFIX(w: Array) -> None:
+    """Write the tip at motors and unknowns."""
+    start_place_SUFFIX(w)
+    place_all_SUFFIX(w)
+    finish_place_SUFFIX(w)'''
+
+
+def looped_motion(plan: MotionPlan) -> MotionParts:
+    """Trace the functions of a looped chain."""
+    unknowns, layout = plan.unknowns, plan.layout
+    places = GroupLayout(layout.prepared)
+    kinds = group_kinds(plan, places)
+    record, sequence = places.end, {}
+    calls: dict[str, list[tuple[int, str]]] = {name: [] for name in _PASSES}
+    for kind in kinds:
+        for place, row in enumerate(kind.rows):
+            motor = unknowns.motor(row)
+            first = unknowns.place[unknowns.moving(row)[0]] if motor is None else motor
+            sequence[row] = (kind.number, record, place * kind.columns.width, first)
+            record += kind.record
+        for name, pass_calls in calls.items():
+            pass_calls.append((kind.number, f"{name}_{kind.number}(w, AT[i], ROW[i], PLACE[i])"))
+    tables: dict[str, object] = {"FIRST": places.bounds, "COUNT": places.bounds + 1, "N_ELEMENTS": len(sequence)}
+    tables |= {f"GROUP_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
+    ordered = [sequence[group[0]] for group in motion_groups(unknowns)]
+    tables |= dict(zip(("KIND", "AT", "ROW", "PLACE"), zip(*ordered, strict=True), strict=True))
+    frame = [
+        _prepare(plan, places, len(ordered)),
+        _start_move(places),
+        _start_articulate(plan, places),
+        _start_resist(plan, places),
+        _start_place(plan, places),
+        _finish_place(plan, places),
+    ]
+    loops, lane_loops = (
+        "\n\n\n".join(
+            [
+                *(loop_text(name, _PASSES[name], calls[name], back=name in _INWARD, suffix=suffix) for name in _PASSES),
+                _CONTROL.replace("_SUFFIX", suffix),
+            ]
+        )
+        for suffix in ("", "_lanes")
+    )
+    return MotionParts([*frame, *(block for kind in kinds for block in kind.blocks)], record, tables, loops, lane_loops)
+
+
+def _prepare(plan: MotionPlan, group_places: GroupLayout, count: int) -> Block:
+    block = Block("motion_prepare", "Compute what depends on motors, force, gravity and time step only.")
+    layout, zero = plan.layout, constants(np.zeros(3))
+    frame = MovingFrame(constants(np.eye(3)), zero, zero, -vector(block.loads(layout.gravity, 3)))
+    for row, element in enumerate(plan.unknowns.leading(block)):
+        places = layout.motor_velocities, layout.motor_accelerations
+        rate, change = (block.load(first + (plan.unknowns.motor(row) or 0)) for first in places)
+        frame = frame.shifted(frame.axes @ element.translation)
+        frame.axes = frame.axes @ element.rotation
+        frame, _, _ = moved(frame, joint_state(element.kind == "slide", element.coordinates[0], rate, change))
+    store_frame(block, group_places.base, frame)
+    block.store_all(group_places.bounds, [0.0, float(count)])
+    return block
+
+
+def _start_move(places: GroupLayout) -> Block:
+    block = Block("start_move", "Start at the base.")
+    store_frame(block, places.frame, load_frame(block, places.base))
+    return block
+
+
+def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
+    block = Block("start_articulate", "Start at the tip with its force, without bodies beyond.")
+    force, lever = _tip_force(plan, places, block)
+    block.store_all(places.inertia, [0.0] * len(UPPER))
+    block.store_all(places.pull, [*force, *outer(lever, force).ravel()])
+    return block
+
+
+def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
+    block = Block("start_resist", "Start at the tip with its force, and clear all sums.")
+    force, lever = _tip_force(plan, places, block)
+    block.store_all(places.wrench, [*cross(lever, force), *force])
+    block.store_all(places.sums, [0.0] * 6)
+    block.store_all(places.answer, [0.0] * 6)
+    return block
+
+
+def _tip_force(plan: MotionPlan, places: GroupLayout, block: Block) -> tuple[Vector, Vector]:
+    """Return the force that the tip needs, minus the load on it, and the tip from the end of the last group."""
+    lever = load_frame(block, places.frame).axes @ constants(plan.unknowns.chain.tip_translation)
+    return -vector(block.loads(plan.layout.force, 3)), lever
+
+
+def _start_place(plan: MotionPlan, places: GroupLayout) -> Block:
+    block = Block("start_place", "Start behind the leading motors.")
+    axes, origin = place_base(plan.unknowns.leading(block))
+    block.store_all(places.frame, axes.ravel().tolist())
+    block.store_all(places.origin, origin.tolist())
+    block.store_all(places.bounds, [0.0, float(len(motion_groups(plan.unknowns)))])
+    return block
+
+
+def _finish_place(plan: MotionPlan, places: GroupLayout) -> Block:
+    block = Block("finish_place", "Write the tip.")
+    axes, origin = vector(block.loads(places.frame, 9)).reshape(3, 3), vector(block.loads(places.origin, 3))
+    block.store_all(plan.layout.tip, (origin + axes @ constants(plan.unknowns.chain.tip_translation)).tolist())
+    return block

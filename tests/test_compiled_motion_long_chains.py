@@ -1,0 +1,167 @@
+"""Compiled motion of long chains: the midpoint rule on Pinocchio's equations of motion, and runs of simulate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.compiled.chain.motion_groups import motion_groups
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.program.motion_program import make_motion_program
+from softrobots.compiled.run.backends import make_run
+from softrobots.core.errors import ParameterError
+from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.kinematics import frame_placement
+from tests.support.serial_chains import ROBOTS, pcc
+
+GRAVITY = (0.7, -0.4, -9.7)
+
+
+def rod(**options: Any) -> SoftModel:
+    return sr.load_model(sr.PccArm(segment_lengths=(0.6,), muscle_azimuths=(), **options))
+
+
+def foreign() -> SoftModel:
+    """Revolute springs about z in turn with y, one behind the other, with motors in between: no two joints at a point."""
+    links = "".join(
+        f'<link name="l{k}"><inertial><origin xyz="0.02 0.01 {0.01 * (k % 3)}"/><mass value="{0.1 + 0.01 * k}"/>'
+        f'<inertia ixx="1e-4" iyy="{2e-4 if k % 2 else 1e-4}" izz="3e-4" ixy="{1e-5 * (k % 2)}" ixz="0" iyz="0"/>'
+        "</inertial></link>"
+        for k in range(19)
+    )
+    joints = "".join(
+        f'<joint name="j{k}" type="{"prismatic" if k == 11 else "revolute"}"><origin xyz="0.1 0 0" rpy="{0.2 * (k % 4)} 0 0"/>'
+        f'<parent link="l{k}"/><child link="l{k + 1}"/><axis xyz="0 {k % 2} {1 - k % 2}"/>'
+        '<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>'
+        for k in range(18)
+    )
+    springs = {f"j{k}": (20.0 + k, 0.1) for k in range(18) if k not in (0, 7, 12)}
+    return sr.load_model(f'<robot name="foreign">{links}{joints}</robot>', springs=springs)
+
+
+LONG: dict[str, Callable[[], SoftModel]] = {
+    "rod": lambda: rod(chain="lumped", hinges=5, torsion=True),
+    "foreign": foreign,
+    "helix_lumped": lambda: sr.load_model(sr.HelixTube(chain="lumped", hinges=6, torsion=True)),
+    "motors between": lambda: sr.load_model(
+        sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(chain="lumped", muscle_azimuths=()))
+    ),
+    "sections": lambda: rod(elastic_sections=3),
+    "helix": ROBOTS["helix"],
+    "tensions": ROBOTS["pcc_forces"],
+    "lumped tensions": lambda: pcc(chain="lumped", hinges=3, muscles="forces"),
+}
+
+
+def started(
+    model: SoftModel, run: Any, rng: np.random.Generator, h: float
+) -> tuple[Any, np.ndarray, np.ndarray, dict[str, Any]]:
+    """A workspace at a random state near rest: it, the path of the motors over a step, the damping, and the state."""
+    n, m = model.n_springs, model.n_motors
+    path = 0.3 * rng.normal(size=m) + np.array([[0.0], [h / 2], [h]]) * rng.normal(size=m) + h * h * rng.normal(size=(3, m))
+    damping = rng.uniform(size=n) * 1e-3 * model.chain().stiffness
+    state = {"position": model.chain().rest + rng.normal(size=n) * 3e-3, "velocity": rng.normal(size=n) * 0.05}
+    given = {"force": rng.normal(size=3) * 0.2, "gravity": np.array(GRAVITY), "time_step": np.array([h]), "damping": damping}
+    given |= dict(zip(("motors_begin", "motors_middle", "motors_end"), path, strict=True))
+    w = run.workspace()
+    for name, values in (state | given).items():
+        run.put(w, getattr(run.layout, name), values)
+    return w, path, damping, state | given
+
+
+@pytest.mark.parametrize("kind", list(LONG))
+def test_a_step_of_a_long_chain_is_the_implicit_midpoint_rule(kind: str, rng: np.random.Generator) -> None:
+    model = LONG[kind]()
+    unknowns = Unknowns(model.chain())
+    assert not unknowns.is_unrolled
+    run: Any = make_run(make_motion_program(unknowns), "python")
+    layout, n, m, h = run.layout, model.n_springs, model.n_motors, 1e-3
+    for _ in range(2):
+        w, path, damping, given = started(model, run, rng, h)
+        y0, v0 = given["position"], given["velocity"]
+        assert run.motion_step(w) == 0
+        y1, a = (np.array(w[place : place + n]) for place in (layout.position, layout.acceleration))
+        np.testing.assert_allclose(y1, y0 + h * v0 + h**2 / 2 * a, rtol=0, atol=1e-15)  # in one step; rounding
+        equations = EquationsOfMotion(model, GRAVITY, np.diag(damping))
+        x = np.concatenate([path[1], y0 + h / 2 * v0 + h**2 / 4 * a])
+        rates = np.concatenate([(path[2] - path[0]) / h, v0 + h / 2 * a])
+        changes = np.concatenate([4 * (path[2] - 2 * path[1] + path[0]) / h**2, a])
+        wrench = {model.tip: np.concatenate([given["force"], np.zeros(3)])}
+        error = equations.balance(x, rates, changes, wrench)[m:]
+        # A change of 1e-13 in the middle is one of K 1e-13 + M 1e-13 / (h^2 / 4) in the torques.
+        size = model.chain().stiffness.max() + np.abs(equations.mass_matrix(x)).max() * 4 / h**2
+        assert np.abs(error).max() < 1e-12 * size
+        run.place_at(w, 1.0)
+        q = model.configuration(path[2], y1)
+        np.testing.assert_allclose(w[layout.tip : layout.tip + 3], frame_placement(model, q, model.tip).translation, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["rod", "sections", "tensions"])
+def test_a_run_is_that_of_simulate_at_the_same_steps(kind: str, rng: np.random.Generator) -> None:
+    model, duration, steps = LONG[kind](), 0.05, 20
+    run: Any = make_run(make_motion_program(Unknowns(model.chain())), "python")
+    n, motors = model.n_springs, rng.uniform(1.0, 5.0, model.n_motors)
+    force, times = rng.normal(size=3) * 0.1, np.linspace(0.0, duration, 11)
+    slow = sr.simulate(
+        model,
+        duration,
+        motors,
+        force=force,
+        gravity=GRAVITY,
+        damping_time=0.01,
+        time_step=duration / steps,
+        output_step=duration / 10,
+    )
+    w = run.workspace()
+    start = {"position": model.rest, "gravity": np.array(GRAVITY), "damping": 0.01 * model.chain().stiffness}
+    for name, values in start.items():
+        run.put(w, getattr(run.layout, name), values)
+    out = run.array(len(times) * (2 * n + 3))
+    grid = run.flat(np.linspace(0.0, duration, steps + 1))
+    path = run.flat(motors), 1, run.flat(force), 1
+    assert run.motion_run(w, *path, grid, steps, run.flat(times), len(times), out) == 0
+    rows = np.reshape(out, (len(times), -1))
+    np.testing.assert_allclose(rows[:, 2 * n :], slow.tip_position, rtol=0, atol=1e-9 * model.reach)
+    np.testing.assert_allclose(rows[:, :n], slow.q_springs, rtol=0, atol=1e-9 * np.abs(slow.q_springs).max())
+    # A change of 1e-13 in the middle of a step is one of 2e-13 / h in the velocity at its end.
+    left = 1e-9 * np.abs(slow.velocities).max() + steps * 2e-13 / (duration / steps)
+    np.testing.assert_allclose(rows[:, n : 2 * n], slow.velocities, rtol=0, atol=left)
+
+
+def test_locked_strains_stay_at_rest(rng: np.random.Generator) -> None:
+    """Bending alone: the step is that of a rod whose twist and stretch are a million times as stiff."""
+    model = rod(elastic_sections=3)
+    run: Any = make_run(make_motion_program(Unknowns(model.chain(), ("twist", "stretch"))), "python")
+    stiff = rod(elastic_sections=3, torsional_stiffness=1e7, axial_stiffness=1e11)
+    whole: Any = make_run(make_motion_program(Unknowns(stiff.chain())), "python")
+    moving = np.concatenate([4 * np.arange(3)[:, None] + [0, 1]]).ravel()
+    ends = []
+    for one, rows in ((run, np.arange(6)), (whole, moving)):
+        w = one.workspace()
+        position = np.zeros(one.layout.unknowns)
+        position[rows] = 0.1 * np.arange(1, 7)
+        for name, values in (("position", position), ("gravity", np.array(GRAVITY)), ("time_step", np.array([1e-3]))):
+            one.put(w, getattr(one.layout, name), values)
+        for _ in range(5):
+            assert one.motion_step(w) == 0
+        ends.append(np.array(w[one.layout.position : one.layout.position + one.layout.unknowns])[rows])
+    assert np.abs(ends[0] - 0.1 * np.arange(1, 7)).max() > 1e-4  # it moves
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-6)
+
+
+def test_hinges_at_one_point_are_one_group() -> None:
+    """Cost is proportional to groups: 30 hinges of bending and twist are 30."""
+    unknowns = Unknowns(rod(chain="lumped", hinges=30, torsion=True, extension=False).chain())
+    assert [len(group) for group in motion_groups(unknowns)] == [3] * 30
+
+
+def test_what_long_chains_cannot_do_is_refused_by_name() -> None:
+    with pytest.raises(ParameterError, match="given muscle lengths"):
+        make_motion_program(Unknowns(ROBOTS["pcc"]().chain()))
+    with pytest.raises(ParameterError, match="mass_damping"):
+        make_motion_program(Unknowns(LONG["rod"]().chain()), full_damping=True)
