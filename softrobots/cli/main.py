@@ -10,12 +10,27 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from softrobots.cli import bench, branches, characterise, completion, doctor, export, helix, ik, load, pcc, solve, urdf, view
+from softrobots.cli import (
+    bench,
+    branches,
+    characterise,
+    completion,
+    doctor,
+    export,
+    helix,
+    ik,
+    load,
+    pcc,
+    simulate,
+    solve,
+    urdf,
+    view,
+)
 from softrobots.cli.options.command_line import exit_status, take_negative_numbers
 from softrobots.core.errors import ParameterError
 from softrobots.version import __version__
 
-COMMANDS = (urdf, export, solve, branches, load, ik, characterise, pcc, helix, view, bench, doctor, completion)
+COMMANDS = (urdf, export, solve, branches, load, ik, simulate, characterise, pcc, helix, view, bench, doctor, completion)
 """Modules of the subcommands, in the order of the help."""
 
 

@@ -89,7 +89,8 @@ def energies(motion: Motion) -> Any:
     lower.plot(motion.time, 1e3 * energy.balance, color="#303030", lw=1.5)
     lower.set(xlabel="time [s]", ylabel="balance [mJ]")
     lower.grid(alpha=0.3)
-    lower.margins(x=0.0)
+    for axes in (upper, lower):
+        axes.margins(x=0.0)
     figure.legend(fontsize=10, loc="outside lower center", ncols=3)
     return figure
 
@@ -120,20 +121,23 @@ def strobe(motion: Motion, *, shown: int = 8, between: tuple[float, float] | Non
     first, last = chosen[0], chosen[-1]
     backbones = [_backbone(motion, row) for row in chosen]
     path = motion.tip_position[first : last + 1]
-    right, up = _axes_of(path, np.vstack(backbones))
-    figure, axes = new_plot((6.0, 5.0), xlabel=f"{'xyz'[right]} [m]", ylabel=f"{'xyz'[up]} [m]")
+    sizes = np.linalg.norm(motion.forces[first : last + 1], axis=1)
+    strongest = int(np.argmax(sizes))
+    arrow = 0.2 * motion.model.reach * motion.forces[first + strongest] / (sizes[strongest] or 1.0)
+    everything = np.vstack([*backbones, path, path[strongest] + arrow])
+    right, up = _axes_of(path, everything)
+    wide, high = np.ptp(everything[:, [right, up]], axis=0)
+    size = (6.0, float(np.clip(1.5 + 5.2 * high / wide, 3.2, 6.4)) if wide > 0.0 else 6.4)
+    figure, axes = new_plot(size, xlabel=f"{'xyz'[right]} [m]", ylabel=f"{'xyz'[up]} [m]")
     for count, (row, points) in enumerate(zip(chosen, backbones, strict=True)):
         shade = 0.82 - 0.74 * count / max(len(chosen) - 1, 1)
         label = f"at {motion.time[row]:.3g} s" if row in (chosen[0], chosen[-1]) else None
         axes.plot(points[:, right], points[:, up], color=(shade, shade, shade), lw=2.5, label=label)
     axes.plot(path[:, right], path[:, up], color=COLOURS[1], lw=1.5, label="path of the tip")
-    sizes = np.linalg.norm(motion.forces[first : last + 1], axis=1)
-    strongest = int(np.argmax(sizes))
     if sizes[strongest] > 0.0:
-        tip, arrow = path[strongest], 0.2 * motion.model.reach * motion.forces[first + strongest] / sizes[strongest]
         label = f"force, {sizes[strongest]:.3g} N at {motion.time[first + strongest]:.3g} s"
         style = {"arrowstyle": "-|>", "color": COLOURS[2], "lw": 2.0, "mutation_scale": 16.0, "shrinkA": 0.0, "shrinkB": 0.0}
-        span = {"xy": (tip + arrow)[[right, up]], "xytext": tip[[right, up]]}
+        span = {"xy": (path[strongest] + arrow)[[right, up]], "xytext": path[strongest][[right, up]]}
         axes.annotate("", **span, arrowprops=style)
         axes.plot(*span["xy"], alpha=0.0)  # axes grow with lines, not with annotations
         axes.plot([], [], color=COLOURS[2], lw=2.0, label=label)
