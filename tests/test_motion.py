@@ -5,13 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import softrobots as sr
 from softrobots.core.checks import FloatArray
+from softrobots.dynamics import simulation
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.motion import MotionState
 from tests.support.laws import law
 
 ROBOTS = (
@@ -22,7 +25,7 @@ ROBOTS = (
 LENGTH, MASS = 0.5, 0.3  # of each link of the pendulums
 
 
-def pendulum(links: int, stiffness: float, **options: Any) -> sr.SoftModel:
+def pendulum(links: int, stiffness: float, springs: Any = None, **options: Any) -> sr.SoftModel:
     """Links with a point mass at the end of each, hinges about y with a spring; upright where all angles are zero."""
     parts = ['<robot name="pendulum"><link name="link_0"/>']
     for number in range(1, links + 1):
@@ -37,19 +40,25 @@ def pendulum(links: int, stiffness: float, **options: Any) -> sr.SoftModel:
         f'<link name="tip"/><joint name="end" type="fixed"><parent link="link_{links}"/><child link="tip"/>'
         f'<origin xyz="0 0 {LENGTH}"/></joint></robot>'
     )
-    springs = {f"hinge_{number}": stiffness for number in range(1, links + 1)}
+    springs = springs or {f"hinge_{number}": stiffness for number in range(1, links + 1)}
     return sr.load_model("".join(parts), springs=springs, tip="tip", **options)
 
 
-def double_pendulum(t: float, state: FloatArray, stiffness: float, gravity: float) -> FloatArray:
-    """Two point masses on rods: Lagrange's equations in absolute angles from the vertical, upwards."""
+def double_pendulum(t: float, state: FloatArray, stiffness: float, gravity: float, push_tip: float = 0.0) -> FloatArray:
+    """Two point masses on rods: Lagrange's equations in absolute angles from the vertical, upwards; a force along x."""
     first, second, rate_1, rate_2 = state
     difference = second - first
     mass = MASS * LENGTH**2 * np.array([[2.0, np.cos(difference)], [np.cos(difference), 1.0]])
     push = MASS * LENGTH**2 * np.sin(difference) * np.array([rate_2**2, -(rate_1**2)])
     weight = MASS * gravity * LENGTH * np.array([2.0 * np.sin(first), np.sin(second)])
     springs = stiffness * np.array([difference - first, -difference])
-    return np.concatenate([[rate_1, rate_2], np.linalg.solve(mass, push + weight + springs)])
+    pushed = push_tip * LENGTH * np.cos([first, second])
+    return np.concatenate([[rate_1, rate_2], np.linalg.solve(mass, push + weight + springs + pushed)])
+
+
+def tip_of(first: Any, second: Any) -> FloatArray:
+    """Tip of the double pendulum at absolute angles, shape (..., 3)."""
+    return LENGTH * np.stack([np.sin(first) + np.sin(second), 0.0 * first, np.cos(first) + np.cos(second)], axis=-1)
 
 
 @law("simulate", "Motion")
@@ -130,3 +139,176 @@ def test_the_equations_are_those_of_lagrange(number: int, random: Any) -> None:
         tensions, strains = x[: model.n_motors], x[model.n_motors :]
         expected[free] += tensions @ model.structure.muscle_paths.at(strains).arms
     assert np.abs(exact[free] - expected[free]).max() < 1e-5 * max(1.0, np.abs(exact).max())
+
+
+def as_table(times: list[float], values: list[float]) -> Any:
+    return times, [(value, 0.0, 0.0) for value in values]
+
+
+@pytest.mark.parametrize(
+    "force",
+    [as_table([0.0, 0.31, 0.31], [0.0, 3.0, -2.0]), lambda t: np.array([3.0 * t / 0.31 if t < 0.31 else -2.0, 0.0, 0.0])],
+    ids=["table", "function"],
+)
+def test_the_tip_stays_within_the_tolerance_over_a_run_with_a_jump_of_the_load(force: Any) -> None:
+    model, stiffness = pendulum(2, 4.0), 4.0
+
+    def slope(t: float, state: FloatArray, push: Any) -> FloatArray:
+        return double_pendulum(t, state, stiffness, 0.0, push(t))
+
+    accurate: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "dense_output": True}
+    first = solve_ivp(slope, (0.0, 0.31), np.zeros(4), args=(lambda t: 3.0 * t / 0.31,), **accurate).sol
+    second = solve_ivp(slope, (0.31, 2.0), first(0.31), args=(lambda _: -2.0,), **accurate).sol
+    for tolerance in (1e-3, 1e-4):
+        moved = sr.simulate(model, 2.0, (), force=force, damping_time=0.0, tolerance=tolerance)
+        exact = np.array([(first if t <= 0.31 else second)(t) for t in moved.time])
+        errors = np.linalg.norm(moved.tip_position - tip_of(exact[:, 0], exact[:, 1]), axis=1)
+        assert moved.tip_error is not None
+        assert errors.max() < tolerance
+        assert errors.max() < 2.0 * moved.tip_error < 2.0 * tolerance  # the estimate is one, not a bound
+        assert np.abs(moved.steps - 0.31).min() < 1e-12
+        assert np.abs(moved.energy.balance).max() < 1e-2 * np.abs(moved.energy.load_work).max()
+
+
+def test_a_motor_that_stops_at_once_gives_the_robot_a_blow() -> None:
+    """A motor turns at constant speed from rest, and stops: its velocity jumps twice, and the momentum of the rest does not."""
+    model = pendulum(2, 0.0, springs={"hinge_2": 3.0}, motors=["hinge_1"])
+    speed, stop = 0.8, 0.4
+
+    def slope(t: float, state: FloatArray) -> FloatArray:
+        second, rate = state
+        first, rate_1 = (speed * t, speed) if t < stop else (speed * stop, 0.0)
+        push = -MASS * LENGTH**2 * np.sin(second - first) * rate_1**2
+        weight = MASS * 9.81 * LENGTH * np.sin(second)
+        return np.array([rate, (push + weight - 3.0 * (second - first)) / (MASS * LENGTH**2)])
+
+    accurate: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+    before = solve_ivp(slope, (0.0, stop), [0.0, -speed], **accurate).y[:, -1]
+    before[1] += speed * np.cos(before[0] - speed * stop)
+    after = solve_ivp(slope, (np.nextafter(stop, 1.0), 1.0), before, **accurate).y[:, -1]
+
+    def path(t: float) -> FloatArray:
+        return np.array([speed * min(t, stop)])
+
+    for options in ({"time_step": 1e-3}, {"tolerance": 1e-4}):
+        moved = sr.simulate(model, 1.0, path, gravity=sr.EARTH_GRAVITY, damping_time=0.0, **options)
+        assert moved.velocities[0, 0] == pytest.approx(-2.0 * speed, abs=1e-6)
+        assert moved.q_springs[-1, 0] + speed * stop == pytest.approx(after[0], abs=2e-4)
+        assert moved.velocities[-1, 0] == pytest.approx(after[1], abs=2e-3)
+        assert np.abs(moved.energy.balance).max() < 1e-3 * np.abs(moved.energy.motor_work).max()
+
+
+def test_steps_end_at_the_knee_of_a_plateau() -> None:
+    """A link whose moment ends in a plateau swings beyond it and back, as SciPy integrates between the events."""
+    text = pendulum(1, 1.0).urdf.replace("<robot ", '<robot xmlns:softrobots="urn:softrobots:urdf" ')
+    text = text.replace("</joint>", '<softrobots:spring stiffness="8.0" rest="0.0"/></joint>', 1)
+    link = '<softrobots:inflated_link springs="hinge_1" radius="0.05" pressure="5e4" max_moment="2.0"/></robot>'
+    model = sr.load_model(text.replace("</robot>", link), tip="tip")
+    inertia, knee = MASS * LENGTH**2, 2.0 / 8.0
+
+    def slope(t: float, state: FloatArray) -> FloatArray:
+        return np.array([state[1], -np.clip(8.0 * state[0], -2.0, 2.0) / inertia])
+
+    begin = np.array([0.0, 1.5 * knee * np.sqrt(8.0 / inertia)])
+    start = MotionState(model, 0.0, np.zeros(0), np.zeros(0), begin[:1], begin[1:])
+    events: Any = [lambda t, s: s[0] - knee, lambda t, s: s[0] + knee]
+    exact = solve_ivp(slope, (0, 2.0), begin, "DOP853", rtol=1e-12, atol=1e-13, events=events, max_step=1e-3)
+    moved = sr.simulate(model, 2.0, (), start=start, damping_time=0.0)
+    assert moved.tolerance is not None
+    assert abs(moved.q_springs[-1, 0] - exact.y[0, -1]) * LENGTH < moved.tolerance
+    crossings = np.sort(np.concatenate(exact.t_events))
+    nearest = np.abs(moved.steps - crossings[:, None]).min(axis=1)
+    assert len(crossings) > 6
+    assert nearest.max() < 0.1 * np.diff(moved.steps).max()
+
+
+@pytest.mark.parametrize("model", ROBOTS, ids=["arm", "lengths", "tensions"])
+def test_every_robot_keeps_its_energy_to_second_order(model: sr.SoftModel) -> None:
+    start = sr.solve_equilibrium(model, model.relaxed_motors, force=(1.0, 2.0, 0.5))
+
+    def path(t: float) -> FloatArray:
+        scale = model.motor_scale * (0.1 if model.muscle_input == "lengths" and model.muscles else 0.3)
+        return np.asarray(model.relaxed_motors + np.sin(8.0 * t) ** 3 * scale)
+
+    options: dict[str, Any] = {"gravity": sr.EARTH_GRAVITY, "damping_time": 0.01, "force": (0.0, 0.5, 0.0)}
+    moved = [sr.simulate(model, 0.12, path, start=start, time_step=h, **options) for h in (2e-3, 1e-3)]
+    coarse, fine = (np.abs(motion.energy.balance).max() for motion in moved)
+    assert coarse < 1e-2 * np.abs(moved[0].energy.kinetic).max()
+    assert 3.2 < coarse / fine < 5.0
+
+
+def test_ctrl_c_returns_what_there_is() -> None:
+    model = pendulum(1, 4.0)
+    pressed: list[int] = []
+
+    def force(t: float) -> FloatArray:
+        pressed.append(1)
+        if len(pressed) == 6000:
+            raise KeyboardInterrupt
+        return np.array([np.sin(t), 0.0, 0.0])
+
+    for options in ({"time_step": 5e-5}, {"tolerance": 1e-9}):
+        pressed.clear()
+        moved = sr.simulate(model, 1.0, (), force=force, **options)
+        assert moved.interrupted
+        assert 0.0 < moved.time[-1] <= 1.0
+        assert np.all(np.isfinite(moved.q_springs))
+
+
+def test_a_chaotic_motion_ends_in_an_error_that_says_how_far_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulation, "MOST_STEPS", 500)
+    model = pendulum(2, 0.01)
+    start = sr.solve_equilibrium(model, (), force=(30.0, 0.0, 5.0))
+    with pytest.raises(sr.NotConverged, match="within the tolerance until t = ") as caught:
+        sr.simulate(model, 8.0, (), start=start, gravity=sr.EARTH_GRAVITY, damping_time=0.0)
+    best = caught.value.best
+    assert isinstance(best, sr.Motion)
+    assert best.tip_error == caught.value.residual > best.tolerance
+
+
+def test_a_section_that_leaves_its_range_ends_in_an_error_with_what_was_reached() -> None:
+    with pytest.raises(sr.NotConverged, match=r"no step from t = .* succeeds") as caught:
+        sr.simulate(ROBOTS[1], 1.0, ROBOTS[1].relaxed_motors, force=(1e4, 0.0, 0.0), time_step=1e-2)
+    best = caught.value.best
+    assert np.all(np.isfinite(best.q_springs))
+    assert np.all(np.isfinite(best.motor_torques))
+
+
+MOTORS = (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "match"),
+    [
+        ({"duration": 0.0}, "duration"),
+        ({"duration": np.nan}, "duration"),
+        ({"q_motors": (0, 0)}, "q_motors"),
+        ({"q_motors": lambda t: np.zeros(2)}, r"q_motors\(t=0\)"),
+        ({"q_motors": lambda t: np.full(3, np.nan if t > 0.05 else 0.0)}, r"q_motors\(t=0\.0"),
+        ({"q_motors": lambda t: np.full(3, float(t > 0.05))}, "jumps at 0.05 s"),
+        ({"q_motors": "home"}, "q_motors"),
+        ({"force": (1, 2)}, "force"),
+        ({"force": ([0.0, 1.0], np.zeros((3, 3)))}, "values of force"),
+        ({"force": ([1.0, 0.0], np.zeros((2, 3)))}, "times of force"),
+        ({"force": lambda t: "down"}, r"force\(t=0\)"),
+        ({"wrench": (1, 2, 3)}, "wrench"),
+        ({"wrench": {"tip": lambda t: np.full(6, np.nan if t > 0.05 else 0.0)}}, "wrench"),
+        ({"gravity": 9.81}, "gravity"),
+        ({"damping_time": -1.0}, "damping_time"),
+        ({"mass_damping": -1.0}, "mass_damping"),
+        ({"time_step": 0.0}, "time_step"),
+        ({"time_step": 1e-12}, "time_step"),
+        ({"output_step": -1.0}, "output_step"),
+        ({"output_step": 1e-12}, "output_step"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"tolerance": 1e-3, "time_step": 1e-3}, "tolerance"),
+        ({"start": "rest"}, "start"),
+        ({"start": sr.solve_equilibrium(ROBOTS[0], (0.1, 0.0, 0.0))}, "q_motors"),
+        ({"motors": "servo"}, "motors"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused(arguments: dict[str, Any], match: str) -> None:
+    with pytest.raises(sr.ParameterError, match=match):
+        sr.simulate(**{"model": ROBOTS[0], "duration": 0.1, "q_motors": MOTORS, "time_step": 1e-2, **arguments})
+    with pytest.raises(sr.NameNotFound, match="nowhere"):
+        sr.simulate(ROBOTS[0], 0.1, MOTORS, wrench={"nowhere": np.zeros(6)})

@@ -24,6 +24,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motor_torque import MotorTorque
+from softrobots.dynamics.time_inputs import MotorPath
 
 _CHANGE = 1e-13  # of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step
 _ROUNDED = 1e-9  # the same, below which an iteration that no longer shrinks has reached rounding
@@ -87,7 +88,7 @@ class MidpointRule:
     def __init__(
         self,
         equations: EquationsOfMotion,
-        path: Callable[[float], FloatArray],
+        path: MotorPath,
         load: Callable[[float], Wrenches],
         torque: MotorTorque | None = None,
     ) -> None:
@@ -95,7 +96,7 @@ class MidpointRule:
 
         Args:
             equations: Equations of motion.
-            path: Actuators at a time, shape (n_motors,) [rad, m or N]; the entries of free ones are not used.
+            path: Actuators over time; the entries of free ones are not used.
             load: Load at a time; the same object while it is the same.
             torque: What acts on the motor joints, which are free then; None: they are prescribed.
         """
@@ -109,6 +110,18 @@ class MidpointRule:
         self._damping = equations.damping[self._block]
         self._past: list[tuple[float, FloatArray]] = []
         self._known: tuple[float, FloatArray] | None = None
+
+    def kicked(self, state: State, change: FloatArray) -> State:
+        r"""State after the velocities of prescribed coordinates jump by `change`, shape (n_motors,).
+
+        The impulse of the motors is shared as by a blow on the mechanism, :math:`M_{yy} \Delta v = -M_{yu} \Delta \dot u`.
+        """
+        mass, free, fixed = self.equations.mass_matrix(state.x), self.free, self.prescribed
+        rates = state.rates.copy()
+        rates[fixed] += change[fixed]
+        if len(free):
+            rates[free] -= np.linalg.solve(mass[self._block], mass[np.ix_(free, fixed)] @ change[fixed])
+        return State(state.time, state.x, rates)
 
     def forget(self) -> None:
         """Forget the last accelerations, which predict the next: the load jumps."""

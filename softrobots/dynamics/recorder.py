@@ -70,6 +70,13 @@ class Recorder:
         self.tips.append(self.tip(step.end.x))
         return more
 
+    def kick(self, change: FloatArray) -> None:
+        """The velocities of prescribed coordinates jump by `change`, shape (n_motors,); motors do the work."""
+        after = self.rule.kicked(self.state, change)
+        work = self._equations.energies(after.x, after.rates)[0] - self._equations.energies(after.x, self.state.rates)[0]
+        dissipated, load_work, motor_work = self._works[-1]
+        self.state, self._works[-1] = after, (dissipated, load_work, motor_work + work)
+
     def mark(self) -> tuple[State, int, int]:
         """What `reset` needs to return to here."""
         return self.state, self.rows, len(self._middles)

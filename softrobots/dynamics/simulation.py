@@ -27,6 +27,8 @@ MOTORS = ("prescribed", "torque")
 """How motors move."""
 
 _ROWS = 200  # of a motion, if no output step is given
+_MOST_ROWS = 10_000_000  # steps or rows of a motion, for which memory suffices
+_APART = 1e-6  # largest distance of motors from where the start has them [rad or m]
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
 
 TIP_TOLERANCE = 5e-4
@@ -113,16 +115,27 @@ def simulate(
     largest = TIP_TOLERANCE * model.reach if tolerance is None else positive_number("tolerance", tolerance, "m")
     between = end / _ROWS if h is None else h * math.ceil(end / h / _ROWS - 1e-9)
     between = between if output_step is None else positive_number("output_step", output_step, "s")
+    for name, length in (("time_step", h), ("output_step", between)):
+        if length is not None and end / length > _MOST_ROWS:
+            raise ParameterError(name, length, f"at least {end / _MOST_ROWS:.3g} s, {_MOST_ROWS} of which make the duration")
     with one_blas_thread(model.n_springs):
         drives = None if drive is None else model.actuators.drives
         equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, alpha), drives)
 
         def new_run() -> Recorder:
+            """A run from the first state, whose velocities take those with which prescribed motors begin."""
             controller = None if drive is None else MotorTorque(model, torque, sample_time)
-            return Recorder(MidpointRule(equations, path, load, controller), first, _grid(end, between))
+            rule = MidpointRule(equations, path, load, controller)
+            change = path.kicks.get(0.0, np.zeros(model.n_motors)) - first.rates[: model.n_motors]
+            slight = _APART * float(np.abs(first.rates[: model.n_motors]).max(initial=_APART))
+            begun = rule.kicked(first, change) if np.abs(change).max(initial=0.0) > slight else first
+            return Recorder(rule, begun, _grid(end, between))
 
         if h is not None:
-            return _fixed(new_run(), _grid(end, h) if drive is None else drive.with_samples(_grid(end, h)), beta, progress)
+            kicks = np.array([time for time in path.kicks if 0.0 < time < end])
+            regular = [time for time in _grid(end, h).tolist() if np.abs(kicks - time).min(initial=h) > 1e-6 * h]
+            grid = np.sort(np.concatenate([regular, kicks]))
+            return _fixed(new_run(), grid if drive is None else drive.with_samples(grid), beta, progress)
         breaks = np.unique(np.concatenate([[end], path.breaks, load.breaks]))
         return _controlled(new_run, breaks if drive is None else drive.with_samples(breaks), largest, beta, progress)
 
@@ -201,8 +214,13 @@ def _first_state(model: SoftModel, start: Any, path: MotorPath, free: int) -> St
             raise ParameterError("start", start, "an Equilibrium, a Motion, a MotionState, or None (relaxed, at rest)")
         if start.model != model:
             raise ParameterError("start", start.model, f"a state of the model given, {model!r}")
+        placed = slice(free, model.n_motors - (len(model.muscles) if model.muscle_input == "forces" else 0))
+        apart = np.abs(motors - start.q_motors)[placed].max(initial=0.0)
+        if apart > _APART:
+            text = f"at {start.q_motors.tolist()} at t = 0, where `start` has the actuators (it is {apart:.3g} rad or m away)"
+            raise ParameterError("q_motors", motors, text)
         springs, motors = start.q_springs, np.concatenate([start.q_motors[:free], motors[free:]])
         if isinstance(start, MotionState):
-            rates[:free] = start.motor_velocities[:free]
+            rates[: model.n_motors] = start.motor_velocities
             rates[model.n_motors :] = start.velocities
     return State(0.0, np.concatenate([motors, springs]), rates)

@@ -108,6 +108,8 @@ def _advance(recorder: Recorder, end: float, *, to_knees: bool = False) -> Itera
         if step is not None and knee is None:
             yield from range(recorder.add(step))
             targets.pop()
+            if step.end.time in recorder.rule.path.kicks and step.end.time < recorder.duration:
+                recorder.kick(recorder.rule.path.kicks[step.end.time])
         elif len(targets) > _HALVINGS:
             now = recorder.state.time
             raise NoStep(f"no step from t = {now:.6g} s succeeds, down to a length of {targets[-1] - now:.3g} s")

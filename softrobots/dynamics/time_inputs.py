@@ -13,6 +13,8 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.trajectory import Trajectory
 
 _SAMPLES = 1000  # of a function of time, among which its jumps are searched
+_NEAR = 1e-7  # of the duration: how far apart a function is compared for its velocity
+_KINK = 1e-3  # of the largest velocity: jumps of the velocity that count
 _KINKS = 200  # rows up to which steps end at each row of a table
 
 Signal = Callable[[float], FloatArray]
@@ -28,7 +30,9 @@ class MotorPath:
             ParameterError: If a value has the wrong shape, is not finite, is one that the robot cannot have, or jumps.
         """
         self.breaks: FloatArray = np.zeros(0)
-        """Times at which the path has a kink [s]."""
+        """Times at which the path, its slope or a tension jumps [s]."""
+        self.kicks: dict[float, FloatArray] = {}
+        """Jump of the velocities of the actuators, shape (n_motors,), by time; at zero the velocities themselves."""
         self.constant = False
         """Whether nothing moves."""
         if isinstance(q_motors, Trajectory):
@@ -40,9 +44,7 @@ class MotorPath:
             self._signal = checked_function("q_motors", q_motors, (model.n_motors,), "rad")
             for time in np.linspace(0.0, duration, 21).tolist():
                 model.checked_motors(self._signal(time), f"q_motors(t={time:.6g})")
-            jumps = find_jumps(self._signal, duration)
-            for time in jumps[:1].tolist():
-                raise ParameterError("q_motors", q_motors, f"a continuous function of time; it jumps at {time:.6g} s")
+            self._find_kicks(model, duration)
         else:
             values = model.checked_motors(q_motors)
             self.constant, self._signal = True, lambda _: values
@@ -50,6 +52,36 @@ class MotorPath:
     def __call__(self, time: float) -> FloatArray:
         """Return the positions, shape (n_motors,) [rad, m or N]."""
         return self._signal(time)
+
+    def _find_kicks(self, model: SoftModel, duration: float) -> None:
+        """Find the jumps of tensions and of velocities; positions have none."""
+        placed = model.n_motors - (len(model.muscles) if model.muscle_input == "forces" else 0)
+        signal, near = self._signal, _NEAR * duration
+        jumps = find_jumps(lambda time: signal(time)[:placed], duration)
+        if len(jumps):
+            text = f"a continuous function of time; it jumps at {jumps[0]:.6g} s"
+            raise ParameterError("q_motors", signal(float(jumps[0])), text)
+
+        def velocity(time: float) -> FloatArray:
+            before, after = max(time - near, 0.0), min(time + near, duration)
+            return np.asarray((signal(after) - signal(before))[:placed] / (after - before))
+
+        fastest = float(np.abs([velocity(time) for time in np.linspace(0.0, duration, 101).tolist()]).max(initial=0.0))
+        kinks = find_jumps(velocity, duration, resolution=4.0 * near, least=_KINK * fastest) if fastest > 0.0 else np.zeros(0)
+        if len(kinks):  # one at a sample is found on both sides of it
+            kinks = np.array([part.mean() for part in np.split(kinks, np.flatnonzero(np.diff(kinks) > 20.0 * near) + 1)])
+        self.kicks = {0.0: velocity(0.0)} if np.abs(velocity(0.0)).max(initial=0.0) > _KINK * fastest else {}
+        for time in kinks.tolist():
+            low, high = time - 8.0 * near, time + 8.0 * near
+            before, after = velocity(low), velocity(high)
+            most = int(np.abs(after - before).argmax())  # its tangents meet at the kink
+            gap = (signal(high) - signal(low))[most] + before[most] * (low - time) - after[most] * (high - time)
+            self.kicks[time - float(gap / (after - before)[most])] = after - before
+        unplaced = np.zeros(model.n_motors - placed)
+        self.kicks = {time: np.concatenate([change, unplaced]) for time, change in self.kicks.items()}
+        kinks = np.array(list(self.kicks))
+        tension_jumps = find_jumps(lambda time: signal(time)[placed:], duration)
+        self.breaks = np.concatenate([kinks, tension_jumps])
 
 
 class TimeLoad:
@@ -120,17 +152,24 @@ def checked_function(name: str, function: Callable[[float], Any], shape: tuple[i
     return checked
 
 
-def find_jumps(signal: Signal, duration: float) -> FloatArray:
-    """Times at which a function of time jumps, found among 1000 samples and located by bisection, shape (n,) [s]."""
+def find_jumps(signal: Signal, duration: float, *, resolution: float = 0.0, least: float = 0.0) -> FloatArray:
+    """Times at which a function of time jumps, found among 1000 samples and located by bisection, shape (n,) [s].
+
+    Args:
+        signal: The function.
+        duration: End of the times that are searched [s].
+        resolution: Width of a jump that counts as one [s].
+        least: Height of the smallest jump that counts.
+    """
     times = np.linspace(0.0, duration, _SAMPLES + 1).tolist()
     values = np.array([signal(time) for time in times])
     changes = np.abs(np.diff(values, axis=0)).max(axis=1, initial=0.0)
     jumps = []
-    for place in np.flatnonzero(changes > 1e-6 * np.ptp(values, axis=0).max(initial=0.0)).tolist():
+    for place in np.flatnonzero(changes > max(least, 1e-6 * np.ptp(values, axis=0).max(initial=0.0))).tolist():
         before, after = times[place], times[place + 1]
         low, high = values[place], values[place + 1]
         rounds = 0
-        while after - before > 4e-16 * duration and rounds < 60:
+        while after - before > max(resolution, 4e-16 * duration) and rounds < 60:
             middle = 0.5 * (before + after)
             if not before < middle < after:
                 break
