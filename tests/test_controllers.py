@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from studies.control import tracking
+from tests.conftest import CHECKOUT
 from tests.support.laws import law
 
 START, END, FORCE = (0.8, 0.1, 0.4), (0.9, 0.2, 0.2), (0.0, 10.0, -15.0)
@@ -155,3 +158,17 @@ def test_the_closed_loop_finds_the_target_under_a_load_that_nobody_told_it(geare
 def test_what_controls_nothing_is_refused(make: Any, name: str, path: sr.Path3D, loaded: sr.Trajectory) -> None:
     with pytest.raises(sr.ParameterError, match=f"^{name} = "):
         make(loaded.model, path, loaded)
+
+
+@pytest.mark.study
+def test_the_record_of_controllers_is_what_a_fresh_run_says() -> None:
+    """And what the guide says of it: feed-forward keeps the tip within millimetres, the closed loop needs no load told."""
+    record = json.loads((CHECKOUT / "docs" / "validation" / "controllers.json").read_text())["rows"]
+    for old, new in zip(record, (one.row() for one in tracking.study()), strict=True):
+        assert old["controller"] == new["controller"]
+        for key, value in new.items():
+            if key.endswith("_m"):
+                assert value == pytest.approx(old[key], rel=0.02, abs=2e-5)  # the loop amplifies rounding of its estimates
+    ends = {(row["controller"], row["load"]): row["end_m"] for row in record}
+    assert ends["PD, with feed-forward", 1.0] < 1e-4 < ends["PD, with feed-forward", 1.2]
+    assert ends["closed loop", 1.2] < 2e-4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import softrobots as sr
+from studies.control import shaping
+from tests.conftest import CHECKOUT
 from tests.support.laws import law
 
 KINDS = ("zv", "zvd", "ei")
@@ -188,3 +191,24 @@ def test_the_sensitivity_is_drawn() -> None:
     assert drawn == pytest.approx({"ZV": 0.0, "ZVD": 0.0, "EI": 5.0}, abs=1e-9)
     with pytest.raises(sr.ParameterError, match=r"^widest "):
         figures.sensitivity(3.5, widest=1.0)
+
+
+def test_a_shaped_move_of_the_arm_leaves_less_than_two_per_cent_of_the_vibration() -> None:
+    """Half a second, half a radian, under weight, with the exact modes of its end."""
+    arm = sr.load_model(sr.InflatableArm())
+    rest = sr.solve_equilibrium(arm, shaping.TO, gravity=sr.EARTH_GRAVITY).tip_position
+    bare, shaped = (shaping.left(*shaping.move(arm, 1.0, name), rest) for name in ("none", "EI"))
+    assert bare > 0.01
+    assert shaped < 0.02 * bare
+
+
+@pytest.mark.study
+def test_the_record_of_shapers_is_what_a_fresh_run_says() -> None:
+    record = json.loads((CHECKOUT / "docs" / "validation" / "input_shaping.json").read_text())["rows"]
+    for old, new in zip(record, shaping.study(), strict=True):
+        assert old["modes"] == new["modes"]
+        assert old["left_m"] == pytest.approx(new["left_m"], rel=1e-3, abs=1e-7)
+    whole, half, tenth = (np.array([row["percent"][place] for row in record[1:]]) for place in range(3))
+    assert (tenth < 0.6).all()  # nearly linear, for each shaper
+    assert (tenth < half).all()
+    assert (half < whole).all()  # what is left is of second order in the move

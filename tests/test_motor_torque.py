@@ -127,7 +127,7 @@ def test_the_balance_of_power_closes_with_motors_friction_and_springs(geared: sr
     for h in (2e-3, 1e-3):
         moved = sr.simulate(
             geared,
-            0.5,
+            0.25,
             (0.3, 0.6, -0.8),
             gravity=sr.EARTH_GRAVITY,
             motors="torque",
@@ -195,3 +195,55 @@ def test_a_robot_without_motor_joints_has_no_torques() -> None:
     model = sr.load_model(wheel().urdf, springs={"motor": 1.0}, tip="wheel")
     with pytest.raises(sr.ParameterError, match="without motor joints"):
         sr.simulate(model, 0.1, (), motors="torque", torque=())
+
+
+def test_chosen_steps_keep_their_tolerance_and_end_at_every_sample(geared: sr.SoftModel) -> None:
+    """The tip of the run with chosen steps is that of a run with steps of an eighth of a sample."""
+    held = sr.solve_equilibrium(geared, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY)
+    target = np.array((0.4, 0.5, -0.7))
+    options: dict[str, Any] = {
+        "start": held,
+        "gravity": sr.EARTH_GRAVITY,
+        "motors": "torque",
+        "torque": lambda _, q, qd: 200.0 * (target - q) - 10.0 * qd - held.motor_torques,
+        "sample_time": 4e-3,
+        "output_step": 0.05,
+    }
+    chosen = sr.simulate(geared, 0.3, None, tolerance=1e-4, **options)
+    fine = sr.simulate(geared, 0.3, None, time_step=5e-4, **options)
+    assert chosen.tip_error is not None
+    assert chosen.tip_error <= 1e-4
+    assert np.linalg.norm(chosen.tip_position - fine.tip_position, axis=1).max() < 1.5e-4  # and the error of the other
+    for instant in 4e-3 * np.arange(75):
+        assert np.abs(chosen.steps - instant).min() < 1e-9
+
+
+def test_mujoco_moves_the_exported_arm_as_we_do() -> None:
+    """With its armature, springs, their damping and weight, under torques over time; Runge-Kutta at a tenth of our step."""
+    mujoco = pytest.importorskip("mujoco")
+    model = sr.load_model(sr.InflatableArm(rotor_inertia=0.05))
+    start = sr.solve_equilibrium(model, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY)
+
+    def torque(t: float, q: Any, qd: Any) -> Any:
+        return -start.motor_torques + np.array((3.0, -2.0, 1.0)) * np.sin(12.0 * t) + 20.0 * (start.q_motors - q) - qd
+
+    options: dict[str, Any] = {"start": start, "gravity": sr.EARTH_GRAVITY, "motors": "torque", "torque": torque}
+    ours = sr.simulate(model, 0.4, None, time_step=1e-3, output_step=0.1, **options)
+    other = mujoco.MjModel.from_xml_string(
+        sr.export.to_mjcf(model, start.q_motors, damping="file", gravity=sr.EARTH_GRAVITY, limits=False)
+    )
+    other.opt.integrator, other.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 1e-4
+    other.actuator_gainprm[:], other.actuator_biasprm[:] = 0.0, 0.0  # the servos of the export let go
+    other.geom_contype[:] = 0
+    data = mujoco.MjData(other)
+    names = [other.joint(number).name for number in range(other.njnt)]
+    order = [model.pinocchio.getJointId(name) - 1 for name in names]
+    motors = [names.index(name) for name in model.motor_joints]
+    data.qpos[:] = np.array(start.q)[order]
+    for row in range(1, len(ours.time)):
+        while data.time < ours.time[row] - 1e-9:
+            data.qfrc_applied[motors] = torque(data.time + 0.5e-4, data.qpos[motors], data.qvel[motors])
+            mujoco.mj_step(other, data)
+        # torques held over a tenth of a millisecond lag by half of it: 1e-5 of motions near 1 rad/s
+        assert data.qpos == pytest.approx(np.array(ours.configuration(row))[order], abs=1e-4)
+    assert np.abs(ours.q_motors[-1] - ours.q_motors[0]).max() > 0.05
