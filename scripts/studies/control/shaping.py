@@ -15,7 +15,7 @@ DURATION, AFTER, STEP = 0.5, 1.0, 2e-3
 """Time of the bare move, time over which the vibration after a move is measured, and step of time [s]."""
 SIZES = (1.0, 0.5, 0.1)
 """Sizes of the move, as shares of the whole, all with the same end."""
-CASES = {"none": ("zv", ()), "ZV": ("zv", None), "ZVD": ("zvd", None), "EI": ("ei", None)}
+CASES = {"none": ("zv", ()), "ZV": ("zv", None), "ZVD": ("zvd", None), "ZVD, both modes": ("zvd", (0, 1)), "EI": ("ei", None)}
 """Shaper, and numbers of its modes (None: those that matter)."""
 
 
