@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+import softrobots.dynamics.saved_modes
 import softrobots.dynamics.saved_motion  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.core.errors import (

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -11,6 +13,7 @@ import pytest
 from scipy.optimize import brentq
 
 import softrobots as sr
+from softrobots.cli import main as cli
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from tests.support.law_robots import model
@@ -241,3 +244,67 @@ def test_python_control_takes_it_and_steps_as_the_simulation(tool: Callable[[str
     assert np.abs(tip - expected[:3]).max() < 2e-3 * np.abs(expected[:3]).max()  # the scheme at 1 ms: (omega h)^2 / 12
     torques = (moved.motor_torques - found.motor_torques).T
     assert np.abs(torques - expected[6:])[:, 1:].max() < 2e-2 * np.abs(expected[6:]).max()
+
+
+# --- What users see of them
+
+
+def test_modes_are_saved_drawn_and_played(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command writes what the library finds; a saved result is computed again, and refused if it claims something else."""
+    asked = ["modes", "inflatable_arm", "--motors", "0.3", "0.6", "-0.8", "--gravity", "--damping-time", "0.01"]
+    asked += ["--servo-stiffness", "900", "--count", "2"]
+    files = [str(tmp_path / name) for name in ("modes.npz", "modes.png", "modes.html")]
+    assert cli.main([*asked, "-o", files[0], "--plot", files[1], "--page", files[2], "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    arm = model("arm")
+    found = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY)
+    modes = sr.vibration_modes(arm, found, damping_time=0.01, servo_stiffness=900.0)
+    assert answer["frequencies"] == modes.frequencies.tolist()
+    assert [Path(file).name for file in answer["files"]] == ["modes.npz", "modes.png", "modes_1.html", "modes_2.html"]
+    assert "mode 2" in (tmp_path / "modes_2.html").read_text(encoding="utf-8")
+    saved = sr.load_result(files[0])
+    assert np.array_equal(saved.shapes, modes.shapes)
+    assert np.array_equal(saved.motor_shapes, modes.motor_shapes)
+    arrays = dict(np.load(files[0]))
+    np.savez(tmp_path / "other.npz", **arrays | {"frequencies": 1.001 * arrays["frequencies"]})
+    with pytest.raises(sr.FileFormatError, match="not those of its equilibrium"):
+        sr.load_result(tmp_path / "other.npz")
+    rows = sr.save_csv(modes, tmp_path / "modes.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0].startswith("mode,frequency [Hz],damping ratio [-]")
+    assert [float(cell) for cell in rows[3].split(",")[:3]] == [3.0, modes.frequencies[2], modes.damping_ratios[2]]
+    assert cli.main(["modes", "inflatable_arm", "--force", "-500", "0", "0.1", "--count", "0"]) == 2
+
+
+def test_a_swing_reaches_its_size_and_passes_the_equilibrium() -> None:
+    robot = rod(4, "sections")
+    modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, (), (0.3, 0, 0)))
+    for mode in (1, 5, 9):
+        swing = modes.swing(mode, 0.05)
+        assert np.array_equal(swing.at(0.0)[1], modes.equilibrium.q_springs)
+        moved, shape = swing.at(0.25)[1] - swing.at(0.0)[1], modes.shapes[:, mode - 1]
+        assert np.linalg.norm(moved / np.linalg.norm(moved) - shape / np.linalg.norm(shape)) < 1e-12
+        tip = swing.tip_position
+        assert np.linalg.norm(tip[-1] - tip[16]) < 0.05 * 1.2
+    with pytest.raises(sr.ParameterError, match="every section"):
+        modes.swing(1, 50.0)
+    with pytest.raises(sr.ParameterError, match="mode"):
+        modes.swing(25, 0.1)
+
+
+def test_the_figure_has_a_panel_for_each_mode(tool: Callable[[str], ModuleType]) -> None:
+    """Titles tell the frequencies; the ends are on both sides of the equilibrium, and modes that only twist stay on it."""
+    tool("matplotlib")
+    from softrobots.view.figures.vibrations import mode_shapes
+
+    robot = model("pcc")
+    modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, robot.relaxed_motors))
+    figure = mode_shapes(modes, shown=5)
+    panels = figure.axes[:5]
+    for panel, frequency in zip(panels, modes.frequencies, strict=False):
+        assert f"{frequency:.4g} Hz" in panel.get_title()
+        one, other, middle = (np.column_stack(line.get_data()) for line in panel.lines)
+        aside = [np.linalg.norm(line - middle, axis=1).max() for line in (one, other)]
+        assert aside[0] == pytest.approx(aside[1], rel=0.05, abs=1e-6)
+        assert (aside[0] < 1e-3) == ("twists" in panel.get_title())
+    with pytest.raises(sr.ParameterError, match="VibrationModes"):
+        mode_shapes(robot)

@@ -20,6 +20,7 @@ from softrobots.cli import (
     helix,
     ik,
     load,
+    modes,
     pcc,
     simulate,
     solve,
@@ -30,7 +31,7 @@ from softrobots.cli.options.command_line import exit_status, take_negative_numbe
 from softrobots.core.errors import ParameterError
 from softrobots.version import __version__
 
-COMMANDS = (urdf, export, solve, branches, load, ik, simulate, characterise, pcc, helix, view, bench, doctor, completion)
+COMMANDS = (urdf, export, solve, branches, load, ik, simulate, modes, characterise, pcc, helix, view, bench, doctor, completion)
 """Modules of the subcommands, in the order of the help."""
 
 

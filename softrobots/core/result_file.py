@@ -71,7 +71,7 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
 
     Args:
         result: A characterisation, equilibrium, imposed displacement, load estimate, IK solution, trajectory, motion,
-            workspace, workspace map, or the branches that `post_buckling_branches` returns.
+            vibration modes, workspace, workspace map, or the branches that `post_buckling_branches` returns.
         path: File to write; `.npz` is added if it has no suffix.
         overwrite: Replace an existing file.
 
@@ -97,15 +97,16 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
 
 
 def save_csv(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Save a trajectory or a motion as a CSV table in full precision, one line a waypoint or an instant.
+    """Save a trajectory, a motion or vibration modes as a CSV table in full precision: a line a waypoint, an instant, a mode.
 
     Columns of a trajectory: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z`
     [m], `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and spring
     [rad] (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link. Those of a motion have their unit
-    in their name: time, motors, springs, their velocities, motor torques, tip, force on the tip and energies.
+    in their name: time, motors, springs, their velocities, motor torques, tip, force on the tip and energies. So have those of
+    modes: frequency, damping ratio, effective masses, motion of the tip and of each coordinate.
 
     Args:
-        result: The trajectory or motion.
+        result: The trajectory, motion or modes.
         path: File to write.
         overwrite: Replace an existing file.
 

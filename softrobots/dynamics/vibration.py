@@ -23,13 +23,14 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.core.checks import FloatArray, finite_number, positive_integer, read_only
+from softrobots.core.checks import FloatArray, positive_integer, positive_number, read_only
 from softrobots.core.errors import DescriptionError, NeutralEquilibrium, ParameterError
 from softrobots.dynamics.small_motion import one_each, small_motion
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
+from softrobots.statics.kinematics import frame_placement
 
 _SAME = 1e-7  # frequencies this close, relative, are one: robots are round but for their tiny links
 _NO_MOTION = 1e-6  # of the largest motion of the tip
@@ -96,26 +97,66 @@ class VibrationModes:
             values: Any = np.linalg.eigvals(state)
         return read_only(values[np.argsort(np.abs(values), kind="stable")])
 
-    def swing(self, mode: int, size: float) -> tuple[FloatArray, FloatArray]:
-        """The robot at the end of a swing in one mode, for pictures: the linear motion of the mode, taken as far as `size`.
+    def swing(self, mode: int, size: float) -> ModeSwing:
+        """The robot swinging in one mode, for pictures and animations: the linear motion of the mode, taken as far as `size`.
 
         Args:
             mode: Number of the mode, from 1.
-            size: Largest motion of the tip or a coordinate, of angles it times the reach; negative: the other end [m].
+            size: Largest motion of the tip and of any coordinate; of angles it times the reach [m].
 
         Returns:
-            Actuator coordinates, shape (n_motors,), and elastic coordinates, shape (n_springs,) [rad or m].
+            The swing; `Viewer.animate` plays it.
 
         Raises:
-            ParameterError: If there is no such mode, or the size is not finite.
+            ParameterError: If there is no such mode, or the size is not positive or bends a section beyond its range.
         """
-        place = positive_integer("mode", mode, len(self.frequencies)) - 1
-        model, reach = self.model, self.model.reach
-        turning = np.concatenate([np.repeat([False, True], 3), model.actuators.turning, model.springs.turning])
-        moved = np.concatenate([one[:, place] for one in (self.tip_shapes, self.motor_shapes, self.shapes)])
-        scale = finite_number("size", size, "m") / float(np.abs(moved * np.where(turning, reach, 1.0)).max())
-        motors, springs = scale * self.motor_shapes[:, place], scale * self.shapes[:, place]
-        return self.equilibrium.q_motors + motors, self.equilibrium.q_springs + springs
+        positive_integer("mode", mode, len(self.frequencies))
+        made = ModeSwing(self, mode, positive_number("size", size, "m"))
+        if not all(self.model.coordinates.at(*made.at(share)).valid for share in (0.25, -0.25)):
+            raise ParameterError("size", size, "small enough for every section (see strain_chain.in_range)")
+        return made
+
+
+@dataclass(frozen=True, eq=False)
+class ModeSwing:
+    """A robot that swings in one mode; made by `VibrationModes.swing`."""
+
+    modes: VibrationModes
+    """The modes."""
+    mode: int
+    """Number of the mode, from 1."""
+    size: float
+    """Largest motion [m]."""
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self.modes.model
+
+    @property
+    def period(self) -> float:
+        """Time of one swing [s]."""
+        return 1.0 / float(self.modes.frequencies[self.mode - 1])
+
+    def at(self, share: float) -> tuple[FloatArray, FloatArray]:
+        """Actuators, shape (n_motors,), and elastic coordinates, shape (n_springs,) [rad or m], at a share of a period.
+
+        At 0 the robot passes its equilibrium, at 0.25 it is at the end that the signs of the mode point to.
+        """
+        modes, place, reach = self.modes, self.mode - 1, self.model.reach
+        turning = np.concatenate([np.repeat([False, True], 3), self.model.actuators.turning, self.model.springs.turning])
+        moved = np.concatenate([one[:, place] for one in (modes.tip_shapes, modes.motor_shapes, modes.shapes)])
+        scale = self.size * math.sin(2.0 * math.pi * share) / float(np.abs(moved * np.where(turning, reach, 1.0)).max())
+        at = modes.equilibrium
+        return at.q_motors + scale * modes.motor_shapes[:, place], at.q_springs + scale * modes.shapes[:, place]
+
+    @property
+    def tip_position(self) -> FloatArray:
+        """Positions of the tip from one end of the swing to the other, shape (33, 3) [m]."""
+        coordinates = (self.at(share) for share in np.linspace(-0.25, 0.25, 33).tolist())
+        return np.array(
+            [frame_placement(self.model, self.model.configuration(*at), self.model.tip).translation for at in coordinates]
+        )
 
 
 def vibration_modes(

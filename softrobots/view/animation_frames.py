@@ -1,4 +1,4 @@
-"""Frames of an animation: waypoints of a trajectory, evenly spaced interpolated states, a motion, a growing tube."""
+"""Frames of an animation: waypoints of a trajectory, evenly spaced interpolated states, a motion, a mode, a growing tube."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, finite_number, non_negative_number, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.vibration import ModeSwing
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.robots.growth import SHORTEST, grown_coordinates
@@ -16,11 +17,15 @@ from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
 
+Movement = Trajectory | Motion | ModeSwing
+"""What can be animated."""
+
 FRAME_RATE = 30
 """Frames a second."""
 
 _MOST_BODIES = 90  # shapes of a continuous body in one animation
 _MOST_INSTANTS = (600, 60)  # of a motion of rigid links, and of a body that bends: pages of about a megabyte at most
+_SWING = 2.0  # [s], of a mode: most are too fast to be seen
 _MOST_FRAMES = 2**31 - 1  # a browser's largest frame number
 
 
@@ -43,21 +48,23 @@ class Frame(NamedTuple):
     """Tension of each muscle in a motion, shape (n_muscles,) [N]."""
 
 
-def playing_time(model: SoftModel, movement: Trajectory | Motion, duration: float | None, speed: float | None) -> float:
+def playing_time(model: SoftModel, movement: Movement, duration: float | None, speed: float | None) -> float:
     """Return how long an animation of a model lasts [s]; the other arguments are those of `Viewer.animate`.
 
     Raises:
         ParameterError: If there is nothing to play, it is of another robot, duration or speed is not positive, or both are
             given.
     """
-    if not isinstance(movement, Trajectory | Motion):
-        raise ParameterError("movement", movement, "a Trajectory or a Motion")
+    if not isinstance(movement, Movement):
+        raise ParameterError("movement", movement, "a Trajectory, a Motion or the swing of a mode")
     if movement.model != model:
         raise ParameterError("movement", movement.model, f"a movement of the model given, {model!r}")
     if duration is not None and speed is not None:
         raise ParameterError("speed", speed, "left out where a duration is given")
     if duration is not None:
         return positive_number("duration", duration, "s")
+    if isinstance(movement, ModeSwing):
+        return _SWING if speed is None else movement.period / positive_number("speed", speed)
     times = movement.time if isinstance(movement, Motion) else movement.times
     return (float(times[-1] - times[0]) or 1.0) / (1.0 if speed is None else positive_number("speed", speed))
 
@@ -110,6 +117,12 @@ def motion_frames(motion: Motion, seconds: float) -> list[Frame]:
         load = Load({model.tip: np.append(forces[row], np.zeros(3))}, motion.gravity)
         frames.append(Frame(number, motors[row], springs[row], None, load=load, tensions=tensions[row]))
     return frames
+
+
+def swing_frames(swing: ModeSwing, seconds: float) -> list[Frame]:
+    """Return evenly spaced frames of one swing in a mode, coloured as its equilibrium."""
+    numbers, total = _spread(seconds, _MOST_INSTANTS[1])
+    return [Frame(number, *swing.at(number / total), swing.modes.equilibrium) for number in numbers.tolist()]
 
 
 def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) -> list[Frame]:

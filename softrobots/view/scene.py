@@ -18,7 +18,15 @@ from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
-from softrobots.view.animation_frames import Frame, even_frames, growth_frames, motion_frames, waypoint_frames
+from softrobots.view.animation_frames import (
+    Frame,
+    Movement,
+    even_frames,
+    growth_frames,
+    motion_frames,
+    swing_frames,
+    waypoint_frames,
+)
 from softrobots.view.body import SegmentBody, body_at
 from softrobots.view.robot_shapes import RobotShapes
 
@@ -128,17 +136,15 @@ class SceneBuilder:
         poses = self.robot.transforms(q)
         return Scene(poses, poses, self._reference())
 
-    def movement(self, movement: Trajectory | Motion, seconds: float) -> dict[int, Scene]:
+    def movement(self, movement: Movement, seconds: float) -> dict[int, Scene]:
         """Return the scenes of an animation by number of frame.
 
-        They are waypoints; evenly spaced shapes of a body that bends; or those of a motion, see `motion_frames`.
+        They are waypoints; evenly spaced shapes of a body that bends; or those of a motion or a mode, see `motion_frames`.
         """
         sections = len(self._model.structure.section_table)
-        if isinstance(movement, Motion):
-            return {
-                frame.number: self._scene(frame, max(_RINGS // max(sections, 1), 2))
-                for frame in motion_frames(movement, seconds)
-            }
+        if not isinstance(movement, Trajectory):
+            moving = motion_frames(movement, seconds) if isinstance(movement, Motion) else swing_frames(movement, seconds)
+            return {frame.number: self._scene(frame, max(_RINGS // max(sections, 1), 2)) for frame in moving}
         frames = (even_frames if sections else waypoint_frames)(movement, seconds)
         return {frame.number: self._scene(frame, 4) for frame in frames}
 

@@ -11,13 +11,12 @@ import numpy as np
 from softrobots.core.checks import FloatArray, finite_array, positive_integer
 from softrobots.core.errors import ParameterError, ViewerError
 from softrobots.core.files import new_file, write_text
-from softrobots.dynamics.motion import Motion
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.trajectory import Trajectory
-from softrobots.view.animation_frames import playing_time
+from softrobots.view.animation_frames import Movement, playing_time
 from softrobots.view.meshcat_page.page_text import InlinePage, legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
 from softrobots.view.meshcat_page.server import connect, end_server, send_html, start_server
@@ -122,7 +121,7 @@ class Viewer(ServedPage):
 
     def animate(
         self,
-        movement: Trajectory | Motion,
+        movement: Movement,
         *,
         duration: float | None = None,
         speed: float | None = None,
@@ -133,8 +132,8 @@ class Viewer(ServedPage):
         Links of a motion are coloured by the moments of their springs, and axial forces without inertia.
 
         Args:
-            movement: A trajectory or a motion of the viewer's robot.
-            duration: Time of the animation [s]; real time by default.
+            movement: A trajectory, a motion, or the swing of a mode (`VibrationModes.swing`) of the viewer's robot.
+            duration: Time of the animation [s]; real time by default, 2 s for a mode.
             speed: How fast it is played, relative to real time [-], e.g. 0.1; in place of `duration`.
             repetitions: How often; many, because meshcat mixes start and end when it is scrubbed after the last one.
 
@@ -145,7 +144,7 @@ class Viewer(ServedPage):
         positive_integer("repetitions", repetitions)
         self._check_open()
         scenes = self._scenes.movement(movement, seconds)
-        path = movement.tip_position if isinstance(movement, Motion) else movement.tip_positions
+        path = movement.tip_positions if isinstance(movement, Trajectory) else movement.tip_position
         self.look_at(path.mean(axis=0))
         self._robot.show(next(iter(scenes.values())))
         self._robot.trace(path)
@@ -265,9 +264,7 @@ class Viewer(ServedPage):
             raise ViewerError("the viewer is closed, or its server has ended; open a new one")
 
 
-def view(
-    model: SoftModel, result: Equilibrium | IkSolution | Trajectory | Motion | None = None, *, port: int | None = None
-) -> Viewer:
+def view(model: SoftModel, result: Equilibrium | IkSolution | Movement | None = None, *, port: int | None = None) -> Viewer:
     """Open a viewer and show a result in it.
 
     Args:
@@ -285,7 +282,7 @@ def view(
     """
     viewer = Viewer(model, port=port)
     try:
-        if isinstance(result, Trajectory | Motion):
+        if isinstance(result, Movement):
             viewer.animate(result)
         elif result is not None:
             shown = result.equilibrium if isinstance(result, IkSolution) else result

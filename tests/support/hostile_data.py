@@ -227,6 +227,7 @@ def results() -> dict[str, Any]:
         "characterisation": inflated_beam.fit_characterisation(
             angle, np.minimum(170.0 * angle, 20.0), pressure=5e4, radius=0.055
         ),
+        "vibration_modes": sr.vibration_modes(model, held, servo_stiffness=(900.0, 800.0, 700.0)),
         "equilibrium": held,
         "ik_solution": sr.solve_ik(model, (0.9, 0.3, 0.2), (0, 0, -5)),
         "imposed_displacement": sr.solve_imposed_displacement(model, (0.3, 0.6, -0.8), 0.01, direction=(0, 0, -1)),

@@ -1,1 +1,1 @@
-"""Motor paths and controllers of the inflatable arm in motion; see scripts/control.py."""
+"""Motor paths and controllers of the inflatable arm in motion; see scripts/controllers.py."""

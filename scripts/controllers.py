@@ -46,7 +46,8 @@ def main(argv: list[str] | None = None) -> int:
         canvas.write_png(shapers.sensitivity(3.5, 0.06), images / "shaper_sensitivity.png", overwrite=True)
         canvas.write_png(report.tracking_figure(followed), images / "controllers.png", overwrite=True)
         for name, result in zip(names, (shaped, rows), strict=True):
-            write_record(arguments.docs, name, tables[name], {"rows": result}, command="python scripts/control.py", page=PAGE)
+            command = "python scripts/controllers.py"
+            write_record(arguments.docs, name, tables[name], {"rows": result}, command=command, page=PAGE)
 
     return exit_status(run)
 

@@ -1,0 +1,132 @@
+"""`softrobots modes`: how a loaded robot vibrates."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.cli.options.command_line import add_numbers
+from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.output_files import (
+    add_output,
+    add_plot,
+    check_ending,
+    check_output,
+    check_plot,
+    save,
+    write_plot,
+)
+from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
+from softrobots.cli.reports.answers import add_json, aligned, print_answer
+from softrobots.core.checks import FloatArray, positive_integer
+from softrobots.core.files import new_file
+from softrobots.dynamics.vibration import VibrationModes, vibration_modes
+from softrobots.statics.equilibrium import solve_equilibrium
+from softrobots.view.figures.vibrations import SWING, mode_shapes
+from softrobots.view.viewer import Viewer
+
+_EXAMPLES = """examples:
+  softrobots modes inflatable_arm --motors 0.3 0.6 -0.8 --gravity --plot modes.png
+  softrobots modes pcc_arm --gravity --count 4 --page modes.html        modes_1.html to modes_4.html
+  softrobots modes inflatable_arm --gravity --servo-stiffness 2000 --set rotor_inertia=0.05 -o modes.csv
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "modes",
+        help="find the frequencies at which a loaded robot vibrates",
+        description="Find the equilibrium, and the natural frequencies, shapes and damping ratios of small vibrations about "
+        "it. Exit status 0 if it vibrates, 1 if there is no equilibrium or a neutral one, 2 if it is unstable or after bad "
+        "input.",
+        epilog=_EXAMPLES,
+    )
+    add_model(parser)
+    add_motors(parser)
+    add_loads(parser)
+    add_numbers(parser, "--damping-time", "T", "damping of springs over their stiffness [s] (damping of the file)")
+    add_numbers(parser, "--mass-damping", "A", "damping in proportion to the mass [1/s] (0)", default=0.0)
+    help_text = "stiffness with which motors hold their place, one for all or one for each [N m/rad or N/m] (they are held)"
+    add_numbers(parser, "--servo-stiffness", "K", help_text, nargs="+")
+    help_text = "how many modes are shown, drawn and animated, slowest first [-] (%(default)s)"
+    parser.add_argument("--count", type=int, default=6, metavar="N", help=help_text)
+    add_output(parser, "all modes as NPZ or .json, for softrobots.load_result, or as a .csv table")
+    add_plot(parser, "the shapes of the modes")
+    help_text = "write an animated page of each mode, FILE_1.html and so on, in slow motion; they work offline (none)"
+    parser.add_argument("--page", type=Path, metavar="FILE.html", help=help_text)
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Find the modes and print the answer."""
+    check_output(arguments, ".npz", ".json", ".csv")
+    check_plot(arguments)
+    positive_integer("--count", arguments.count)
+    model = statics_model_of(arguments)
+    pages = _pages(arguments, model.n_springs)
+    equilibrium = solve_equilibrium(model, motors_of(model, arguments.motors), **loads_of(arguments, model))
+    servos = arguments.servo_stiffness
+    modes = vibration_modes(
+        model,
+        equilibrium,
+        damping_time=arguments.damping_time,
+        mass_damping=arguments.mass_damping,
+        servo_stiffness=servos[0] if servos is not None and len(servos) == 1 else servos,
+    )
+    files = save(arguments, modes) + write_plot(arguments, lambda: mode_shapes(modes, shown=arguments.count))
+    if pages:
+        with Viewer(model) as viewer:
+            for mode, page in enumerate(pages, start=1):
+                viewer.animate(modes.swing(mode, SWING * model.reach))
+                title = f"{model.pinocchio.name}, mode {mode}, {modes.frequencies[mode - 1]:.4g} Hz"
+                viewer.write_html(page, title=title, overwrite=arguments.overwrite)
+    print_answer(arguments, _answer(modes), _lines(modes, arguments.count), files + pages)
+
+
+def _pages(arguments: argparse.Namespace, modes: int) -> list[Path]:
+    """A page for each mode that is shown, refused before the work if it cannot be written."""
+    page: Path | None = arguments.page
+    if page is None:
+        return []
+    check_ending("--page", page, ".html")
+    files = [page.with_stem(f"{page.stem}_{number}") for number in range(1, min(arguments.count, modes) + 1)]
+    return [new_file(file, overwrite=arguments.overwrite) for file in files]
+
+
+def _answer(modes: VibrationModes) -> dict[str, Any]:
+    units = {
+        "frequencies": "Hz",
+        "damping_ratios": "-",
+        "effective_masses": "kg, kg m^2",
+        "tip_shapes": "1/sqrt(kg), rad/(sqrt(kg) m)",
+        "shapes": "rad/(sqrt(kg) m) or 1/sqrt(kg)",
+        "motor_shapes": "rad/(sqrt(kg) m) or 1/sqrt(kg)",
+    }
+    springs, motors = modes.model.spring_joints, modes.model.motor_joints
+    return {**{name: getattr(modes, name) for name in units}, "springs": springs, "motors": motors, "units": units}
+
+
+def _lines(modes: VibrationModes, count: int) -> list[str]:
+    """A table of the slowest modes."""
+    rows = [("mode", "frequency [Hz]", "damping ratio", "tip moves along", "effective mass x, y, z [kg]")]
+    for place in range(min(count, len(modes.frequencies))):
+        masses = "  ".join(f"{mass:.4f}" for mass in modes.effective_masses[place, :3])
+        numbers = f"{modes.frequencies[place]:.6g}", f"{modes.damping_ratios[place]:.4g}"
+        rows.append((str(place + 1), *numbers, _direction(modes.tip_shapes[:, place], modes.model.reach), masses))
+    left = len(modes.frequencies) - len(rows) + 1
+    more = [f"and {left} faster ones, up to {modes.frequencies[-1]:.6g} Hz"] if left else []
+    shaken = "  ".join(f"{mass:.4f}" for mass in modes.effective_masses.sum(axis=0)[:3])
+    return [*aligned(rows), *more, "", f"mass that shakes with the base along x, y, z, in all modes: {shaken} kg"]
+
+
+def _direction(moved: FloatArray, reach: float) -> str:
+    """Where the tip goes in a mode, as a unit vector, or that it turns only."""
+    size = float(np.linalg.norm(moved[:3]))
+    if size <= 1e-6 * reach * float(np.linalg.norm(moved[3:])):
+        return "nowhere: it turns"
+    return "  ".join(f"{part:6.3f}" for part in moved[:3].round(9) / size + 0.0)
