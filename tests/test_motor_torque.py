@@ -98,6 +98,9 @@ def test_torque_is_limited_to_the_effort_of_the_file() -> None:
     moved = run(wheel(effort=2.0), 0.1, (50.0,), time_step=1e-3)
     assert moved.q_motors[-1, 0] == pytest.approx(0.5 * 2.0 / WHOLE * 0.1**2, rel=1e-12)
     assert (moved.motor_torques == -2.0).all()  # the sign of what motors carry
+    braked = run(wheel(effort=2.0), 0.3, lambda t, q, qd: 50.0 * (0.2 - q) - 3.0 * qd, time_step=1e-3)
+    asked = 50.0 * (0.2 - braked.q_motors) - 3.0 * braked.motor_velocities
+    assert braked.motor_torques == pytest.approx(-np.clip(asked, -2.0, 2.0), abs=1e-12)
     assert run(wheel(), 0.1, (50.0,), time_step=1e-3).q_motors[-1, 0] == pytest.approx(25.0 / WHOLE * 0.01, rel=1e-12)
 
 

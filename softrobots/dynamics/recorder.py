@@ -33,6 +33,7 @@ class Recorder:
         self._middles: list[float] = []
         self._exerted: list[FloatArray] = []
         self._works = [(0.0, 0.0, 0.0)]
+        self._driven: FloatArray = np.zeros((len(rows), rule.torque.count if rule.torque else 0))
 
     def tip(self, x: FloatArray) -> FloatArray:
         """Position of the tip, shape (3,) [m]."""
@@ -63,6 +64,8 @@ class Recorder:
                 x[prescribed] = self.rule.path(time)[prescribed]
                 rates[prescribed] = (middle.rates + (time - middle.time) * step.accelerations)[prescribed]
             self._x[row], self._rates[row] = x, rates
+            if self.rule.torque is not None:
+                self._driven[row] = self.rule.torque.exerted(time, x, rates)
         self.rows, more = last, max(last - self._most, 0)
         self._most += more
         self.state = step.end
@@ -96,6 +99,8 @@ class Recorder:
             times, n = self._times[:1], 1
             self._x[0], self._rates[0] = self.state.x, self.state.rates
         x, rates = self._x[:n], self._rates[:n]
+        exerted = self._at_rows(times, m)
+        exerted[:, : self._driven.shape[1]] = self._driven[:n]
         kept = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
         works = np.array(self._works)
         flown = np.column_stack([np.interp(times, self.times, work) for work in works.T])
@@ -109,7 +114,7 @@ class Recorder:
             motor_velocities=read_only(np.array(rates[:, :m])),
             q_springs=read_only(np.array(x[:, m:])),
             velocities=read_only(np.array(rates[:, m:])),
-            motor_torques=read_only(-self._at_rows(times, m)),
+            motor_torques=read_only(-exerted),
             forces=read_only(forces),
             gravity=equations.gravity,
             energy=MotionEnergy(*columns),
