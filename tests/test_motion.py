@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -21,6 +21,8 @@ ROBOTS = (
     sr.load_model(sr.InflatableArm()),
     sr.load_model(sr.PccArm(elastic_sections=2)),
     sr.load_model(sr.PccArm(elastic_sections=2), muscles="forces"),
+    sr.load_model(sr.PccArm(chain="lumped", hinges=2)),
+    sr.load_model(sr.InflatableArm(moment_law="slack_wall", wrist=(0.08, 0.12))),
 )
 LENGTH, MASS = 0.5, 0.3  # of each link of the pendulums
 
@@ -62,6 +64,7 @@ def tip_of(first: Any, second: Any) -> FloatArray:
 
 
 @law("simulate", "Motion")
+@settings(max_examples=25)
 @given(st.floats(1.0, 50.0), st.floats(-0.5, 0.5), st.floats(0.0, 0.05))
 def test_one_spring_vibrates_as_the_scheme_does_in_closed_form(stiffness: float, angle: float, damping_time: float) -> None:
     """The midpoint rule turns a linear vibration by `2 atan(omega h / 2)` a step, and keeps its energy with what is lost."""
@@ -108,7 +111,8 @@ def test_a_motion_runs_backwards_to_its_start() -> None:
     assert np.abs(back.velocities[-1]).max() < 1e-7
 
 
-@given(st.integers(0, 2), st.randoms(use_true_random=False))
+@settings(max_examples=40)
+@given(st.integers(0, len(ROBOTS) - 1), st.randoms(use_true_random=False))
 def test_the_equations_are_those_of_lagrange(number: int, random: Any) -> None:
     """`r = d/dt (M xd) - d(T - V)/dx`, by central differences of mass matrix and energies along a path."""
     model = ROBOTS[number]
@@ -222,7 +226,7 @@ def test_steps_end_at_the_knee_of_a_plateau() -> None:
     assert nearest.max() < 0.1 * np.diff(moved.steps).max()
 
 
-@pytest.mark.parametrize("model", ROBOTS, ids=["arm", "lengths", "tensions"])
+@pytest.mark.parametrize("model", ROBOTS, ids=["arm", "lengths", "tensions", "lumped", "wrist"])
 def test_every_robot_keeps_its_energy_to_second_order(model: sr.SoftModel) -> None:
     start = sr.solve_equilibrium(model, model.relaxed_motors, force=(1.0, 2.0, 0.5))
 
@@ -268,7 +272,7 @@ def test_a_chaotic_motion_ends_in_an_error_that_says_how_far_it_is_known(monkeyp
 
 def test_a_section_that_leaves_its_range_ends_in_an_error_with_what_was_reached() -> None:
     with pytest.raises(sr.NotConverged, match=r"no step from t = .* succeeds") as caught:
-        sr.simulate(ROBOTS[1], 1.0, ROBOTS[1].relaxed_motors, force=(1e4, 0.0, 0.0), time_step=1e-2)
+        sr.simulate(ROBOTS[1], 1.0, ROBOTS[1].relaxed_motors, force=(1e4, 0.0, 0.0), time_step=0.1)
     best = caught.value.best
     assert np.all(np.isfinite(best.q_springs))
     assert np.all(np.isfinite(best.motor_torques))
@@ -312,3 +316,27 @@ def test_what_cannot_be_simulated_is_refused(arguments: dict[str, Any], match: s
         sr.simulate(**{"model": ROBOTS[0], "duration": 0.1, "q_motors": MOTORS, "time_step": 1e-2, **arguments})
     with pytest.raises(sr.NameNotFound, match="nowhere"):
         sr.simulate(ROBOTS[0], 0.1, MOTORS, wrench={"nowhere": np.zeros(6)})
+
+
+@settings(max_examples=20)
+@given(st.integers(0, len(ROBOTS) - 1), st.tuples(*(st.floats(-3.0, 3.0),) * 3))
+def test_an_equilibrium_that_keeps_its_load_stays(number: int, force: tuple[float, float, float]) -> None:
+    """Motors carry what they carry at rest, and nothing moves, to the tolerance of the equilibrium."""
+    model = ROBOTS[number]
+    start = sr.solve_equilibrium(model, model.relaxed_motors, force=force, gravity=sr.EARTH_GRAVITY, tolerance=1e-13)
+    options: dict[str, Any] = {"force": force, "gravity": sr.EARTH_GRAVITY, "damping_time": 0.0}
+    kept = sr.simulate(model, 0.02, start.q_motors, start=start, time_step=5e-3, **options)
+    assert np.abs(kept.q_springs - start.q_springs).max() < 1e-9
+    assert np.allclose(kept.motor_torques, start.motor_torques, rtol=1e-7, atol=1e-7)
+    assert np.allclose(kept.tip_position, start.tip_position, atol=1e-9)
+    assert np.allclose(kept.forces, force)
+
+
+def test_a_robot_without_springs_and_one_without_joints_move_as_they_are_told() -> None:
+    model = pendulum(2, 0.0, springs={"hinge_2": None}, motors=["hinge_1", "hinge_2"])
+    moved = sr.simulate(model, 0.5, lambda t: np.array([t**2, -(t**3)]), gravity=sr.EARTH_GRAVITY)
+    assert np.allclose(moved.q_motors, np.stack([moved.time**2, -(moved.time**3)], axis=1))
+    assert np.allclose(moved.tip_position, tip_of(moved.time**2, moved.time**2 - moved.time**3))
+    assert np.abs(moved.energy.balance).max() < 1e-4
+    still = sr.load_model('<robot name="still"><link name="tip"/></robot>', tip="tip", springs={})
+    assert np.array_equal(sr.simulate(still, 0.5, (), force=(1.0, 0.0, 0.0)).tip_position[-1], np.zeros(3))

@@ -158,6 +158,8 @@ class EquationsOfMotion:
 
     def _jacobian(self, q: FloatArray, frame: str) -> Any:
         """Jacobian of a frame, shape (6, nv), in world axes."""
+        if self._pinocchio.nv == 0:  # Pinocchio crashes without columns
+            return np.zeros((6, 0))
         jacobian = pin.computeFrameJacobian(self._pinocchio, self._data, q, self.model.frame_id(frame), _AXES)
         return jacobian.reshape(6, -1)
 

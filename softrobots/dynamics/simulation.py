@@ -18,7 +18,7 @@ from softrobots.dynamics.midpoint import MidpointRule, State
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MotorTorque
 from softrobots.dynamics.recorder import Recorder
-from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_errors
+from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_distances
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
@@ -29,6 +29,7 @@ MOTORS = ("prescribed", "torque")
 _ROWS = 200  # of a motion, if no output step is given
 _MOST_ROWS = 10_000_000  # steps or rows of a motion, for which memory suffices
 _APART = 1e-6  # largest distance of motors from where the start has them [rad or m]
+_LEAST = 1e-300  # distance that two runs have at least [m]
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
 
 TIP_TOLERANCE = 5e-4
@@ -151,7 +152,7 @@ def _controlled(
 ) -> Motion:
     """Motion with steps for a tolerance of the tip."""
     facts: dict[str, Any] = {"damping_time": damping_time, "tolerance": tolerance, "tip_error": None}
-    run, history = new_run(), [math.inf]
+    run, history, last = new_run(), [math.inf], math.inf
     if _go(run, choose(run, breaks, tolerance), damping_time, progress, "motion"):
         return run.motion(**facts, interrupted=True)
     while True:
@@ -159,7 +160,10 @@ def _controlled(
         grid = halved(np.array(run.times))
         if _go(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps"):
             return run.motion(**facts, interrupted=True)
-        errors = tip_errors(run, finer)
+        errors = tip_distances(run, finer)
+        furthest = float(errors.max())
+        errors /= min(max(last / max(furthest, _LEAST), 2.0), 4.0) - 1.0 if math.isfinite(last) else 1.0
+        last = furthest
         history.append(float(errors.max()))
         facts["tip_error"] = history[-1]
         if history[-1] <= tolerance:
