@@ -33,7 +33,7 @@ FORMS = {"link": ("pseudo-rigid, hinge in the middle", "pseudo-rigid, hinge at l
 FRESH = {
     "inflatable_link_400N": ((4, 8), FORMS["link"]),
     "pcc_arm": ((4, 8), ("lumped", "sections")),
-    "helix_tube_1_turn": ((8, 16), ("lumped", "sections")),
+    "helix_tube_1_turn": ((16, 32), ("lumped", "sections")),
 }
 """What is computed anew here: studies, numbers of segments, forms."""
 SAME = 1e-12
