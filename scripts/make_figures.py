@@ -22,7 +22,7 @@ from softrobots.core.progress import with_progress
 from softrobots.description.expansion import expand
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.view.browser import take_picture
-from softrobots.view.figures import canvas, equilibria, inflated_link
+from softrobots.view.figures import canvas, equilibria, inflated_link, vibrations
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 EXAMPLES = DOCS / "examples"
@@ -112,6 +112,14 @@ def link_reaction() -> Any:
     return equilibria.reaction(runs)
 
 
+def vibration_modes() -> Any:
+    """The four modes of the arm of docs/motion.md."""
+    arm = sr.load_model(sr.InflatableArm())
+    return vibrations.mode_shapes(
+        sr.vibration_modes(arm, sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY))
+    )
+
+
 def finger_grip() -> Any:
     """Closing angle and grip force of the pneumatic finger of docs/own_robot.md over its pressure."""
     finger, way_to_close = _example("soft_finger.py")["SoftFinger"](), _example("three_fingers.py")["way_to_close"]
@@ -178,6 +186,7 @@ FIGURES: dict[str, Callable[[], Any]] = {
         link_reaction,
         arm_buckling,
         arm_branches,
+        vibration_modes,
         finger_grip,
     )
 }
