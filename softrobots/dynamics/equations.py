@@ -68,10 +68,15 @@ class EquationsOfMotion:
         given = model.muscles and model.muscle_input == "forces"
         self._tensions = slice(self.n_motors - len(model.muscles), self.n_motors) if given else slice(0, 0)
         self._applied: tuple[Any, AppliedLoad] | None = None
+        self._last: tuple[bytes, Point] | None = None
+        self._motors_move = drives is not None
 
     def point(self, x: FloatArray) -> Point:
-        """The robot at coordinates, shape (n,)."""
-        return self.model.coordinates.at(x[: self.n_motors], x[self.n_motors :])
+        """The robot at coordinates, shape (n,); the last one is kept."""
+        key = x.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self.model.coordinates.at(*np.split(x.copy(), [self.n_motors]))
+        return self._last[1]
 
     def balance(self, x: FloatArray, rates: FloatArray, accelerations: FloatArray, wrenches: Mapping[str, FloatArray]) -> Any:
         """What has to act on each coordinate from outside; see the module.
@@ -121,17 +126,15 @@ class EquationsOfMotion:
         return mass if self._rotorless else mass + np.diag(self.rotor_inertia)
 
     def stiffness(self, x: FloatArray, wrenches: Mapping[str, FloatArray]) -> FloatArray:
-        """Derivative of `balance` at rest with respect to the coordinates, shape (n, n).
-
-        Rows of actuators that are muscles are those of their columns: it is meant for coordinates that are free.
-        """
+        """Derivative of `balance` at rest with respect to the coordinates, shape (n, n); rows of prescribed motors are zero."""
         m, point = self.n_motors, self.point(x)
         load = self._load_of(wrenches).at(self.model.embed(point.joints))
         reduced = point.reduce(load)
         stiffness: FloatArray = np.zeros((self.n, self.n))
         stiffness[m:, m:] = self.model.springs.at(x[m:])[2] - reduced.derivative
         stiffness[m:, :m] = -reduced.coupling
-        stiffness[:m, m:] = -reduced.coupling.T
+        if self._motors_move:
+            stiffness[:m] = -np.concatenate(point.motor_derivatives(load), axis=1)
         return stiffness
 
     def energies(self, x: FloatArray, rates: FloatArray) -> tuple[float, float, float]:

@@ -16,8 +16,9 @@ leaves out (the derivatives of centrifugal and inertial forces) is small with th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -106,7 +107,8 @@ class MidpointRule:
         """Places of the free coordinates."""
         self.prescribed = np.setdiff1d(np.arange(m), self.free)
         """Places of the prescribed coordinates."""
-        self._block = np.ix_(self.free, self.free)
+        self._at = self.free if torque else slice(m, n)  # the same, quickly
+        self._block: Any = np.ix_(self.free, self.free) if torque else (self._at, self._at)
         self._damping = equations.damping[self._block]
         self._past: list[tuple[float, FloatArray]] = []
         self._known: tuple[float, FloatArray] | None = None
@@ -129,7 +131,7 @@ class MidpointRule:
 
     def step(self, start: State, end_time: float) -> Step | None:
         """Return the step from a state to a time; None if its equations could not be solved."""
-        equations, free = self.equations, self.free
+        equations, free = self.equations, self._at
         m, n = equations.n_motors, equations.n
         h, middle_time = end_time - start.time, 0.5 * (start.time + end_time)
         wrenches = self.load(middle_time)
@@ -140,7 +142,7 @@ class MidpointRule:
         torque = self.torque
         if torque is not None:
             torque.begin(start.time, start.x, start.rates)
-        a = self._predicted(middle_time, len(free))
+        a, size = self._predicted(middle_time, len(y0)), max(1.0, math.sqrt(y0.dot(y0)))
         solve, last, shrinking = None, np.inf, 0.0
         for iteration in range(1, _ITERATIONS + 1):
             x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
@@ -148,13 +150,13 @@ class MidpointRule:
             residual = forces[free]
             if torque is not None:
                 residual[: torque.count] += torque.friction(rates) - torque.exerted(middle_time, x, rates)
-            if not np.isfinite(residual).all():
+            if not math.isfinite(residual.dot(residual)):
                 return None
             if solve is None or iteration == _RENEWED or (torque is not None and shrinking > _SLOW):
                 solve = self._factorised(middle_time, x, rates, wrenches, h)
             change = solve(residual)
             a = a - change
-            moved = 0.25 * h * h * float(np.abs(change).max(initial=0.0)) / max(1.0, float(np.abs(x[free]).max(initial=0.0)))
+            moved = 0.25 * h * h * math.sqrt(change.dot(change)) / size
             if moved <= _CHANGE or (moved >= 0.5 * last and last <= _ROUNDED):
                 break
             if not moved < 1e3 * last:
@@ -191,7 +193,7 @@ class MidpointRule:
         """Solver of the equations with the matrix of Newton's method."""
         from scipy.linalg.lapack import dgetrf, dgetrs
 
-        matrix = self.equations.mass_matrix(x)[self._block]
+        matrix = np.array(self.equations.mass_matrix(x)[self._block])
         matrix += 0.5 * h * self._damping + 0.25 * h * h * self.equations.stiffness(x, wrenches)[self._block]
         if self.torque is not None:
             by_x, by_rates = self.torque.slopes(time, x, rates)

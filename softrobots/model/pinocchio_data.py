@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 
 MAX_DOF = 300
@@ -53,6 +53,12 @@ class PinocchioData(threading.local):
         """Place in the configuration of each place in the velocity."""
         return np.array([joint.idx_q for joint in list(self._model.joints)[1:]], dtype=np.intp)
 
+    @cached_property
+    def _triangle(self) -> tuple[FloatArray, FloatArray]:
+        """Masks of the diagonal and of what is above it, shape (nv, nv)."""
+        ones = np.ones((self._model.nv, self._model.nv))
+        return read_only(np.eye(len(ones))), read_only(np.triu(ones, 1))
+
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Return the mass matrix at a configuration, shape (nq,), per velocity, shape (nv, nv) [kg m^2, kg m, kg].
 
@@ -60,8 +66,10 @@ class PinocchioData(threading.local):
             DescriptionError: If the robot has more than `MAX_DOF` coordinates.
         """
         model, data = self.at(None)
-        upper = np.triu(pin.crba(model, data, q))
-        return np.asarray(upper + np.triu(upper, 1).T)
+        on_diagonal, above = self._triangle
+        filled = pin.crba(model, data, q)  # its upper triangle
+        upper = filled * above
+        return np.asarray(upper + upper.T + filled * on_diagonal)
 
     def _pair(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         if gravity is None:
