@@ -22,7 +22,8 @@ from softrobots.core.progress import with_progress
 from softrobots.description.expansion import expand
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.view.browser import take_picture
-from softrobots.view.figures import canvas, equilibria, inflated_link, vibrations
+from softrobots.view.figures import canvas, equilibria, inflated_link, motions, vibrations
+from studies.motion import examples
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 EXAMPLES = DOCS / "examples"
@@ -152,6 +153,31 @@ def finger_grip() -> Any:
     return figure
 
 
+def motion_release() -> Any:
+    """The arm of docs/motion.md that is let go, over its first swing."""
+    return motions.strobe(examples.release(0.14), shown=7)
+
+
+def motion_tip() -> Any:
+    """Its tip over time."""
+    return motions.tip_over_time(examples.release())
+
+
+def motion_energies() -> Any:
+    """Its energies."""
+    return motions.energies(examples.release())
+
+
+def motion_turn() -> Any:
+    """The tip of the arm that turns fast, with and without shaping."""
+    return motions.tip_over_time(examples.turns())
+
+
+def motion_gust() -> Any:
+    """The helix in a gust."""
+    return motions.strobe(examples.gust(0.45), shown=7)
+
+
 def tool_arm() -> sr.Viewer:
     """The arm of docs/examples/tool_arm.urdf.xacro holds a load up with its tip on target."""
     model = sr.load_model(expand(EXAMPLES / "tool_arm.urdf.xacro", {"tool_stiffness": "60"}))
@@ -188,6 +214,11 @@ FIGURES: dict[str, Callable[[], Any]] = {
         arm_branches,
         vibration_modes,
         finger_grip,
+        motion_release,
+        motion_tip,
+        motion_energies,
+        motion_turn,
+        motion_gust,
     )
 }
 """Plots by the name of their file."""

@@ -19,6 +19,8 @@ PAGES = {
     "inflatable_arm": "wrinkling_arm",
     "wrist": "wrist",
     "ur5_bench": "ur5_bench",
+    "motion_release": "released_arm",
+    "motion_gust": "helix_in_a_gust",
 }
 """Name of each page, and its exhibit."""
 

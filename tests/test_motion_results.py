@@ -145,7 +145,7 @@ def test_frames_follow_the_cubics_of_the_motion(released: sr.Motion) -> None:
 
 def test_bodies_have_fewer_frames_and_muscles_their_tension(bending: sr.Motion) -> None:
     frames = motion_frames(bending, 1e3)
-    assert len(frames) == 60
+    assert len(frames) == 50
     assert np.allclose(frames[-1].tensions, bending.motor_torques[-1])
     scene = SceneBuilder(bending.model).movement(bending, 0.1)[0]
     assert scene.arrows["tip"].force == 3.0

@@ -32,7 +32,7 @@ from softrobots.view.figures import canvas, motions
 from softrobots.view.viewer import Viewer
 
 _EXAMPLES = """examples:
-  softrobots simulate inflatable_arm --duration 2 --gravity --release 0 10 -15 --plot tip.png --page ringing.html
+  softrobots simulate inflatable_arm --duration 2 --gravity --release 0 6 -8 --plot tip.png --page ringing.html
   softrobots simulate inflatable_arm --waypoints path.csv --duration 4 --gravity --start equilibrium -o motion.npz
   softrobots simulate inflatable_arm --trajectory followed.npz --force 0 10 -15 --gravity --strobe moves.png
   softrobots simulate helix_tube --duration 3 --force-table gust.csv --damping-time 0.01 --json
@@ -123,7 +123,7 @@ def run(arguments: argparse.Namespace) -> None:
         time_step=arguments.time_step,
         tolerance=arguments.tolerance,
         output_step=arguments.output_step,
-        progress="motion",
+        progress=True,
     )
     files = save(arguments, motion) + _write_pictures(arguments, motion)
     print_answer(arguments, motion_answer(motion, load), motion_lines(motion, load), files)

@@ -24,7 +24,7 @@ FRAME_RATE = 30
 """Frames a second."""
 
 _MOST_BODIES = 90  # shapes of a continuous body in one animation
-_MOST_INSTANTS = (600, 60)  # of a motion of rigid links, and of a body that bends: pages of about a megabyte at most
+_MOST_INSTANTS = (600, 50)  # of a motion of rigid links, and of a body that bends: pages of about a megabyte at most
 _SWING = 2.0  # [s], of a mode: most are too fast to be seen
 _MOST_FRAMES = 2**31 - 1  # a browser's largest frame number
 
@@ -98,7 +98,7 @@ def even_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
 def motion_frames(motion: Motion, seconds: float) -> list[Frame]:
     """Return evenly spaced frames of a motion, interpolated by the cubics that its velocities tell.
 
-    There are as many as the frame rate asks for, but at most 600, or 60 of a body that bends.
+    There are as many as the frame rate asks for, but at most 600, or 50 of a body that bends.
     """
     from scipy.interpolate import CubicHermiteSpline
 

@@ -12,12 +12,14 @@ from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.description.composition import fix_joints, mount
 from softrobots.description.third_party import UR5, robot_file
+from softrobots.dynamics.motion import Motion
 from softrobots.model.loader import load_model
 from softrobots.robots import HelixTube, InflatableArm, PccArm
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
 from softrobots.statics.trajectory import Trajectory, follow_trajectory
 from softrobots.view.viewer import Viewer, view
+from studies.motion.examples import gust, release
 from studies.ur5.bench import UR5Bench
 from studies.ur5.bench_run import push_link
 
@@ -151,6 +153,13 @@ def ur5_with_soft_arm() -> Viewer:
     return view(model, solve_equilibrium(model, pose, payload, gravity=EARTH_GRAVITY))
 
 
+def in_slow_motion(motion: Motion, speed: float) -> Viewer:
+    """A motion, played at a speed relative to real time."""
+    viewer = Viewer(motion.model)
+    viewer.animate(motion, speed=speed)
+    return viewer
+
+
 EXHIBITS = {
     "inflatable_arm": Exhibit(lambda: circling_arm(18.0), "Inflatable arm, 18 N on the tip, sag compensated", 0.04),
     "wrinkling_arm": Exhibit(
@@ -163,6 +172,8 @@ EXHIBITS = {
     "helix_tube": Exhibit(sagging_helix_tube, "Helical tube under its own weight"),
     "helix_growth": Exhibit(growing_helix_tube, "Growth of the helical tube", 0.45),
     "ur5_bench": Exhibit(characterisation_bench, "UR5 pushes an inflated link at 30 kPa", 0.8),
+    "released_arm": Exhibit(lambda: in_slow_motion(release(), 0.5), "The sagging arm is let go, at half speed", 0.06),
+    "helix_in_a_gust": Exhibit(lambda: in_slow_motion(gust(), 0.5), "A helical tube in a gust, at half speed", 0.1),
     "ur5_with_soft_arm": Exhibit(ur5_with_soft_arm, "UR5 with a soft arm, 1 kg at its tip"),
 }
 """The scenes by name."""

@@ -43,7 +43,7 @@ def motion_lines(motion: Motion, load: Load) -> list[str]:
     rows = [
         ("time", f"{motion.time[-1]:g} s{', INTERRUPTED' if motion.interrupted else ''}, {len(motion.time)} rows"),
         ("steps", steps),
-        ("tip error", "not measured, with fixed steps" if motion.tip_error is None else _error(motion)),
+        ("tip error", _error(motion)),
         ("damping", damping),
         ("kinetic energy", f"at most {energy.kinetic.max():.4g} J"),
         ("dissipated", f"{energy.dissipated[-1]:.4g} J"),
@@ -55,8 +55,11 @@ def motion_lines(motion: Motion, load: Load) -> list[str]:
 
 
 def _error(motion: Motion) -> str:
-    tolerance = "" if motion.tolerance is None else f" ({motion.tolerance:.2g} m allowed)"
-    return f"{motion.tip_error:.2g} m{tolerance}"
+    if motion.tolerance is None:
+        return "not measured, with fixed steps"
+    if motion.tip_error is None:
+        return f"not measured before the end ({motion.tolerance:.2g} m allowed)"
+    return f"{motion.tip_error:.2g} m ({motion.tolerance:.2g} m allowed)"
 
 
 def _ranges(what: str, names: Any, values: Any, units: Any, loads: Any = None, load_names: Any = ()) -> list[str]:

@@ -1,0 +1,1 @@
+"""Motions of the documentation and of `scripts/motion.py`."""
