@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -17,41 +16,14 @@ import softrobots as sr
 from softrobots.compiled import Status
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
-from tests.support.c_libraries import build_library
+from tests.support.c_libraries import Controller
 from tests.support.load_cases import cases, directions
 
 pytestmark = pytest.mark.system
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
-SAME = 1e-12  # sine and cosine differ from libm's by an ulp; of angles of a radian and lengths of a metre
 Array = ctypes.POINTER(ctypes.c_double)
-
-
-class Controller:
-    """What a control loop does with the file: an array of its own, and the places that the head of the file tells."""
-
-    def __init__(self, solver: CompiledModel, folder: Path, *, gravity: bool, name: str, poses: bool = False) -> None:
-        text = solver.c_source(gravity=gravity, prefix=name, poses=poses)
-        self.path = build_library(folder, text, name)
-        self.place = {key: int(value) for key, value in re.findall(rf"^enum {{ {name}_(\w+) = (\d+) }};$", text, re.MULTILINE)}
-        self._library, self._name = ctypes.CDLL(str(self.path)), name
-        self.w = (ctypes.c_double * self.place["WORKSPACE_SIZE"])()
-
-    def put(self, name: str, values: Any) -> None:
-        first = self.place[name]
-        self.w[first : first + len(values)] = [float(value) for value in values]
-
-    def get(self, name: str, count: int) -> np.ndarray:
-        first = self.place[name]
-        return np.array(self.w[first : first + count])
-
-    def call(self, name: str, *rest: Any) -> int:
-        function = getattr(self._library, f"{self._name}_{name}")
-        function.restype = ctypes.c_int
-        return int(function(self.w, *rest))
-
-    def clear(self) -> None:
-        ctypes.memset(self.w, 0, ctypes.sizeof(self.w))
+SAME = 1e-12  # sine and cosine differ from libm's by an ulp; of angles of a radian and lengths of a metre
 
 
 @pytest.fixture(scope="module")

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+import functools
+import importlib.util
+import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.compiled import Status
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.motion_program import make_motion_program
+from softrobots.compiled.run import motion_runs
 from softrobots.compiled.run.backends import make_run
+from softrobots.compiled.run.compiled_model import CompiledModel
+from softrobots.compiled.run.motion_results import MotionBatch
+from softrobots.core.errors import NotConverged, ParameterError
+from softrobots.dynamics.motion import MotionState
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
+from tests.support.c_libraries import Controller
+from tests.support.laws import law
 from tests.support.serial_chains import ROBOTS
 
 GRAVITY = np.array([0.7, -0.4, -9.7])
@@ -75,3 +89,222 @@ def test_a_step_is_the_implicit_midpoint_rule(kind: str, full: bool, rng: np.ran
         assert run.place_at(w, 1.0) is None
         q = model.configuration(path[2], y1)
         np.testing.assert_allclose(w[layout.tip : layout.tip + 3], frame_placement(model, q, model.tip).translation, atol=1e-12)
+
+
+# --- The API
+
+
+@pytest.fixture(scope="module")
+def solver(arm: SoftModel) -> CompiledModel:
+    return sr.compile(arm, backend="python")
+
+
+def swaying(time: float) -> np.ndarray:
+    return np.array([0.3, 0.6, -0.8]) + 0.4 * np.sin(4.0 * time) * np.array([1.0, -0.5, 0.7])
+
+
+def gust(time: float) -> np.ndarray:
+    return np.array([0.0, 20.0 * time, -8.0])
+
+
+def options(arm: SoftModel) -> dict[str, tuple[Any, dict[str, Any]]]:
+    """Motors and options of simulations of all kinds."""
+    loaded = sr.solve_equilibrium(arm, swaying(0.0), (0.0, 5.0, -20.0), gravity=GRAVITY)
+    path = sr.straight_line((0.9, 0.2, 0.3), (0.8, 0.4, 0.3), 0.08, 5)
+    followed = sr.follow_trajectory(arm, path.positions, times=path.times)
+    return {
+        "released": (swaying(0.0), {"start": loaded, "gravity": GRAVITY, "damping_time": 1e-3}),
+        "swaying": (swaying, {"force": gust, "gravity": GRAVITY, "damping_time": 0.0}),
+        "trajectory": (followed, {"force": ([0.0, 0.03, 0.1], [[0, 0, 0], [0, 9, 0], [3, 0, 0]]), "mass_damping": 2.0}),
+    }
+
+
+@pytest.mark.parametrize("case", ["released", "swaying", "trajectory"])
+def test_same_answer_as_simulate_at_the_same_steps(case: str, arm: SoftModel, solver: CompiledModel) -> None:
+    motors, given = options(arm)[case]
+    given |= {"time_step": 1e-3, "output_step": 3.3e-3}
+    found, expected = solver.simulate(0.1, motors, **given), sr.simulate(arm, 0.1, motors, **given)
+    for name in ("time", "q_motors", "motor_velocities", "forces", "steps"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-12)
+    for name, size in (("q_springs", 1.0), ("velocities", 10.0), ("tip_position", 1.0)):
+        # Both solve a step to 1e-13 in its middle, 4e-10 in a velocity.
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=1e-9 * size)
+    # Torques feel the acceleration, which is known to 4e-13 / h^2.
+    np.testing.assert_allclose(found.motor_torques, expected.motor_torques, rtol=0, atol=1e-5)
+    for name in ("kinetic", "elastic", "potential", "dissipated", "load_work", "motor_work"):
+        np.testing.assert_allclose(getattr(found.energy, name), getattr(expected.energy, name), rtol=0, atol=1e-8)
+    assert pickle.loads(pickle.dumps(found)).energy.kinetic[-1] == found.energy.kinetic[-1]
+    again = solver.simulate(0.05, motors if case == "released" else swaying, start=found, time_step=1e-3)
+    np.testing.assert_array_equal(again.q_springs[0], found.q_springs[-1])
+    np.testing.assert_array_equal(again.velocities[0], found.velocities[-1])
+
+
+def test_the_tolerance_is_kept(solver: CompiledModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = {"gravity": GRAVITY, "damping_time": 1e-3, "force": (0.0, 4.0, -3.0), "output_step": 5e-3}
+    found = solver.simulate(0.2, swaying, tolerance=1e-4, **given)
+    exact = solver.simulate(0.2, swaying, time_step=1e-4, **given)  # its own error is a hundredth of that of 1 ms
+    assert found.tip_error is not None
+    assert found.tip_error <= found.tolerance == 1e-4
+    error = np.linalg.norm(found.tip_position - exact.tip_position, axis=1).max()
+    assert error <= 1.3 * found.tip_error + 1e-6  # an estimate of second order
+    many = solver.simulations(0.2, [swaying, swaying], tolerance=1e-4, forces=(0.0, 4.0, -3.0), **_without(given, "force"))
+    assert many.tip_error is not None
+    assert many.tip_error.max() <= 1e-4
+    monkeypatch.setattr(motion_runs, "MOST_STEPS", 2_000)
+    with pytest.raises(NotConverged) as raised:
+        solver.simulate(0.2, swaying, tolerance=1e-15, **given)
+    assert raised.value.best.tip_error > 1e-15
+
+
+def _without(given: dict[str, Any], name: str) -> dict[str, Any]:
+    return {key: value for key, value in given.items() if key != name}
+
+
+def test_a_batch_has_the_motions_of_its_cases(solver: CompiledModel, rng: np.random.Generator) -> None:
+    given = {"gravity": GRAVITY, "damping_time": 1e-3, "time_step": 2e-3, "output_step": 7e-3}
+    motors, forces = rng.uniform(-1, 1, (5, 3)), rng.normal(size=(5, 3)) * 10
+    starts = rng.normal(size=(5, 4)) * 0.05, rng.normal(size=(5, 4))
+    motors[3, 1] = np.nan
+    batch = solver.simulations(0.05, motors, starts=starts, forces=forces, **given)
+    assert batch.status.tolist() == [0, 0, 0, Status.NOT_A_NUMBER, 0]
+    assert np.all(np.isfinite(batch.tip_position))
+    moving = solver.simulations(
+        0.05, [swaying, lambda _: motors[0]], forces=[gust, (0.0, 0.0, 0.0)], starts=batch.q_springs[:2, 0], **given
+    )
+    ends = solver.simulations(0.02, motors[:2], starts=_first(batch, 2), **given)
+    for row in (0, 1, 2, 4):
+        state = MotionState(solver.model, 0.0, motors[row], np.zeros(3), starts[0][row], starts[1][row])
+        one = solver.simulate(0.05, motors[row], start=state, force=forces[row], **given)
+        np.testing.assert_allclose(one.time, batch.time, rtol=0, atol=0)
+        np.testing.assert_allclose(batch.q_springs[row], one.q_springs, rtol=0, atol=1e-10)  # velocities differ by 1e-10
+        np.testing.assert_allclose(batch.tip_position[row], one.tip_position, rtol=0, atol=1e-10)
+        if row == 0:
+            one = solver.simulate(
+                0.05,
+                swaying,
+                start=MotionState(solver.model, 0.0, motors[0], np.zeros(3), starts[0][0], np.zeros(4)),
+                force=gust,
+                **given,
+            )
+            np.testing.assert_allclose(moving.tip_position[0], one.tip_position, rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(ends.q_springs[:, 0], batch.q_springs[:2, -1])
+
+
+def _first(batch: MotionBatch, count: int) -> tuple[np.ndarray, np.ndarray]:
+    return batch.q_springs[:count, -1], batch.velocities[:count, -1]
+
+
+SMALL = st.floats(-1.0, 1.0)
+
+
+@law("CompiledModel.simulate", "CompiledModel.simulations", "CompiledModel.step")
+@given(st.tuples(*[SMALL] * 3), st.tuples(*[SMALL] * 4), st.tuples(*[SMALL] * 4), st.floats(1e-4, 5e-3))
+@settings(max_examples=20)
+def test_undamped_motion_runs_backwards(motors: Any, springs: Any, rates: Any, h: float) -> None:
+    """The scheme is symmetric in time: with rates reversed the robot goes back where it came from."""
+    solver, q = undamped(), np.array(motors)
+    y0, v0 = 0.2 * np.array(springs), 2.0 * np.array(rates)
+    given: dict[str, Any] = {"gravity": GRAVITY, "damping_time": 0.0, "time_step": h}
+    there = solver.simulate(6 * h, q, start=MotionState(solver.model, 0.0, q, np.zeros(3), y0, v0), **given)
+    back = MotionState(solver.model, 0.0, q, np.zeros(3), there.q_springs[-1], -there.velocities[-1])
+    again = solver.simulate(6 * h, q, start=back, **given)
+    # Each step is solved to 1e-13 in its middle, and 4e-13 / h in a velocity.
+    np.testing.assert_allclose(again.q_springs, there.q_springs[::-1], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(again.velocities, -there.velocities[::-1], rtol=0, atol=1e-11 / h)
+    batch = solver.simulations(6 * h, q, starts=(there.q_springs[-1], -there.velocities[-1]), **given)
+    np.testing.assert_allclose(batch.q_springs[0], there.q_springs[::-1], rtol=0, atol=1e-11)
+    step = solver.step(there.q_springs[1], -there.velocities[1], q, **given)
+    np.testing.assert_allclose(step.q_springs, y0, rtol=0, atol=1e-11)
+
+
+@functools.cache
+def undamped() -> CompiledModel:
+    return sr.compile(ROBOTS["arm"](), backend="python")
+
+
+def test_steps_that_do_not_converge_are_halved(solver: CompiledModel) -> None:
+    """A step in which motors turn by 1.5 rad and springs by 1 rad: alone, in a batch, and as two halves."""
+    state, h = (np.zeros(4), np.array([20.0, 20.0, 10.0, -14.0])), 0.05
+    begin = MotionState(solver.model, 0.0, np.zeros(3), np.zeros(3), *state)
+
+    def turning(time: float) -> np.ndarray:
+        return 30.0 * time * np.array([1.0, -0.7, 0.5])
+
+    given: dict[str, Any] = {"start": begin, "damping_time": 0.0}
+    whole = solver.simulate(h, turning, time_step=h, **given)
+    halves = solver.simulate(h, turning, time_step=h / 2, **given)
+    assert len(whole.steps) == 2  # it is one step to the caller
+    np.testing.assert_allclose(whole.q_springs[-1], halves.q_springs[-1], rtol=0, atol=1e-10)
+    calm = (lambda _: np.zeros(3)), (lambda _: np.zeros(3))
+    batch = solver.simulations(h, [*calm, turning], starts=state, time_step=h, damping_time=0.0)
+    assert np.all(batch.certified)
+    np.testing.assert_allclose(batch.q_springs[2], whole.q_springs, rtol=0, atol=1e-12)
+    step = solver.step(*state, [turning(0.0), turning(h / 2), turning(h)], time_step=h, damping_time=0.0)
+    np.testing.assert_allclose(step.q_springs, whole.q_springs[-1], rtol=0, atol=1e-12)
+
+
+def test_a_step_is_that_of_a_simulation(solver: CompiledModel) -> None:
+    given = {"gravity": GRAVITY, "damping_time": 1e-3, "time_step": 1e-3}
+    whole = solver.simulate(5e-3, swaying, force=gust, **given)
+    springs, rates = np.zeros(4), np.zeros(4)
+    for row in range(5):
+        begin = 1e-3 * row
+        motors = [swaying(time) for time in (begin, begin + 0.5e-3, begin + 1e-3)]
+        springs, rates, tip = solver.step(springs, rates, motors, gust(begin + 0.5e-3), **given)
+        np.testing.assert_allclose(springs, whole.q_springs[row + 1], rtol=0, atol=1e-11)
+        np.testing.assert_allclose(rates, whole.velocities[row + 1], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(tip, whole.tip_position[row + 1], rtol=0, atol=1e-11)
+
+
+REFUSED: list[tuple[Any, str]] = [
+    (lambda c: c.simulate(0.0, np.zeros(3)), "duration"),
+    (lambda c: c.simulate(1.0, np.zeros(2)), "q_motors"),
+    (lambda c: c.simulate(1.0, np.full(3, 1e12)), "q_motors"),
+    (lambda c: c.simulate(1.0, np.zeros(3), start=5), "start"),
+    (lambda c: c.simulate(1.0, np.zeros(3), force=np.zeros(2)), "force"),
+    (lambda c: c.simulate(1.0, np.zeros(3), time_step=-1.0), "time_step"),
+    (lambda c: c.simulate(1.0, np.zeros(3), time_step=1e-3, tolerance=1e-3), "tolerance"),
+    (lambda c: c.simulate(1.0, np.zeros(3), mass_damping=-1.0), "mass_damping"),
+    (lambda c: c.step(np.zeros(3), np.zeros(4), np.zeros(3)), "q_springs"),
+    (lambda c: c.step(np.zeros(4), np.zeros(4), np.zeros((2, 3))), "q_motors"),
+    (lambda c: c.step(np.zeros(4), np.zeros(4), np.zeros(3), np.full(3, np.nan)), "force"),
+    (lambda c: c.simulations(1.0, np.zeros((4, 3)), forces=np.zeros((3, 3))), "q_motors"),
+    (lambda c: c.simulations(1.0, np.zeros(3), threads=0), "threads"),
+]
+
+
+@pytest.mark.parametrize("row", range(len(REFUSED)))
+def test_refused(row: int, solver: CompiledModel) -> None:
+    call, name = REFUSED[row]
+    with pytest.raises(ParameterError, match=name):
+        call(solver)
+
+
+def test_given_muscle_lengths_are_refused_by_name() -> None:
+    solver = sr.compile(ROBOTS["pcc"](), backend="python")
+    for call in (lambda: solver.simulate(0.1, solver.model.relaxed_motors), lambda: solver.c_source(motion=True)):
+        with pytest.raises(ParameterError, match="given muscle lengths"):
+            call()
+
+
+@pytest.mark.system
+def test_other_back_ends_take_the_same_steps(solver: CompiledModel, arm: SoftModel, tmp_path: Path) -> None:
+    """numba, single and in lanes, and C through ctypes, as a controller calls it."""
+    given = {"gravity": GRAVITY, "damping_time": 1e-3, "time_step": 1e-3}
+    expected = solver.simulate(0.1, swaying, force=gust, output_step=1e-3, **given)
+    controller = Controller(solver, tmp_path, name="moving", motion=True)
+    controller.put("GRAVITY", GRAVITY)
+    controller.put("DAMPING", 1e-3 * arm.stiffness)
+    controller.put("TIME_STEP", [1e-3])
+    for row in range(100):
+        for name, share in (("MOTORS_BEGIN", 0.0), ("MOTORS_MIDDLE", 0.5), ("MOTORS_END", 1.0)):
+            controller.put(name, swaying(1e-3 * (row + share)))
+        controller.put("FORCE", gust(1e-3 * (row + 0.5)))
+        assert controller.call("motion_step") == 0
+        np.testing.assert_allclose(controller.get("POSITION", 4), expected.q_springs[row + 1], rtol=0, atol=1e-11)
+    if importlib.util.find_spec("numba") is not None:
+        fast = sr.compile(arm, backend="numba")
+        found = fast.simulate(0.1, swaying, force=gust, output_step=1e-3, **given)
+        np.testing.assert_allclose(found.tip_position, expected.tip_position, rtol=0, atol=1e-11)
+        many = fast.simulations(0.1, [swaying, swaying], forces=[gust, gust], output_step=1e-3, **given)
+        np.testing.assert_allclose(many.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
+import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
 
 FLAGS = [
@@ -23,3 +29,30 @@ def build_library(folder: Path, text: str, name: str) -> Path:
     done = subprocess.run(["gcc", *FLAGS, str(source), "-o", str(library)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, ""), f"{done.stderr}\n{text}"
     return library
+
+
+class Controller:
+    """What a control loop does with the file: an array of its own, and the places that the head of the file tells."""
+
+    def __init__(self, solver: CompiledModel, folder: Path, *, name: str, **options: bool) -> None:
+        text = solver.c_source(prefix=name, **options)
+        self.path = build_library(folder, text, name)
+        self.place = {key: int(value) for key, value in re.findall(rf"^enum {{ {name}_(\w+) = (\d+) }};$", text, re.MULTILINE)}
+        self._library, self._name = ctypes.CDLL(str(self.path)), name
+        self.w = (ctypes.c_double * self.place["WORKSPACE_SIZE"])()
+
+    def put(self, name: str, values: Any) -> None:
+        first = self.place[name]
+        self.w[first : first + len(values)] = [float(value) for value in values]
+
+    def get(self, name: str, count: int) -> np.ndarray:
+        first = self.place[name]
+        return np.array(self.w[first : first + count])
+
+    def call(self, name: str, *rest: Any) -> int:
+        function = getattr(self._library, f"{self._name}_{name}")
+        function.restype = ctypes.c_int
+        return int(function(self.w, *rest))
+
+    def clear(self) -> None:
+        ctypes.memset(self.w, 0, ctypes.sizeof(self.w))

@@ -63,9 +63,9 @@ def settle_middle(w: Array) -> bool:
 def motion_step(w: Array) -> int:
     """Move the robot by one step of time: POSITION and VELOCITY become those at its end.
 
-    MOTORS_BEGIN, MOTORS_MIDDLE and MOTORS_END are the motors at its beginning, in its middle and at its end; FORCE acts in its
-    middle. A step whose corrections do not converge is halved. Returns CERTIFIED, or UNSETTLED, where even the smallest part of
-    the step does not converge.
+    MOTORS_BEGIN, MOTORS_MIDDLE and MOTORS_END are the motors at its beginning,
+    in its middle and at its end; FORCE acts in its middle. A step whose
+    corrections do not converge is halved, and again. Returns the status.
     """
     whole = w[TIME_STEP]
     w[WHOLE_STEP] = whole
@@ -120,10 +120,12 @@ def motion_run(
 ) -> int:
     """Take many steps, and write the motion at given times; return the status of the last step.
 
-    `motors` are the motors at the beginning, in the middle and at the end of the steps, one row after the other, shape
-    (2 n_steps + 1, N_MOTORS), or one row for all (`motor_rows` is 1); `forces` those in the middle, (n_steps, 3), or one row;
-    `grid` the ends of the steps, (n_steps + 1); `times` ascend from the first to the last of them. A row of `out` is UNKNOWN,
-    RATE and TIP at one of them, (n_times, 2 N + 3).
+    grid: the ends of the steps, the first included, (n_steps + 1);
+    motors: motors at the beginning, in the middle and at the end of the steps, one row
+        after the other, (2 n_steps + 1, N_MOTORS), or one row, if motor_rows is 1;
+    forces: forces in the middles, (n_steps, 3), or one row, if force_rows is 1;
+    times: ascending, within the grid, (n_times);
+    out: a row is UNKNOWN, RATE and TIP at one of them, (n_times, 2 N + 3).
     """
     by_step = 0
     if motor_rows > 1:

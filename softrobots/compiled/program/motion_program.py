@@ -22,11 +22,24 @@ from softrobots.core.errors import ParameterError
 _STATUSES = (Status.CERTIFIED, Status.UNSETTLED)
 
 
-def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False) -> Program:
-    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix."""
+def check_motion(unknowns: Unknowns, *, full_damping: bool = False) -> None:
+    """Refuse robots whose motion is not compiled.
+
+    Raises:
+        ParameterError: If muscle lengths are given, or the damping of a long chain is a matrix.
+    """
     if unknowns.chain.constrained or (full_damping and not unknowns.is_unrolled):
         what = "given muscle lengths" if unknowns.chain.constrained else "a damping matrix (mass_damping)"
         raise ParameterError("model", unknowns.chain.name, f"a robot without {what}, to have its motion compiled")
+
+
+def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False) -> Program:
+    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix.
+
+    Raises:
+        ParameterError: If muscle lengths are given, or the damping of a long chain is a matrix.
+    """
+    check_motion(unknowns, full_damping=full_damping)
     plan = MotionPlan(unknowns, full_damping)
     layout = plan.layout
     parts = unrolled_motion(plan) if unknowns.is_unrolled else looped_motion(plan)
@@ -61,13 +74,14 @@ def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
     """Return the docstring, and the names of all places in it."""
     unknowns, layout = plan.unknowns, plan.layout
     n, m = layout.unknowns, layout.motors
-    names = f"motor joints [rad or m]: {motor_names(unknowns)}"
+    muscles = f", and {unknowns.n_tensions} muscle tensions [N]" if unknowns.n_tensions else ""
+    names = f"motor joints [rad or m]: {motor_names(unknowns)}{muscles}"
     damping = "damping matrix, row by row" if layout.full_damping else "damping of each unknown"
     given = [Place("TIME_STEP", 1, "length of the step [s]")]
     if m:
         given.append(Place("MOTORS_BEGIN", m, f"at the beginning of the step, {names}"))
-        given.append(Place("MOTORS_MIDDLE", m, "motor joints in the middle of the step"))
-        given.append(Place("MOTORS_END", m, "motor joints at the end of the step"))
+        given.append(Place("MOTORS_MIDDLE", m, "the same in the middle of the step"))
+        given.append(Place("MOTORS_END", m, "the same at the end of the step"))
     given.append(Place("FORCE", 3, "force on the tip in the middle of the step [N], world axes"))
     given.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
     given.append(Place("DAMPING", n * n if layout.full_damping else n, f"{damping} [N m s/rad or N s/m]"))
@@ -77,16 +91,19 @@ def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
         Place("POSITION", n, "unknowns at the end [rad or m]"),
         Place("VELOCITY", n, "their velocities [rad/s or m/s]"),
         Place("ACCELERATION", n, "their accelerations in the middle [rad/s^2 or m/s^2]"),
+        Place("UNKNOWN", n, "unknowns [rad or m]; of place_at"),
+        Place("RATE", n, "their velocities [rad/s or m/s]; of place_at"),
         Place("TIP", 3, "the tip [m], world axes; of place_at"),
     ]
     lines = [
         f"Motion of {on_a_line(unknowns.chain.name)}: generated code.",
         "",
-        "Functions work on an array of WORKSPACE_SIZE numbers, initially zero, one array for each robot: it holds the state",
-        "and accelerations of the steps before. motion_step moves the state by one step; place_at(w, 1.0) writes the tip.",
-        "They return a status; the results are valid only if it is 0:",
+        "Functions work on an array of WORKSPACE_SIZE numbers, initially zero, one array for each robot.",
+        "It holds the state, and accelerations of the steps before, from which the next one is guessed.",
+        "motion_step and motion_run return a status; the results are valid only if it is 0:",
         "",
-        *(f"    {status.value}  {status.name:<14} {status.explanation}" for status in _STATUSES),
+        "    0  CERTIFIED      the step was taken",
+        "    2  UNSETTLED      the step does not converge, even in small parts",
         *place_table(given, found, layout.constants()),
     ]
     return "\n".join(lines), list(dict.fromkeys(row.name for row in (*given, *found)))

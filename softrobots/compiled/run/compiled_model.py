@@ -9,7 +9,8 @@ import numpy as np
 
 from softrobots.compiled.run.backends import BACKENDS, available_backend
 from softrobots.compiled.run.batches import batch_rows, fail, flat_targets, gravity_vector, unusable, without
-from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE, CompiledStatics
+from softrobots.compiled.run.compiled_dynamics import CompiledDynamics
+from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE
 from softrobots.compiled.run.looped_search import LoopedSearch
 from softrobots.compiled.run.results import CompiledLoadEstimate, LoadBatch, MotorBatch
 from softrobots.compiled.run.unrolled_search import UnrolledSearch
@@ -50,7 +51,7 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
     return CompiledModel(model, chosen, tuple(locked_strains))
 
 
-class CompiledModel(CompiledStatics):
+class CompiledModel(CompiledDynamics):
     """Compiled solvers of a robot, for single cases and for batches; made by `softrobots.compile`.
 
     Loads are a dead force on the tip and gravity, in world axes. Angles, signs and tolerances are those of

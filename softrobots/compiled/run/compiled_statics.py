@@ -9,6 +9,7 @@ import numpy as np
 
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import make_program
+from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
@@ -65,36 +66,42 @@ class CompiledStatics:
         """The back end: "numba" or "python"."""
         return self._backend
 
-    def source(self, *, gravity: bool = False, lanes: bool = False) -> str:
+    def source(self, *, gravity: bool = False, lanes: bool = False, motion: bool = False) -> str:
         """Return the generated code as Python runs it.
 
         Args:
             gravity: Return the code for robots with weight.
             lanes: Append the functions for batches.
+            motion: Return the code of motion instead, which always has gravity.
+
+        Raises:
+            ParameterError: If motion is asked for and muscle lengths are given.
         """
-        program = self._run(gravity).program
+        program = make_motion_program(self._unknowns) if motion else self._run(gravity).program
         return str(program.text + ("\n\n" + program.lane_text if lanes else ""))
 
-    def c_source(self, *, gravity: bool = False, prefix: str = "softrobots", poses: bool = False) -> str:
+    def c_source(self, *, gravity: bool = False, prefix: str = "softrobots", poses: bool = False, motion: bool = False) -> str:
         """Return the generated code as freestanding C99: one file without libraries, allocation or state, for a control loop.
 
         Every function works on an array of doubles that the caller owns. The comment at the head of the file lists inputs and
         results with their places and units, and the meaning of each status. `settle` finds equilibria of every robot;
-        `estimate`, `reach` and `follow` exist for unrolled chains.
+        `estimate`, `reach` and `follow` exist for unrolled chains; `motion_step` takes a step of time.
 
         Args:
             gravity: Return the code for robots with weight.
             prefix: Beginning of every name, before an underscore.
             poses: Return the code whose targets are poses.
+            motion: Return the code of motion instead of that of statics; it always has gravity.
 
         Raises:
-            ParameterError: If the prefix is not an identifier of C, or the robot cannot have poses as targets.
+            ParameterError: If the prefix is not an identifier of C, the robot cannot have poses as targets, or muscle lengths
+                are given and motion is asked for.
         """
         from softrobots.compiled.c.source import to_c
 
         if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
             raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
-        program = self._run(gravity, poses).program
+        program = make_motion_program(self._unknowns) if motion else self._run(gravity, poses).program
         return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
 
     def equilibrium(

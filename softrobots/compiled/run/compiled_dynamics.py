@@ -1,0 +1,303 @@
+"""Compiled motion of a robot, single and in batches, without Pinocchio in the loop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.program.motion_program import check_motion, make_motion_program
+from softrobots.compiled.run.backends import make_run
+from softrobots.compiled.run.batches import fail, gravity_vector
+from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
+from softrobots.compiled.run.motion_cases import MotionCases
+from softrobots.compiled.run.motion_course import Course, forces_at, motors_at, start_state
+from softrobots.compiled.run.motion_results import CompiledMotion, MotionBatch, StepEnd
+from softrobots.compiled.run.motion_runs import Taken, finer_and_finer, replay, take_batch, take_one, time_grid
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
+from softrobots.core.errors import NotConverged, ParameterError
+from softrobots.dynamics.damping import damping_matrix
+from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
+from softrobots.model.soft_model import SoftModel
+
+_ROWS = 200  # of a motion, if no output step is given
+_TIP_TOLERANCE = 5e-4  # of the reach
+
+
+class CompiledDynamics(CompiledStatics):
+    """Compiled motion of a robot, for single cases and for batches.
+
+    See `softrobots.compiled.run.compiled_model.CompiledModel`, which adds load estimation and inverse kinematics.
+    """
+
+    def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
+        """Generate and load the code; call `softrobots.compile` instead."""
+        super().__init__(model, backend, locked_strains)
+        self._motion_runs: dict[bool, Any] = {}
+        self._dampings: dict[tuple[float | None, float], FloatArray] = {}
+
+    def simulate(
+        self,
+        duration: Any,
+        q_motors: Any,
+        *,
+        start: Any = None,
+        force: Any = None,
+        gravity: Any = None,
+        damping_time: Any = None,
+        mass_damping: Any = 0.0,
+        time_step: Any = None,
+        output_step: Any = None,
+        tolerance: Any = None,
+    ) -> Motion:
+        """Simulate the motion of the robot as `softrobots.simulate` does, with the same answer at the same steps.
+
+        Args:
+            duration: Time to simulate [s].
+            q_motors: Motors, shape (n_motors,) [rad or m]: constants, a `Trajectory` or a function of time.
+            start: An `Equilibrium`, a `Motion` or a `MotionState`; by default relaxed springs at rest.
+            force: Force on the tip, shape (3,) [N], world axes: constant, a table or a function of time.
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+            damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
+            mass_damping: Rayleigh's factor of the mass [1/s].
+            time_step: Length of each step [s]; by default steps are halved until the tip is within the tolerance.
+            output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
+            tolerance: Largest error of the tip [m], measured with steps twice as long; by default 5e-4 of the reach.
+
+        Returns:
+            The motion; its torques and energies are computed when they are first asked for, by Pinocchio.
+
+        Raises:
+            ParameterError: If an argument has the wrong shape, is not finite or out of range, or muscle lengths are given.
+            NotConverged: If a step fails, however short, or the tolerance is not met; `best` is the motion so far.
+        """
+        end = positive_number("duration", duration, "s")
+        path, load = MotorPath(self._model, q_motors, end), TimeLoad(self._model, force, None, end)
+        course = Course(path, load, *start_state(self._model, start), self._model.tip)
+        run, given, damping = self._motion_code(gravity, damping_time, mass_damping)
+        h, largest, rows = self._times(end, time_step, output_step, tolerance)
+        facts: dict[str, Any] = {
+            "gravity": None if gravity is None else tuple(gravity_vector(gravity).tolist()),
+            "damping_time": None if damping_time is None else float(damping_time),
+            "tolerance": largest,
+            "tip_error": None,
+        }
+        state = [*self._started(course.q_springs, course.velocities, run.layout), *given]
+        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, 2 * _ROWS + 1))
+
+        def take(grid: FloatArray) -> Taken:
+            return take_one(run, state, course, grid, looked)
+
+        if h is not None:
+            taken = take(time_grid(end, h))
+        else:
+            taken = finer_and_finer(take, end, course.breaks, largest)
+            facts["tip_error"] = None if taken.errors is None else float(taken.errors[0])
+        at_rows = replace(taken, rows=taken.rows[:, np.searchsorted(looked, rows)])
+        motion = self._motion(run, state, course, at_rows, rows, damping, facts)
+        if taken.interrupted or (taken.status[0] == Status.CERTIFIED and taken.is_within):
+            return motion
+        why = "steps fail, however short" if taken.is_within else "a shorter duration or more damping may help, or a time_step"
+        raise NotConverged(
+            f"the motion is known until t = {motion.time[-1]:.6g} s, the tip to {motion.tip_error} m, required {largest} m, "
+            f"after a run with {len(taken.grid) - 1} steps: {why}",
+            best=motion,
+            residual=math.inf if motion.tip_error is None else motion.tip_error,
+            iterations=len(taken.grid) - 1,
+        )
+
+    def step(
+        self,
+        q_springs: Any,
+        velocities: Any,
+        q_motors: Any,
+        force: Any = NO_FORCE,
+        *,
+        time_step: Any = 1e-3,
+        gravity: Any = None,
+        damping_time: Any = None,
+        mass_damping: Any = 0.0,
+    ) -> StepEnd:
+        """Take one step of time from a state, for an observer or a controller; `c_source(motion=True)` has it in C.
+
+        Args:
+            q_springs: Elastic coordinates at the beginning, shape (n_springs,) [rad or m].
+            velocities: Their rates, shape (n_springs,) [rad/s or m/s].
+            q_motors: Motors, shape (n_motors,) [rad or m] if they stand still, or (3, n_motors): at the beginning, in the
+                middle and at the end of the step.
+            force: Force on the tip in the middle of the step, shape (3,) [N], world axes.
+            time_step: Length of the step [s].
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+            damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
+            mass_damping: Rayleigh's factor of the mass [1/s].
+
+        Returns:
+            The state at the end.
+
+        Raises:
+            ParameterError: If an argument has the wrong shape, is not finite or out of range, or muscle lengths are given.
+            NotConverged: If the step fails, even in small parts; `best` is None.
+        """
+        run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
+        layout, n = run.layout, self._model.n_springs
+        path = [q_motors] * 3 if np.ndim(q_motors) < 2 else finite_array("q_motors", q_motors, (3, self._motors), "rad")
+        state = finite_array("q_springs", q_springs, (n,), "rad"), finite_array("velocities", velocities, (n,), "rad/s")
+        w = run.workspace()
+        for place, values in [
+            *given,
+            *self._started(*state, layout),
+            (layout.force, finite_array("force", force, (3,), "N")),
+            (layout.time_step, np.array([positive_number("time_step", time_step, "s")])),
+            (layout.motors_begin, np.concatenate([self._actuation.checked(one) for one in path])),
+        ]:
+            run.put(w, place, values)
+        status = Status(run.motion_step(w))
+        if status != Status.CERTIFIED:
+            why = f"the step of {time_step} s fails, even in small parts: {status.explanation}"
+            raise NotConverged(why, best=None, residual=math.inf, iterations=1)
+        run.place_at(w, 1.0)
+        springs, rates = self._elastic_state(np.array(w[layout.position : layout.position + 2 * layout.unknowns]))
+        return StepEnd(read_only(springs), read_only(rates), read_only(np.array(w[layout.tip : layout.tip + 3])))
+
+    def simulations(
+        self,
+        duration: Any,
+        q_motors: Any,
+        *,
+        starts: Any = None,
+        forces: Any = None,
+        gravity: Any = None,
+        damping_time: Any = None,
+        mass_damping: Any = 0.0,
+        time_step: Any = None,
+        output_step: Any = None,
+        tolerance: Any = None,
+        threads: int = 1,
+    ) -> MotionBatch:
+        """Simulate many cases side by side, all with the same steps.
+
+        Args:
+            duration: Time to simulate [s].
+            q_motors: Motors that stand still, shape (n, n_motors), or (n_motors,) for all cases [rad or m]; a `Trajectory` or a
+                function of time for all cases; or a list of those.
+            starts: Elastic coordinates at rest, shape (n, n_springs) or (n_springs,) [rad or m]; a pair of those and their
+                rates; a `MotionBatch`, whose last rows are taken, or an `EquilibriumBatch`; by default relaxed springs.
+            forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes; a table or a function of time for all
+                cases; or a list of those.
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+            damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
+            mass_damping: Rayleigh's factor of the mass [1/s].
+            time_step: Length of each step [s]; by default steps are halved until all tips are within the tolerance.
+            output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
+            tolerance: Largest error of the tip in a row [m], measured with steps twice as long; by default 5e-4 of the reach.
+            threads: Number of threads; more than one speeds up numba only.
+
+        Returns:
+            One motion a case. The status tells which cases failed; a failed case does not affect others.
+
+        Raises:
+            ParameterError: If an argument has the wrong shape or is out of range, or muscle lengths are given.
+            NotConverged: If the tolerance is not met; `best` is the batch so far.
+        """
+        end = positive_number("duration", duration, "s")
+        positive_integer("threads", threads)
+        run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
+        h, largest, rows = self._times(end, time_step, output_step, tolerance)
+        cases = MotionCases(self._model, self._actuation, end, q_motors, forces, starts)
+        values = [*self._started(*cases.state, run.layout), *((place, one[None]) for place, one in given)]
+        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, 2 * _ROWS + 1))
+
+        def take(grid: FloatArray) -> Taken:
+            return take_batch(run, values, cases, grid, looked, threads)
+
+        taken = take(time_grid(end, h)) if h is not None else finer_and_finer(take, end, cases.breaks, largest, cases.bad)
+        found = taken.rows[:, np.searchsorted(looked, rows)]
+        fail(taken.status, cases.bad, [], [found])
+        batch = MotionBatch(
+            read_only(rows),
+            *self._elastic_state(found[..., :-3]),
+            np.ascontiguousarray(found[..., -3:]),
+            taken.status,
+            read_only(taken.grid),
+            taken.errors,
+            largest,
+        )
+        if not taken.is_within:
+            raise NotConverged(
+                f"the tips are not known to {largest:.3g} m after a run with {len(taken.grid) - 1} steps; a shorter duration "
+                "or more damping may help, or a time_step",
+                best=batch,
+                residual=math.inf if taken.errors is None else float(taken.errors.max()),
+                iterations=len(taken.grid) - 1,
+            )
+        return batch
+
+    def _motion_code(self, gravity: Any, damping_time: Any, mass_damping: Any) -> tuple[Any, Any, FloatArray]:
+        """Return the code, what stands in its workspace of gravity and damping, and the damping of the elastic coordinates."""
+        check_motion(self._unknowns)
+        down = gravity_vector(gravity)
+        alpha = non_negative_number("mass_damping", mass_damping, "1/s")
+        beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
+        if (beta, alpha) not in self._dampings:
+            self._dampings[beta, alpha] = damping_matrix(self._model, beta, alpha)
+        damping = self._dampings[beta, alpha]
+        strains = list(self._unknowns.strains)
+        own = damping[np.ix_(strains, strains)]
+        full = bool(np.any(own != np.diag(np.diag(own))))
+        run = self._motion_runs.get(full)
+        if run is None:
+            run = self._motion_runs[full] = make_run(make_motion_program(self._unknowns, full_damping=full), self._backend)
+        return run, [(run.layout.damping, own.ravel() if full else np.diag(own)), (run.layout.gravity, down)], damping
+
+    def _started(self, springs: FloatArray, rates: FloatArray, layout: Any) -> list[tuple[int, FloatArray]]:
+        """Return places in the workspace and values of a state, or of one a row."""
+        strains = list(self._unknowns.strains)
+        return [(layout.position, springs[..., strains]), (layout.velocity, rates[..., strains])]
+
+    def _elastic_state(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return elastic coordinates and rates, each shape (..., n_springs), from unknowns and their rates."""
+        n = state.shape[-1] // 2
+        elastic = self._actuation.elastic
+        return elastic(state[..., :n].copy()), elastic(state[..., n:].copy()) - elastic(np.zeros(n))
+
+    def _times(self, end: float, time_step: Any, output_step: Any, tolerance: Any) -> tuple[float | None, Any, FloatArray]:
+        """Return the length of the steps, the tolerance of the tip, and the times of the rows, as `softrobots.simulate`."""
+        h = None if time_step is None else positive_number("time_step", time_step, "s")
+        if h is not None and tolerance is not None:
+            raise ParameterError("tolerance", tolerance, "None with a given time_step, whose error is not measured")
+        largest = _TIP_TOLERANCE * self._model.reach if tolerance is None else positive_number("tolerance", tolerance, "m")
+        between = end / _ROWS if h is None else h * math.ceil(end / h / _ROWS - 1e-9)
+        between = between if output_step is None else positive_number("output_step", output_step, "s")
+        return h, None if h is not None else largest, time_grid(end, between)
+
+    def _motion(
+        self, run: Any, given: Any, course: Course, taken: Taken, rows: FloatArray, damping: FloatArray, facts: dict[str, Any]
+    ) -> CompiledMotion:
+        """Return the motion of the rows that were reached."""
+        found = taken.rows[0]
+        found = found[np.isfinite(found[:, -1])]
+        time = read_only(rows[: len(found)])
+        steps = read_only(taken.grid[taken.grid <= time[-1]])
+        motors, motor_velocities = motors_at(course.path, time, taken.grid)
+        springs, rates = self._elastic_state(found[:, :-3])
+        fields = {
+            "time": time,
+            "q_motors": motors,
+            "motor_velocities": motor_velocities,
+            "q_springs": springs,
+            "velocities": rates,
+            "forces": forces_at(course.load, course.tip, time.tolist()),
+            "steps": steps,
+        }
+
+        def again() -> Motion:
+            ends = take_one(run, given, course, steps, steps)
+            states = np.concatenate(self._elastic_state(ends.rows[..., :-3]), axis=-1)
+            return replay(self._model, course, damping, replace(ends, rows=states), time, facts)
+
+        known = {name: read_only(value) for name, value in fields.items()}
+        return CompiledMotion(again, model=self._model, **known, **facts, interrupted=taken.interrupted)

@@ -1,0 +1,82 @@
+"""Results of compiled motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray
+from softrobots.dynamics.motion import Motion, MotionEnergy
+
+
+class CompiledMotion(Motion):
+    """A `Motion` whose torques and energies are computed when they are asked for, from all steps of the same motion again."""
+
+    def __init__(self, replay: Callable[[], Motion], **known: Any) -> None:
+        """Take the other fields of a `Motion`, and a function that returns it with all of them."""
+        vars(self).update(known, _replay=replay)
+
+    @cached_property
+    def _whole(self) -> Motion:
+        replay: Callable[[], Motion] = vars(self)["_replay"]
+        return replay()
+
+    @cached_property
+    def motor_torques(self) -> FloatArray:
+        """Load that each motor carries, with that of the accelerated masses, shape (n, n_motors) [N m or N]."""
+        return self._whole.motor_torques
+
+    @cached_property
+    def energy(self) -> MotionEnergy:
+        """Energies and their balance."""
+        return self._whole.energy
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle as a `Motion`."""
+        return Motion, tuple(getattr(self, field.name) for field in fields(Motion))
+
+
+class StepEnd(NamedTuple):
+    """State at the end of a step of time."""
+
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n_springs,) [rad or m]."""
+    velocities: FloatArray
+    """Their rates, shape (n_springs,) [rad/s or m/s]."""
+    tip_position: FloatArray
+    """The tip, shape (3,) [m], world axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionBatch:
+    """Motions of many cases, at the same times."""
+
+    time: FloatArray
+    """Times of the rows, shape (t,) [s]."""
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n, t, n_springs) [rad or m]."""
+    velocities: FloatArray
+    """Their rates, shape (n, t, n_springs) [rad/s or m/s]."""
+    tip_position: FloatArray
+    """The tip, shape (n, t, 3) [m], world axes."""
+    status: Any
+    """`Status` of each case, shape (n,), small integers; only rows with `Status.CERTIFIED` are valid."""
+    steps: FloatArray
+    """Times at the ends of all steps, the first included, shape (m,) [s]."""
+    tip_error: FloatArray | None = None
+    """Measured error of the tip, the largest of all rows, shape (n,) [m]; None for fixed steps, where it is not measured."""
+    tolerance: float | None = None
+    """Largest `tip_error` that was asked for [m]; None for fixed steps."""
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in (self.time, self.q_springs, self.velocities, self.tip_position, self.status, self.steps):
+            array.setflags(write=False)
+
+    @property
+    def certified(self) -> Any:
+        """Mask of the valid cases, shape (n,)."""
+        return self.status == Status.CERTIFIED
