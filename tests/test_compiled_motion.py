@@ -107,6 +107,10 @@ def gust(time: float) -> np.ndarray:
     return np.array([0.0, 20.0 * time, -8.0])
 
 
+def stopping(time: float) -> np.ndarray:
+    return np.array([0.3, 0.6, -0.8]) + 2.0 * min(time, 0.0304) * np.array([1.0, -0.5, 0.7])
+
+
 def options(arm: SoftModel) -> dict[str, tuple[Any, dict[str, Any]]]:
     """Motors and options of simulations of all kinds."""
     loaded = sr.solve_equilibrium(arm, swaying(0.0), (0.0, 5.0, -20.0), gravity=GRAVITY)
@@ -114,12 +118,13 @@ def options(arm: SoftModel) -> dict[str, tuple[Any, dict[str, Any]]]:
     followed = sr.follow_trajectory(arm, path.positions, times=path.times)
     return {
         "released": (swaying(0.0), {"start": loaded, "gravity": GRAVITY, "damping_time": 1e-3}),
+        "stopping": (stopping, {"gravity": GRAVITY, "damping_time": 1e-3}),
         "swaying": (swaying, {"force": gust, "gravity": GRAVITY, "damping_time": 0.0}),
         "trajectory": (followed, {"force": ([0.0, 0.03, 0.1], [[0, 0, 0], [0, 9, 0], [3, 0, 0]]), "mass_damping": 2.0}),
     }
 
 
-@pytest.mark.parametrize("case", ["released", "swaying", "trajectory"])
+@pytest.mark.parametrize("case", ["released", "stopping", "swaying", "trajectory"])
 def test_same_answer_as_simulate_at_the_same_steps(case: str, arm: SoftModel, solver: CompiledModel) -> None:
     motors, given = options(arm)[case]
     given |= {"time_step": 1e-3, "output_step": 3.3e-3}
@@ -134,9 +139,11 @@ def test_same_answer_as_simulate_at_the_same_steps(case: str, arm: SoftModel, so
     for name in ("kinetic", "elastic", "potential", "dissipated", "load_work", "motor_work"):
         np.testing.assert_allclose(getattr(found.energy, name), getattr(expected.energy, name), rtol=0, atol=1e-8)
     assert pickle.loads(pickle.dumps(found)).energy.kinetic[-1] == found.energy.kinetic[-1]
-    again = solver.simulate(0.05, motors if case == "released" else swaying, start=found, time_step=1e-3)
-    np.testing.assert_array_equal(again.q_springs[0], found.q_springs[-1])
-    np.testing.assert_array_equal(again.velocities[0], found.velocities[-1])
+    stopped = found.q_motors[-1]  # at once
+    found, expected = (
+        engine(0.02, stopped, start=found, time_step=1e-3) for engine in (solver.simulate, functools.partial(sr.simulate, arm))
+    )
+    np.testing.assert_allclose(found.velocities, expected.velocities, rtol=0, atol=1e-8)
 
 
 def test_the_tolerance_is_kept(solver: CompiledModel, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,15 +185,11 @@ def test_a_batch_has_the_motions_of_its_cases(solver: CompiledModel, rng: np.ran
         np.testing.assert_allclose(one.time, batch.time, rtol=0, atol=0)
         np.testing.assert_allclose(batch.q_springs[row], one.q_springs, rtol=0, atol=1e-10)  # velocities differ by 1e-10
         np.testing.assert_allclose(batch.tip_position[row], one.tip_position, rtol=0, atol=1e-10)
-        if row == 0:
-            one = solver.simulate(
-                0.05,
-                swaying,
-                start=MotionState(solver.model, 0.0, motors[0], np.zeros(3), starts[0][0], np.zeros(4)),
-                force=gust,
-                **given,
-            )
-            np.testing.assert_allclose(moving.tip_position[0], one.tip_position, rtol=0, atol=1e-10)
+    state = MotionState(solver.model, 0.0, swaying(0.0), np.zeros(3), starts[0][0], np.zeros(4))
+    one = solver.simulate(0.05, swaying, start=state, force=gust, **given)
+    np.testing.assert_allclose(moving.tip_position[0], one.tip_position, rtol=0, atol=1e-10)
+    one, many = solver.simulate(0.05, stopping, **given), solver.simulations(0.05, [stopping, stopping], **given)
+    np.testing.assert_allclose(many.q_springs[1], one.q_springs, rtol=0, atol=1e-10)  # the blow comes between two steps
     np.testing.assert_array_equal(ends.q_springs[:, 0], batch.q_springs[:2, -1])
 
 
@@ -239,14 +242,16 @@ def test_steps_that_do_not_converge_are_halved(solver: CompiledModel) -> None:
     batch = solver.simulations(h, [*calm, turning], starts=state, time_step=h, damping_time=0.0)
     assert np.all(batch.certified)
     np.testing.assert_allclose(batch.q_springs[2], whole.q_springs, rtol=0, atol=1e-12)
-    step = solver.step(*state, [turning(0.0), turning(h / 2), turning(h)], time_step=h, damping_time=0.0)
+    step = solver.step(
+        whole.q_springs[0], whole.velocities[0], [turning(0.0), turning(h / 2), turning(h)], time_step=h, damping_time=0.0
+    )
     np.testing.assert_allclose(step.q_springs, whole.q_springs[-1], rtol=0, atol=1e-12)
 
 
 def test_a_step_is_that_of_a_simulation(solver: CompiledModel) -> None:
     given = {"gravity": GRAVITY, "damping_time": 1e-3, "time_step": 1e-3}
     whole = solver.simulate(5e-3, swaying, force=gust, **given)
-    springs, rates = np.zeros(4), np.zeros(4)
+    springs, rates = whole.q_springs[0], whole.velocities[0]  # behind the blow with which the motors begin
     for row in range(5):
         begin = 1e-3 * row
         motors = [swaying(time) for time in (begin, begin + 0.5e-3, begin + 1e-3)]
@@ -296,6 +301,7 @@ def test_other_back_ends_take_the_same_steps(solver: CompiledModel, arm: SoftMod
     controller.put("GRAVITY", GRAVITY)
     controller.put("DAMPING", 1e-3 * arm.stiffness)
     controller.put("TIME_STEP", [1e-3])
+    controller.put("VELOCITY", expected.velocities[0])  # behind the blow with which the motors begin
     for row in range(100):
         for name, share in (("MOTORS_BEGIN", 0.0), ("MOTORS_MIDDLE", 0.5), ("MOTORS_END", 1.0)):
             controller.put(name, swaying(1e-3 * (row + share)))

@@ -14,11 +14,16 @@ from softrobots.core.errors import NotConverged, ParameterError
 from softrobots.core.progress import with_progress
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
-from softrobots.dynamics.midpoint import MidpointRule, State
+from softrobots.dynamics.midpoint import MidpointRule
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MotorTorque
 from softrobots.dynamics.recorder import Recorder
+<<<<<<< HEAD
 from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_distances
+=======
+from softrobots.dynamics.starting import first_kick, first_state, grid_with_kicks, steps_and_rows
+from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_errors
+>>>>>>> 921015f (Compiled motion begins and ends as simulate does: blows of motors that start or stop at once; both engines share starts, grids and rows)
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
@@ -26,14 +31,14 @@ from softrobots.statics.equilibrium import Equilibrium
 MOTORS = ("prescribed", "torque")
 """How motors move."""
 
+<<<<<<< HEAD
 _ROWS = 200  # of a motion, if no output step is given
 _MOST_ROWS = 10_000_000  # steps or rows of a motion, for which memory suffices
 _APART = 1e-6  # largest distance of motors from where the start has them [rad or m]
 _LEAST = 1e-300  # distance that two runs have at least [m]
+=======
+>>>>>>> 921015f (Compiled motion begins and ends as simulate does: blows of motors that start or stop at once; both engines share starts, grids and rows)
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
-
-TIP_TOLERANCE = 5e-4
-"""Default of the largest error of the tip, relative to the reach of the robot."""
 
 MOST_STEPS = 400_000
 """Most steps of one run that is refined for a tolerance."""
@@ -109,16 +114,8 @@ def simulate(
     weight = None if gravity is None else tuple(finite_array("gravity", gravity, (3,), "m/s^2").tolist())
     alpha = non_negative_number("mass_damping", mass_damping, "1/s")
     beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
-    first = _first_state(model, start, path, 0 if drive is None else drive.count)
-    h = None if time_step is None else positive_number("time_step", time_step, "s")
-    if h is not None and tolerance is not None:
-        raise ParameterError("tolerance", tolerance, "None with a given time_step, whose error is not measured")
-    largest = TIP_TOLERANCE * model.reach if tolerance is None else positive_number("tolerance", tolerance, "m")
-    between = end / _ROWS if h is None else h * math.ceil(end / h / _ROWS - 1e-9)
-    between = between if output_step is None else positive_number("output_step", output_step, "s")
-    for name, length in (("time_step", h), ("output_step", between)):
-        if length is not None and end / length > _MOST_ROWS:
-            raise ParameterError(name, length, f"at least {end / _MOST_ROWS:.3g} s, {_MOST_ROWS} of which make the duration")
+    first = first_state(model, start, path, 0 if drive is None else drive.count)
+    h, largest, rows = steps_and_rows(end, model.reach, time_step, output_step, tolerance)
     with one_blas_thread(model.n_springs):
         drives = None if drive is None else model.actuators.drives
         equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, alpha), drives)
@@ -127,15 +124,11 @@ def simulate(
             """A run from the first state, whose velocities take those with which prescribed motors begin."""
             controller = None if drive is None else MotorTorque(model, torque, sample_time)
             rule = MidpointRule(equations, path, load, controller)
-            change = path.kicks.get(0.0, np.zeros(model.n_motors)) - first.rates[: model.n_motors]
-            slight = _APART * float(np.abs(first.rates[: model.n_motors]).max(initial=_APART))
-            begun = rule.kicked(first, change) if np.abs(change).max(initial=0.0) > slight else first
-            return Recorder(rule, begun, _grid(end, between))
+            change = first_kick(path, first.rates[: model.n_motors])
+            return Recorder(rule, first if change is None else rule.kicked(first, change), rows)
 
         if h is not None:
-            kicks = np.array([time for time in path.kicks if 0.0 < time < end])
-            regular = [time for time in _grid(end, h).tolist() if np.abs(kicks - time).min(initial=h) > 1e-6 * h]
-            grid = np.sort(np.concatenate([regular, kicks]))
+            grid = grid_with_kicks(end, h, np.array(list(path.kicks)))
             return _fixed(new_run(), grid if drive is None else drive.with_samples(grid), beta, progress)
         breaks = np.unique(np.concatenate([[end], path.breaks, load.breaks]))
         return _controlled(new_run, breaks if drive is None else drive.with_samples(breaks), largest, beta, progress)
@@ -201,30 +194,3 @@ def _go(run: Recorder, steps: Iterable[int], damping_time: float | None, progres
         best = run.motion(damping_time=damping_time)
         raise NotConverged(str(error), best=best, residual=math.inf, iterations=len(run.times) - 1) from None
     return False
-
-
-def _grid(end: float, step: float) -> FloatArray:
-    """Times from zero to the end, `step` apart, the last one nearer if need be, shape (n,) [s]."""
-    return np.append(step * np.arange(math.ceil(end / step - 1e-9)), end)
-
-
-def _first_state(model: SoftModel, start: Any, path: MotorPath, free: int) -> State:
-    """The state at time zero; the first `free` actuators are where `start` has them, the others where the path begins."""
-    motors, springs, rates = path(0.0), model.rest, np.zeros(model.n_motors + model.n_springs)
-    if start is not None:
-        if isinstance(start, Motion):
-            start = start.end
-        if not isinstance(start, Equilibrium | MotionState):
-            raise ParameterError("start", start, "an Equilibrium, a Motion, a MotionState, or None (relaxed, at rest)")
-        if start.model != model:
-            raise ParameterError("start", start.model, f"a state of the model given, {model!r}")
-        placed = slice(free, model.n_motors - (len(model.muscles) if model.muscle_input == "forces" else 0))
-        apart = np.abs(motors - start.q_motors)[placed].max(initial=0.0)
-        if apart > _APART:
-            text = f"at {start.q_motors.tolist()} at t = 0, where `start` has the actuators (it is {apart:.3g} rad or m away)"
-            raise ParameterError("q_motors", motors, text)
-        springs, motors = start.q_springs, np.concatenate([start.q_motors[:free], motors[free:]])
-        if isinstance(start, MotionState):
-            rates[: model.n_motors] = start.motor_velocities
-            rates[model.n_motors :] = start.velocities
-    return State(0.0, np.concatenate([motors, springs]), rates)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,19 +14,20 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
-from softrobots.compiled.run.motion_course import Course, forces_at, motors_at, start_state
+from softrobots.compiled.run.motion_course import Blows, Course, forces_at, motors_at
 from softrobots.compiled.run.motion_results import CompiledMotion, MotionBatch, StepEnd
-from softrobots.compiled.run.motion_runs import Taken, finer_and_finer, replay, take_batch, take_one, time_grid
+from softrobots.compiled.run.motion_runs import Taken, finer_and_finer, replay, take_batch, take_one
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
-from softrobots.core.errors import NotConverged, ParameterError
+from softrobots.core.errors import NotConverged
 from softrobots.dynamics.damping import damping_matrix
+from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.starting import first_kick, first_state, grid_with_kicks, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 
-_ROWS = 200  # of a motion, if no output step is given
-_TIP_TOLERANCE = 5e-4  # of the reach
+_LOOKED = 401  # times at which tips of two runs are compared, besides those of the rows
 
 
 class CompiledDynamics(CompiledStatics):
@@ -77,28 +79,34 @@ class CompiledDynamics(CompiledStatics):
         """
         end = positive_number("duration", duration, "s")
         path, load = MotorPath(self._model, q_motors, end), TimeLoad(self._model, force, None, end)
-        course = Course(path, load, *start_state(self._model, start), self._model.tip)
+        course = Course(path, load, self._model.tip, Blows(self._model, self._unknowns.strains))
         run, given, damping = self._motion_code(gravity, damping_time, mass_damping)
-        h, largest, rows = self._times(end, time_step, output_step, tolerance)
+        h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         facts: dict[str, Any] = {
-            "gravity": None if gravity is None else tuple(gravity_vector(gravity).tolist()),
             "damping_time": None if damping_time is None else float(damping_time),
-            "tolerance": largest,
+            "tolerance": None if h is not None else largest,
             "tip_error": None,
         }
-        state = [*self._started(course.q_springs, course.velocities, run.layout), *given]
-        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, 2 * _ROWS + 1))
+        state = self._first_state(course, start)
+        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _LOOKED))
 
         def take(grid: FloatArray) -> Taken:
-            return take_one(run, state, course, grid, looked)
+            return take_one(run, state, given, course, grid, looked)
 
         if h is not None:
-            taken = take(time_grid(end, h))
+            taken = take(grid_with_kicks(end, h, np.array(list(path.kicks))))
         else:
             taken = finer_and_finer(take, end, course.breaks, largest)
             facts["tip_error"] = None if taken.errors is None else float(taken.errors[0])
         at_rows = replace(taken, rows=taken.rows[:, np.searchsorted(looked, rows)])
-        motion = self._motion(run, state, course, at_rows, rows, damping, facts)
+        down = None if gravity is None else tuple(gravity_vector(gravity).tolist())
+
+        def again(steps: FloatArray, rows: FloatArray) -> Motion:
+            ends = take_one(run, state, given, course, steps, steps)
+            ends = replace(ends, rows=np.concatenate(self._elastic_state(ends.rows[..., :-3]), axis=-1))
+            return replay(EquationsOfMotion(self._model, down, damping), course, ends, rows, facts)
+
+        motion = self._motion(course, at_rows, rows, again, facts | {"gravity": down})
         if taken.interrupted or (taken.status[0] == Status.CERTIFIED and taken.is_within):
             return motion
         why = "steps fail, however short" if taken.is_within else "a shorter duration or more damping may help, or a time_step"
@@ -143,13 +151,14 @@ class CompiledDynamics(CompiledStatics):
             NotConverged: If the step fails, even in small parts; `best` is None.
         """
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
-        layout, n = run.layout, self._model.n_springs
+        layout, n, strains = run.layout, self._model.n_springs, list(self._unknowns.strains)
         path = [q_motors] * 3 if np.ndim(q_motors) < 2 else finite_array("q_motors", q_motors, (3, self._motors), "rad")
         state = finite_array("q_springs", q_springs, (n,), "rad"), finite_array("velocities", velocities, (n,), "rad/s")
         w = run.workspace()
         for place, values in [
             *given,
-            *self._started(*state, layout),
+            (layout.position, state[0][strains]),
+            (layout.velocity, state[1][strains]),
             (layout.force, finite_array("force", force, (3,), "N")),
             (layout.time_step, np.array([positive_number("time_step", time_step, "s")])),
             (layout.motors_begin, np.concatenate([self._actuation.checked(one) for one in path])),
@@ -206,15 +215,21 @@ class CompiledDynamics(CompiledStatics):
         end = positive_number("duration", duration, "s")
         positive_integer("threads", threads)
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
-        h, largest, rows = self._times(end, time_step, output_step, tolerance)
+        h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         cases = MotionCases(self._model, self._actuation, end, q_motors, forces, starts)
-        values = [*self._started(*cases.state, run.layout), *((place, one[None]) for place, one in given)]
-        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, 2 * _ROWS + 1))
+        strains, blows = list(self._unknowns.strains), Blows(self._model, self._unknowns.strains)
+        springs, rates = (np.array(one[:, strains]) for one in cases.state)
+        cases.strike(blows, 0.0, slice(None), springs, rates)
+        values = [(run.layout.position, springs), (run.layout.velocity, rates), *((place, one[None]) for place, one in given)]
+        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _LOOKED))
 
         def take(grid: FloatArray) -> Taken:
-            return take_batch(run, values, cases, grid, looked, threads)
+            return take_batch(run, values, cases, blows, grid, looked, threads)
 
-        taken = take(time_grid(end, h)) if h is not None else finer_and_finer(take, end, cases.breaks, largest, cases.bad)
+        if h is not None:
+            taken = take(grid_with_kicks(end, h, cases.kicks))
+        else:
+            taken = finer_and_finer(take, end, cases.breaks, largest, cases.bad)
         found = taken.rows[:, np.searchsorted(looked, rows)]
         fail(taken.status, cases.bad, [], [found])
         batch = MotionBatch(
@@ -224,7 +239,7 @@ class CompiledDynamics(CompiledStatics):
             taken.status,
             read_only(taken.grid),
             taken.errors,
-            largest,
+            None if h is not None else largest,
         )
         if not taken.is_within:
             raise NotConverged(
@@ -253,10 +268,12 @@ class CompiledDynamics(CompiledStatics):
             run = self._motion_runs[full] = make_run(make_motion_program(self._unknowns, full_damping=full), self._backend)
         return run, [(run.layout.damping, own.ravel() if full else np.diag(own)), (run.layout.gravity, down)], damping
 
-    def _started(self, springs: FloatArray, rates: FloatArray, layout: Any) -> list[tuple[int, FloatArray]]:
-        """Return places in the workspace and values of a state, or of one a row."""
-        strains = list(self._unknowns.strains)
-        return [(layout.position, springs[..., strains]), (layout.velocity, rates[..., strains])]
+    def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:
+        """Return unknowns and rates at time zero, each shape (n,), after the motors have begun to move."""
+        first, m, strains = first_state(self._model, start, course.path), self._motors, list(self._unknowns.strains)
+        springs, rates = first.x[m:][strains], first.rates[m:][strains]
+        change = first_kick(course.path, first.rates[:m])
+        return springs, rates if change is None else rates + course.blows.at(first.x[:m], springs, change)
 
     def _elastic_state(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return elastic coordinates and rates, each shape (..., n_springs), from unknowns and their rates."""
@@ -264,18 +281,8 @@ class CompiledDynamics(CompiledStatics):
         elastic = self._actuation.elastic
         return elastic(state[..., :n].copy()), elastic(state[..., n:].copy()) - elastic(np.zeros(n))
 
-    def _times(self, end: float, time_step: Any, output_step: Any, tolerance: Any) -> tuple[float | None, Any, FloatArray]:
-        """Return the length of the steps, the tolerance of the tip, and the times of the rows, as `softrobots.simulate`."""
-        h = None if time_step is None else positive_number("time_step", time_step, "s")
-        if h is not None and tolerance is not None:
-            raise ParameterError("tolerance", tolerance, "None with a given time_step, whose error is not measured")
-        largest = _TIP_TOLERANCE * self._model.reach if tolerance is None else positive_number("tolerance", tolerance, "m")
-        between = end / _ROWS if h is None else h * math.ceil(end / h / _ROWS - 1e-9)
-        between = between if output_step is None else positive_number("output_step", output_step, "s")
-        return h, None if h is not None else largest, time_grid(end, between)
-
     def _motion(
-        self, run: Any, given: Any, course: Course, taken: Taken, rows: FloatArray, damping: FloatArray, facts: dict[str, Any]
+        self, course: Course, taken: Taken, rows: FloatArray, again: Callable[..., Motion], facts: dict[str, Any]
     ) -> CompiledMotion:
         """Return the motion of the rows that were reached."""
         found = taken.rows[0]
@@ -293,11 +300,5 @@ class CompiledDynamics(CompiledStatics):
             "forces": forces_at(course.load, course.tip, time.tolist()),
             "steps": steps,
         }
-
-        def again() -> Motion:
-            ends = take_one(run, given, course, steps, steps)
-            states = np.concatenate(self._elastic_state(ends.rows[..., :-3]), axis=-1)
-            return replay(self._model, course, damping, replace(ends, rows=states), time, facts)
-
-        known = {name: read_only(value) for name, value in fields.items()}
-        return CompiledMotion(again, model=self._model, **known, **facts, interrupted=taken.interrupted)
+        known = {name: read_only(value) for name, value in fields.items()} | facts
+        return CompiledMotion(lambda: again(steps, time), model=self._model, **known, interrupted=taken.interrupted)

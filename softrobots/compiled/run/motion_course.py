@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from softrobots.compiled.settings import LARGEST_POSITION
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
-from softrobots.dynamics.motion import Motion, MotionState
+from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.equilibrium import Equilibrium
 
 
 def motors_of_steps(path: MotorPath, grid: FloatArray) -> FloatArray:
@@ -58,6 +56,30 @@ def motors_at(path: MotorPath, times: FloatArray, grid: FloatArray) -> tuple[Flo
     return np.array([path(time) for time in times.tolist()]), rates
 
 
+class Blows:
+    """What springs do when velocities of motors jump; see `MidpointRule.kicked`."""
+
+    def __init__(self, model: SoftModel, strains: Sequence[int]) -> None:
+        """Take the robot, and which elastic coordinates can move."""
+        self._model, self._strains = model, list(strains)
+        self._equations: EquationsOfMotion | None = None
+
+    def at(self, motors: FloatArray, unknowns: FloatArray, change: FloatArray) -> FloatArray:
+        """Return the jump of the velocities of the unknowns, shape (n,).
+
+        Args:
+            motors: Where the motors are, shape (n_motors,) [rad or m].
+            unknowns: The unknowns there, shape (n,) [rad or m].
+            change: Jump of the velocities of the motors, shape (n_motors,).
+        """
+        if self._equations is None:
+            self._equations = EquationsOfMotion(self._model)
+        springs, free = np.array(self._model.rest), self._model.n_motors + np.array(self._strains, dtype=np.intp)
+        springs[self._strains] = unknowns
+        mass = self._equations.mass_matrix(np.concatenate([motors, springs]))
+        return np.asarray(-np.linalg.solve(mass[np.ix_(free, free)], mass[free, : len(change)] @ change))
+
+
 @dataclass(frozen=True)
 class Course:
     """What drives one simulation."""
@@ -66,30 +88,12 @@ class Course:
     """Positions of the motors."""
     load: TimeLoad
     """Force on the tip."""
-    q_springs: FloatArray
-    """Elastic coordinates at the start, shape (n_springs,) [rad or m]."""
-    velocities: FloatArray
-    """Their rates, shape (n_springs,)."""
     tip: str
     """Name of the tip."""
+    blows: Blows
+    """What springs do when velocities of motors jump."""
 
     @property
     def breaks(self) -> FloatArray:
         """Times at which motors or force have a jump or a kink, shape (n,) [s]."""
         return np.concatenate([self.path.breaks, self.load.breaks])
-
-
-def start_state(model: SoftModel, start: Any) -> tuple[FloatArray, FloatArray]:
-    """Return elastic coordinates and rates of a start, each shape (n_springs,).
-
-    Raises:
-        ParameterError: If the start is of another kind, or of another robot.
-    """
-    if start is None:
-        return model.rest, np.zeros(model.n_springs)
-    state = start.end if isinstance(start, Motion) else start
-    if not isinstance(state, Equilibrium | MotionState):
-        raise ParameterError("start", start, "an Equilibrium, a Motion, a MotionState, or None (relaxed, at rest)")
-    if state.model != model:
-        raise ParameterError("start", state.model, f"a state of the model given, {model!r}")
-    return state.q_springs, state.velocities if isinstance(state, MotionState) else np.zeros(model.n_springs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -11,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.motion_cases import MotionCases
-from softrobots.compiled.run.motion_course import Course, forces_of_steps, motors_of_steps
+from softrobots.compiled.run.motion_course import Blows, Course, forces_of_steps, motors_of_steps
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.midpoint import MidpointRule, State, Step
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.recorder import Recorder
-from softrobots.model.soft_model import SoftModel
 
 _FIRST_STEPS = 400  # of the first of the runs that are compared
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
@@ -30,11 +30,6 @@ MOST_STEPS = 1_000_000
 
 Given = Sequence[tuple[int, FloatArray]]
 """Places in the workspace, and what stands there."""
-
-
-def time_grid(end: float, step: float) -> FloatArray:
-    """Return times from zero to the end, `step` apart, the last one nearer if need be, shape (n,) [s]."""
-    return np.append(step * np.arange(math.ceil(end / step - 1e-9)), end)
 
 
 @dataclass(frozen=True)
@@ -60,21 +55,23 @@ def finer_and_finer(
 ) -> Taken:
     """Halve all steps until the tips of the valid cases are known to a tolerance; return the last run.
 
-    As the scheme is of second order, the finer of two runs has a third of the difference of their tips as its error. `bad`
-    marks cases that do not count.
+    As the scheme is of second order, the finer of two runs has a third of the difference of their tips as its error, or more
+    where the differences shrink more slowly; see `softrobots.dynamics.step_control`. `bad` marks cases that do not count.
     """
     stops = np.unique([0.0, *(time for time in breaks.tolist() if 1e-9 * end < time < end * (1.0 - 1e-9)), end])
     counts = np.ceil(np.diff(stops) / end * _FIRST_STEPS)
     ends = zip(stops[:-1], stops[1:], counts.astype(int) + 1, strict=True)
     grid = np.append(np.concatenate([np.linspace(one, other, count)[:-1] for one, other, count in ends]), end)
-    before, history = take(grid), [math.inf]
+    before, history, last = take(grid), [math.inf], math.inf
     while not before.interrupted:
         finer = np.zeros(2 * len(grid) - 1)
         finer[::2], finer[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
         now, grid = take(finer), finer
-        errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1) / 3.0
+        errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1)
         sure = (now.status == Status.CERTIFIED) & (before.status == Status.CERTIFIED) & ~np.asarray(bad)
-        now = replace(now, errors=np.where(sure, errors, np.inf))
+        furthest = max(float(errors[sure].max(initial=0.0)), 1e-300)
+        errors /= min(max(last / furthest, 2.0), 4.0) - 1.0 if math.isfinite(last) else 1.0
+        now, last = replace(now, errors=np.where(sure, errors, np.inf)), furthest
         history.append(float(errors[sure].max(initial=0.0)))
         stalled = len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]
         if history[-1] <= tolerance or stalled or 2 * len(grid) > MOST_STEPS or now.interrupted:
@@ -83,80 +80,109 @@ def finer_and_finer(
     return before
 
 
-def take_one(run: Any, given: Given, course: Course, grid: FloatArray, times: FloatArray) -> Taken:
-    """Take the steps of a grid; `times` are looked at."""
-    w, width = run.workspace(), 2 * run.layout.unknowns + 3
-    for place, values in given:
+def take_one(
+    run: Any, state: tuple[FloatArray, FloatArray], given: Given, course: Course, grid: FloatArray, times: FloatArray
+) -> Taken:
+    """Take the steps of a grid from a state, unknowns and rates; `times` are looked at."""
+    w, layout = run.workspace(), run.layout
+    n, last = layout.unknowns, len(grid) - 1
+    for place, values in [(layout.position, state[0]), (layout.velocity, state[1]), *given]:
         run.put(w, place, values)
-    rows, status, interrupted = np.full((1, len(times), width), np.nan), Status.CERTIFIED, False
+    rows, status, interrupted = np.full((1, len(times), 2 * n + 3), np.nan), Status.CERTIFIED, False
+    stops = np.union1d(_stops(grid, np.array(list(course.path.kicks))), np.arange(0, last, _CHUNK))
     try:
-        for first in range(0, len(grid) - 1, _CHUNK):
-            part = grid[first : first + _CHUNK + 1]
-            begin = 0 if first == 0 else int(np.searchsorted(times, part[0], "right"))
-            end = len(times) if first + _CHUNK + 1 >= len(grid) else int(np.searchsorted(times, part[-1], "right"))
+        for first, end in itertools.pairwise(stops.tolist()):
+            part, looked = grid[first : end + 1], _looked(times, grid, first, end)
             motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, course.tip, part)
-            out = run.flat(rows[0, begin:end])
+            out = run.flat(rows[0, looked])
             paths = run.flat(motors), len(motors), run.flat(forces), len(forces)
-            looked = run.flat(times[begin:end]), end - begin, out
-            status = Status(run.motion_run(w, *paths, run.flat(part), len(part) - 1, *looked))
-            rows[0, begin:end] = np.reshape(out, (end - begin, width))
+            seen = run.flat(times[looked]), looked.stop - looked.start, out
+            status = Status(run.motion_run(w, *paths, run.flat(part), len(part) - 1, *seen))
+            rows[0, looked] = np.reshape(out, (-1, 2 * n + 3))
             if status != Status.CERTIFIED:
                 break
+            if end < last and grid[end] in course.path.kicks:
+                y, v = (np.array(w[place : place + n]) for place in (layout.position, layout.velocity))
+                time = float(grid[end])
+                run.put(w, layout.velocity, v + course.blows.at(course.path(time), y, course.path.kicks[time]))
     except KeyboardInterrupt:
         interrupted = True
     return Taken(grid, rows, np.array([status]), interrupted)
 
 
-def take_batch(run: Any, given: Given, cases: MotionCases, grid: FloatArray, times: FloatArray, threads: int) -> Taken:
-    """Take the steps of a grid with many cases; a value in `given` has one row a case, or one for all."""
-    out = np.full((cases.count, len(times), 2 * run.layout.unknowns + 3), np.nan)
+def take_batch(
+    run: Any, given: Given, cases: MotionCases, blows: Blows, grid: FloatArray, times: FloatArray, threads: int
+) -> Taken:
+    """Take the steps of a grid with many cases; `given` has positions, velocities and what is the same for all cases."""
+    n = run.layout.unknowns
+    out = np.full((cases.count, len(times), 2 * n + 3), np.nan)
     statuses = np.zeros(cases.count, dtype=np.uint8)
-    inputs, places = [np.ascontiguousarray(values) for _, values in given], tuple(place for place, _ in given)
+    places = tuple(place for place, _ in given)
     most = 4096 if cases.stand_still else max(_SAMPLES // (2 * len(grid)), 1)
     size = 16 * math.ceil(min(most, cases.count / threads) / 16)
+    stops = _stops(grid, cases.kicks).tolist()
 
-    def solve(first: int) -> None:
-        rows = slice(first, min(first + size, cases.count))
-        own = tuple(np.array(values[rows] if len(values) > 1 else values) for values in inputs)  # all of one type for numba
-        found = out[rows]
-        run.motion_batch(
-            own, places, cases.motors(grid, rows), cases.forces(grid, rows), grid, times, found, statuses[rows], 0, len(found)
-        )
+    def solve(case: int) -> None:
+        rows = slice(case, min(case + size, cases.count))
+        own = [
+            np.array(values[rows] if len(values) > 1 else values, order="C") for _, values in given
+        ]  # all of one type for numba
+        count = rows.stop - case
+        for first, end in itertools.pairwise(stops):
+            part, looked = grid[first : end + 1], _looked(times, grid, first, end)
+            seen = np.append(times[looked], grid[end])
+            found, status = np.full((count, len(seen), 2 * n + 3), np.nan), np.zeros(count, dtype=np.uint8)
+            driven = cases.motors(part, rows), cases.forces(part, rows), part, seen
+            run.motion_batch(tuple(own), places, *driven, found, status, 0, count)
+            out[rows, looked] = found[:, :-1]
+            statuses[rows] = np.maximum(statuses[rows], status)
+            own[:2] = [found[:, -1, :n].copy(), found[:, -1, n : 2 * n].copy()]
+            cases.strike(blows, float(grid[end]), rows, own[0], own[1])
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(solve, range(0, cases.count, size)))
     return Taken(grid, out, statuses)
 
 
-def replay(
-    model: SoftModel, course: Course, damping: FloatArray, taken: Taken, rows: FloatArray, facts: dict[str, Any]
-) -> Motion:
+def _stops(grid: FloatArray, kicks: FloatArray) -> Any:
+    """Places of the grid between which no velocity of a motor jumps."""
+    inside = kicks[(kicks > 0.0) & (kicks < grid[-1])]
+    return np.unique([0, *np.searchsorted(grid, inside).tolist(), len(grid) - 1])
+
+
+def _looked(times: FloatArray, grid: FloatArray, first: int, end: int) -> slice:
+    """Which of the times are within steps `first` to `end`, without the beginning but of the first."""
+    begin = 0 if first == 0 else int(np.searchsorted(times, grid[first], "right"))
+    return slice(begin, len(times) if end == len(grid) - 1 else int(np.searchsorted(times, grid[end], "right")))
+
+
+def replay(equations: EquationsOfMotion, course: Course, taken: Taken, rows: FloatArray, facts: dict[str, Any]) -> Motion:
     """Return the motion with torques and energies, by Pinocchio, from the states at the ends of all steps.
 
     Args:
-        model: The robot.
+        equations: Equations of motion.
         course: What drove it.
-        damping: Damping of the elastic coordinates, shape (n_springs, n_springs).
         taken: The steps, looked at at their ends; elastic coordinates and rates instead of unknowns and theirs.
         rows: Times of the rows, shape (n,) [s].
-        facts: Other fields of the motion, gravity among them.
+        facts: Other fields of the motion.
     """
-    equations = EquationsOfMotion(model, facts["gravity"], damping)
-    m, k = model.n_motors, model.n_springs
-    motors, states = motors_of_steps(course.path, taken.grid), taken.rows[0, :, : 2 * k]
-    motors = np.broadcast_to(motors, (2 * len(taken.grid) - 1, m))
-    begin = State(0.0, np.concatenate([motors[0], states[0, :k]]), np.concatenate([np.zeros(m), states[0, k:]]))
+    m, k, count = equations.n_motors, equations.n - equations.n_motors, 2 * len(taken.grid) - 1
+    motors, states = np.broadcast_to(motors_of_steps(course.path, taken.grid), (count, m)), taken.rows[0]
+    begin = State(0.0, np.concatenate([motors[0], states[0, :k]]), np.concatenate([np.zeros(m), states[0, k : 2 * k]]))
     recorder = Recorder(MidpointRule(equations, course.path, course.load), begin, rows)
-    for step, (time, end) in enumerate(zip(taken.grid[:-1].tolist(), taken.grid[1:].tolist(), strict=True)):
-        h, middle_time = end - time, 0.5 * (time + end)
+    for step, end in enumerate(taken.grid[1:].tolist()):
+        before = recorder.state
+        h, middle_time = end - before.time, 0.5 * (before.time + end)
         u0, middle, u1 = motors[2 * step : 2 * step + 3]
-        y0, v0, y1, v1 = states[step, :k], states[step, k:], states[step + 1, :k], states[step + 1, k:]
+        y1, v1, v0 = states[step + 1, :k], states[step + 1, k : 2 * k], before.rates[m:]
         accelerations = np.concatenate([4.0 * (u1 - 2.0 * middle + u0) / h**2, (v1 - v0) / h])
         rates = np.concatenate([(u1 - u0) / h, 0.5 * (v0 + v1)])
-        x, wrenches = np.concatenate([middle, y0 + 0.5 * h * rates[m:]]), course.load(middle_time)
-        half = 0.5 * h * accelerations[:m]
-        begin = State(time, np.concatenate([u0, y0]), np.concatenate([rates[:m] - half, v0]))
+        x, half = np.concatenate([middle, before.x[m:] + 0.5 * h * rates[m:]]), 0.5 * h * accelerations[:m]
+        begin = State(before.time, before.x, np.concatenate([rates[:m] - half, v0]))
         last = State(end, np.concatenate([u1, y1]), np.concatenate([rates[:m] + half, v1]))
+        wrenches = course.load(middle_time)
         forces = equations.balance(x, rates, accelerations, wrenches)[:m]
         recorder.add(Step(begin, last, State(middle_time, x, rates), accelerations, forces, wrenches, 1))
-    return recorder.motion(**{name: value for name, value in facts.items() if name != "gravity"})
+        if end in course.path.kicks and end < recorder.duration:
+            recorder.kick(course.path.kicks[end])
+    return recorder.motion(**facts)
