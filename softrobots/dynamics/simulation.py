@@ -18,12 +18,8 @@ from softrobots.dynamics.midpoint import MidpointRule
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MotorTorque
 from softrobots.dynamics.recorder import Recorder
-<<<<<<< HEAD
-from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_distances
-=======
 from softrobots.dynamics.starting import first_kick, first_state, grid_with_kicks, steps_and_rows
-from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_errors
->>>>>>> 921015f (Compiled motion begins and ends as simulate does: blows of motors that start or stop at once; both engines share starts, grids and rows)
+from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_distances
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
@@ -31,13 +27,7 @@ from softrobots.statics.equilibrium import Equilibrium
 MOTORS = ("prescribed", "torque")
 """How motors move."""
 
-<<<<<<< HEAD
-_ROWS = 200  # of a motion, if no output step is given
-_MOST_ROWS = 10_000_000  # steps or rows of a motion, for which memory suffices
-_APART = 1e-6  # largest distance of motors from where the start has them [rad or m]
 _LEAST = 1e-300  # distance that two runs have at least [m]
-=======
->>>>>>> 921015f (Compiled motion begins and ends as simulate does: blows of motors that start or stop at once; both engines share starts, grids and rows)
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
 
 MOST_STEPS = 400_000
