@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +13,7 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
-from softrobots.compiled.run.motion_course import Blows, Course, forces_at, motors_at
+from softrobots.compiled.run.motion_course import Blows, Course
 from softrobots.compiled.run.motion_results import CompiledMotion, MotionBatch, StepEnd
 from softrobots.compiled.run.motion_runs import Taken, finer_and_finer, replay, take_batch, take_one
 from softrobots.compiled.statuses import Status
@@ -101,12 +100,15 @@ class CompiledDynamics(CompiledStatics):
         at_rows = replace(taken, rows=taken.rows[:, np.searchsorted(looked, rows)])
         down = None if gravity is None else tuple(gravity_vector(gravity).tolist())
 
-        def again(steps: FloatArray, rows: FloatArray) -> Motion:
+        def again(steps: FloatArray, times: FloatArray) -> Motion:
             ends = take_one(run, state, given, course, steps, steps)
             ends = replace(ends, rows=np.concatenate(self._elastic_state(ends.rows[..., :-3]), axis=-1))
-            return replay(EquationsOfMotion(self._model, down, damping), course, ends, rows, facts)
+            return replay(EquationsOfMotion(self._model, down, damping), course, ends, times, facts)
 
-        motion = self._motion(course, at_rows, rows, again, facts | {"gravity": down})
+        found = at_rows.rows[0][np.isfinite(at_rows.rows[0, :, -1])]
+        springs, rates = self._elastic_state(found[:, :-3])
+        known = course.inputs_at(rows[: len(found)], taken.grid) | facts | {"gravity": down, "interrupted": taken.interrupted}
+        motion = CompiledMotion(again, model=self._model, q_springs=springs, velocities=rates, **known)
         if taken.interrupted or (taken.status[0] == Status.CERTIFIED and taken.is_within):
             return motion
         why = "steps fail, however short" if taken.is_within else "a shorter duration or more damping may help, or a time_step"
@@ -280,25 +282,3 @@ class CompiledDynamics(CompiledStatics):
         n = state.shape[-1] // 2
         elastic = self._actuation.elastic
         return elastic(state[..., :n].copy()), elastic(state[..., n:].copy()) - elastic(np.zeros(n))
-
-    def _motion(
-        self, course: Course, taken: Taken, rows: FloatArray, again: Callable[..., Motion], facts: dict[str, Any]
-    ) -> CompiledMotion:
-        """Return the motion of the rows that were reached."""
-        found = taken.rows[0]
-        found = found[np.isfinite(found[:, -1])]
-        time = read_only(rows[: len(found)])
-        steps = read_only(taken.grid[taken.grid <= time[-1]])
-        motors, motor_velocities = motors_at(course.path, time, taken.grid)
-        springs, rates = self._elastic_state(found[:, :-3])
-        fields = {
-            "time": time,
-            "q_motors": motors,
-            "motor_velocities": motor_velocities,
-            "q_springs": springs,
-            "velocities": rates,
-            "forces": forces_at(course.load, course.tip, time.tolist()),
-            "steps": steps,
-        }
-        known = {name: read_only(value) for name, value in fields.items()} | facts
-        return CompiledMotion(lambda: again(steps, time), model=self._model, **known, interrupted=taken.interrupted)

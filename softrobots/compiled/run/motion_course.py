@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -97,3 +98,9 @@ class Course:
     def breaks(self) -> FloatArray:
         """Times at which motors or force have a jump or a kink, shape (n,) [s]."""
         return np.concatenate([self.path.breaks, self.load.breaks])
+
+    def inputs_at(self, time: FloatArray, grid: FloatArray) -> dict[str, Any]:
+        """Return the fields of a `Motion` with rows at given times, shape (n,) [s], that the steps of a grid do not compute."""
+        motors, rates = motors_at(self.path, time, grid)
+        forces, steps = forces_at(self.load, self.tip, time.tolist()), grid[grid <= time[-1]]
+        return {"time": time, "q_motors": motors, "motor_velocities": rates, "forces": forces, "steps": steps}

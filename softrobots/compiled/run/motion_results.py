@@ -7,22 +7,27 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, read_only
 from softrobots.dynamics.motion import Motion, MotionEnergy
 
 
 class CompiledMotion(Motion):
     """A `Motion` whose torques and energies are computed when they are asked for, from all steps of the same motion again."""
 
-    def __init__(self, replay: Callable[[], Motion], **known: Any) -> None:
-        """Take the other fields of a `Motion`, and a function that returns it with all of them."""
-        vars(self).update(known, _replay=replay)
+    def __init__(self, replay: Callable[[FloatArray, FloatArray], Motion], **known: Any) -> None:
+        """Take the other fields of a `Motion`, and a function of its steps and rows that returns it with all of them."""
+        vars(self).update(
+            {name: read_only(value) if isinstance(value, np.ndarray) else value for name, value in known.items()},
+            _replay=replay,
+        )
 
     @cached_property
     def _whole(self) -> Motion:
-        replay: Callable[[], Motion] = vars(self)["_replay"]
-        return replay()
+        replay: Callable[[FloatArray, FloatArray], Motion] = vars(self)["_replay"]
+        return replay(self.steps, self.time)
 
     @cached_property
     def motor_torques(self) -> FloatArray:
