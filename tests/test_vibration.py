@@ -140,6 +140,33 @@ def test_effective_masses_sum_to_the_mass_that_shakes() -> None:
     assert 0.0 < shares[1] < 0.3 * shares[0] < 0.05
 
 
+def test_a_body_on_a_hinge_has_its_inertia_about_it() -> None:
+    """Turning base about the hinge: all of it, by Steiner; shaken across its lever: `(m d)^2 / I`."""
+    inertia = '<inertia ixx="0.3" iyy="0.2" izz="0.4" ixy="0" ixz="0" iyz="0"/>'
+    text = (
+        f'<robot name="pendulum"><link name="l0"/><link name="body"><inertial><origin xyz="0.5 0 0"/><mass value="2"/>{inertia}'
+        '</inertial></link><joint name="turn" type="revolute"><parent link="l0"/><child link="body"/><axis xyz="0 1 0"/>'
+        '<limit lower="-3" upper="3" effort="1" velocity="1"/><dynamics damping="0.6" friction="0"/></joint></robot>'
+    )
+    robot = sr.load_model(text, springs={"turn": 7.0}, tip="body")
+    modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, ()), mass_damping=0.25)
+    about = 0.2 + 2.0 * 0.5**2
+    assert modes.effective_masses[0] == pytest.approx([0, 0, 1.0 / about, 0, about, 0], abs=1e-14)
+    omega = np.sqrt(7.0 / about)
+    assert modes.frequencies[0] == pytest.approx(omega / (2.0 * np.pi), rel=1e-14)
+    assert modes.damping_ratios[0] == pytest.approx((0.6 / about + 0.25) / (2.0 * omega), rel=1e-14)
+    assert modes.eigenvalues.sum() == pytest.approx(-(0.6 / about + 0.25), rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["pcc", "pulled", "pcc_lumped", "helix", "helix_lumped"])
+def test_the_file_of_a_robot_says_its_damping_time(kind: str) -> None:
+    """0.05 s by default, in sections of constant strain, in hinges, and under muscles of given length."""
+    robot = model(kind)
+    assert np.allclose(damping_matrix(robot), 0.05 * np.diag(robot.stiffness), rtol=1e-12, atol=1e-12 * robot.stiffness.max())
+    assert np.array_equal(damping_matrix(robot, 0.02), np.diag(0.02 * robot.stiffness))
+    assert np.array_equal(damping_matrix(model("arm")), np.eye(4))
+
+
 def test_stiff_servos_hold_and_soft_ones_do_not() -> None:
     """One motor, one spring, in closed form: two inertias on two springs, `det(K - w^2 M) = 0`."""
     arm = model("arm")
