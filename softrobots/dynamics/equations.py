@@ -4,7 +4,7 @@ With joint positions `q(x)` and :math:`Q = \partial q / \partial x` the joints m
 
 .. math:: \dot q = Q \dot x, \qquad \ddot q = Q \ddot x + \dot Q \dot x
 
-and the power of any motion gives (theory 5; Featherstone, Rigid Body Dynamics Algorithms, 2008, section 3.2)
+and the power of any motion gives (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 3.2)
 
 .. math:: r(x, \dot x, \ddot x) = Q^T \bigl(\mathrm{ID}(q, \dot q, \ddot q) - J^T w\bigr) + \partial V / \partial x
           + D \dot x + A \ddot x
