@@ -168,6 +168,19 @@ def test_arrows_of_a_motion_are_as_long_as_the_force(released: sr.Motion) -> Non
     assert np.allclose(np.array(scales.values)[:, 0], np.maximum(forces / forces.max(), 1e-6), rtol=1e-9)
 
 
+def test_links_are_limited_in_motion_as_at_rest(arm: sr.SoftModel, bending: sr.Motion) -> None:
+    """A robot that stays in its equilibrium has the limits of that; what wrinkles at rest is said to wrinkle in motion."""
+    motors = (0.3, 0.6, -0.8)
+    for force in ((0.0, 3.0, -5.0), (0.0, 10.0, -18.0)):
+        held = sr.solve_equilibrium(arm, motors, force, gravity=sr.EARTH_GRAVITY)
+        still = sr.simulate(arm, 0.02, motors, start=held, force=force, gravity=sr.EARTH_GRAVITY, time_step=0.01)
+        for mine, theirs in zip(still.link_limits(-1), held.link_limits, strict=True):
+            assert np.allclose(mine, theirs, rtol=1e-9)  # the equilibrium itself is in balance to 1e-10
+        assert still.wrinkled.tolist() == [held.wrinkled] * 3
+    assert held.wrinkled
+    assert not bending.wrinkled.any()  # no inflated links
+
+
 def test_what_cannot_be_played_is_refused(released: sr.Motion, odd_arm: sr.SoftModel) -> None:
     other = dataclasses.replace(released, model=odd_arm)
     with sr.Viewer(released.model) as viewer:

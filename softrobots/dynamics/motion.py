@@ -7,8 +7,10 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.model.link_limits import LinkLimits, link_limits
 from softrobots.model.soft_model import SoftModel
 
 
@@ -113,6 +115,32 @@ class Motion:
     def tip_position(self) -> FloatArray:
         """Position of the tip in the world, shape (n, 3) [m]."""
         return read_only(np.ascontiguousarray(self.transforms()[:, :3, 3]))
+
+    def link_limits(self, row: int) -> LinkLimits:
+        """What inflated links carry in a row, and the limits of their walls, as `Equilibrium.link_limits`.
+
+        Moments are those of the springs. Axial forces are those of the weight and of the force on the tip; those of accelerated
+        masses, and of wrenches at other frames, are left out.
+        """
+        parts = {"q": self.configuration(row), "torques": self.model.springs.at(self.q_springs[row])[1]}
+        tensions = self.motor_torques[row, self.model.n_motors - len(self.model.muscles) :]
+        load = {self.model.tip: np.append(self.forces[row], np.zeros(3))}
+        return link_limits(self.model, load, self.gravity, **parts, tensions=tensions)
+
+    @cached_property
+    def wrinkled(self) -> NDArray[np.bool_]:
+        """Whether a link carries its wrinkling moment (3) of [Troise 2021] or more, or is on its plateau, shape (n,).
+
+        Linear springs are no longer valid there.
+        """
+        wrinkled = np.zeros(len(self.time), dtype=bool)
+        groups = self.model.spring_groups
+        for row in range(len(self.time) if groups else 0):
+            beyond = self.model.springs.saturated(self.q_springs[row])
+            flat = any(not beyond.isdisjoint(group.springs) for group in groups)
+            wrinkled[row] = flat or bool(np.any(self.link_limits(row).wrinkling_margins <= 0.0))
+        wrinkled.setflags(write=False)
+        return wrinkled
 
     @property
     def end(self) -> MotionState:

@@ -23,7 +23,7 @@ def motion_answer(motion: Motion, load: Load) -> dict[str, Any]:
         Fact("q_springs", motion.q_springs, joined_units(springs)),
         Fact("velocities", motion.velocities, joined_units([f"{unit}/s" for unit in springs])),
         Fact("energy", {**energies, "balance": motion.energy.balance}, "J"),
-        *attributes(motion, steps="s", tip_error="m", tolerance="m", damping_time="s", interrupted=""),
+        *attributes(motion, steps="s", tip_error="m", tolerance="m", damping_time="s", wrinkled="", interrupted=""),
     ]
     return model_answer(motion.model, load, facts)
 
@@ -45,6 +45,7 @@ def motion_lines(motion: Motion, load: Load) -> list[str]:
         ("steps", steps),
         ("tip error", _error(motion)),
         ("damping", damping),
+        *([("wrinkled", _wrinkled(motion))] if model.spring_groups else []),
         ("kinetic energy", f"at most {energy.kinetic.max():.4g} J"),
         ("dissipated", f"{energy.dissipated[-1]:.4g} J"),
         ("work", f"of loads {energy.load_work[-1]:.4g} J, of motors {energy.motor_work[-1]:.4g} J"),
@@ -52,6 +53,13 @@ def motion_lines(motion: Motion, load: Load) -> list[str]:
     ]
     tables = [line for part in parts if part for line in (*part, "")]
     return [*head_lines(model, load), "", *tables, *aligned(rows)]
+
+
+def _wrinkled(motion: Motion) -> str:
+    if not motion.wrinkled.any():
+        return "no"
+    share, first = motion.wrinkled.mean(), motion.time[np.argmax(motion.wrinkled)]
+    return f"YES: {100.0 * share:.0f} % of the time, first at {first:.3g} s; linear springs no longer hold"
 
 
 def _error(motion: Motion) -> str:
