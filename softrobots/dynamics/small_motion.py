@@ -20,10 +20,10 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray, non_negative_array
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.damping import damping_matrix
+from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import frame_jacobian
-from softrobots.statics.loads import AppliedLoad
 
 
 class SmallMotion(NamedTuple):
@@ -61,29 +61,30 @@ def small_motion(
         ParameterError: If a number is negative or not finite, or a shape differs.
         DescriptionError: If the robot has more joints than Pinocchio supports.
     """
-    n_tensions = len(model.muscles) if model.muscle_input == "forces" else 0
-    placed = model.n_motors - n_tensions
-    kept = np.r_[:placed, model.n_motors : model.n_motors + model.n_springs]
+    m, n_tensions = model.n_motors, len(model.muscles) if model.muscle_input == "forces" else 0
+    placed = m - n_tensions
     drives = model.actuators.drives
-    given = drives.rotor_inertia[:placed] if rotor_inertia is None else rotor_inertia
-    rotors = one_each("rotor_inertia", given, placed, "kg m^2 or kg")
-    q, point = equilibrium.q, model.coordinates.at(equilibrium.q_motors, equilibrium.q_springs)
+    if rotor_inertia is not None:
+        given = one_each("rotor_inertia", rotor_inertia, placed, "kg m^2 or kg")
+        drives = drives._replace(rotor_inertia=np.pad(given, (0, n_tensions)))
+    load, x = equilibrium.load, np.concatenate([equilibrium.q_motors, equilibrium.q_springs])
+    equations = EquationsOfMotion(model, load.gravity, drives=drives)
+    point, whole, stiffness = equations.point(x), equations.mass_matrix(x), equations.stiffness(x, load.wrenches)
+    damping = equations.damping
+    damping[m:, m:] = damping_matrix(model, damping_time, mass_damping, whole[m:, m:])
+    kept = np.r_[:placed, m : len(x)]
 
     def columns(by_joint: FloatArray) -> FloatArray:
-        return np.asarray(np.concatenate(point.columns(np.ascontiguousarray(by_joint)), axis=1)[:, kept])
+        return np.asarray(np.concatenate(point.columns(by_joint), axis=1)[:, kept])
 
-    mass = columns(columns(model.data.mass_matrix(q)).T)
-    mass = 0.5 * (mass + mass.T)
-    mass[:placed, :placed] += np.diag(rotors)
-    by_motors, by_elastic = point.motor_derivatives(AppliedLoad(model, equilibrium.load).at(q))
-    rows = np.hstack([by_motors[:placed, :placed], by_elastic[:placed]])
-    stiffness = np.vstack([-rows, np.hstack([-equilibrium.coupling[:, :placed], equilibrium.tangent_stiffness])])
-    damping = np.zeros_like(mass)
-    damping[:placed, :placed] = np.diag(drives.damping[:placed])
-    damping[placed:, placed:] = damping_matrix(model, damping_time, mass_damping, mass[placed:, placed:])
-    by_tension = np.concatenate([np.zeros((placed, n_tensions)), equilibrium.coupling[:, placed:]])
     return SmallMotion(
-        placed, mass, damping, stiffness, by_tension, columns(frame_jacobian(model, q, model.tip)), columns(_momentum(model, q))
+        n_placed=placed,
+        mass=0.5 * (whole + whole.T)[np.ix_(kept, kept)],
+        damping=damping[np.ix_(kept, kept)],
+        stiffness=stiffness[np.ix_(kept, kept)],
+        by_tension=-stiffness[kept, placed:m],
+        tip=columns(frame_jacobian(model, equilibrium.q, model.tip)),
+        momentum=columns(_momentum(model, equilibrium.q)),
     )
 
 
