@@ -68,9 +68,11 @@ def time_grid(end: float, step: float) -> FloatArray:
 
 def grid_with_kicks(end: float, step: float, kicks: FloatArray) -> FloatArray:
     """Return such times with those at which velocities of motors jump among them, shape (n,) [s]."""
-    inside = kicks[(kicks > 0.0) & (kicks < end)]
-    regular = [time for time in time_grid(end, step).tolist() if np.abs(inside - time).min(initial=step) > 1e-6 * step]
-    return np.unique(np.concatenate([regular, inside]))
+    grid, inside = time_grid(end, step), kicks[(kicks > 0.0) & (kicks < end)]
+    if len(inside):
+        replaced = np.abs(grid[:, None] - inside).min(axis=1) <= 1e-6 * step
+        grid = np.unique(np.concatenate([grid[~replaced], inside]))
+    return grid
 
 
 def steps_and_rows(

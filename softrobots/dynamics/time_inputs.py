@@ -35,6 +35,7 @@ class MotorPath:
         """Jump of the velocities of the actuators, shape (n_motors,), by time; at zero the velocities themselves."""
         self.constant = False
         """Whether nothing moves."""
+        self._is_curve = isinstance(q_motors, Trajectory)
         if isinstance(q_motors, Trajectory):
             if q_motors.model != model:
                 raise ParameterError("q_motors", q_motors.model, f"a Trajectory of the model given, {model!r}")
@@ -52,6 +53,12 @@ class MotorPath:
     def __call__(self, time: float) -> FloatArray:
         """Return the positions, shape (n_motors,) [rad, m or N]."""
         return self._signal(time)
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return the positions at many times, shape (n,) [s], as shape (n, n_motors)."""
+        if self._is_curve:
+            return self._signal(times)
+        return np.array([self._signal(time) for time in times.tolist()]).reshape(len(times), -1)
 
     def _find_kicks(self, model: SoftModel, duration: float) -> None:
         """Find the jumps of tensions and of velocities; positions have none."""

@@ -24,7 +24,7 @@ def motors_of_steps(path: MotorPath, grid: FloatArray) -> FloatArray:
     """
     times = np.zeros(2 * len(grid) - 1)
     times[::2], times[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
-    found = path(0.0)[None] if path.constant else np.array([path(time) for time in times.tolist()])
+    found = path(0.0)[None] if path.constant else path.at(times)
     if found.size and np.abs(found).max() > LARGEST_POSITION:
         requirement = f"within +-{LARGEST_POSITION:g} rad or m at motor joints, for compiled solvers"
         raise ParameterError("q_motors", float(np.abs(found).max()), requirement)
@@ -51,10 +51,10 @@ def motors_at(path: MotorPath, times: FloatArray, grid: FloatArray) -> tuple[Flo
         return motors, np.zeros_like(motors)
     step = np.maximum(np.searchsorted(grid, times) - 1, 0)
     ends = np.array([grid[step], 0.5 * (grid[step] + grid[step + 1]), grid[step + 1]])
-    u0, middle, u1 = (np.array([path(time) for time in row]) for row in ends.tolist())
+    u0, middle, u1 = (path.at(row) for row in ends)
     h, since = (ends[2] - ends[0])[:, None], (times - ends[1])[:, None]
     rates = (u1 - u0) / h + since * (u1 - 2.0 * middle + u0) * 4.0 / h**2
-    return np.array([path(time) for time in times.tolist()]), rates
+    return path.at(times), rates
 
 
 class Blows:
