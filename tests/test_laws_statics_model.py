@@ -236,6 +236,7 @@ def test_every_kind_of_result_comes_back_from_its_file_to_the_last_digit(kind: s
         sr.Trajectory: sr.follow_trajectory(robot, tips, force, gravity=down, q_motors0=motors),
         sr.Workspace: sr.sample_workspace(robot, 3, force=force, gravity=down, seed=seed),
         sr.ImposedDisplacement: sr.solve_imposed_displacement(robot, motors, 1e-3, direction=(1, 2, 3), gravity=down),
+        sr.Motion: sr.simulate(robot, 2e-3, motors, start=made, gravity=down, time_step=1e-3),
     }
     try:
         results[sr.LoadEstimate] = sr.estimate_load(robot, motors, made.motor_torques, gravity=down, torque_std=0.1)
@@ -244,10 +245,11 @@ def test_every_kind_of_result_comes_back_from_its_file_to_the_last_digit(kind: s
     with TemporaryDirectory() as folder:
         for expected, result in results.items():
             assert isinstance(result, expected)
-            again = sr.load_result(sr.save_result(result, Path(folder) / expected.__name__))
-            assert isinstance(again, expected)
-            differing = [path for (path, one), (_, other) in zip(parts(result), parts(again), strict=True) if one != other]
-            assert differing == [], expected
+            for suffix in ("npz", "json"):
+                again = sr.load_result(sr.save_result(result, Path(folder) / f"{expected.__name__}.{suffix}"))
+                assert isinstance(again, expected)
+                differing = [path for (path, one), (_, other) in zip(parts(result), parts(again), strict=True) if one != other]
+                assert differing == [], expected
 
 
 # --- Pages

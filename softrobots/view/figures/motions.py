@@ -91,7 +91,8 @@ def energies(motion: Motion) -> Any:
     lower.grid(alpha=0.3)
     for axes in (upper, lower):
         axes.margins(x=0.0)
-    figure.legend(fontsize=10, loc="outside lower center", ncols=3)
+    if upper.lines:
+        figure.legend(fontsize=10, loc="outside lower center", ncols=3)
     return figure
 
 
