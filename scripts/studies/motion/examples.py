@@ -50,7 +50,7 @@ def turns(duration: float = 2.0) -> dict[str, sr.Motion]:
     paths = {
         "as told": bare,
         "shaped, ZV": sr.shape_input(path, modes),
-        "shaped, ZVD": sr.shape_input(path, modes, shaper="zvd"),
+        "shaped, EI": sr.shape_input(path, modes, shaper="ei"),
     }
     options: dict[str, Any] = {"start": first, "gravity": sr.EARTH_GRAVITY, "damping_time": LIGHT_DAMPING}
     return {name: sr.simulate(arm, duration, one, progress=f"turn {name}", **options) for name, one in paths.items()}
