@@ -101,7 +101,9 @@ class ArticulatedGroup:
     motions: Any
     """Angular and linear velocity at its end per coordinate, shape (6, k)."""
     shift: Vector
-    """From its base to its end [m]."""
+    """From its first joint to its end [m]."""
+    reach: Vector
+    """From there to the next group [m]."""
 
 
 @dataclass
@@ -129,23 +131,23 @@ class Pull:
 
 
 def articulate(
-    inertia: Any, pull: Pull, joints: list[JointLine], base: Vector, slopes: Any, own: list[Scalar], quarter: Scalar
+    inertia: Any, pull: Pull, joints: list[JointLine], reach: Vector, slopes: Any, own: list[Scalar], quarter: Scalar
 ) -> tuple[ArticulatedGroup, Any, Pull]:
     """Eliminate the coordinates of a group of joints.
 
     Args:
-        inertia: Inertia of all beyond its end, about its end, shape (6, 6).
-        pull: Forces on all beyond its end, from its end.
+        inertia: Inertia of all beyond, about the origin of the next group, shape (6, 6).
+        pull: Forces on all beyond, from there.
         joints: The joints, base to tip.
-        base: From the end of the group before to the origin of the first joint [m].
+        reach: From the end of the last joint to there [m].
         slopes: Derivatives of the joint positions by the coordinates, shape (n, k).
         own: `h/2 D + h^2/4 K` of each coordinate (k).
         quarter: `h^2/4` [s^2].
 
     Returns:
-        The factors, and inertia and forces from the end of the group before.
+        The factors, and inertia and forces from the origin of the group.
     """
-    shift = constants(np.zeros(3))
+    inertia, pull, shift = moved_inertia(inertia, reach), pull.moved(reach), constants(np.zeros(3))
     motions: list[Vector] = []  # angular and linear velocity of the end by each joint
     pushes: list[Vector] = []  # moment and force by its acceleration, and by the turn of all nearer to the base
     products = constants(np.zeros((len(joints), len(joints))))
@@ -165,19 +167,16 @@ def articulate(
         if joint.shift is not None:
             inertia, pull, shift = moved_inertia(inertia, joint.shift), pull.moved(joint.shift), shift + joint.shift
             pushes = [moved_wrench(push, joint.shift) for push in pushes]
-    if np.any(base != 0.0):
-        inertia, pull, shift = moved_inertia(inertia, base), pull.moved(base), shift + base
-        pushes = [moved_wrench(push, base) for push in pushes]
     if not own:
         rigid = Eliminated(constants(np.eye(0)), [], constants(np.zeros((0, 6))), [])
-        return ArticulatedGroup(rigid, constants(np.zeros((6, 0))), shift), inertia, pull
+        return ArticulatedGroup(rigid, constants(np.zeros((6, 0))), shift, reach), inertia, pull
     block = slopes.T @ (products @ slopes)
     for place, value in enumerate(own):
         block[place, place] = block[place, place] + value
     bends = -(np.stack(pushes, axis=1) @ slopes)
     none = constants(np.zeros(bends.shape))
     eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, bends, block, [], [1.0] * len(own))
-    return ArticulatedGroup(eliminated, np.stack(motions, axis=1) @ slopes, shift), -rest.matrix, pull
+    return ArticulatedGroup(eliminated, np.stack(motions, axis=1) @ slopes, shift, reach), -rest.matrix, pull
 
 
 def carried_inward(group: ArticulatedGroup, gradient: list[Scalar], beyond: Vector) -> tuple[list[Scalar], Vector]:
@@ -186,12 +185,12 @@ def carried_inward(group: ArticulatedGroup, gradient: list[Scalar], beyond: Vect
     Args:
         group: Its factors.
         gradient: The torque out of balance on each coordinate (k).
-        beyond: Sum `s` of the elimination at its end, shape (6,).
+        beyond: Sum `s` of the elimination at the next group, shape (6,).
 
     Returns:
-        The reduced right-hand side of the group, and `s` at its base.
+        The reduced right-hand side of the group, and `s` at its origin.
     """
-    factors = group.eliminated
+    factors, beyond = group.eliminated, moved_wrench(beyond, group.reach)
     values = [value + group.motions[:, place] @ beyond for place, value in enumerate(gradient)]
     reduced = factors.reduced(values)
     total = moved_wrench(beyond, group.shift)
@@ -201,10 +200,10 @@ def carried_inward(group: ArticulatedGroup, gradient: list[Scalar], beyond: Vect
 
 
 def carried_outward(group: ArticulatedGroup, reduced: list[Scalar], before: Vector) -> tuple[Vector, Vector]:
-    """Return the corrections of the coordinates of a group, and the acceleration at its end that they add up to, shape (6,)."""
+    """Return the corrections of the coordinates of a group, and the acceleration of the next that they give, shape (6,)."""
     group.eliminated.columns = [reduced]
     after = moved_acceleration(before, group.shift)
     if not reduced:
-        return vector([]), after
+        return vector([]), moved_acceleration(after, group.reach)
     steps = group.eliminated.steps(0, before)
-    return steps, after + group.motions @ steps
+    return steps, moved_acceleration(after + group.motions @ steps, group.reach)

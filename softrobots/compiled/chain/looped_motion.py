@@ -7,6 +7,7 @@ kind differ stand in a table; values for a later pass in the record of the group
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -27,11 +28,12 @@ from softrobots.compiled.chain.elements import Screw, Vector, constants, turned,
 from softrobots.compiled.chain.elimination import Eliminated
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.looped_chain import Kind, TableColumns
-from softrobots.compiled.chain.motion_groups import MovingGroup, group_signature, motion_groups
+from softrobots.compiled.chain.motion_groups import MovingGroup, group_signature, motion_groups, moving_bodies
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Expression, Scalar
+from softrobots.model.serial_chain import ChainBody
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class GroupLayout:
 
     first: int
     """First of the places."""
+    unknowns: int
+    """Number of unknown strains."""
     frame: int = field(init=False)
     """Axes, angular velocity, angular acceleration and acceleration behind the last group of the outward pass (18)."""
     origin: int = field(init=False)
@@ -56,6 +60,10 @@ class GroupLayout:
     """Angular and linear acceleration that the corrections so far add up to (6)."""
     base: int = field(init=False)
     """Frame behind the leading motors (18)."""
+    cosine: int = field(init=False)
+    """Cosine of each unknown that is an angle of a joint (n)."""
+    sine: int = field(init=False)
+    """Its sine (n)."""
     bounds: int = field(init=False)
     """First and last bound of the loops (2)."""
     end: int = field(init=False)
@@ -63,7 +71,21 @@ class GroupLayout:
 
     def __post_init__(self) -> None:
         """Compute the places."""
-        sizes = dict(frame=18, origin=3, inertia=len(UPPER), pull=12, wrench=6, sums=6, answer=6, base=18, bounds=2, end=0)
+        n = self.unknowns
+        sizes = dict(
+            frame=18,
+            origin=3,
+            inertia=len(UPPER),
+            pull=12,
+            wrench=6,
+            sums=6,
+            answer=6,
+            base=18,
+            cosine=n,
+            sine=n,
+            bounds=2,
+            end=0,
+        )
         assign_places(self, self.first, **sizes)
 
 
@@ -88,6 +110,9 @@ class _Record:
             return value
         if value.operation == "neg":
             return -self._one(block, value.arguments[0])
+        negative = -value
+        if isinstance(negative, Expression) and negative.number in self._kept:
+            return -self._kept[negative.number]
         if value.number not in self._kept:
             block.store(self.size, value, "at")
             self._kept[value.number] = block.load(self.size, "at")
@@ -98,12 +123,16 @@ class _Record:
 def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
     """Trace the code of every kind of group; `rows` of a kind are the first elements of its groups."""
     kinds: dict[Any, list[tuple[int, ...]]] = {}
+    bodies = moving_bodies(plan.unknowns)
     for group in motion_groups(plan.unknowns):
-        kinds.setdefault(tuple(group_signature(plan.unknowns, row) for row in group), []).append(group)
-    return [_trace_kind(number, groups, plan, places) for number, groups in enumerate(kinds.values())]
+        signature = tuple(group_signature(plan.unknowns, row, bodies[row]) for row in group)
+        kinds.setdefault(signature, []).append(group)
+    return [_trace_kind(number, groups, plan, places, bodies) for number, groups in enumerate(kinds.values())]
 
 
-def _trace_kind(number: int, groups: list[tuple[int, ...]], plan: MotionPlan, places: GroupLayout) -> Kind:
+def _trace_kind(
+    number: int, groups: list[tuple[int, ...]], plan: MotionPlan, places: GroupLayout, bodies: Sequence[Sequence[ChainBody]]
+) -> Kind:
     names = ("at", "row", "q")
     out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names)
     factor, back, step, place = (
@@ -116,16 +145,16 @@ def _trace_kind(number: int, groups: list[tuple[int, ...]], plan: MotionPlan, pl
         )
     )
     columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), _Record()
-    group = MovingGroup(plan, out, groups, columns)
+    group = MovingGroup(plan, out, groups, columns, bodies)
     moving = _trace_move(out, record, places, group)
     factors = _trace_factors(factor, record, plan, places, group, moving)
 
-    total, loads = vector(back.loads(places.wrench, 6)), []
+    total, loads = moved_wrench(vector(back.loads(places.wrench, 6)), moving.reach), []
     for joint, own in zip(moving.joints[::-1], moving.wrenches[::-1], strict=True):
         total = total + own
         loads.append(joint.load(total))
         total = total if joint.shift is None else moved_wrench(total, joint.shift)
-    back.store_all(places.wrench, moved_wrench(total, moving.base).tolist())
+    back.store_all(places.wrench, total.tolist())
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
     reduced, sums = carried_inward(factors, gradient, vector(back.loads(places.sums, 6)))
     back.store_all(places.sums, sums.tolist())
@@ -145,8 +174,8 @@ class _Moving(NamedTuple):
     """Its joints, base to tip; axes of their frames are not kept."""
     wrenches: list[Vector]
     """Moment and force that move the body behind each joint, shape (6,)."""
-    base: Vector
-    """From the end of the group before to its first joint [m]."""
+    reach: Vector
+    """From its end to the next group [m]."""
     slopes: Any
     """Derivatives of the joint positions by the unknowns, shape (n, k)."""
     torques: Any
@@ -155,9 +184,7 @@ class _Moving(NamedTuple):
 
 def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingGroup) -> _Moving:
     frame = load_frame(out, places.frame)
-    base = frame.axes @ group.elements[0].translation
-    frame = frame.shifted(base)
-    states, slopes = group.joints()
+    states, slopes = group.joints(out, places.cosine, places.sine)
     turns = {place: element.rotation for place, element in enumerate(group.elements)}
     joints, wrenches = [], []
     for place, (state, body) in enumerate(zip(states, group.bodies, strict=True)):
@@ -169,8 +196,9 @@ def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingG
         axes, needed = constants(np.zeros((3, 3))), body.needed_axes
         axes[:, needed] = record.keep(out, frame.axes[:, needed])
         joints.append(JointLine(record.keep(out, axis), kept_shift, axes, body, wrenches[-1][3:]))
-    store_frame(out, places.frame, frame)
-    return _Moving(joints, wrenches, *(record.keep(out, one) for one in (base, slopes, vector(group.torques))))
+    reach = frame.axes @ group.reach
+    store_frame(out, places.frame, frame.shifted(range(3), group.reach))
+    return _Moving(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques))))
 
 
 def _trace_factors(
@@ -179,19 +207,20 @@ def _trace_factors(
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
     h, pulls = factor.load(plan.layout.time_step), vector(factor.loads(places.pull, 12))
     inertia, pull = symmetric(factor.loads(places.inertia, len(UPPER))), Pull(pulls[:3], pulls[3:].reshape(3, 3))
-    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.base, moving.slopes, group.own, h * h * 0.25)
+    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, group.own, h * h * 0.25)
     factor.store_all(places.inertia, [inertia[index] for index in UPPER])
     factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated
     lower, inverses, coupling = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots, one.coupling))
     eliminated = Eliminated(lower, inverses.tolist(), coupling, [])
-    return ArticulatedGroup(eliminated, record.keep(factor, found.motions), record.keep(factor, found.shift))
+    copies = (record.keep(factor, part) for part in (found.motions, found.shift, found.reach))
+    return ArticulatedGroup(eliminated, *copies)
 
 
 def _trace_place(block: Block, places: GroupLayout, group: MovingGroup) -> None:
     axes, origin = vector(block.loads(places.frame, 9)).reshape(3, 3), vector(block.loads(places.origin, 3))
     for element in group.elements:
-        origin, axes = origin + axes @ element.translation, axes @ element.rotation
+        axes = axes @ element.rotation
         if element.kind == "section":
             screw = Screw(element.coordinates, element.length)
             origin, axes = origin + axes @ screw.position, axes @ screw.rotation
@@ -200,7 +229,7 @@ def _trace_place(block: Block, places: GroupLayout, group: MovingGroup) -> None:
         else:
             axes = turned(axes, element.coordinates[0])
     block.store_all(places.frame, axes.ravel().tolist())
-    block.store_all(places.origin, origin.tolist())
+    block.store_all(places.origin, (origin + axes @ group.reach).tolist())
 
 
 def load_frame(block: Block, place: int) -> MovingFrame:

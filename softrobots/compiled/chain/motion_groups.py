@@ -17,7 +17,8 @@ from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.chain.unknowns import Unknowns, bodies_of
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
-from softrobots.model.serial_chain import ChainBody
+from softrobots.core.checks import FloatArray
+from softrobots.model.serial_chain import ChainBody, ChainJoint
 
 _MOST_JOINTS = 4  # of a group: its cost grows with their square
 
@@ -25,8 +26,18 @@ _MOST_JOINTS = 4  # of a group: its cost grows with their square
 class MovingGroup:
     """Inputs of the groups of a kind: table entries for the numbers in which they differ, loads from the workspace."""
 
-    def __init__(self, plan: MotionPlan, block: Block, groups: Sequence[tuple[int, ...]], columns: TableColumns) -> None:
-        """Read the elements of the groups, base to tip; `q` is the place of the first unknown, or of the motor."""
+    def __init__(
+        self,
+        plan: MotionPlan,
+        block: Block,
+        groups: Sequence[tuple[int, ...]],
+        columns: TableColumns,
+        bodies: Sequence[Sequence[ChainBody]],
+    ) -> None:
+        """Read the elements of the groups, base to tip, and their `moving_bodies`.
+
+        In the block `q` is the place of the first unknown, or of the motor.
+        """
         unknowns, layout = plan.unknowns, plan.layout
         self.elements: list[TracedElement] = []
         """The elements, with their coordinates."""
@@ -40,6 +51,8 @@ class MovingGroup:
         """`h/2 D + h^2/4 K` of each unknown."""
         self.torques: list[Scalar] = []
         """Torque of spring, damper and muscles on each unknown."""
+        self.reach = columns.entries([reach_behind(unknowns, group[-1]) for group in groups])
+        """From its end to the beginning of the next group, or to the tip, in the axes of its end [m]."""
         h, place = block.load(layout.time_step), 0
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
@@ -70,27 +83,31 @@ class MovingGroup:
             self.elements.append(replace(element, coordinates=coordinates))
             self.rates.append(rates)
             self.changes.append(changes)
-            for number in range(len(element.bodies)):
-                bodies = [bodies_of(unknowns.chain.elements[row])[number] for row in rows]
-                self.bodies.append(_body(bodies, columns))
+            self.bodies += [_body(alike, columns) for alike in zip(*(bodies[row] for row in rows), strict=True)]
 
-    def joints(self) -> tuple[list[JointState], Any]:
-        """Return the joints, and the derivatives of their positions by the coordinates, shape (n, k)."""
+    def joints(self, block: Block, cosines: int, sines: int) -> tuple[list[JointState], Any]:
+        """Return the joints, and the derivatives of their positions by the coordinates, shape (n, k).
+
+        Cosines and sines of the unknowns stand at places in the workspace.
+        """
         first = self.elements[0]
         if first.kind == "section":
             section = SectionState(first.coordinates, self.rates[0], self.changes[0], first.length)
             return section.joints, section.slopes[:, list(first.moving)]
-        joints = [
-            joint_state(element.kind == "slide", element.coordinates[0], rates[0], changes[0])
-            for element, rates, changes in zip(self.elements, self.rates, self.changes, strict=True)
-        ]
+        joints = []
+        for place, (element, rates, changes) in enumerate(zip(self.elements, self.rates, self.changes, strict=True)):
+            joint = joint_state(element.kind == "slide", element.coordinates[0], rates[0], changes[0])
+            if element.kind == "turn" and element.moving:
+                joint = joint._replace(cosine=block.load(cosines + place, "q"), sine=block.load(sines + place, "q"))
+            joints.append(joint)
         return joints, constants(np.eye(len(joints), len(self.own)))
 
 
 def _body(bodies: Sequence[ChainBody], columns: TableColumns) -> RigidBody:
     """Return the body of the elements of a kind; all are round about the same axis, or none is."""
-    parts = [round_part(body.inertia) for body in bodies]
-    others = [np.zeros((3, 3)) if across else body.inertia for body, (_, across, _) in zip(bodies, parts, strict=True)]
+    rounds = [round_part(body.inertia) for body in bodies]
+    others = [body.inertia if part is None else np.zeros((3, 3)) for body, part in zip(bodies, rounds, strict=True)]
+    parts = [part or (0, 0.0, 0.0) for part in rounds]
     return RigidBody(
         mass=columns.entry([float(body.mass) for body in bodies]),
         moment=columns.entries([body.first_moment for body in bodies]),
@@ -118,11 +135,40 @@ def motion_groups(unknowns: Unknowns) -> list[tuple[int, ...]]:
     return groups
 
 
-def group_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
+def moving_bodies(unknowns: Unknowns) -> list[list[ChainBody]]:
+    """Return the bodies of each element, where they cost least.
+
+    How far a round body has turned about its own axis changes only its spin about it. So of a body that is round about the
+    axis of its own joint only the inertia about this axis stays there, and all else is fixed to the element before.
+    """
+    elements = unknowns.chain.elements
+    bodies = [list(bodies_of(element)) for element in elements]
+    for row, element in enumerate(elements):
+        part = round_part(bodies[row][0].inertia)
+        moment = bodies[row][0].first_moment
+        if isinstance(element, ChainJoint) and not element.slides and part and part[0] == 2 and not np.any(moment[:2]):
+            mass, along = bodies[row][0].mass, np.diag([0.0, 0.0, part[1] + part[2]])
+            bodies[row] = [ChainBody(0.0, np.zeros(3), along)]
+            if row > unknowns.leading_motors:
+                before, shift, turned_moment = bodies[row - 1][-1], element.translation, element.rotation @ moment
+                shifted = np.eye(3) * (shift @ (mass * shift + 2.0 * turned_moment))
+                mixed = np.outer(shift, turned_moment + 0.5 * mass * shift)
+                across = element.rotation @ np.diag([part[1], part[1], 0.0]) @ element.rotation.T
+                inertia = before.inertia + across + shifted - mixed - mixed.T
+                first_moment = before.first_moment + turned_moment + mass * shift
+                bodies[row - 1][-1] = ChainBody(before.mass + mass, first_moment, inertia)
+    return bodies
+
+
+def group_signature(unknowns: Unknowns, row: int, bodies: Sequence[ChainBody]) -> tuple[Any, ...]:
     """Return the properties that elements with the same code share."""
-    rounds = [
-        (axis, across == 0.0)
-        for axis, across, _ in (round_part(body.inertia) for body in bodies_of(unknowns.chain.elements[row]))
-    ]
+    rounds = [part and part[0] for part in (round_part(body.inertia) for body in bodies)]
     segment = unknowns.segment_at(row)
-    return (*element_signature(unknowns, row), str(rounds), segment and segment.muscles)
+    reach = (reach_behind(unknowns, row) != 0.0).tolist()
+    return (*element_signature(unknowns, row), str(rounds), segment and segment.muscles, str(reach))
+
+
+def reach_behind(unknowns: Unknowns, row: int) -> FloatArray:
+    """Return the origin of the next element at zero, or the tip, in the frame behind an element [m]."""
+    elements = unknowns.chain.elements
+    return elements[row + 1].translation if row + 1 < len(elements) else unknowns.chain.tip_translation

@@ -12,13 +12,13 @@ velocity of the chord and the angular velocity of the end. With the section coor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Screw, Vector, constants, cross, matrix, vector
-from softrobots.compiled.trace.expressions import Scalar, cosine, sine, square_root
+from softrobots.compiled.chain.elements import Screw, Vector, constants, cross, matrix, outer, vector
+from softrobots.compiled.trace.expressions import Expression, Scalar, cosine, sine, square_root
 
 SECTION_AXES = (0, 1, 2, 0, 1, 2)
 """Axis of each joint of a section: x, y, z."""
@@ -48,13 +48,13 @@ class RigidBody(NamedTuple):
     def turned(self, axes: Any) -> Any:
         """Return the rotational inertia in the axes in which those of the frame are given, shape (3, 3)."""
         n = axes[:, self.round_axis]
-        whole = constants(np.eye(3)) * self.across + np.multiply.outer(n, n * self.along)
-        return whole + axes @ self.inertia @ axes.T
+        return constants(np.eye(3)) * self.across + outer(n, n) * self.along + axes @ self.inertia @ axes.T
 
-    def times(self, axes: Any, spin: Vector) -> Vector:
-        """Return that inertia times a vector."""
-        n = axes[:, self.round_axis]
-        return spin * self.across + n * ((n @ spin) * self.along) + axes @ (self.inertia @ (axes.T @ spin))
+    @property
+    def is_rod(self) -> bool:
+        """Whether it is round about an axis through its centre of mass, as a straight rod with the origin on it."""
+        aside = [self.moment[axis] for axis in range(3) if axis != self.round_axis]
+        return all(_is_zero(one) for one in (*self.inertia.ravel(), *aside))
 
     @property
     def needed_axes(self) -> list[int]:
@@ -68,8 +68,8 @@ class RigidBody(NamedTuple):
         ]
 
 
-def round_part(inertia: Any) -> tuple[int, float, float]:
-    """Return axis, inertia across it, and how much more there is about it; zeros for a body that is not round."""
+def round_part(inertia: Any) -> tuple[int, float, float] | None:
+    """Return axis, inertia across it, and how much more there is about it; None if a body is not round."""
     diagonal = np.diag(inertia)
     small = 1e-14 * float(np.abs(diagonal).max())
     if np.abs(inertia - np.diag(diagonal)).max() <= small:
@@ -77,7 +77,7 @@ def round_part(inertia: Any) -> tuple[int, float, float]:
             across, other = diagonal[axis - 1], diagonal[axis - 2]
             if abs(across - other) <= small:
                 return axis, float(across), float(diagonal[axis] - across)
-    return 0, 0.0, 0.0
+    return None
 
 
 def _is_zero(value: Scalar) -> bool:
@@ -96,10 +96,27 @@ class MovingFrame:
     """Its angular acceleration [rad/s^2]."""
     lift: Vector
     """Acceleration of its origin, less gravity [m/s^2]."""
+    swings: dict[tuple[float, ...], tuple[Vector, Vector]] = field(default_factory=dict)
+    """Velocity and acceleration of unit vectors that the last joint does not turn, by the numbers of their expressions."""
 
-    def shifted(self, by: Vector) -> MovingFrame:
-        """Return the same axes at another origin that moves with them, `by` from this one."""
-        return replace(self, lift=self.lift + cross(self.turning, by) + cross(self.spin, cross(self.spin, by)))
+    def swing(self, direction: Vector) -> tuple[Vector, Vector]:
+        """Return velocity and acceleration of a unit vector that moves with the frame."""
+        numbers, opposite = _numbers(direction), _numbers(-direction)
+        if opposite < numbers:  # one of the two, so that a vector and its opposite share their expressions
+            velocity, acceleration = self.swing(-direction)
+            return -velocity, -acceleration
+        if numbers not in self.swings:
+            velocity = cross(self.spin, direction)
+            self.swings[numbers] = velocity, cross(self.turning, direction) + cross(self.spin, velocity)
+        return self.swings[numbers]
+
+    def shifted(self, axes: Any, by: Sequence[Scalar]) -> MovingFrame:
+        """Return the same axes at another origin that moves with them, at coordinates `by` along given ones of these axes."""
+        lift = self.lift
+        for axis, distance in zip(axes, by, strict=True):
+            if not _is_zero(distance):
+                lift = lift + self.swing(self.axes[:, axis])[1] * distance
+        return replace(self, lift=lift)
 
 
 class JointState(NamedTuple):
@@ -133,21 +150,42 @@ def moved(frame: MovingFrame, joint: JointState) -> tuple[MovingFrame, Vector, V
     swing = cross(frame.spin, velocity)
     if joint.offset is not None:
         shift = axis * joint.offset
-        behind = frame.shifted(shift)
+        behind = frame.shifted([joint.axis], [joint.offset])
         return replace(behind, lift=behind.lift + swing * 2.0 + axis * joint.change), axis, shift
     one, other = (joint.axis + 1) % 3, (joint.axis + 2) % 3
     axes = frame.axes.copy()
     axes[:, one] = frame.axes[:, one] * joint.cosine + frame.axes[:, other] * joint.sine
     axes[:, other] = frame.axes[:, other] * joint.cosine - frame.axes[:, one] * joint.sine
-    return MovingFrame(axes, frame.spin + velocity, frame.turning + swing + axis * joint.change, frame.lift), axis, None
+    behind = MovingFrame(axes, frame.spin + velocity, frame.turning + swing + axis * joint.change, frame.lift)
+    frame.swing(axis)
+    behind.swings |= {key: frame.swings[key] for key in (_numbers(axis), _numbers(-axis)) if key in frame.swings}
+    return behind, axis, None
+
+
+def _numbers(direction: Vector) -> tuple[float, ...]:
+    """Return what tells a vector from others."""
+    return tuple(one.number if isinstance(one, Expression) else -3.0 - one for one in direction)
 
 
 def wrench(frame: MovingFrame, body: RigidBody) -> tuple[Vector, Vector]:
-    """Return force and moment about the origin that move a body as its frame moves [N], [N m]."""
-    moment = frame.axes @ body.moment
+    r"""Return force and moment about the origin that move a body as its frame moves [N], [N m].
+
+    For a rod along the unit vector `n`, with first moment `b` and inertias :math:`I_t` across and :math:`I_a` along it
+
+    .. math:: f = m a + b \ddot n, \quad
+        \tau = n \times (I_t \ddot n + b a) + I_a (n (n \cdot \dot\omega) + \dot n (n \cdot \omega))
+    """
+    if body.is_rod:
+        n, first = frame.axes[:, body.round_axis], body.moment[body.round_axis]
+        if _numbers(-n) < _numbers(n):
+            n, first = -n, -first
+        velocity, acceleration = frame.swing(n)
+        axial = n * (n @ frame.turning) + velocity * (n @ frame.spin)
+        turn = cross(n, acceleration) * body.across + axial * (body.across + body.along)
+        return frame.lift * body.mass + acceleration * first, turn + cross(n, frame.lift) * first
+    moment, inertia = frame.axes @ body.moment, body.turned(frame.axes)
     force = frame.lift * body.mass + cross(frame.turning, moment) + cross(frame.spin, cross(frame.spin, moment))
-    turn = body.times(frame.axes, frame.turning) + cross(frame.spin, body.times(frame.axes, frame.spin))
-    return force, turn + cross(moment, frame.lift)
+    return force, inertia @ frame.turning + cross(frame.spin, inertia @ frame.spin) + cross(moment, frame.lift)
 
 
 class SectionState:

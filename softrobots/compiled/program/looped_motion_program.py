@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from softrobots.compiled.chain.articulated import UPPER
-from softrobots.compiled.chain.elements import Vector, constants, cross, outer, vector
+from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
-from softrobots.compiled.chain.motion_groups import motion_groups
+from softrobots.compiled.chain.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import MovingFrame, joint_state, moved
 from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_parts import MotionParts
 from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.expressions import cosine, sine
 
 _PASSES = {
     "move": "Outward pass: motion of the bodies.",
@@ -27,6 +30,8 @@ _INWARD = ("articulate", "resist")
 _CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
     """Evaluate and factor; write the correction."""
     start_move_SUFFIX(w)
+    for i in range(N):
+        bend_SUFFIX(w, i)
     move_all_SUFFIX(w)
     start_articulate_SUFFIX(w)
     articulate_all_SUFFIX(w)
@@ -38,6 +43,8 @@ _CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
 def motion_correct_SUFFIX(w: Array) -> None:
     """Evaluate; write the correction with the factors that are there."""
     start_move_SUFFIX(w)
+    for i in range(N):
+        bend_SUFFIX(w, i)
     move_all_SUFFIX(w)
     start_resist_SUFFIX(w)
     resist_all_SUFFIX(w)
@@ -54,7 +61,7 @@ def motion_tip_SUFFIX(w: Array) -> None:
 def looped_motion(plan: MotionPlan) -> MotionParts:
     """Trace the functions of a looped chain."""
     unknowns, layout = plan.unknowns, plan.layout
-    places = GroupLayout(layout.prepared)
+    places = GroupLayout(layout.prepared, layout.unknowns)
     kinds = group_kinds(plan, places)
     record, sequence = places.end, {}
     calls: dict[str, list[tuple[int, str]]] = {name: [] for name in _PASSES}
@@ -73,9 +80,10 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     frame = [
         _prepare(plan, places, len(ordered)),
         _start_move(places),
+        _bend(plan, places),
         _start_articulate(plan, places),
         _start_resist(plan, places),
-        _start_place(plan, places),
+        _start_place(plan, places, len(ordered)),
         _finish_place(plan, places),
     ]
     loops, lane_loops = (
@@ -90,18 +98,19 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     return MotionParts([*frame, *(block for kind in kinds for block in kind.blocks)], record, tables, loops, lane_loops)
 
 
-def _prepare(plan: MotionPlan, group_places: GroupLayout, count: int) -> Block:
+def _prepare(plan: MotionPlan, places: GroupLayout, count: int) -> Block:
     block = Block("motion_prepare", "Compute what depends on motors, force, gravity and time step only.")
-    layout, zero = plan.layout, constants(np.zeros(3))
+    unknowns, layout, zero = plan.unknowns, plan.layout, constants(np.zeros(3))
     frame = MovingFrame(constants(np.eye(3)), zero, zero, -vector(block.loads(layout.gravity, 3)))
-    for row, element in enumerate(plan.unknowns.leading(block)):
-        places = layout.motor_velocities, layout.motor_accelerations
-        rate, change = (block.load(first + (plan.unknowns.motor(row) or 0)) for first in places)
-        frame = frame.shifted(frame.axes @ element.translation)
-        frame.axes = frame.axes @ element.rotation
-        frame, _, _ = moved(frame, joint_state(element.kind == "slide", element.coordinates[0], rate, change))
-    store_frame(block, group_places.base, frame)
-    block.store_all(group_places.bounds, [0.0, float(count)])
+    for row, element in enumerate(unknowns.leading(block)):
+        motor = unknowns.motor(row) or 0
+        rate, change = (block.load(first + motor) for first in (layout.motor_velocities, layout.motor_accelerations))
+        frame = frame.shifted(range(3), element.translation.tolist())
+        turned = replace(frame, axes=frame.axes @ element.rotation)
+        frame, _, _ = moved(turned, joint_state(element.kind == "slide", element.coordinates[0], rate, change))
+    frame = frame.shifted(range(3), reach_behind(unknowns, unknowns.leading_motors - 1).tolist())
+    store_frame(block, places.base, frame)
+    block.store_all(places.bounds, [0.0, float(count)])
     return block
 
 
@@ -111,40 +120,46 @@ def _start_move(places: GroupLayout) -> Block:
     return block
 
 
+def _bend(plan: MotionPlan, places: GroupLayout) -> Block:
+    """They do not depend on each other, so that compilers vectorise the loop."""
+    block = Block("bend", "Compute cosine and sine of an unknown.", ("i",))
+    angle = block.load(plan.layout.unknown, "i")
+    block.store(places.cosine, cosine(angle), "i")
+    block.store(places.sine, sine(angle), "i")
+    return block
+
+
 def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_articulate", "Start at the tip with its force, without bodies beyond.")
-    force, lever = _tip_force(plan, places, block)
     block.store_all(places.inertia, [0.0] * len(UPPER))
-    block.store_all(places.pull, [*force, *outer(lever, force).ravel()])
+    block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9])
     return block
 
 
 def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_resist", "Start at the tip with its force, and clear all sums.")
-    force, lever = _tip_force(plan, places, block)
-    block.store_all(places.wrench, [*cross(lever, force), *force])
+    block.store_all(places.wrench, [0.0, 0.0, 0.0, *_tip_force(plan, block)])
     block.store_all(places.sums, [0.0] * 6)
     block.store_all(places.answer, [0.0] * 6)
     return block
 
 
-def _tip_force(plan: MotionPlan, places: GroupLayout, block: Block) -> tuple[Vector, Vector]:
-    """Return the force that the tip needs, minus the load on it, and the tip from the end of the last group."""
-    lever = load_frame(block, places.frame).axes @ constants(plan.unknowns.chain.tip_translation)
-    return -vector(block.loads(plan.layout.force, 3)), lever
+def _tip_force(plan: MotionPlan, block: Block) -> Vector:
+    """Return the force that the tip needs, minus the load on it."""
+    return -vector(block.loads(plan.layout.force, 3))
 
 
-def _start_place(plan: MotionPlan, places: GroupLayout) -> Block:
+def _start_place(plan: MotionPlan, places: GroupLayout, count: int) -> Block:
     block = Block("start_place", "Start behind the leading motors.")
     axes, origin = place_base(plan.unknowns.leading(block))
+    reach = constants(reach_behind(plan.unknowns, plan.unknowns.leading_motors - 1))
     block.store_all(places.frame, axes.ravel().tolist())
-    block.store_all(places.origin, origin.tolist())
-    block.store_all(places.bounds, [0.0, float(len(motion_groups(plan.unknowns)))])
+    block.store_all(places.origin, (origin + axes @ reach).tolist())
+    block.store_all(places.bounds, [0.0, float(count)])
     return block
 
 
 def _finish_place(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("finish_place", "Write the tip.")
-    axes, origin = vector(block.loads(places.frame, 9)).reshape(3, 3), vector(block.loads(places.origin, 3))
-    block.store_all(plan.layout.tip, (origin + axes @ constants(plan.unknowns.chain.tip_translation)).tolist())
+    block.store_all(plan.layout.tip, block.loads(places.origin, 3))
     return block
