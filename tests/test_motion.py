@@ -259,6 +259,35 @@ def test_ctrl_c_returns_what_there_is() -> None:
         assert np.all(np.isfinite(moved.q_springs))
 
 
+def test_ctrl_c_at_any_moment_leaves_a_whole_motion() -> None:
+    """Whichever call of the path of the motors it falls into: between steps, within one, or while rows are written."""
+    motor = pendulum(2, 4.0, {"hinge_2": 4.0})
+    calls, pressed = 0, 0
+
+    def path(t: float) -> list[float]:
+        nonlocal calls
+        calls += 1
+        if calls == pressed:
+            raise KeyboardInterrupt
+        return [0.1 * np.sin(t) ** 2]
+
+    options: dict[str, Any] = {"time_step": 0.04, "output_step": 0.015, "damping_time": 0.01}
+    whole = sr.simulate(motor, 0.2, path, **options)
+    total, rows = calls, []
+    for back in range(total):
+        calls, pressed = 0, total - back
+        try:
+            moved = sr.simulate(motor, 0.2, path, **options)
+        except KeyboardInterrupt:  # while the arguments are checked there is no motion yet
+            break
+        count = len(moved.time)
+        assert moved.interrupted
+        assert np.array_equal(moved.q_springs, whole.q_springs[:count])
+        assert np.allclose(moved.energy.balance, whole.energy.balance[:count], rtol=0.0, atol=1e-15)
+        rows.append(count)
+    assert rows[0] > rows[-1] == 1
+
+
 def test_a_chaotic_motion_ends_in_an_error_that_says_how_far_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation, "MOST_STEPS", 500)
     model = pendulum(2, 0.01)

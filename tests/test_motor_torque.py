@@ -182,6 +182,7 @@ def test_a_motor_and_a_spring_are_two_masses_with_a_spring() -> None:
         ({"torque": lambda *_: math.nan}, r"torque\(t=0.0005, ...\)"),
         ({"torque": lambda *_: (1.0, 2.0)}, r"torque\(t=0.0005, ...\)"),
         ({"torque": (1.0,), "sample_time": 0.0}, "sample_time"),
+        ({"torque": (1.0,), "sample_time": 1e-12}, "sample_time"),
         ({"torque": (1.0,), "motors": "prescribed"}, "torque"),
         ({"sample_time": 1e-3, "motors": "prescribed"}, "sample_time"),
         ({"torque": (1.0,), "q_motors": None}, "q_motors"),

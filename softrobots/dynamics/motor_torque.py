@@ -26,6 +26,7 @@ CREEP = 1e-4
 
 _DIFFERENCE = 1e-6  # of the derivatives of a controller, in its arguments
 _ON_TIME = 1e-9  # of a sampling interval
+_MOST_SAMPLES = 10_000_000  # of a motion, for which memory suffices
 
 Torque = Callable[[float, FloatArray, FloatArray], Any]
 """A controller: torques of the motor joints, shape (n,) [N m or N], from time [s], positions, velocities, each shape (n,)."""
@@ -61,9 +62,16 @@ class MotorTorque:
         self._held, self._sample = np.zeros(self.count), -1
 
     def with_samples(self, grid: FloatArray) -> FloatArray:
-        """Return the times of steps with the instants at which a sampled controller is evaluated, shape (n,) [s]."""
+        """Return the times of steps with the instants at which a sampled controller is evaluated, shape (n,) [s].
+
+        Raises:
+            ParameterError: If there are too many of them.
+        """
         if self.sample_time is None:
             return grid
+        if grid[-1] / self.sample_time > _MOST_SAMPLES:
+            requirement = f"at least {grid[-1] / _MOST_SAMPLES:.3g} s, {_MOST_SAMPLES} of which make the duration"
+            raise ParameterError("sample_time", self.sample_time, requirement)
         instants = self.sample_time * np.arange(math.ceil(grid[-1] / self.sample_time - _ON_TIME))
         every = np.unique(np.concatenate([grid, instants]))
         return np.asarray(every[np.append(np.diff(every) > _ON_TIME * self.sample_time, True)])

@@ -50,10 +50,7 @@ class Recorder:
         if step.wrenches:
             load_work += h * float(equations.load(middle.x, step.wrenches) @ middle.rates)
         motor_work += h * float(step.actuator_forces @ equations.actuator_rates(middle.x, middle.rates))
-        self._works.append((dissipated, load_work, motor_work))
-        self._middles.append(middle.time)
-        self._exerted.append(step.actuator_forces)
-        prescribed = self.rule.prescribed
+        prescribed, tip = self.rule.prescribed, self.tip(step.end.x)
         last = (
             len(self._times) if step.end.time >= self._times[-1] else int(np.searchsorted(self._times, step.end.time, "right"))
         )
@@ -66,11 +63,13 @@ class Recorder:
             self._x[row], self._rates[row] = x, rates
             if self.rule.torque is not None:
                 self._driven[row] = self.rule.torque.exerted(time, x, rates)
-        self.rows, more = last, max(last - self._most, 0)
-        self._most += more
-        self.state = step.end
+        self._middles.append(middle.time)  # all is known; where Ctrl-C comes now, what is longer than `times` does not count
+        self._exerted.append(step.actuator_forces)
+        self._works.append((dissipated, load_work, motor_work))
+        self.tips.append(tip)
         self.times.append(step.end.time)
-        self.tips.append(self.tip(step.end.x))
+        self.state, self.rows, more = step.end, last, max(last - self._most, 0)
+        self._most += more
         return more
 
     def kick(self, change: FloatArray) -> None:
@@ -87,8 +86,8 @@ class Recorder:
     def reset(self, mark: tuple[State, int, int]) -> None:
         """Forget the steps since a mark."""
         self.state, self.rows, steps = mark
-        del self._middles[steps:], self._exerted[steps:]
         del self.times[steps + 1 :], self.tips[steps + 1 :], self._works[steps + 1 :]
+        del self._middles[steps:], self._exerted[steps:]
         self.rule.forget()
 
     def motion(self, **facts: Any) -> Motion:
@@ -102,7 +101,7 @@ class Recorder:
         exerted = self._at_rows(times, m)
         exerted[:, : self._driven.shape[1]] = self._driven[:n]
         kept = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
-        works = np.array(self._works)
+        works = np.array(self._works[: len(self.times)])
         flown = np.column_stack([np.interp(times, self.times, work) for work in works.T])
         load, tip = self.rule.load, equations.model.tip
         forces = np.array([load(float(time)).get(tip, np.zeros(6))[:3] for time in times])
@@ -124,9 +123,10 @@ class Recorder:
 
     def _at_rows(self, times: FloatArray, m: int) -> FloatArray:
         """What actuators exert at the rows, from the middles of the steps, shape (n, m)."""
-        if len(self._exerted) < 2:
-            return np.tile(self._exerted[0] if self._exerted else np.zeros(m), (len(times), 1))
-        middles, exerted = np.array(self._middles), np.array(self._exerted)
+        steps = len(self.times) - 1
+        if steps < 2:
+            return np.tile(self._exerted[0] if steps else np.zeros(m), (len(times), 1))
+        middles, exerted = np.array(self._middles[:steps]), np.array(self._exerted[:steps])
         place = np.clip(np.searchsorted(middles, times) - 1, 0, len(middles) - 2)
         share = ((times - middles[place]) / (middles[place + 1] - middles[place]))[:, None]
         return np.asarray(exerted[place] + share * (exerted[place + 1] - exerted[place]))

@@ -126,8 +126,11 @@ def simulate(
 
 def _fixed(run: Recorder, grid: FloatArray, damping_time: float | None, progress: bool | str) -> Motion:
     """Motion with given steps."""
-    interrupted = _go(run, follow(run, grid), damping_time, progress, "motion")
-    return run.motion(damping_time=damping_time, interrupted=interrupted)
+    try:
+        _go(run, follow(run, grid), damping_time, progress, "motion")
+        return run.motion(damping_time=damping_time)
+    except KeyboardInterrupt:
+        return run.motion(damping_time=damping_time, interrupted=True)
 
 
 def _controlled(
@@ -136,41 +139,42 @@ def _controlled(
     """Motion with steps for a tolerance of the tip."""
     facts: dict[str, Any] = {"damping_time": damping_time, "tolerance": tolerance, "tip_error": None}
     run, history, last = new_run(), [math.inf], math.inf
-    if _go(run, choose(run, breaks, tolerance), damping_time, progress, "motion"):
+    try:
+        _go(run, choose(run, breaks, tolerance), damping_time, progress, "motion")
+        while True:
+            finer = new_run()
+            grid = halved(np.array(run.times))
+            _go(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps")
+            errors = tip_distances(run, finer)
+            furthest = float(errors.max())
+            errors /= min(max(last / max(furthest, _LEAST), 2.0), 4.0) - 1.0 if math.isfinite(last) else 1.0
+            last = furthest
+            history.append(float(errors.max()))
+            facts["tip_error"] = history[-1]
+            if history[-1] <= tolerance:
+                return finer.motion(**facts)
+            if len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]:
+                why = "halving the steps brings the runs no closer, as in chaotic motion"
+            elif (needed := len(finer.times) * 2 ** math.ceil(0.5 * math.log2(history[-1] / tolerance))) > MOST_STEPS:
+                why = f"about {needed} would be needed, {MOST_STEPS} are the most"
+            else:
+                run = finer
+                continue
+            within = float(run.times[int(np.argmax(errors > tolerance)) - 1])
+            raise NotConverged(
+                f"the tip is known to {history[-1]:.3g} m, required {tolerance:.3g} m, with {len(finer.times) - 1} steps: "
+                f"{why}. It is within the tolerance until t = {within:.4g} s of {run.duration:.4g} s. A shorter duration, a "
+                f"larger tolerance or more damping may help, or a given time_step; `best` is the last run",
+                best=finer.motion(**facts),
+                residual=history[-1],
+                iterations=len(history),
+            )
+    except KeyboardInterrupt:
         return run.motion(**facts, interrupted=True)
-    while True:
-        finer = new_run()
-        grid = halved(np.array(run.times))
-        if _go(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps"):
-            return run.motion(**facts, interrupted=True)
-        errors = tip_distances(run, finer)
-        furthest = float(errors.max())
-        errors /= min(max(last / max(furthest, _LEAST), 2.0), 4.0) - 1.0 if math.isfinite(last) else 1.0
-        last = furthest
-        history.append(float(errors.max()))
-        facts["tip_error"] = history[-1]
-        if history[-1] <= tolerance:
-            return finer.motion(**facts)
-        if len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]:
-            why = "halving the steps brings the runs no closer, as in chaotic motion"
-        elif (needed := len(finer.times) * 2 ** math.ceil(0.5 * math.log2(history[-1] / tolerance))) > MOST_STEPS:
-            why = f"about {needed} would be needed, {MOST_STEPS} are the most"
-        else:
-            run = finer
-            continue
-        within = float(run.times[int(np.argmax(errors > tolerance)) - 1])
-        raise NotConverged(
-            f"the tip is known to {history[-1]:.3g} m, required {tolerance:.3g} m, with {len(finer.times) - 1} steps: {why}. "
-            f"It is within the tolerance until t = {within:.4g} s of {run.duration:.4g} s. A shorter duration, a larger "
-            f"tolerance or more damping may help, or a given time_step; `best` is the last run",
-            best=finer.motion(**facts),
-            residual=history[-1],
-            iterations=len(history),
-        )
 
 
-def _go(run: Recorder, steps: Iterable[int], damping_time: float | None, progress: bool | str, label: str) -> bool:
-    """Take all steps of a run; return whether Ctrl-C ended it.
+def _go(run: Recorder, steps: Iterable[int], damping_time: float | None, progress: bool | str, label: str) -> None:
+    """Take all steps of a run.
 
     Raises:
         NotConverged: If no step from a state succeeds; `best` is the motion up to there.
@@ -178,9 +182,6 @@ def _go(run: Recorder, steps: Iterable[int], damping_time: float | None, progres
     try:
         for _ in with_progress(steps, progress, label=label, unit="row", total=run.count):
             pass
-    except KeyboardInterrupt:
-        return True
     except NoStep as error:
         best = run.motion(damping_time=damping_time)
         raise NotConverged(str(error), best=best, residual=math.inf, iterations=len(run.times) - 1) from None
-    return False
