@@ -28,7 +28,7 @@ MOTORS = ("prescribed", "torque")
 """How motors move."""
 
 _LEAST = 1e-300  # distance that two runs have at least [m]
-_STALLED = 4  # runs in which the error of the tip is to halve at least once
+_STALLED = 3  # runs in which the error of the tip is to halve at least once
 
 MOST_STEPS = 400_000
 """Most steps of one run that is refined for a tolerance."""
@@ -63,7 +63,7 @@ def simulate(
         start: An `Equilibrium` (with another load than its own: released), a `Motion`, whose end is taken, or a `MotionState`;
             by default relaxed springs at rest.
         force: Force on the tip, shape (3,) [N], world axes: constant, a table `(times (n,), values (n, 3))`, linear between its
-            rows, or a function of time.
+            rows, or a function of time. Functions are looked at a thousand times: pulses shorter than that are to be tables.
         wrench: Wrench at the tip, shape (6,) [N, N m], force first, or `{frame: (6,)}`; constant, tables or functions of time.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.

@@ -27,8 +27,8 @@ from softrobots.dynamics.midpoint import Step
 from softrobots.dynamics.recorder import Recorder
 
 _BLOCK = 40  # steps between two measurements of the drift
-_LONGEST = 1 / 200  # of the duration: no first step is longer
-_SHORTEST = 1 / 200_000  # of the duration: none is chosen shorter
+_LONGEST = 1 / 80  # of the duration: no first step is longer
+_SHORTEST = 1 / 50_000  # of the duration: none is chosen shorter
 _QUIET = 2e-5  # of the tolerance: a block with less drift than this in each step is fine enough
 _COARSER = 12.0  # error of the first run over the tolerance, which that of a quarter of its steps meets
 _FADING = 0.9  # of the measured drift, from block to block
@@ -61,11 +61,11 @@ def choose(recorder: Recorder, breaks: FloatArray, tolerance: float) -> Iterator
         NoStep: If no step succeeds.
     """
     duration, now = recorder.duration, recorder.state.time
-    h, drift = _LONGEST * duration / 8.0, 0.0
+    h, drift = _LONGEST * duration / 2.0, 0.0
     for stop in [*(time for time in breaks.tolist() if 0.0 < time < duration), duration]:
         recorder.rule.forget()
         while now < stop:
-            mark, steps = recorder.mark(), math.ceil((stop - now) / h - 1e-9)
+            mark, steps = recorder.mark(), max(1, math.ceil((stop - now) / h - 1e-9))
             if steps > _BLOCK:
                 steps = _BLOCK * math.ceil(steps / _BLOCK)
             length, taken = (stop - now) / steps, min(steps, _BLOCK)

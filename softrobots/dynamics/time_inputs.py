@@ -30,7 +30,7 @@ class MotorPath:
             ParameterError: If a value has the wrong shape, is not finite, is one that the robot cannot have, or jumps.
         """
         self.breaks: FloatArray = np.zeros(0)
-        """Times at which the path, its slope or a tension jumps [s]."""
+        """Times at which a tension or the slope of the path jumps, and the path begins or ceases to change [s]."""
         self.kicks: dict[float, FloatArray] = {}
         """Jump of the velocities of the actuators, shape (n_motors,), by time; at zero the velocities themselves."""
         self.constant = False
@@ -88,7 +88,8 @@ class MotorPath:
         self.kicks = {time: np.concatenate([change, unplaced]) for time, change in self.kicks.items()}
         kinks = np.array(list(self.kicks))
         tension_jumps = find_jumps(lambda time: signal(time)[placed:], duration)
-        self.breaks = np.concatenate([kinks, tension_jumps])
+        onsets = [time for time in find_onsets(signal, duration) if np.abs(kinks - time).min(initial=np.inf) > 100.0 * near]
+        self.breaks = np.concatenate([kinks, tension_jumps, onsets])
 
 
 class TimeLoad:
@@ -113,7 +114,7 @@ class TimeLoad:
             model.frame_id(frame)
             if callable(value):
                 signal = checked_function(name, value, (size,), "N")
-                breaks.append(find_jumps(signal, duration))
+                breaks += [find_jumps(signal, duration), find_onsets(signal, duration)]
                 self._moving.append((frame, size, signal))
             elif isinstance(value, tuple | list) and len(value) == 2:
                 signal, kinks = _table(name, value, size)
@@ -122,7 +123,7 @@ class TimeLoad:
             else:
                 self._add(self._constant, frame, finite_array(name, value, (size,), "N"))
         self.breaks: FloatArray = np.concatenate(breaks)
-        """Times at which the load jumps or has a kink [s]."""
+        """Times at which the load jumps, has a kink, or begins or ceases to change [s]."""
         self.constant = not self._moving
         """Whether the load stays the same."""
         self._last: dict[str, FloatArray] = self._constant
@@ -191,6 +192,17 @@ def find_jumps(signal: Signal, duration: float, *, resolution: float = 0.0, leas
         if np.abs(high - low).max() > 0.3 * changes[place]:
             jumps.append(after)
     return np.array(jumps)
+
+
+def find_onsets(signal: Signal, duration: float) -> FloatArray:
+    """Times, among 1000 samples, at which a function of time begins or ceases to change, shape (n,) [s].
+
+    A pulse in a long quiet time has a step of its own between them. None of a function that does so all the time.
+    """
+    times = np.linspace(0.0, duration, _SAMPLES + 1)
+    changes = np.abs(np.diff([signal(time) for time in times.tolist()], axis=0)).max(axis=1, initial=0.0)
+    onsets = times[1:-1][np.diff(changes > 1e-6 * changes.max(initial=0.0))]
+    return onsets if len(onsets) <= _KINKS else np.zeros(0)
 
 
 def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
