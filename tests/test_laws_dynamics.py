@@ -11,6 +11,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.dynamics.damping import Decay
+from softrobots.dynamics.vibration import ModeSwing
 from softrobots.statics.elastic_state import elastic_state
 from tests.support.law_robots import ROBOTS, Case, cases, load_energy, model, stored_energy, tip_pose
 from tests.support.laws import law
@@ -36,7 +38,7 @@ def joint_rates(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray, ra
     return np.asarray((4.0 * one - two) / 3.0)
 
 
-@law("vibration_modes", "VibrationModes")
+@law("vibration_modes", "VibrationModes", "dynamics.vibration.ModeSwing")
 @pytest.mark.parametrize("kind", ROBOTS)
 @given(case=cases(1.0), seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=5)
@@ -48,6 +50,9 @@ def test_modes_swing_energies_that_neither_mix_nor_depend_on_the_mass_matrix(kin
     robot, found = settled(kind, case)
     modes = sr.vibration_modes(robot, found)
     assert isinstance(modes, sr.VibrationModes)
+    swing = modes.swing(1, 1e-3 * robot.reach)
+    assert isinstance(swing, ModeSwing)
+    assert np.abs(swing.tip_position - found.tip_position).max() <= 1.01e-3 * robot.reach
     assert np.all(np.diff(modes.frequencies) >= 0.0)
     mixture = np.random.default_rng(seed).normal(size=robot.n_springs) / (2.0 * np.pi * modes.frequencies)
     way = modes.shapes @ mixture
@@ -142,7 +147,7 @@ def test_a_linear_model_is_the_slope_of_the_equations_of_motion(
         ]
 
 
-@law("damping_time_from_decrement", "measured_decay")
+@law("damping_time_from_decrement", "measured_decay", "dynamics.damping.Decay")
 @given(
     ratio=st.floats(0.0, 0.3),
     frequency=st.floats(0.1, 1e3),
@@ -160,6 +165,7 @@ def test_a_ring_down_tells_the_damping_time_that_it_was_made_with(
     time = np.arange(0.0, periods, 0.025) / (slow * frequency)
     signal = offset + 0.3 * np.exp(-ratio * omega * time) * np.cos(slow * omega * time + phase)
     decay = sr.measured_decay(time, signal)
+    assert isinstance(decay, Decay)
     assert decay.decrement == pytest.approx(2.0 * np.pi * ratio / slow, rel=1e-5, abs=1e-7)
     assert decay.frequency == pytest.approx(slow * frequency, rel=1e-6)
     assert sr.damping_time_from_decrement(*decay) == pytest.approx(2.0 * ratio / omega, rel=2e-5, abs=1e-7 / omega)

@@ -310,6 +310,8 @@ def test_modes_are_saved_drawn_and_played(tmp_path: Path, capsys: pytest.Capture
     assert answer["frequencies"] == modes.frequencies.tolist()
     assert [Path(file).name for file in answer["files"]] == ["modes.npz", "modes.png", "modes_1.html", "modes_2.html"]
     assert "mode 2" in (tmp_path / "modes_2.html").read_text(encoding="utf-8")
+    assert cli.main(["view", "--result", files[0], "--html", str(tmp_path / "view.html")]) == 0
+    assert f"mode 1 of 7, {modes.frequencies[0]:.4g} Hz" in capsys.readouterr().out
     saved = sr.load_result(files[0])
     assert np.array_equal(saved.shapes, modes.shapes)
     assert np.array_equal(saved.motor_shapes, modes.motor_shapes)

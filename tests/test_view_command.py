@@ -374,7 +374,7 @@ def test_results_that_cannot_be_shown_or_moved(arm: sr.SoftModel, tmp_path: Path
     sr.save_result(sr.follow_trajectory(arm, [(0.8, 0.1, 0.2), (0.8, 0.2, 0.2)]), tmp_path / "path.npz")
     for option in (["--live", "keyboard"], ["--sliders"]):
         assert main(["view", "--result", str(tmp_path / "path.npz"), *option]) == 2
-        assert "no trajectory or motion with" in capsys.readouterr().err
+        assert "nothing that moves with" in capsys.readouterr().err
 
 
 def test_a_branch_is_shown_at_its_last_stable_point(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -76,8 +76,8 @@ PAGES = {
         "Simulation, vibration modes, linear models for controllers, damping, and motor paths that leave no vibration behind.",
         (
             *_top("simulate", "Motion", "dynamics.motion.MotionEnergy", "dynamics.motion.MotionState"),
-            *_top("vibration_modes", "VibrationModes", "linearize", "LinearModel"),
-            *_top("damping_time_from_decrement", "measured_decay"),
+            *_top("vibration_modes", "VibrationModes", "dynamics.vibration.ModeSwing", "linearize", "LinearModel"),
+            *_top("damping_time_from_decrement", "measured_decay", "dynamics.damping.Decay"),
             *_top("PD", "ClosedLoop"),
             *_top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),
         ),

@@ -21,6 +21,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
 from softrobots.core.result_file import load_result
 from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.vibration import ModeSwing, VibrationModes
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
@@ -29,7 +30,9 @@ from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate
 from softrobots.statics.trajectory import Trajectory
+from softrobots.view.animation_frames import Movement
 from softrobots.view.browser import find_chromium, take_picture
+from softrobots.view.figures.vibrations import SWING
 from softrobots.view.live.input import commands_from
 from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
 from softrobots.view.served_page import ServedPage
@@ -76,7 +79,9 @@ def add_parser(subparsers: Any) -> None:
     add_motors(parser, help_text)
     add_loads(parser)
     add_numbers(parser, "--target", "X Y Z", "move the loaded tip to this position by inverse kinematics [m] (no target)")
-    help_text = "show a saved result, e.g. of `softrobots solve -o`, `ik -o` or `simulate -o`, in place of ROBOT (none)"
+    help_text = (
+        "show a saved result, e.g. of `softrobots solve -o`, `ik -o`, `modes -o` or `simulate -o`, in place of ROBOT (none)"
+    )
     parser.add_argument("--result", type=Path, metavar="FILE.npz", help=help_text)
     help_text = "the branch of a --result of `softrobots branches`, as --branch=LABEL: its last stable point (its only one)"
     parser.add_argument("--branch", metavar="LABEL", help=help_text)
@@ -113,18 +118,17 @@ def run(arguments: argparse.Namespace) -> None:
         _grow(arguments)
         return
     result = _result(arguments)
-    if isinstance(result, Trajectory | Motion):
+    if isinstance(result, Movement):
         if arguments.live is not None or arguments.sliders:
             raise ParameterError(
-                "--result", str(arguments.result), "no trajectory or motion with --live or --sliders, which move the robot"
+                "--result", str(arguments.result), "nothing that moves with --live or --sliders, which move the robot"
             )
         with Viewer(result.model, port=arguments.port) as viewer:
             viewer.animate(result, speed=arguments.speed)
-            told = f"of {result.time[-1]:g} s" if isinstance(result, Motion) else f"of {len(result.times)} waypoints"
-            _show(arguments, viewer, result.model, f"a {type(result).__name__.lower()} {told}")
+            _show(arguments, viewer, result.model, _words(result))
         return
     if arguments.speed is not None:
-        raise ParameterError("--speed", arguments.speed, "given with the --result of a trajectory or a motion")
+        raise ParameterError("--speed", arguments.speed, "given with a --result that moves: a trajectory, a motion or modes")
     equilibrium = result.equilibrium if isinstance(result, IkSolution) else result
     if arguments.live is not None or arguments.sliders:
         tip_force(equilibrium)  # refused before the work
@@ -138,7 +142,16 @@ def run(arguments: argparse.Namespace) -> None:
             _follow(arguments, viewer, LiveView(viewer, result))
 
 
-def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Trajectory | Motion:
+def _words(movement: Movement) -> str:
+    """What moves, in a few words."""
+    if isinstance(movement, ModeSwing):
+        return f"mode 1 of {len(movement.modes.frequencies)}, {1.0 / movement.period:.4g} Hz"
+    if isinstance(movement, Motion):
+        return f"a motion of {movement.time[-1]:g} s"
+    return f"a trajectory of {len(movement.times)} waypoints"
+
+
+def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Movement:
     """The saved result, or the solution for the load or target of the arguments."""
     if arguments.result is None:
         model = model_of(arguments)
@@ -156,13 +169,15 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Traject
         raise ParameterError("--branch", arguments.branch, "left out: the result has no branches")
     if isinstance(result, ImposedDisplacement | LoadEstimate):
         return result.equilibrium
+    if isinstance(result, VibrationModes):
+        return result.swing(1, SWING * result.model.reach)
     if isinstance(result, Equilibrium | IkSolution | Trajectory | Motion):
         return result
     kind = type(result).__name__
     raise ParameterError(
         "--result",
         str(arguments.result),
-        f"an equilibrium, a solution, an estimate, branches, a trajectory or a motion, not a {kind}",
+        f"an equilibrium, a solution, an estimate, branches, a trajectory, a motion or modes, not a {kind}",
     )
 
 
