@@ -261,6 +261,37 @@ def test_a_step_is_that_of_a_simulation(solver: CompiledModel) -> None:
         np.testing.assert_allclose(tip, whole.tip_position[row + 1], rtol=0, atol=1e-11)
 
 
+def test_a_motion_that_fails_says_where(solver: CompiledModel) -> None:
+    with pytest.raises(NotConverged, match="no step from t = 0 s") as raised:
+        solver.simulate(0.01, np.zeros(3), force=(0.0, 1e20, 0.0), time_step=1e-3)
+    assert raised.value.best.time.tolist() == [0.0]
+    batch = solver.simulations(0.01, np.zeros(3), forces=np.array([[0, 1.0, 0], [0, 1e20, 0], [0, np.inf, 0]]), time_step=1e-3)
+    assert batch.status.tolist() == [Status.CERTIFIED, Status.UNSETTLED, Status.NOT_A_NUMBER]
+    assert np.all(np.isfinite(batch.q_springs))
+    assert np.all(np.isfinite(batch.tip_position))
+    with pytest.raises(NotConverged, match="small parts"):
+        solver.step(np.zeros(4), np.zeros(4), np.zeros(3), (0.0, 1e20, 0.0))
+
+
+def test_an_interrupted_motion_has_what_there_is(solver: CompiledModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C in the seventh of ten parts of a run."""
+    given: dict[str, Any] = {"time_step": 1e-3, "gravity": GRAVITY, "output_step": 1e-3}
+    whole, sample, calls = solver.simulate(0.1, np.zeros(3), **given), motion_runs.forces_of_steps, []
+
+    def pressed(*arguments: Any) -> np.ndarray:
+        calls.append(arguments)
+        if len(calls) == 7:
+            raise KeyboardInterrupt
+        return sample(*arguments)
+
+    monkeypatch.setattr(motion_runs, "_CHUNK", 10)
+    monkeypatch.setattr(motion_runs, "forces_of_steps", pressed)
+    motion = solver.simulate(0.1, np.zeros(3), **given)
+    assert motion.interrupted
+    assert motion.time[-1] == pytest.approx(0.06)
+    np.testing.assert_array_equal(motion.q_springs, whole.q_springs[: len(motion.time)])
+
+
 REFUSED: list[tuple[Any, str]] = [
     (lambda c: c.simulate(0.0, np.zeros(3)), "duration"),
     (lambda c: c.simulate(1.0, np.zeros(2)), "q_motors"),

@@ -108,13 +108,19 @@ class CompiledDynamics(CompiledStatics):
         found = at_rows.rows[0][np.isfinite(at_rows.rows[0, :, -1])]
         springs, rates = self._elastic_state(found[:, :-3])
         known = course.inputs_at(rows[: len(found)], taken.grid) | facts | {"gravity": down, "interrupted": taken.interrupted}
+        if path.constant and len(found) == len(rows):
+            known["tip_position"] = np.ascontiguousarray(found[:, -3:])
         motion = CompiledMotion(again, model=self._model, q_springs=springs, velocities=rates, **known)
         if taken.interrupted or (taken.status[0] == Status.CERTIFIED and taken.is_within):
             return motion
-        why = "steps fail, however short" if taken.is_within else "a shorter duration or more damping may help, or a time_step"
+        why = f"no step from t = {motion.time[-1]:.6g} s succeeds, however short"
+        if taken.status[0] == Status.CERTIFIED:
+            why = (
+                f"the tip is known to {motion.tip_error:.3g} m, required {largest:.3g} m, with {len(taken.grid) - 1} steps; a "
+                "shorter duration, a larger tolerance or more damping may help, or a given time_step"
+            )
         raise NotConverged(
-            f"the motion is known until t = {motion.time[-1]:.6g} s, the tip to {motion.tip_error} m, required {largest} m, "
-            f"after a run with {len(taken.grid) - 1} steps: {why}",
+            why,
             best=motion,
             residual=math.inf if motion.tip_error is None else motion.tip_error,
             iterations=len(taken.grid) - 1,

@@ -59,22 +59,24 @@ def finer_and_finer(
     where the differences shrink more slowly; see `softrobots.dynamics.step_control`. `bad` marks cases that do not count.
     """
     stops = np.unique([0.0, *(time for time in breaks.tolist() if 1e-9 * end < time < end * (1.0 - 1e-9)), end])
-    counts = np.ceil(np.diff(stops) / end * _FIRST_STEPS)
-    ends = zip(stops[:-1], stops[1:], counts.astype(int) + 1, strict=True)
+    ends = zip(stops[:-1], stops[1:], np.ceil(np.diff(stops) / end * _FIRST_STEPS).astype(int) + 1, strict=True)
     grid = np.append(np.concatenate([np.linspace(one, other, count)[:-1] for one, other, count in ends]), end)
     before, history, last = take(grid), [math.inf], math.inf
     while not before.interrupted:
         finer = np.zeros(2 * len(grid) - 1)
         finer[::2], finer[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
         now, grid = take(finer), finer
+        if now.interrupted:
+            return replace(before, interrupted=True)
         errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1)
-        sure = (now.status == Status.CERTIFIED) & (before.status == Status.CERTIFIED) & ~np.asarray(bad)
-        furthest = max(float(errors[sure].max(initial=0.0)), 1e-300)
+        errors = np.where(before.status == Status.CERTIFIED, errors, np.inf)
+        counts = (now.status == Status.CERTIFIED) & ~np.asarray(bad)
+        furthest = max(float(errors[counts].max(initial=0.0)), 1e-300)
         errors /= min(max(last / furthest, 2.0), 4.0) - 1.0 if math.isfinite(last) else 1.0
-        now, last = replace(now, errors=np.where(sure, errors, np.inf)), furthest
-        history.append(float(errors[sure].max(initial=0.0)))
+        now, last = replace(now, errors=np.where(counts, errors, np.inf)), furthest
+        history.append(float(errors[counts].max(initial=0.0)))
         stalled = len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]
-        if history[-1] <= tolerance or stalled or 2 * len(grid) > MOST_STEPS or now.interrupted:
+        if history[-1] <= tolerance or stalled or 2 * len(grid) > MOST_STEPS:
             return replace(now, is_within=history[-1] <= tolerance)
         before = now
     return before
@@ -89,6 +91,7 @@ def take_one(
     for place, values in [(layout.position, state[0]), (layout.velocity, state[1]), *given]:
         run.put(w, place, values)
     rows, status, interrupted = np.full((1, len(times), 2 * n + 3), np.nan), Status.CERTIFIED, False
+    rows[0, 0] = np.concatenate([*state, np.zeros(3)])  # even if no step is taken
     stops = np.union1d(_stops(grid, np.array(list(course.path.kicks))), np.arange(0, last, _CHUNK))
     try:
         for first, end in itertools.pairwise(stops.tolist()):
