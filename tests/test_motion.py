@@ -235,7 +235,7 @@ def test_every_robot_keeps_its_energy_to_second_order(model: sr.SoftModel) -> No
         return np.asarray(model.relaxed_motors + np.sin(8.0 * t) ** 3 * scale)
 
     options: dict[str, Any] = {"gravity": sr.EARTH_GRAVITY, "damping_time": 0.01, "force": (0.0, 0.5, 0.0)}
-    moved = [sr.simulate(model, 0.12, path, start=start, time_step=h, **options) for h in (2e-3, 1e-3)]
+    moved = [sr.simulate(model, 0.08, path, start=start, time_step=h, **options) for h in (2e-3, 1e-3)]
     coarse, fine = (np.abs(motion.energy.balance).max() for motion in moved)
     assert coarse < 1e-2 * np.abs(moved[0].energy.kinetic).max()
     assert 3.2 < coarse / fine < 5.0
@@ -293,14 +293,16 @@ def test_a_chaotic_motion_ends_in_an_error_that_says_how_far_it_is_known(monkeyp
     model = pendulum(2, 0.01)
     start = sr.solve_equilibrium(model, (), force=(30.0, 0.0, 5.0))
     with pytest.raises(sr.NotConverged, match="within the tolerance until t = ") as caught:
-        sr.simulate(model, 8.0, (), start=start, gravity=sr.EARTH_GRAVITY, damping_time=0.0)
+        sr.simulate(model, 6.0, (), start=start, gravity=sr.EARTH_GRAVITY, damping_time=0.0)
     best = caught.value.best
     assert isinstance(best, sr.Motion)
     assert best.tip_error == caught.value.residual > best.tolerance
 
 
 def test_a_section_that_leaves_its_range_ends_in_an_error_with_what_was_reached() -> None:
-    with pytest.raises(sr.NotConverged, match=r"no step from t = .* succeeds") as caught:
+    with pytest.raises(
+        sr.NotConverged, match=r"no step from t = .* succeeds.*: section_1_1.* at the end of the range"
+    ) as caught:
         sr.simulate(ROBOTS[1], 1.0, ROBOTS[1].relaxed_motors, force=(1e4, 0.0, 0.0), time_step=0.1)
     best = caught.value.best
     assert np.all(np.isfinite(best.q_springs))

@@ -114,12 +114,22 @@ def _advance(recorder: Recorder, end: float, *, to_knees: bool = False) -> Itera
                 recorder.kick(recorder.rule.path.kicks[step.end.time])
         elif len(targets) > _HALVINGS:
             now = recorder.state.time
-            raise NoStep(f"no step from t = {now:.6g} s succeeds, down to a length of {targets[-1] - now:.3g} s")
+            raise NoStep(
+                f"no step from t = {now:.6g} s succeeds, down to a length of {targets[-1] - now:.3g} s" + _range_end(recorder)
+            )
         elif knee is not None:
             targets = [knee]
         else:
             recorder.rule.forget()
             targets.append(0.5 * (recorder.state.time + targets[-1]))
+
+
+def _range_end(recorder: Recorder) -> str:
+    """Why no step succeeds, if a section is the reason."""
+    model, x = recorder.rule.equations.model, recorder.state.x
+    ends = model.structure.at_range_end(x[: model.n_motors], x[model.n_motors :])
+    where = "at the end of the range of sections (see strain_chain.in_range), more of which bend further"
+    return f": {', '.join(ends)} {where}" if ends else ""
 
 
 def _first_knee(recorder: Recorder, step: Step) -> float | None:
