@@ -149,12 +149,14 @@ class MidpointRule:
             forces = equations.balance(x, rates, accelerations, wrenches)
             residual = forces[free]
             if torque is not None:
-                residual[: torque.count] += torque.friction(rates) - torque.exerted(middle_time, x, rates)
+                residual[: torque.count] -= torque.exerted(middle_time, x, rates)
             if not math.isfinite(residual.dot(residual)):
                 return None
             if solve is None or iteration == _RENEWED or (torque is not None and shrinking > _SLOW):
                 solve = self._factorised(middle_time, x, rates, wrenches, h)
             change = solve(residual)
+            if torque is not None and torque.rubs:
+                change = torque.rubbed(solve, change, (v0 + h * a)[: torque.count], h)
             a = a - change
             moved = 0.25 * h * h * math.sqrt(change.dot(change)) / size
             if moved <= _CHANGE or (moved >= 0.5 * last and last <= _ROUNDED):
@@ -173,7 +175,7 @@ class MidpointRule:
         middle_state, lost = State(middle_time, x, rates), 0.0
         if torque is not None:
             forces[: torque.count] = torque.exerted(*middle_state)
-            lost = float(torque.friction(rates) @ rates[: torque.count])
+            lost = float(torque.resistance @ rates[: torque.count])
         return Step(start, State(end_time, ends, end_rates), middle_state, accelerations, forces[:m], wrenches, iteration, lost)
 
     def _path(self, time: float) -> FloatArray:

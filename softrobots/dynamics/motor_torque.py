@@ -2,11 +2,13 @@ r"""Motors that move by their torque: a controller's, within the effort of the f
 
 A motor joint then is a free coordinate, with its rotor in the mass matrix and its viscous friction in the damping:
 
-.. math:: \tau = \mathrm{clip}(\tau_c(t, u, \dot u), -\tau_{max}, \tau_{max}) - f \tanh(\dot u / v_f)
+.. math:: \tau = \mathrm{clip}(\tau_c(t, u, \dot u), -\tau_{max}, \tau_{max}) - f\, \mathrm{clip}(\dot u / v_f, -1, 1)
 
-with the dry friction `f` and `v_f` = `CREEP`: a joint that sticks creeps, at most so fast. (A step function has no derivative,
-and the implicit step needs one.) A continuous controller is evaluated in the middle of each step, so that the scheme keeps its
-order; a sampled one at its instants, at which steps end, and its torque is held until the next (zero-order hold).
+with the dry friction `f` and `v_f` = `CREEP`: a joint that sticks creeps, in proportion to what it carries. Dry friction acts
+by the velocity at the end of a step, so that a joint that comes to rest stays there: by that in the middle, it would turn round
+at each step. It is found together with the accelerations, by an active set of the joints that stick. A continuous controller is
+evaluated in the middle of each step, so that the scheme keeps its order; a sampled one at its instants, at which steps end, and
+its torque is held until the next (zero-order hold).
 """
 
 from __future__ import annotations
@@ -22,11 +24,13 @@ from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
 
 CREEP = 1e-4
-"""Speed at which a joint under three quarters of its dry friction creeps [rad/s or m/s]."""
+"""Speed at which a joint begins to slide; it creeps by half of it under half of its dry friction [rad/s or m/s]."""
 
 _DIFFERENCE = 1e-6  # of the derivatives of a controller, in its arguments
 _ON_TIME = 1e-9  # of a sampling interval
 _MOST_SAMPLES = 10_000_000  # of a motion, for which memory suffices
+_ATTEMPTS, _WHOLE = 60, 20  # to find which joints stick, and those whose change is not halved
+_SETTLED = 1e-13  # change of the friction, over itself, that ends them
 
 Torque = Callable[[float, FloatArray, FloatArray], Any]
 """A controller: torques of the motor joints, shape (n,) [N m or N], from time [s], positions, velocities, each shape (n,)."""
@@ -60,6 +64,8 @@ class MotorTorque:
         drives = model.actuators.drives
         self._effort, self._friction = drives.effort[: self.count], drives.friction[: self.count]
         self._held, self._sample = np.zeros(self.count), -1
+        self.resistance: FloatArray = np.zeros(self.count)
+        """Dry friction against the motion in the last step, shape (n,) [N m or N]."""
 
     def with_samples(self, grid: FloatArray) -> FloatArray:
         """Return the times of steps with the instants at which a sampled controller is evaluated, shape (n,) [s].
@@ -88,14 +94,46 @@ class MotorTorque:
         """Torque of the motors, shape (n,) of the motor joints [N m or N]."""
         return self._evaluated(time, x, rates) if self.sample_time is None else self._held
 
-    def friction(self, rates: FloatArray) -> FloatArray:
-        """Dry friction against the motion of the motor joints, shape (n,) [N m or N]."""
-        return np.asarray(self._friction * np.tanh(rates[: self.count] / CREEP))
+    @property
+    def rubs(self) -> bool:
+        """Whether there is dry friction."""
+        return bool(self._friction.any())
+
+    def rubbed(
+        self, solve: Callable[[FloatArray], FloatArray], change: FloatArray, rates: FloatArray, step: float
+    ) -> FloatArray:
+        """Return the change of the accelerations with dry friction, shape (n,), and keep the friction as `resistance`.
+
+        Args:
+            solve: Solver of the linear equations of a step.
+            change: Decrease of the accelerations without friction, shape (n,).
+            rates: Velocities of the motor joints at the end of the step before the change, shape (m,).
+            step: Length of the step [s].
+        """
+        m = self.count
+        columns = np.column_stack([solve(unit) for unit in np.eye(m, len(change))])  # all at once, threads of BLAS take longer
+        free, gain = rates - step * change[:m], step * columns[:m]
+        most = self._friction
+        friction, rubbing = self.resistance, np.flatnonzero(most)
+        yielding = gain[np.ix_(rubbing, rubbing)] + np.diag(CREEP / most[rubbing])
+        free, most, held = free[rubbing], most[rubbing], friction[rubbing]
+        diagonal = np.diag(yielding)
+        for attempt in range(_ATTEMPTS):
+            trial = held + (free - yielding @ held) / diagonal
+            sticks = np.abs(trial) <= most
+            found = np.where(sticks, 0.0, np.copysign(most, trial))
+            found[sticks] = np.linalg.solve(yielding[np.ix_(sticks, sticks)], (free - yielding @ found)[sticks])
+            settled = np.abs(found - held).max() <= _SETTLED * most.max()
+            held = found if attempt < _WHOLE else np.clip(0.5 * (held + found), -most, most)
+            if settled:
+                break
+        friction[rubbing] = held
+        return np.asarray(change + columns @ friction)
 
     def slopes(self, time: float, x: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of torque less friction by the positions and velocities of the motor joints, each shape (n, n)."""
+        """Derivatives of the torque by the positions and velocities of the motor joints, each shape (n, n)."""
         m = self.count
-        by_x, by_rates = np.zeros((m, m)), np.diag(-self._friction / CREEP * (1.0 - np.tanh(rates[:m] / CREEP) ** 2))
+        by_x, by_rates = np.zeros((m, m)), np.zeros((m, m))
         if self.sample_time is None:
             here = self._evaluated(time, x, rates)
             for joint in range(m):
