@@ -174,6 +174,16 @@ def test_the_tip_stays_within_the_tolerance_over_a_run_with_a_jump_of_the_load(f
         assert np.abs(moved.energy.balance).max() < 1e-2 * np.abs(moved.energy.load_work).max()
 
 
+def test_a_short_pulse_in_a_long_table_is_not_passed_over() -> None:
+    """Rows on the straight lines of a table change nothing: 1 ms of up to 40 N, with three rows or with four thousand."""
+    model, rows = pendulum(2, 4.0), np.linspace(0.0, 2.0, 4001)
+    short = as_table([0.7525, 0.753, 0.7535], [0.0, 40.0, 0.0])
+    long = as_table(list(rows), list(np.where(np.arange(4001) == 1506, 40.0, 0.0)))
+    moved = [sr.simulate(model, 2.0, (), force=force, tolerance=1e-4) for force in (short, long)]
+    assert np.ptp(moved[0].tip_position[:, 0]) > 0.01
+    assert np.abs(moved[0].tip_position - moved[1].tip_position).max() < 2e-4
+
+
 def test_a_motor_that_stops_at_once_gives_the_robot_a_blow() -> None:
     """A motor turns at constant speed from rest, and stops: its velocity jumps twice, and the momentum of the rest does not."""
     model = pendulum(2, 0.0, springs={"hinge_2": 3.0}, motors=["hinge_1"])

@@ -67,7 +67,7 @@ def simulate(
         wrench: Wrench at the tip, shape (6,) [N, N m], force first, or `{frame: (6,)}`; constant, tables or functions of time.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
-        mass_damping: Rayleigh's factor of the mass [1/s].
+        mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
         time_step: Length of each step [s]; None: chosen so that the tip stays within the tolerance, see
             `softrobots.dynamics.step_control`.
         output_step: Time between two rows of the result [s]; by default 200 rows or a few less.

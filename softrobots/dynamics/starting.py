@@ -68,7 +68,7 @@ def time_grid(end: float, step: float) -> FloatArray:
 
 def grid_with_kicks(end: float, step: float, kicks: FloatArray) -> FloatArray:
     """Return such times with those at which velocities of motors jump among them, shape (n,) [s]."""
-    grid, inside = time_grid(end, step), kicks[(kicks > 0.0) & (kicks < end)]
+    grid, inside = time_grid(end, step), kicks[(kicks > 0.0) & (kicks < end - 1e-6 * step)]
     if len(inside):
         replaced = np.abs(grid[:, None] - inside).min(axis=1) <= 1e-6 * step
         grid = np.unique(np.concatenate([grid[~replaced], inside]))

@@ -16,6 +16,7 @@ _SAMPLES = 1000  # of a function of time, among which its jumps are searched
 _NEAR = 1e-7  # of the duration: how far apart a function is compared for its velocity
 _KINK = 1e-3  # of the largest velocity: jumps of the velocity that count
 _KINKS = 200  # rows up to which steps end at each row of a table
+_SHARP = 10.0  # times as much as a row of a longer table usually bends, at which steps end
 
 Signal = Callable[[float], FloatArray]
 
@@ -220,7 +221,17 @@ def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
         share = (time - times[row - 1]) / (times[row] - times[row - 1])
         return np.asarray(values[row - 1] + share * (values[row] - values[row - 1]))
 
-    return signal, times if len(times) <= _KINKS else times[1:][np.diff(times) == 0.0]
+    return signal, times if len(times) <= _KINKS else times[_sharpest(times, values)]
+
+
+def _sharpest(times: FloatArray, values: FloatArray) -> Any:
+    """Rows of a long table at which it jumps, or bends much more than elsewhere, as at a short pulse."""
+    gaps = np.diff(times)[:, None]
+    slopes = np.diff(values, axis=0) / np.where(gaps > 1e-12 * (times[-1] - times[0]), gaps, 1.0)
+    bends = np.abs(np.diff(slopes, axis=0, prepend=0.0, append=0.0)).max(axis=1)
+    much = np.flatnonzero(bends > _SHARP * np.median(bends))
+    much = much[np.argsort(bends[much], kind="stable")[-_KINKS:]]
+    return np.union1d(much, np.flatnonzero(gaps[:, 0] == 0.0) + 1)
 
 
 def curve(times: FloatArray, values: FloatArray) -> Callable[[Any], FloatArray]:

@@ -49,7 +49,7 @@ def turns(duration: float = 2.0) -> dict[str, sr.Motion]:
     bare = sr.shape_input(path, modes, numbers=())  # the same path as a function of time
     paths = {
         "as told": bare,
-        "shaped, ZV": sr.shape_input(path, modes),
+        "shaped, ZV": sr.shape_input(path, modes, shaper="zv"),
         "shaped, EI": sr.shape_input(path, modes, shaper="ei"),
     }
     options: dict[str, Any] = {"start": first, "gravity": sr.EARTH_GRAVITY, "damping_time": LIGHT_DAMPING}

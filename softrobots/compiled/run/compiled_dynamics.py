@@ -64,7 +64,7 @@ class CompiledDynamics(CompiledStatics):
             force: Force on the tip, shape (3,) [N], world axes: constant, a table or a function of time.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
-            mass_damping: Rayleigh's factor of the mass [1/s].
+            mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
             time_step: Length of each step [s]; by default steps are halved until the tip is within the tolerance.
             output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
             tolerance: Largest error of the tip [m], measured with steps twice as long; by default 5e-4 of the reach.
@@ -149,7 +149,7 @@ class CompiledDynamics(CompiledStatics):
             time_step: Length of the step [s].
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
-            mass_damping: Rayleigh's factor of the mass [1/s].
+            mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
 
         Returns:
             The state at the end.
@@ -207,7 +207,7 @@ class CompiledDynamics(CompiledStatics):
                 cases; or a list of those.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
-            mass_damping: Rayleigh's factor of the mass [1/s].
+            mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
             time_step: Length of each step [s]; by default steps are halved until all tips are within the tolerance.
             output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
             tolerance: Largest error of the tip in a row [m], measured with steps twice as long; by default 5e-4 of the reach.
