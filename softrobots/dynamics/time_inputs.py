@@ -174,7 +174,10 @@ def find_jumps(signal: Signal, duration: float, *, resolution: float = 0.0, leas
     values = np.array([signal(time) for time in times])
     changes = np.abs(np.diff(values, axis=0)).max(axis=1, initial=0.0)
     jumps = []
-    for place in np.flatnonzero(changes > max(least, 1e-6 * np.ptp(values, axis=0).max(initial=0.0))).tolist():
+    # Beside a jump of 0.3 of a change or more, which counts below, the changes differ by as much.
+    bends = np.pad(np.abs(np.diff(values, 2, axis=0)).max(axis=1, initial=0.0), 1)
+    apart = np.maximum(bends[:-1], bends[1:]) > 0.15 * changes
+    for place in np.flatnonzero(apart & (changes > max(least, 1e-6 * np.ptp(values, axis=0).max(initial=0.0)))).tolist():
         before, after = times[place], times[place + 1]
         low, high = values[place], values[place + 1]
         rounds = 0
