@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
+from tests.support.c_libraries import Controller
 from tests.support.serial_chains import ROBOTS, pcc
 
 GRAVITY = (0.7, -0.4, -9.7)
@@ -152,6 +155,41 @@ def test_locked_strains_stay_at_rest(rng: np.random.Generator) -> None:
         ends.append(np.array(w[one.layout.position : one.layout.position + one.layout.unknowns])[rows])
     assert np.abs(ends[0] - 0.1 * np.arange(1, 7)).max() > 1e-4  # it moves
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["rod", "tensions"])
+def test_a_batch_has_the_motions_of_its_cases(kind: str, rng: np.random.Generator) -> None:
+    model = LONG[kind]()
+    solver = sr.compile(model, backend="python")
+    given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": 1e-3, "output_step": 2e-3}
+    motors, forces = rng.uniform(1.0, 5.0, (3, model.n_motors)), rng.normal(size=(3, 3)) * 0.1
+    batch = solver.simulations(0.01, motors, forces=forces, **given)
+    for row in range(3):
+        one = solver.simulate(0.01, motors[row], force=forces[row], **given)
+        np.testing.assert_allclose(batch.tip_position[row], one.tip_position, rtol=0, atol=1e-10)
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("kind", ["rod", "sections"])
+def test_other_back_ends_take_the_same_steps(kind: str, tmp_path: Path) -> None:
+    """C through ctypes, and numba, single and in lanes."""
+    model, force, h = LONG[kind](), (0.2, -0.1, 0.05), 1e-3
+    solver = sr.compile(model, backend="python")
+    given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": h}
+    expected = solver.simulate(0.02, (), force=force, output_step=h, **given)
+    controller = Controller(solver, tmp_path, name="rod", motion=True)
+    numbers = {"GRAVITY": GRAVITY, "DAMPING": 0.01 * model.stiffness, "TIME_STEP": [h], "FORCE": force, "POSITION": model.rest}
+    for name, values in numbers.items():
+        controller.put(name, values)
+    for row in range(20):
+        assert controller.call("motion_step") == 0
+        np.testing.assert_allclose(controller.get("POSITION", model.n_springs), expected.q_springs[row + 1], rtol=0, atol=1e-11)
+    if importlib.util.find_spec("numba") is not None and kind == "rod":
+        fast = sr.compile(model, backend="numba")
+        found = fast.simulate(0.02, (), force=force, output_step=h, **given)
+        np.testing.assert_allclose(found.tip_position, expected.tip_position, rtol=0, atol=1e-11)
+        many = fast.simulations(0.02, np.zeros((2, 0)), forces=force, output_step=h, **given)
+        np.testing.assert_allclose(many.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)
 
 
 def test_hinges_at_one_point_are_one_group() -> None:
