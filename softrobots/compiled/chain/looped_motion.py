@@ -28,12 +28,11 @@ from softrobots.compiled.chain.elements import Screw, Vector, constants, turned,
 from softrobots.compiled.chain.elimination import Eliminated
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.looped_chain import Kind, TableColumns
-from softrobots.compiled.chain.motion_groups import MovingGroup, group_signature, motion_groups, moving_bodies
+from softrobots.compiled.chain.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Expression, Scalar
-from softrobots.model.serial_chain import ChainBody
 
 
 @dataclass(frozen=True)
@@ -123,15 +122,15 @@ class _Record:
 def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
     """Trace the code of every kind of group; `rows` of a kind are the first elements of its groups."""
     kinds: dict[Any, list[tuple[int, ...]]] = {}
-    bodies = moving_bodies(plan.unknowns)
+    parts = moving_parts(plan.unknowns)
     for group in motion_groups(plan.unknowns):
-        signature = tuple(group_signature(plan.unknowns, row, bodies[row]) for row in group)
+        signature = tuple(group_signature(plan.unknowns, row, parts[row]) for row in group)
         kinds.setdefault(signature, []).append(group)
-    return [_trace_kind(number, groups, plan, places, bodies) for number, groups in enumerate(kinds.values())]
+    return [_trace_kind(number, groups, plan, places, parts) for number, groups in enumerate(kinds.values())]
 
 
 def _trace_kind(
-    number: int, groups: list[tuple[int, ...]], plan: MotionPlan, places: GroupLayout, bodies: Sequence[Sequence[ChainBody]]
+    number: int, groups: list[tuple[int, ...]], plan: MotionPlan, places: GroupLayout, parts: Sequence[ElementParts]
 ) -> Kind:
     names = ("at", "row", "q")
     out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names)
@@ -145,7 +144,7 @@ def _trace_kind(
         )
     )
     columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), _Record()
-    group = MovingGroup(plan, out, groups, columns, bodies)
+    group = MovingGroup(plan, out, groups, columns, parts)
     moving = _trace_move(out, record, places, group)
     factors = _trace_factors(factor, record, plan, places, group, moving)
 
@@ -196,6 +195,7 @@ def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingG
         axes, needed = constants(np.zeros((3, 3))), body.needed_axes
         axes[:, needed] = record.keep(out, frame.axes[:, needed])
         joints.append(JointLine(record.keep(out, axis), kept_shift, axes, body, wrenches[-1][3:]))
+    frame = replace(frame, axes=frame.axes @ group.turn)
     reach = frame.axes @ group.reach
     store_frame(out, places.frame, frame.shifted(range(3), group.reach))
     return _Moving(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques))))
@@ -228,6 +228,7 @@ def _trace_place(block: Block, places: GroupLayout, group: MovingGroup) -> None:
             origin = origin + axes[:, 2] * element.coordinates[0]
         else:
             axes = turned(axes, element.coordinates[0])
+    axes = axes @ group.turn
     block.store_all(places.frame, axes.ravel().tolist())
     block.store_all(places.origin, (origin + axes @ group.reach).tolist())
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,9 +33,9 @@ class MovingGroup:
         block: Block,
         groups: Sequence[tuple[int, ...]],
         columns: TableColumns,
-        bodies: Sequence[Sequence[ChainBody]],
+        parts: Sequence[ElementParts],
     ) -> None:
-        """Read the elements of the groups, base to tip, and their `moving_bodies`.
+        """Read the elements of the groups, base to tip, and their `moving_parts`.
 
         In the block `q` is the place of the first unknown, or of the motor.
         """
@@ -51,12 +52,14 @@ class MovingGroup:
         """`h/2 D + h^2/4 K` of each unknown."""
         self.torques: list[Scalar] = []
         """Torque of spring, damper and muscles on each unknown."""
-        self.reach = columns.entries([reach_behind(unknowns, group[-1]) for group in groups])
+        self.turn = constants(parts[groups[0][-1]].turn)
+        """Axes of its end in those of its last element, shape (3, 3)."""
+        self.reach = columns.entries([parts[group[-1]].reach for group in groups])
         """From its end to the beginning of the next group, or to the tip, in the axes of its end [m]."""
         h, place = block.load(layout.time_step), 0
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
-            element = table_element(ones, columns)
+            element = replace(table_element(ones, columns), rotation=columns.entries([parts[row].rotation for row in rows]))
             rest = columns.entries([one.rest for one in ones])
             coordinates = [columns.entry([one.coordinates[axis] for one in ones]) for axis in range(len(element.coordinates))]
             rates: list[Scalar] = [0.0] * len(coordinates)
@@ -83,7 +86,7 @@ class MovingGroup:
             self.elements.append(replace(element, coordinates=coordinates))
             self.rates.append(rates)
             self.changes.append(changes)
-            self.bodies += [_body(alike, columns) for alike in zip(*(bodies[row] for row in rows), strict=True)]
+            self.bodies += [_body(alike, columns) for alike in zip(*(parts[row].bodies for row in rows), strict=True)]
 
     def joints(self, block: Block, cosines: int, sines: int) -> tuple[list[JointState], Any]:
         """Return the joints, and the derivatives of their positions by the coordinates, shape (n, k).
@@ -135,6 +138,39 @@ def motion_groups(unknowns: Unknowns) -> list[tuple[int, ...]]:
     return groups
 
 
+class ElementParts(NamedTuple):
+    """Constants of an element in the axes that its group works with."""
+
+    bodies: Sequence[ChainBody]
+    """Its bodies; see `moving_bodies`."""
+    rotation: FloatArray
+    """Its axes in those in which its group begins, or in those of the element before, shape (3, 3)."""
+    turn: FloatArray
+    """Of the last element of a group: axes of the end of the group in its own, shape (3, 3)."""
+    reach: FloatArray
+    """Of the last element of a group: from its origin to the next group, in the axes of the end, shape (3,) [m]."""
+
+
+def moving_parts(unknowns: Unknowns) -> list[ElementParts]:
+    """Return the constants of each element.
+
+    A group of a straight rod ends in axes that are parallel at zero to those in which it begins, so that equal groups share
+    their code, whatever came before.
+    """
+    bodies, turn = moving_bodies(unknowns), np.eye(3)
+    parts = [
+        ElementParts(bodies[row], element.rotation, np.eye(3), reach_behind(unknowns, row))
+        for row, element in enumerate(unknowns.chain.elements)
+    ]
+    for group in motion_groups(unknowns):
+        first, last = group[0], group[-1]
+        parts[first] = parts[first]._replace(rotation=turn.T @ parts[first].rotation)
+        whole = functools.reduce(np.matmul, [parts[row].rotation for row in group])
+        turn = whole.T if np.all(np.isin(whole, (-1.0, 0.0, 1.0))) else np.eye(3)
+        parts[last] = parts[last]._replace(turn=turn, reach=turn.T @ parts[last].reach)
+    return parts
+
+
 def moving_bodies(unknowns: Unknowns) -> list[list[ChainBody]]:
     """Return the bodies of each element, where they cost least.
 
@@ -160,12 +196,12 @@ def moving_bodies(unknowns: Unknowns) -> list[list[ChainBody]]:
     return bodies
 
 
-def group_signature(unknowns: Unknowns, row: int, bodies: Sequence[ChainBody]) -> tuple[Any, ...]:
+def group_signature(unknowns: Unknowns, row: int, parts: ElementParts) -> tuple[Any, ...]:
     """Return the properties that elements with the same code share."""
-    rounds = [part and part[0] for part in (round_part(body.inertia) for body in bodies)]
-    segment = unknowns.segment_at(row)
-    reach = (reach_behind(unknowns, row) != 0.0).tolist()
-    return (*element_signature(unknowns, row), str(rounds), segment and segment.muscles, str(reach))
+    rounds = [part and part[0] for part in (round_part(body.inertia) for body in parts.bodies)]
+    segment, (kind, moving, *_, muscles) = unknowns.segment_at(row), element_signature(unknowns, row)
+    zeros = [(array == 0.0).tolist() for array in (parts.rotation, parts.reach)]
+    return kind, moving, muscles, str(rounds), segment and segment.muscles, str(zeros), str(parts.turn.tolist())
 
 
 def reach_behind(unknowns: Unknowns, row: int) -> FloatArray:
