@@ -19,6 +19,7 @@ from studies.benchmark.arm_baselines import (
     add_python,
     batch_name,
     compiled_batch,
+    compiled_calls,
     expected_springs,
     newton_name,
     pinocchio_calls,
@@ -97,9 +98,12 @@ def under_gravity(settings: Settings) -> Outcome:
     robot, newton = PinocchioArm(arm(), EARTH_GRAVITY), newton_name("torque derivatives")
     comparison.add(FIXED_POINT, partial(pinocchio_calls, FIXED_POINT, robot, fixed_point, few, expected))
     comparison.add(newton, partial(pinocchio_calls, newton, robot, newton_by_torque_derivatives, few, expected))
+    weightless = f"{single_name('numba')}, weightless"
+    comparison.add(weightless, partial(compiled_calls, "numba", few, expected_springs(few, None), None))
     comparison.run()
     job, fast, single = "equilibrium under gravity", batch_name("numba"), single_name("numba")
-    return Outcome([comparison.cheaper(job, ours, baseline) for ours in (fast, single) for baseline in (FIXED_POINT, newton)])
+    rows = [comparison.cheaper(job, ours, baseline) for ours in (fast, single) for baseline in (FIXED_POINT, newton)]
+    return Outcome([*rows, comparison.costlier(job, single, weightless)])
 
 
 def batches(settings: Settings) -> Outcome:

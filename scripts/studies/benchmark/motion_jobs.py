@@ -1,0 +1,175 @@
+"""Jobs of motion: rods of many pairs of hinges and the inflatable arm, against real time and against MuJoCo at equal error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import SoftRobotsError
+from softrobots.dynamics.simulation import simulate
+from softrobots.model.loader import load_model
+from softrobots.robots.pcc_arm import PccArm
+from softrobots.statics.equilibrium import solve_equilibrium
+from softrobots.statics.loads import EARTH_GRAVITY
+from studies.benchmark.cases import arm, random_forces
+from studies.benchmark.comparison import Comparison, Outcome, Settings
+from studies.benchmark.compiled_solvers import compiled
+from studies.benchmark.measurement import Workload, spread
+from studies.benchmark.mujoco_motion import MujocoMotion, Released, tip_error
+from studies.benchmark.results import AT_LEAST, Row
+
+COMPILED, PYTHON, MUJOCO, REAL_TIME = "compiled, numba", "simulate", "MuJoCo, best integrator and step", "real time"
+TIP_ERROR = 5e-4
+"""Mean error of the tip at which rods are compared [m]."""
+ARM_STEP = 1e-3
+"""Step of the inflatable arm [s]."""
+
+_STEPS = (10e-3, 5e-3, 4e-3, 2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3, 0.25e-3)  # tried for rods, the longest first [s]
+_LENGTH, _RADIUS, _YOUNG, _DENSITY, _PUSH = 0.4, 5e-3, 70e6, 1200.0, 0.1  # of a rod of TPU, SI units
+_DAMPING = 1e-3  # [s]: 0.7 % of critical damping in the first mode
+_ROW = 0.02  # [s]
+
+
+def motion(settings: Settings) -> Outcome:
+    """Motion of rods and of the arm."""
+    outcomes = [
+        _rod(settings, pairs, target)
+        for pairs, target in zip((3, 2) if settings.quick else (30, 50), (100.0, 50.0), strict=True)
+    ]
+    outcomes.append(_arm(settings))
+    return Outcome([row for one in outcomes for row in one.rows], notes=[note for one in outcomes for note in one.notes])
+
+
+def _rod(settings: Settings, pairs: int, target: float) -> Outcome:
+    """A rod of TPU that is let go: the longest step whose tip is near enough to that of the tests' own rod."""
+    area = np.pi * _RADIUS**2
+    bending = _YOUNG * area * _RADIUS**2 / 4.0
+    model = load_model(
+        PccArm(
+            segment_lengths=(_LENGTH,), muscle_azimuths=(), chain="lumped", hinges=pairs, extension=False, radius=_RADIUS,
+            bending_stiffness=bending, torsional_stiffness=bending / 1.5, linear_density=_DENSITY * area,
+        )
+    )  # fmt: skip
+    start = solve_equilibrium(model, (), force=(_PUSH, 0.0, 0.0), gravity=EARTH_GRAVITY)
+    released = Released(start, EARTH_GRAVITY, _DAMPING, _ROW, 5 if settings.quick else 500)
+    job, comparison = f"motion of a rod, {pairs} pairs with twist", Comparison(settings, f"motion of {pairs} pairs")
+    notes: list[str] = []
+    ours = partial(compiled(model, "numba").simulate, released.duration, ())
+    expected = reference(released.duration, released.rows)
+    bound = np.inf if settings.quick else TIP_ERROR
+
+    def tuned() -> Workload:
+        for step in _STEPS:
+            run = _run(ours, released, step)
+            error = tip_error(run().tip_position, expected)
+            if error <= bound:
+                notes.append(f"{job}, compiled: steps of {1e3 * step:g} ms, mean error of the tip {1e3 * error:.2g} mm")
+                return Workload(1, run)
+        raise SoftRobotsError(f"the tip is {1e3 * error:.2g} mm off with steps of {1e3 * step:g} ms")
+
+    _compare(comparison, notes, job, tuned, released, expected, bound)
+    return Outcome(
+        [
+            _real_time(comparison, job, released.duration, target),
+            comparison.cheaper(f"{job}, equal error", COMPILED, MUJOCO, AT_LEAST, 10.0),
+        ],
+        notes=notes,
+    )
+
+
+def reference(duration: float, rows: int) -> FloatArray:
+    """Path of the tip of the rod by `tests.support.planar_rod`, shape (rows + 1, 3) [m]."""
+    from tests.support.planar_rod import PlanarRod
+
+    rod = PlanarRod(_LENGTH, _RADIUS, _YOUNG, _DENSITY, 8, retardation=_DAMPING, gravity=(0.0, EARTH_GRAVITY[2]))
+    step = 2e-5  # [s]: the damping of the highest polynomial is stiff
+    tips = rod.tips(rod.equilibrium((_PUSH, 0.0)), duration, rows, round(duration / rows / step))
+    return np.stack([tips[:, 0], 0.0 * tips[:, 0], tips[:, 1]], axis=1)
+
+
+def _arm(settings: Settings) -> Outcome:
+    """The inflatable arm of three motors and four springs, let go at steps of 1 ms."""
+    model, motors = arm(), (0.3, 0.6, -0.8)
+    start = solve_equilibrium(model, motors, force=(0.0, 10.0, -15.0), gravity=EARTH_GRAVITY)
+    released = Released(start, EARTH_GRAVITY, 1e-3, _ROW, 5 if settings.quick else 100)
+    job, comparison, solver = (
+        "motion of the arm, steps of 1 ms",
+        Comparison(settings, "motion of the arm"),
+        compiled(model, "numba"),
+    )
+    finest = _run(partial(simulate, model, released.duration, motors), released, ARM_STEP / 8.0)().tip_position
+    ours = _run(partial(solver.simulate, released.duration, motors), released, ARM_STEP)
+    error, notes = tip_error(ours().tip_position, finest), []
+    notes.append(f"{job}: mean error of the tip {1e3 * error:.2g} mm")
+    _compare(comparison, notes, job, lambda: Workload(1, ours), released, finest, np.inf if settings.quick else error)
+    comparison.add(PYTHON, lambda: Workload(1, _run(partial(simulate, model, released.duration, motors), released, ARM_STEP)))
+    count = 8 if settings.quick else 256
+    forces = random_forces(count, 10.0)
+    batch = partial(
+        solver.simulations, released.duration, np.tile(motors, (count, 1)), forces=forces, gravity=EARTH_GRAVITY,
+        damping_time=released.damping_time, time_step=ARM_STEP, output_step=released.duration,
+    )  # fmt: skip
+    comparison.add(f"{COMPILED}, batch", lambda: Workload(count, batch))
+    comparison.run()
+    return Outcome(
+        [
+            _real_time(comparison, job, released.duration, 1000.0, run=False),
+            _real_time(comparison, job, released.duration, 5000.0, f"{COMPILED}, batch", run=False),
+            comparison.cheaper(job, COMPILED, PYTHON),
+            comparison.cheaper(f"{job}, equal error", COMPILED, MUJOCO, AT_LEAST, 10.0),
+        ],
+        notes=notes,
+    )
+
+
+def _run(solve: Callable[..., Any], released: Released, step: float) -> Callable[[], Any]:
+    """A simulation with steps of one length."""
+    return partial(
+        solve, start=released.start, gravity=released.gravity, damping_time=released.damping_time, time_step=step,
+        output_step=released.row_step,
+    )  # fmt: skip
+
+
+def _compare(
+    comparison: Comparison, notes: list[str], job: str, ours: Callable[[], Workload], released: Released, expected: FloatArray,
+    error: float,
+) -> None:  # fmt: skip
+    """Add ours, and MuJoCo tuned for the error."""
+    comparison.add(COMPILED, ours)
+
+    def tuned() -> Workload:
+        simulator = MujocoMotion(released)
+        notes.append(f"{job}, MuJoCo: {simulator.tune(expected, error)}")
+        return Workload(1, simulator.path)
+
+    comparison.add(MUJOCO, tuned)
+
+
+def _real_time(
+    comparison: Comparison, job: str, duration: float, target: float, name: str = COMPILED, *, run: bool = True
+) -> Row:
+    """How many times faster than real time a motion is simulated; the cost is that of one second."""
+    if run:
+        comparison.run()
+    if name in comparison.absent:
+        return Row(
+            job,
+            name,
+            REAL_TIME,
+            "times cheaper",
+            None,
+            None,
+            None,
+            AT_LEAST,
+            target,
+            None,
+            None,
+            "CPU",
+            comparison.absent[name],
+        )
+    seconds = comparison.seconds[name] / duration
+    return Row(job, name, REAL_TIME, "times cheaper", *spread(1.0 / seconds), AT_LEAST, target, float(np.median(seconds)), 1.0)
