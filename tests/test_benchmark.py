@@ -15,12 +15,13 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from studies.benchmark import compiled_solvers, mujoco_settling, pinocchio_solvers, processes
+from studies.benchmark import cases, compiled_solvers, motion_jobs, mujoco_settling, pinocchio_solvers, processes
 from studies.benchmark.aligned_joints import aligned_joints
 from studies.benchmark.cases import FORCE, ROD_LENGTH, ROD_STIFFNESS, path_targets, rod, rod_forces, standard_cases
 from studies.benchmark.comparison import Comparison, Settings, figure, quick_settings
 from studies.benchmark.jobs import JOBS, measure
 from studies.benchmark.measurement import Workload, interleaved, ratio, require_agreement
+from studies.benchmark.mujoco_motion import MujocoMotion, Released, tip_error
 from studies.benchmark.mujoco_settling import SettlingArm
 from studies.benchmark.numpy_arrays import ArrayArm
 from studies.benchmark.pictures import PICTURES
@@ -277,6 +278,13 @@ class StandIn:
     def follow(self, targets: object, force: object, *, q_motors0: object, tolerance: float) -> sr.Trajectory:
         return sr.follow_trajectory(self.model, targets, force, q_motors0=q_motors0)
 
+    def simulate(self, duration: float, q_motors: object, **options: object) -> sr.Motion:
+        return sr.simulate(self.model, duration, q_motors, **options)
+
+    def simulations(self, duration: float, q_motors: object, *, forces: object, **options: object) -> list[sr.Motion]:
+        pairs = zip(q_motors, forces, strict=True)
+        return [self.simulate(duration, motors, force=force, **options) for motors, force in pairs]
+
 
 @pytest.fixture
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple]]:
@@ -315,6 +323,41 @@ def test_jobs_compare_ours_with_the_baselines(tool: Callable, stand_in: list) ->
         assert row.clock == ("wall" if "wall clock" in row.job else "CPU")
 
 
+def test_motion_is_compared_with_real_time_and_with_mujoco(
+    tool: Callable, stand_in: list, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tool("mujoco")
+    monkeypatch.setattr(motion_jobs, "reference", lambda duration, rows: np.zeros((rows + 1, 3)))
+    results = measure(QUICK, ["motion"])
+    assert [row.skipped for row in results.rows] == [""] * 8
+    assert [row.target for row in results.rows] == [100.0, 10.0, 50.0, 10.0, 1000.0, 5000.0, None, 10.0]
+    for row in results.rows:
+        assert row.value == pytest.approx(row.baseline_seconds / row.our_seconds, rel=1e-12)
+    assert sum("MuJoCo" in note and "steps of" in note for note in results.notes) == 3
+
+
+def test_mujoco_is_tuned_for_an_error_of_the_tip(tool: Callable) -> None:
+    tool("mujoco")
+    start = sr.solve_equilibrium(cases.arm(), (0.3, 0.6, -0.8), force=(0.0, 10.0, -15.0), gravity=sr.EARTH_GRAVITY)
+    simulator = MujocoMotion(Released(start, sr.EARTH_GRAVITY, 1e-3, 0.02, 5))
+    moved = sr.simulate(
+        cases.arm(),
+        0.1,
+        start.q_motors,
+        start=start,
+        gravity=sr.EARTH_GRAVITY,
+        damping_time=1e-3,
+        time_step=1e-4,
+        output_step=0.02,
+    )
+    assert "RK4" in simulator.tune(moved.tip_position, 2e-6)
+    assert tip_error(simulator.path(), moved.tip_position) < 2e-6  # both are the same arm
+    simulator.set("RK4", 1)
+    assert tip_error(simulator.path(), moved.tip_position) > 2e-6
+    with pytest.raises(sr.SoftRobotsError, match="no step that keeps the tip within 0 mm"):
+        simulator.tune(moved.tip_position + 1e-3, 0.0)
+
+
 def test_curves_go_over_all_sizes(stand_in: list, tmp_path: Path) -> None:
     results = measure(dataclasses.replace(QUICK, sizes=(2, 3)), ["sizes", "batches"])
     assert [curve.sizes for curve in results.curves if curve.picture == "sizes"] == [(2, 3)] * 5
@@ -329,7 +372,7 @@ def test_wrong_answers_of_ours_are_not_timed(stand_in: list, monkeypatch: pytest
         return sr.solve_equilibrium(self.model, q_motors, 0.5 * np.asarray(force), gravity=gravity)
 
     monkeypatch.setattr(StandIn, "equilibrium", half)
-    rows = measure(QUICK, ["gravity"]).rows
+    rows = measure(QUICK, ["gravity"]).rows[:-1]  # the last one compares ours with ours
     assert all("is off by" in row.skipped and row.value is None and row.baseline_seconds > 0.0 for row in rows)
 
 

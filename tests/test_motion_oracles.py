@@ -17,7 +17,7 @@ from tests.support.rods import elastica_tip
 
 STEEL = PlanarRod(0.6, 0.8e-3, 200e9, 7850.0, gravity=(0.0, -9.81))
 TPU = PlanarRod(0.4, 5e-3, 70e6, 1200.0, stretches=6, gravity=(0.0, -9.81))
-RELEASED = {"steel": (STEEL, 0.6, (13, 2000)), "TPU": (TPU, 0.3, (11, 1100))}
+RELEASED = {"steel": (STEEL, 0.15, (13, 2000)), "TPU": (TPU, 0.1, (11, 1100))}
 """Rods that stand upright and are released from a sideways force [N]; polynomials and steps per 0.05 s of the reference."""
 SOFT = CosseratRod(0.4, 0.02, 1e6, 1000.0, 24, gravity=(0.0, 0.0, -3.0))
 
@@ -153,6 +153,8 @@ def test_ten_thousand_random_runs_end_with_numbers(engine: str) -> None:
     rng, failed, runs = np.random.default_rng(21), 0, 0
     for kind in law_robots.ROBOTS:
         model = law_robots.model(kind)
+        if engine == "compiled" and model.muscles and model.muscle_input == "lengths":
+            continue  # refused there
         simulate: Any = (
             sr.compile(model).simulate if engine == "compiled" else lambda *a, model=model, **o: sr.simulate(model, *a, **o)
         )
