@@ -74,7 +74,9 @@ class Motion:
     velocities: FloatArray
     """Their rates, shape (n, n_springs) [rad/s or m/s]."""
     motor_torques: FloatArray
-    """Load that each actuator carries, with that of the accelerated masses, shape (n, n_motors) [N m or N]."""
+    """Load that each actuator carries, with that of the accelerated masses, shape (n, n_motors) [N m or N].
+
+    Of a motor that moves by its torque: minus that torque."""
     forces: FloatArray
     """Force on the tip, shape (n, 3) [N]."""
     gravity: tuple[float, float, float] | None
