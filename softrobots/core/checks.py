@@ -92,6 +92,14 @@ def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
     return array
 
 
+def one_each(name: str, value: Any, count: int, unit: str) -> FloatArray:
+    """Return one number for all or one for each of `count`, zero or positive, as an array, or raise ParameterError."""
+    given = non_negative_array(name, value, unit)
+    if given.shape not in ((), (count,)):
+        raise ParameterError(name, value, f"one number, or of shape ({count},) [{unit}] (it has shape {given.shape})")
+    return np.array(np.broadcast_to(given, (count,)))
+
+
 def common_shape(name: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
     """Return the shape to which arrays of these shapes broadcast, or raise ParameterError."""
     try:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, instance_of, non_negative_array, non_negative_number
+from softrobots.core.checks import FloatArray, finite_array, instance_of, non_negative_number, one_each
 from softrobots.core.errors import LoadNotFound, ParameterError
 from softrobots.dynamics.time_inputs import checked_function, curve
 from softrobots.model.soft_model import SoftModel, check_model
@@ -55,7 +55,7 @@ class PD:
         count = len(model.structure.motor_joints)
         if count == 0:
             raise ParameterError("model", model, "a robot with at least one motor joint")
-        self._kp, self._kd = _gains("kp", kp, count), _gains("kd", kd, count)
+        self._kp, self._kd = one_each("kp", kp, count, "N m/rad"), one_each("kd", kd, count, "N m s/rad")
         self._reference = _law(model, "reference", reference, model.n_motors, lambda one: one.q_motors)
         self._feed_forward = _law(
             model, "feed_forward", np.zeros(count) if feed_forward is None else feed_forward, count, _held
@@ -126,14 +126,12 @@ class ClosedLoop:
         if count < 3 or model.muscles:
             raise ParameterError("model", model, "a robot with three motor joints or more, and no muscles")
         self._path = instance_of("path", path, Path3D, "a Path3D, e.g. of softrobots.straight_line")
-        self._kp, self._kd = _gains("kp", kp, count), _gains("kd", kd, count)
+        self._kp, self._kd = one_each("kp", kp, count, "N m/rad"), one_each("kd", kd, count, "N m s/rad")
         self._start = instance_of("start", start, Equilibrium, "an Equilibrium")
         if start.model != model:
             raise ParameterError("start", start.model, f"an Equilibrium of the model given, {model!r}")
-        self._gain, self._filter = (
-            non_negative_number("gain", gain, "1/s"),
-            non_negative_number("filter_time", filter_time, "s"),
-        )
+        self._gain = non_negative_number("gain", gain, "1/s")
+        self._filter = non_negative_number("filter_time", filter_time, "s")
         self._load = Load.of(model, None, gravity=gravity)
         self._forget()
 
@@ -177,13 +175,6 @@ class ClosedLoop:
         torque = self._kp * (self._command - q) + self._kd * (rate - qd) - self._felt
         self._exerted = -torque
         return np.asarray(torque)
-
-
-def _gains(name: str, value: Any, count: int) -> FloatArray:
-    gains = non_negative_array(name, value, "N m/rad")
-    if gains.shape not in ((), (count,)):
-        raise ParameterError(name, value, f"a number, or shape ({count},), one for each motor joint")
-    return np.broadcast_to(gains, (count,))
 
 
 def _law(

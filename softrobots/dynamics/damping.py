@@ -19,6 +19,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_number
 from softrobots.core.errors import NotConverged, ParameterError
+from softrobots.model.assembly import velocity_indices
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.stability import mass_matrix
 
@@ -150,11 +151,9 @@ def _of_the_file(model: SoftModel) -> FloatArray:
     """The damping of the joints of the file, in elastic coordinates."""
     structure, joints = model.structure, np.array(model.pinocchio.damping)
     strains = [joints[structure.spring_indices]]
-    if structure.constant_strain:
-        places = {name: model.pinocchio.joints[model.pinocchio.getJointId(name)].idx_v for name in structure.section_joints}
-        for row in structure.section_table:
-            of_section = joints[[places[name] for name in row.joint_names]]
-            strains.append(of_section[np.array(_SHARING)].mean(axis=1))
+    for row in structure.section_table if structure.constant_strain else ():
+        of_section = joints[velocity_indices(model.pinocchio, row.joint_names)]
+        strains.append(of_section[np.array(_SHARING)].mean(axis=1))
     damping = np.concatenate(strains)
     if structure.muscle_lengths is None:
         return np.diag(damping)

@@ -26,9 +26,8 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.actuators import Drives
 from softrobots.model.coordinates import Point
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import AppliedLoad, Load
-
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 class EquationsOfMotion:
@@ -65,8 +64,7 @@ class EquationsOfMotion:
             self.rotor_inertia[: self.n_motors] = drives.rotor_inertia
             self.damping[: self.n_motors, : self.n_motors] += np.diag(drives.damping)
         self._undamped, self._rotorless = not self.damping.any(), not self.rotor_inertia.any()
-        given = model.muscles and model.muscle_input == "forces"
-        self._tensions = slice(self.n_motors - len(model.muscles), self.n_motors) if given else slice(0, 0)
+        self._tensions = slice(model.actuators.n_placed, self.n_motors)
         self._applied: tuple[Any, AppliedLoad] | None = None
         self._last: tuple[bytes, Point] | None = None
         self._motors_move = drives is not None
@@ -97,10 +95,8 @@ class EquationsOfMotion:
         joint_accelerations = point.velocity(accelerations[:m], accelerations[m:])
         joint_accelerations += point.velocity_product(rates[:m], rates[m:])
         q = self.model.embed(point.joints)
-        torque = -pin.rnea(self._pinocchio, self._data, q, joint_rates, joint_accelerations)
-        for frame, wrench in wrenches.items():
-            torque += wrench.dot(self._jacobian(q, frame))
-        forces: FloatArray = np.concatenate(point.loads(torque))
+        inertia = pin.rnea(self._pinocchio, self._data, q, joint_rates, joint_accelerations)
+        forces: FloatArray = np.concatenate(point.loads(self._joint_load(q, wrenches) - inertia))
         np.negative(forces, out=forces)
         forces[m:] += self.model.springs.at(x[m:])[1]
         if not self._undamped:
@@ -112,10 +108,7 @@ class EquationsOfMotion:
     def load(self, x: FloatArray, wrenches: Mapping[str, FloatArray]) -> FloatArray:
         """Wrenches on each coordinate, `Q^T J^T w`, shape (n,) [N m or N]: their power is that times the rates."""
         point = self.point(x)
-        q = self.model.embed(point.joints)
-        torque: FloatArray = np.zeros(len(point.joints))
-        for frame, wrench in wrenches.items():
-            torque += wrench.dot(self._jacobian(q, frame))
+        torque = self._joint_load(self.model.embed(point.joints), wrenches)
         return np.asarray(np.concatenate(point.columns(torque[None]), axis=1)[0])
 
     def mass_matrix(self, x: FloatArray) -> FloatArray:
@@ -155,16 +148,16 @@ class EquationsOfMotion:
     def actuator_rates(self, x: FloatArray, rates: FloatArray) -> FloatArray:
         """Rates with which actuators move, shape (n_motors,): those of the lengths where tensions are given [rad/s, m/s]."""
         moving = np.array(rates[: self.n_motors])
-        if self._tensions.stop:
+        if self._tensions.start < self.n_motors:
             moving[self._tensions] = self.model.structure.muscle_paths.at(x[self.n_motors :]).arms @ rates[self.n_motors :]
         return moving
 
-    def _jacobian(self, q: FloatArray, frame: str) -> Any:
-        """Jacobian of a frame, shape (6, nv), in world axes."""
-        if self._pinocchio.nv == 0:  # Pinocchio crashes without columns
-            return np.zeros((6, 0))
-        jacobian = pin.computeFrameJacobian(self._pinocchio, self._data, q, self.model.frame_id(frame), _AXES)
-        return jacobian.reshape(6, -1)
+    def _joint_load(self, q: FloatArray, wrenches: Mapping[str, FloatArray]) -> FloatArray:
+        """Wrenches on each joint, `J^T w`, shape (nv,) [N m or N]."""
+        torque: FloatArray = np.zeros(self._pinocchio.nv)
+        for frame, wrench in wrenches.items():
+            torque += wrench.dot(frame_jacobian(self.model, q, frame))
+        return torque
 
     def _load_of(self, wrenches: Mapping[str, FloatArray]) -> AppliedLoad:
         """The load of wrenches, kept while they stay the same object."""

@@ -63,8 +63,6 @@ class Step(NamedTuple):
     """What actuators exert in the middle, shape (n_motors,) [N m or N]."""
     wrenches: Wrenches
     """Load in the middle."""
-    iterations: int
-    """Evaluations of the equations of motion."""
     friction_power: float = 0.0
     """Power that dry friction takes in the middle [W]."""
 
@@ -176,7 +174,7 @@ class MidpointRule:
         if torque is not None:
             forces[: torque.count] = torque.exerted(*middle_state)
             lost = float(torque.resistance @ rates[: torque.count])
-        return Step(start, State(end_time, ends, end_rates), middle_state, accelerations, forces[:m], wrenches, iteration, lost)
+        return Step(start, State(end_time, ends, end_rates), middle_state, accelerations, forces[:m], wrenches, lost)
 
     def _path(self, time: float) -> FloatArray:
         """Actuators at a time, which may be the end of the last step."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.model.link_limits import LinkLimits, link_limits
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.kinematics import frame_placement
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,13 +105,9 @@ class Motion:
         Raises:
             NameNotFound: If there is no such frame.
         """
-        number = self.model.frame_id(self.model.tip if frame is None else frame)
-        pin_model, data = self.model.workspace(None)
-        poses: FloatArray = np.zeros((len(self.time), 4, 4))
-        for row in range(len(self.time)):
-            pin.forwardKinematics(pin_model, data, self.configuration(row))
-            poses[row] = pin.updateFramePlacement(pin_model, data, number).homogeneous
-        return poses
+        name = self.model.tip if frame is None else frame
+        configurations = map(self.configuration, range(len(self.time)))
+        return np.array([frame_placement(self.model, q, name).homogeneous for q in configurations])
 
     @cached_property
     def tip_position(self) -> FloatArray:

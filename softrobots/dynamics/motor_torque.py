@@ -58,7 +58,6 @@ class MotorTorque:
             constant = finite_array("torque", torque, (self.count,), "N m")
             torque = lambda *_: constant  # noqa: E731
         self._torque: Torque = torque
-        self._n = model.n_motors + model.n_springs
         self.sample_time = None if sample_time is None else positive_number("sample_time", sample_time, "s")
         """Time between two evaluations [s]; None: continuous."""
         drives = model.actuators.drives
@@ -136,12 +135,12 @@ class MotorTorque:
         by_x, by_rates = np.zeros((m, m)), np.zeros((m, m))
         if self.sample_time is None:
             here = self._evaluated(time, x, rates)
-            for joint in range(m):
-                for matrix, arguments in ((by_x, (x.copy(), rates)), (by_rates, (x, rates.copy()))):
-                    moved = arguments[0] if matrix is by_x else arguments[1]
-                    step = _DIFFERENCE * max(1.0, abs(moved[joint]))
-                    moved[joint] += step
-                    matrix[:, joint] += (self._evaluated(time, *arguments) - here) / step
+            for which, matrix in enumerate((by_x, by_rates)):
+                for joint in range(m):
+                    state = [x.copy(), rates.copy()]
+                    step = _DIFFERENCE * max(1.0, abs(state[which][joint]))
+                    state[which][joint] += step
+                    matrix[:, joint] += (self._evaluated(time, *state) - here) / step
         return by_x, by_rates
 
     def _evaluated(self, time: float, x: FloatArray, rates: FloatArray) -> FloatArray:

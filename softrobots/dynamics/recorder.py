@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.dynamics.midpoint import MidpointRule, State, Step
 from softrobots.dynamics.motion import Motion, MotionEnergy
+from softrobots.statics.kinematics import frame_placement
 
 
 class Recorder:
@@ -38,9 +38,8 @@ class Recorder:
     def tip(self, x: FloatArray) -> FloatArray:
         """Position of the tip, shape (3,) [m]."""
         model = self._equations.model
-        pin_model, data = model.workspace(None)
-        pin.forwardKinematics(pin_model, data, model.embed(self._equations.point(x).joints))
-        return np.array(pin.updateFramePlacement(pin_model, data, model.frame_id(model.tip)).translation)
+        q = model.embed(self._equations.point(x).joints)
+        return np.array(frame_placement(model, q, model.tip).translation)
 
     def add(self, step: Step) -> int:
         """Take a step; return how many rows there are more than ever before."""
@@ -51,9 +50,7 @@ class Recorder:
             load_work += h * float(equations.load(middle.x, step.wrenches) @ middle.rates)
         motor_work += h * float(step.actuator_forces @ equations.actuator_rates(middle.x, middle.rates))
         prescribed, tip = self.rule.prescribed, self.tip(step.end.x)
-        last = (
-            len(self._times) if step.end.time >= self._times[-1] else int(np.searchsorted(self._times, step.end.time, "right"))
-        )
+        last = int(np.searchsorted(self._times, step.end.time, "right"))
         for row in range(self.rows, last):
             time = float(self._times[row])
             x, rates = step.at(time)

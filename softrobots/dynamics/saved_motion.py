@@ -18,7 +18,6 @@ from softrobots.statics.loads import Load
 from softrobots.statics.saved_results import pack_model, unpack_model
 
 _NUMBERS = ("damping_time", "tip_error", "tolerance")
-_RATES = {"rad": "rad/s", "m": "m/s", "N": "N/s"}
 _LOADS = {"rad": "N m", "m": "N", "N": "N"}
 
 
@@ -40,8 +39,9 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
     time = finite_array("time", fields["time"], (None,), "s")
     if len(time) == 0 or fields["interrupted"].dtype != bool or fields["interrupted"].shape:
         raise FileFormatError("it must have at least one instant, and say whether it was interrupted")
-    widths = _columns(model)
-    columns = {name: read_only(finite_array(name, fields[name], (len(time), width))) for name, width in widths.items()}
+    columns: dict[str, Any] = {}
+    for name, width in _columns(model).items():
+        columns[name] = read_only(finite_array(name, fields[name], (len(time), width)))
     names = [one.name for one in fields_of(MotionEnergy)]
     energies = {name: read_only(finite_array(name, fields[name], (len(time),), "J")) for name in names}
     for motors in columns["q_motors"]:
@@ -49,20 +49,13 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
     for motors, springs in zip(columns["q_motors"], columns["q_springs"], strict=True):
         if not model.coordinates.at(motors, springs).valid:
             raise FileFormatError("a section is out of its range")
-    numbers = {name: finite_number(name, fields[name]) if name in fields else None for name in _NUMBERS}
+    numbers: dict[str, Any] = {name: finite_number(name, fields[name]) if name in fields else None for name in _NUMBERS}
     steps = finite_array("steps", fields["steps"], (None,), "s")
     return Motion(
         model=model,
         time=read_only(increasing("time", time, "s")),
-        q_motors=columns["q_motors"],
-        motor_velocities=columns["motor_velocities"],
-        q_springs=columns["q_springs"],
-        velocities=columns["velocities"],
-        motor_torques=columns["motor_torques"],
-        forces=columns["forces"],
-        damping_time=numbers["damping_time"],
-        tip_error=numbers["tip_error"],
-        tolerance=numbers["tolerance"],
+        **columns,
+        **numbers,
         gravity=load.gravity,
         energy=MotionEnergy(**energies),
         steps=read_only(increasing("steps", steps, "s")),
@@ -78,8 +71,8 @@ def _table(motion: Motion) -> dict[str, FloatArray]:
     blocks: list[tuple[list[str], Any]] = [
         ([f"{name} [{unit}]" for name, unit in motors], motion.q_motors),
         ([f"{name} [{unit}]" for name, unit in springs], motion.q_springs),
-        ([f"{name} velocity [{_RATES[unit]}]" for name, unit in motors], motion.motor_velocities),
-        ([f"{name} velocity [{_RATES[unit]}]" for name, unit in springs], motion.velocities),
+        ([f"{name} velocity [{unit}/s]" for name, unit in motors], motion.motor_velocities),
+        ([f"{name} velocity [{unit}/s]" for name, unit in springs], motion.velocities),
         ([f"{name} load [{_LOADS[unit]}]" for name, unit in motors], motion.motor_torques),
         ([f"tip {axis} [m]" for axis in "xyz"], motion.tip_position),
         ([f"force {axis} [N]" for axis in "xyz"], motion.forces),

@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray, non_negative_array
-from softrobots.core.errors import ParameterError
+from softrobots.core.checks import FloatArray, one_each
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.model.soft_model import SoftModel
@@ -61,12 +60,10 @@ def small_motion(
         ParameterError: If a number is negative or not finite, or a shape differs.
         DescriptionError: If the robot has more joints than Pinocchio supports.
     """
-    m, n_tensions = model.n_motors, len(model.muscles) if model.muscle_input == "forces" else 0
-    placed = m - n_tensions
-    drives = model.actuators.drives
+    m, placed, drives = model.n_motors, model.actuators.n_placed, model.actuators.drives
     if rotor_inertia is not None:
         given = one_each("rotor_inertia", rotor_inertia, placed, "kg m^2 or kg")
-        drives = drives._replace(rotor_inertia=np.pad(given, (0, n_tensions)))
+        drives = drives._replace(rotor_inertia=np.pad(given, (0, m - placed)))
     load, x = equilibrium.load, np.concatenate([equilibrium.q_motors, equilibrium.q_springs])
     equations = EquationsOfMotion(model, load.gravity, drives=drives)
     point, whole, stiffness = equations.point(x), equations.mass_matrix(x), equations.stiffness(x, load.wrenches)
@@ -86,14 +83,6 @@ def small_motion(
         tip=columns(frame_jacobian(model, equilibrium.q, model.tip)),
         momentum=columns(_momentum(model, equilibrium.q)),
     )
-
-
-def one_each(name: str, value: Any, count: int, unit: str) -> FloatArray:
-    """Return one number for all or one for each of `count`, zero or positive, as an array, or raise ParameterError."""
-    given = non_negative_array(name, value, unit)
-    if given.shape not in ((), (count,)):
-        raise ParameterError(name, value, f"one number, or of shape ({count},) [{unit}] (it has shape {given.shape})")
-    return np.array(np.broadcast_to(given, (count,)))
 
 
 def _momentum(model: SoftModel, q: FloatArray) -> FloatArray:

@@ -37,8 +37,7 @@ def first_state(model: SoftModel, start: Any, path: MotorPath, free: int = 0) ->
             raise ParameterError("start", start, "an Equilibrium, a Motion, a MotionState, or None (relaxed, at rest)")
         if start.model != model:
             raise ParameterError("start", start.model, f"a state of the model given, {model!r}")
-        placed = slice(free, model.n_motors - (len(model.muscles) if model.muscle_input == "forces" else 0))
-        apart = np.abs(motors - start.q_motors)[placed].max(initial=0.0)
+        apart = np.abs(motors - start.q_motors)[free : model.actuators.n_placed].max(initial=0.0)
         if apart > _APART:
             text = f"at {start.q_motors.tolist()} at t = 0, where `start` has the actuators (it is {apart:.3g} rad or m away)"
             raise ParameterError("q_motors", motors, text)

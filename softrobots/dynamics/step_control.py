@@ -136,8 +136,6 @@ def _first_knee(recorder: Recorder, step: Step) -> float | None:
     """First time well within a step at which a spring reaches or leaves the plateau of its law [s]; None: none does."""
     equations = recorder.rule.equations
     springs, m = equations.model.springs, equations.n_motors
-    if not springs.has_plateaus:
-        return None
     before, after = (springs.beyond_plateaus(state.x[m:]) for state in (step.start, step.end))
     times = [step.end.time]
     for hinge in np.flatnonzero((before < 0.0) != (after < 0.0)).tolist():

@@ -63,8 +63,7 @@ class MotorPath:
 
     def _find_kicks(self, model: SoftModel, duration: float) -> None:
         """Find the jumps of tensions and of velocities; positions have none."""
-        placed = model.n_motors - (len(model.muscles) if model.muscle_input == "forces" else 0)
-        signal, near = self._signal, _NEAR * duration
+        placed, signal, near = model.actuators.n_placed, self._signal, _NEAR * duration
         jumps = find_jumps(lambda time: signal(time)[:placed], duration)
         if len(jumps):
             text = f"a continuous function of time; it jumps at {jumps[0]:.6g} s"

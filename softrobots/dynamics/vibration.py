@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.core.checks import FloatArray, positive_integer, positive_number, read_only
+from softrobots.core.checks import FloatArray, one_each, positive_integer, positive_number, read_only
 from softrobots.core.errors import DescriptionError, NeutralEquilibrium, ParameterError
-from softrobots.dynamics.small_motion import one_each, small_motion
+from softrobots.dynamics.small_motion import small_motion
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled

@@ -62,6 +62,8 @@ class Actuators:
         """Rotors, friction and largest torques."""
         self.names = (*joints, *(muscle.name for muscle in muscles))
         """Name of each."""
+        self.n_placed = len(joints) if lengths is None else len(self.names)
+        """Number of those that have a place, which come first: all but muscles of given tension."""
         self.limits = read_only(np.concatenate([joint_limits, self.muscle_forces if lengths is None else self.muscle_lengths]))
         """Lower and upper limits, shape (n_motors, 2) [rad, m or N]."""
         muscle_scale = 1.0 / (softness * distance) if lengths is None else distance

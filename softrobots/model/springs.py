@@ -161,11 +161,6 @@ class Springs:
         """Return the places of the springs whose hinge is on its plateau at coordinates `y`, shape (n,)."""
         return frozenset(place for hinge in self._softened(y) if hinge.tangent == 0.0 for place in hinge.places)
 
-    @cached_property
-    def has_plateaus(self) -> bool:
-        """Whether the moment of a link ends in a plateau, with a knee at its beginning."""
-        return any(group.max_moment is not None for group in self.groups)
-
     def beyond_plateaus(self, y: FloatArray) -> FloatArray:
         """Return how far each hinge with a plateau is bent beyond its knee, negative before it, shape (n_hinges,) [rad]."""
         return np.array(

@@ -185,7 +185,7 @@ def replay(equations: EquationsOfMotion, course: Course, taken: Taken, rows: Flo
         last = State(end, np.concatenate([u1, y1]), np.concatenate([rates[:m] + half, v1]))
         wrenches = course.load(middle_time)
         forces = equations.balance(x, rates, accelerations, wrenches)[:m]
-        recorder.add(Step(begin, last, State(middle_time, x, rates), accelerations, forces, wrenches, 1))
+        recorder.add(Step(begin, last, State(middle_time, x, rates), accelerations, forces, wrenches))
         if end in course.path.kicks and end < recorder.duration:
             recorder.kick(course.path.kicks[end])
     return recorder.motion(**facts)
