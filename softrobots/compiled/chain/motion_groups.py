@@ -14,13 +14,14 @@ from softrobots.compiled.chain.looped_chain import TableColumns, element_signatu
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import JointState, RigidBody, SectionState, joint_state, round_part
 from softrobots.compiled.chain.muscle_terms import pulls_on
-from softrobots.compiled.chain.recursion import TracedElement
+from softrobots.compiled.chain.recursion import TracedElement, range_margin
 from softrobots.compiled.chain.unknowns import Unknowns, bodies_of
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Scalar, if_less
 from softrobots.core.checks import FloatArray
 from softrobots.model.serial_chain import ChainBody, ChainJoint
 
+_OUT_OF_RANGE = 1e200  # torque on a section beyond its range: a step that ends there does not converge
 _MOST_JOINTS = 4  # of a group: its cost grows with their square
 
 
@@ -96,6 +97,8 @@ class MovingGroup:
         first = self.elements[0]
         if first.kind == "section":
             section = SectionState(first.coordinates, self.rates[0], self.changes[0], first.length)
+            beyond = if_less(0.0, range_margin(first, section.screw), 0.0, _OUT_OF_RANGE)
+            self.torques[0] = self.torques[0] + beyond
             return section.joints, section.slopes[:, list(first.moving)]
         joints = []
         for place, (element, rates, changes) in enumerate(zip(self.elements, self.rates, self.changes, strict=True)):

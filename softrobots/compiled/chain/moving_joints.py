@@ -193,7 +193,8 @@ class SectionState:
 
     def __init__(self, z: Sequence[Scalar], rates: Sequence[Scalar], changes: Sequence[Scalar], length: Scalar) -> None:
         """Evaluate the joints at section coordinates, velocities and accelerations (4), and rest length [m]."""
-        motion = Screw(z, length)
+        self.screw = motion = Screw(z, length)
+        """Its screw motion."""
         self._chord_axes(motion)
         lift, turning = motion.accelerations(rates)
         back = self._chord.T

@@ -166,7 +166,7 @@ def inward(
         if len(loads) > 1:
             balance.weight = balance.weight + motion.weight[row] * motion.weight[row]
     if outward_pass.screw is not None:
-        balance.range_margin = smaller(balance.range_margin, _range_margin(element, outward_pass.screw))
+        balance.range_margin = smaller(balance.range_margin, range_margin(element, outward_pass.screw))
     shifted = [Load(load.force, load.lever + outward_pass.shift * load.share, load.share) for load in at_start]
     if not moving:
         return InwardPass(motion, [], None, shifted, beyond)
@@ -240,7 +240,7 @@ def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[L
     return sliding_joint(axis, here), slid
 
 
-def _range_margin(element: TracedElement, screw: Screw) -> Scalar:
+def range_margin(element: TracedElement, screw: Screw) -> Scalar:
     """Return a number that is positive for a section in range: bending and twist below half a turn, positive length."""
     direction = screw.position
     at_end = screw.rotation[:, 2] @ direction
@@ -254,7 +254,7 @@ def _range_margin(element: TracedElement, screw: Screw) -> Scalar:
         np.pi**2 - element.coordinates[2] * element.coordinates[2],
         element.coordinates[3] + 0.999 * element.length,
     ]
-    range_margin: Scalar = margins[0]
+    least: Scalar = margins[0]
     for one in margins[1:]:
-        range_margin = smaller(range_margin, one)
-    return range_margin
+        least = smaller(least, one)
+    return least
