@@ -59,7 +59,7 @@ class CompiledDynamics(CompiledStatics):
 
         Args:
             duration: Time to simulate [s].
-            q_motors: Motors, shape (n_motors,) [rad or m]: constants, a `Trajectory` or a function of time.
+            q_motors: Actuators, shape (n_motors,) [rad, m or N]: constants, a `Trajectory` or a function of time.
             start: An `Equilibrium`, a `Motion` or a `MotionState`; by default relaxed springs at rest.
             force: Force on the tip, shape (3,) [N], world axes: constant, a table or a function of time.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
@@ -143,7 +143,7 @@ class CompiledDynamics(CompiledStatics):
         Args:
             q_springs: Elastic coordinates at the beginning, shape (n_springs,) [rad or m].
             velocities: Their rates, shape (n_springs,) [rad/s or m/s].
-            q_motors: Motors, shape (n_motors,) [rad or m] if they stand still, or (3, n_motors): at the beginning, in the
+            q_motors: Actuators, shape (n_motors,) [rad, m or N] if they stand still, or (3, n_motors): at the beginning, in the
                 middle and at the end of the step.
             force: Force on the tip in the middle of the step, shape (3,) [N], world axes.
             time_step: Length of the step [s].
@@ -199,7 +199,7 @@ class CompiledDynamics(CompiledStatics):
 
         Args:
             duration: Time to simulate [s].
-            q_motors: Motors that stand still, shape (n, n_motors), or (n_motors,) for all cases [rad or m]; a `Trajectory` or a
+            q_motors: Actuators that stand still, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N]; a `Trajectory` or a
                 function of time for all cases; or a list of those.
             starts: Elastic coordinates at rest, shape (n, n_springs) or (n_springs,) [rad or m]; a pair of those and their
                 rates; a `MotionBatch`, whose last rows are taken, or an `EquilibriumBatch`; by default relaxed springs.

@@ -1,4 +1,4 @@
-"""Compiled load estimation and inverse kinematics of a robot, on top of its compiled equilibria; `softrobots.compile`."""
+"""Compiled load estimation and inverse kinematics of a robot, on top of its equilibria and motion; `softrobots.compile`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SEED = 20210312  # of the motors that searches of a batch start from
 
 
 def compile_model(model: SoftModel, *, backend: str | None = None, locked_strains: tuple[str, ...] = ()) -> CompiledModel:
-    """Compile the statics of a robot.
+    """Compile the statics and the motion of a robot.
 
     Args:
         model: A robot that is one serial chain from base to tip, with linear springs, sections of constant strain, or both.
