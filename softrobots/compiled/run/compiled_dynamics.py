@@ -199,8 +199,8 @@ class CompiledDynamics(CompiledStatics):
 
         Args:
             duration: Time to simulate [s].
-            q_motors: Actuators that stand still, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N]; a `Trajectory` or a
-                function of time for all cases; or a list of those.
+            q_motors: Actuators that stand still, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N]; a
+                `Trajectory` or a function of time for all cases; or a list of those.
             starts: Elastic coordinates at rest, shape (n, n_springs) or (n_springs,) [rad or m]; a pair of those and their
                 rates; a `MotionBatch`, whose last rows are taken, or an `EquilibriumBatch`; by default relaxed springs.
             forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes; a table or a function of time for all
