@@ -265,6 +265,8 @@ def test_ctrl_c_returns_what_there_is() -> None:
         pressed.clear()
         moved = sr.simulate(model, 1.0, (), force=force, **options)
         assert moved.interrupted
+        assert repr(moved).endswith("interrupted=True)")
+        assert len(repr(moved)) < 150  # in a line, whatever the number of rows
         assert 0.0 < moved.time[-1] <= 1.0
         assert np.all(np.isfinite(moved.q_springs))
 

@@ -94,6 +94,13 @@ class Motion:
     interrupted: bool = False
     """Whether Ctrl-C ended it early; the rows end before the duration then, or their steps miss the tolerance."""
 
+    def __repr__(self) -> str:
+        """Robot, rows, steps and error in a line, instead of all numbers."""
+        return (
+            f"Motion({self.model.pinocchio.name}, {len(self.time)} rows until {self.time[-1]:.6g} s, "
+            f"{len(self.steps) - 1} steps, tip_error={self.tip_error}, interrupted={self.interrupted})"
+        )
+
     def configuration(self, row: int) -> FloatArray:
         """Pinocchio's configuration in a row, shape (nq,)."""
         point = self.model.coordinates.at(self.q_motors[row], self.q_springs[row])
