@@ -53,17 +53,15 @@ def test_a_release_is_that_of_the_library(arm: sr.SoftModel, tmp_path: Path, cap
     assert told["units"]["velocities"] == "rad/s"
 
 
-def test_motors_follow_tables_trajectories_and_waypoints(
-    arm: sr.SoftModel, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
-    """A trajectory saved as NPZ, as CSV and as waypoints gives one motion; the duration is theirs."""
+def test_motors_follow_tables_and_trajectories(arm: sr.SoftModel, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """A trajectory saved as NPZ and as CSV gives one motion; the duration is theirs."""
     path = sr.straight_line((0.8, 0.0, 0.3), (0.8, 0.3, 0.3), 0.2, 8)
     followed = sr.follow_trajectory(arm, path.positions, gravity=sr.EARTH_GRAVITY, times=path.times)
     start = sr.solve_equilibrium(arm, followed.q_motors[0], gravity=sr.EARTH_GRAVITY)
     want = sr.simulate(arm, 0.2, followed, start=start, gravity=sr.EARTH_GRAVITY, **FIXED)
     table, saved = sr.save_csv(followed, tmp_path / "a.csv"), sr.save_result(followed, tmp_path / "a.npz")
-    for option, file in (("--trajectory", table), ("--trajectory", saved), ("--waypoints", table)):
-        told = answer([*ARM, option, str(file), "--gravity", "--start", "equilibrium", *SHORT], capsys)
+    for file in (table, saved):
+        told = answer([*ARM, "--trajectory", str(file), "--gravity", "--start", "equilibrium", *SHORT], capsys)
         assert np.allclose(told["q_motors"], want.q_motors, rtol=0, atol=1e-9)  # targets are reached within 1e-9 m
         assert np.allclose(told["tip_position"], want.tip_position, rtol=0, atol=1e-7)
     longer = answer([*ARM, "--trajectory", str(table), "--duration", "0.3", *SHORT], capsys)
@@ -111,7 +109,7 @@ def test_a_saved_motion_is_shown_at_any_speed(arm: sr.SoftModel, tmp_path: Path,
     file = str(sr.save_result(motion, tmp_path / "m.npz"))
     assert main(["view", "--result", file, "--speed", "0.1", "--html", str(tmp_path / "a.html")]) == 0
     assert "a motion of 0.1 s" in capsys.readouterr().out
-    for words, told in ((["--live", "keyboard"], "no trajectory or motion"), (["--speed", "0"], "speed")):
+    for words, told in ((["--live", "keyboard"], "nothing that moves"), (["--speed", "0"], "speed")):
         assert main(["view", "--result", file, *words]) == 2
         assert told in capsys.readouterr().err
     assert main(["view", "inflatable_arm", "--speed", "2"]) == 2
@@ -139,7 +137,10 @@ def test_a_saved_motion_is_shown_at_any_speed(arm: sr.SoftModel, tmp_path: Path,
         ("--duration 1 -o a.txt", "ends in .npz or .json or .csv"),
         ("--trajectory bad.csv", "t, motor_1, motor_2, motor_3 are required"),
         ("--trajectory one.csv", "at least two are required"),
-        ("--duration 1 --force-table back.csv", "increasing"),
+        ("--trajectory back.csv", "increasing"),
+        ("--duration 1 --force-table back.csv", "not before the row above"),
+        ("--duration 1 --force-table empty.csv", "at least one"),
+        ("--duration nan --trajectory turn.csv", "--duration must be a finite number"),
         ("--duration 1 --frame nowhere", "nowhere"),
     ],
 )
@@ -147,11 +148,13 @@ def test_bad_words_are_refused(
     words: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    texts = {"bad": "t,x\n0,1\n", "one": "t,motor_1,motor_2,motor_3\n0,0,0,0\n", "back": "t,fx,fy,fz\n1,0,0,0\n0,0,0,0\n"}
+    one = "t,motor_1,motor_2,motor_3\n0,0,0,0\n"
+    back = "t,fx,fy,fz,motor_1,motor_2,motor_3\n1,0,0,0,0,0,0\n0,0,0,0,0,0,0\n"
+    texts = {"bad": "t,x\n0,1\n", "one": one, "turn": f"{one}1,1,1,1\n", "back": back, "empty": "t,fx,fy,fz\n"}
     for name, text in texts.items():
         Path(f"{name}.csv").write_text(text)
     assert main([*ARM, *words.split()]) == 2
     out, err = capsys.readouterr()
     assert told in err
     assert out == ""
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == len(texts)

@@ -51,8 +51,8 @@ def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--overwrite", action="store_true", help="allow files to be replaced")
 
 
-def check_plot(arguments: argparse.Namespace) -> None:
-    """Refuse a picture of `--plot` that cannot be drawn or written.
+def check_plot(arguments: argparse.Namespace, option: str = "plot") -> None:
+    """Refuse a picture of `--plot`, or of another option, that cannot be drawn or written.
 
     Raises:
         ParameterError: If the file name does not end in .png.
@@ -60,23 +60,23 @@ def check_plot(arguments: argparse.Namespace) -> None:
         OutputError: If its folder cannot be created.
         MissingDependency: If matplotlib is not installed.
     """
-    if arguments.plot is None:
+    file: Path | None = getattr(arguments, option)
+    if file is None:
         return
-    check_ending("--plot", arguments.plot, ".png")
+    check_ending(f"--{option}", file, ".png")
     canvas.require_matplotlib()
-    new_file(arguments.plot, overwrite=arguments.overwrite)
+    new_file(file, overwrite=arguments.overwrite)
 
 
-def write_plot(arguments: argparse.Namespace, draw: Callable[[], Any]) -> list[Path]:
-    """Write the figure that `draw` returns if `--plot` is given; return the files written.
+def write_plot(arguments: argparse.Namespace, draw: Callable[[], Any], option: str = "plot") -> list[Path]:
+    """Write the figure that `draw` returns if `--plot`, or another option, is given; return the files written.
 
     Raises:
         OutputExists: If the file exists by now.
         OutputError: If it cannot be written.
     """
-    if arguments.plot is None:
-        return []
-    return [canvas.write_png(draw(), arguments.plot, overwrite=arguments.overwrite)]
+    file: Path | None = getattr(arguments, option)
+    return [] if file is None else [canvas.write_png(draw(), file, overwrite=arguments.overwrite)]
 
 
 def check_ending(option: str, file: Path, *endings: str) -> None:
