@@ -421,3 +421,19 @@ def test_every_oracle_of_this_file_agrees_with_the_others() -> None:
         with mp.workdps(50):
             joints = [float(joint) for joint in exact_joints(*map(mp.mpf, z.tolist()))]
         assert np.abs(chain_matrix(joints) - screw_matrix(z, H)).max() < 1e-14
+
+
+@given(st.lists(sections_, min_size=1, max_size=4), st.lists(st.floats(-2.0, 2.0), min_size=16, max_size=16))
+@settings(max_examples=60)
+def test_the_velocity_product_is_the_derivative_of_the_joint_rates(sections: list, numbers: list[float]) -> None:
+    z = np.array(sections)
+    rates = np.array(numbers).reshape(4, 4)[: len(z)] * (1.0, 1.0, 1.0, H)
+    chain = SectionChain(z, H)
+    assume(chain.valid)
+
+    def joint_rates(time: float) -> np.ndarray:
+        return (SectionChain(z + time * rates, H).first @ rates[..., None])[..., 0]
+
+    step = 1e-5
+    expected = (joint_rates(step) - joint_rates(-step)) / (2.0 * step)
+    assert np.abs(chain.velocity_product(rates) - expected).max() <= 1e-6 * max(1.0, np.abs(expected).max())

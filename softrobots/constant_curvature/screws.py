@@ -81,6 +81,33 @@ class Screw:
         result[..., :3] -= np.swapaxes(twists[..., :3, :], -1, -2) @ (skew(force) @ twists[..., 3:, :3])
         return result
 
+    def twist_product(self, rates: FloatArray) -> FloatArray:
+        r"""Rate of the twist of the end while the section coordinates change at constant rates, shape (..., 4), shape (..., 6).
+
+        It is :math:`\sum \partial S_a / \partial z_b\, \dot z_a \dot z_b`, in the axes of the end, linear part first: angular
+        the derivative of `T wd`, linear :math:`R^T \ddot p - (T \dot w) \times R^T \dot p`.
+        """
+        omega, turning, c = self._omega, rates[..., :3], self._c
+        d = _slopes(c, 5)
+        rate = (omega * turning).sum(axis=-1, keepdims=True)
+        size = (turning * turning).sum(axis=-1, keepdims=True)
+        first = [rate * d[k] for k in range(4)]
+        second = [None, *((k * d[k + 2] - d[k + 1]) * rate * rate + d[k] * size for k in (1, 2, 3))]
+        across = (self._turn @ turning[..., None])[..., 0]
+        twice = (self._turn @ across[..., None])[..., 0]
+        angular = turning - c[2] * across + c[3] * twice
+        bent = (skew(turning) @ across[..., None])[..., 0]
+        angular_rate = c[3] * bent - first[2] * across + first[3] * twice
+        aside, outer = turning @ _CROSS_AXIS.T, turning[..., 2:] * omega + omega[..., 2:] * turning
+        along = omega[..., 2:] * omega
+        slope = first[1] * _AXIS + first[2] * self._across + c[2] * aside + first[3] * along + c[3] * outer
+        bend = second[1] * _AXIS + second[2] * self._across + second[3] * along
+        bend += 2.0 * (first[2] * aside + first[3] * outer + c[3] * turning[..., 2:] * turning)
+        stretching, back = rates[..., 3:], np.swapaxes(self.rotation, -1, -2)
+        linear = back @ (stretching * self._direction + self._length * slope)[..., None]
+        linear_rate = back @ (2.0 * stretching * slope + self._length * bend)[..., None] - skew(angular) @ linear
+        return np.concatenate([linear_rate[..., 0], angular_rate], axis=-1)
+
     def _position_hessian(self, pull: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Second derivatives of `pull . p` with respect to `w`, and to `w` and the length, shapes (..., 3, 3) and (..., 3)."""
         omega, c = self._omega, self._c

@@ -69,6 +69,18 @@ class SectionChain:
         screw_part = self._screw.curvature(self._twists, covector)
         return np.asarray(screw_part - np.swapaxes(first, -1, -2) @ ((brackets * _UPPER) @ first))
 
+    def velocity_product(self, rates: FloatArray) -> FloatArray:
+        r"""Return the joint accelerations, shape (..., 6), at constant rates of the section coordinates, shape (..., 4).
+
+        :math:`J_b^{-1} (S'(\dot z) \dot z - \sum_{i<j} [J_i \dot m_i, J_j \dot m_j])`, see `curvature`.
+        """
+        moving = self._jacobian * (self.first @ rates[..., None])[..., 0][..., None, :]  # twist of the end by each joint
+        nearer = np.cumsum(moving, axis=-1) - moving
+        ends = np.swapaxes(moving, -1, -2)
+        linear = nearer[..., :3, :] @ ends[..., 3:] + nearer[..., 3:, :] @ ends[..., :3]
+        brackets = np.concatenate([_axial(linear), _axial(nearer[..., 3:, :] @ ends[..., 3:])], axis=-1)
+        return np.asarray((self._inverse @ (self._screw.twist_product(rates) - brackets)[..., None])[..., 0])
+
     @cached_property
     def _twists(self) -> FloatArray:
         return self._screw.twists()
@@ -105,6 +117,12 @@ def _in_range(z: FloatArray, rest_length: FloatArray, end: Screw, positions: Flo
         return False
     # As the strain is constant, the chord has the same angle to the axes of both ends.
     return bool(np.all(end.position[..., 2] > 1e-3 * np.sqrt((end.position * end.position).sum(axis=-1))))
+
+
+def _axial(products: FloatArray) -> FloatArray:
+    """Sum of cross products `a x b` from that of the products `a b^T`, shape (..., 3, 3), shape (..., 3)."""
+    other = products - np.swapaxes(products, -1, -2)
+    return np.stack([other[..., 1, 2], other[..., 2, 0], other[..., 0, 1]], axis=-1)
 
 
 def _positions(rotation: FloatArray, position: FloatArray) -> FloatArray:

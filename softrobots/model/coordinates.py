@@ -219,11 +219,9 @@ class SectionPoint:
 
     def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Second derivative of the map of each section along its rates."""
-        strain_rates = elastic[len(self._c.spring_indices) :].reshape(-1, 1, 4)
-        second = self._chain.curvature(np.broadcast_to(np.eye(6)[:, None, :], (6, len(strain_rates), 6)))
+        strain_rates = elastic[len(self._c.spring_indices) :].reshape(-1, 4)
         accelerations: FloatArray = np.zeros(self._c.count)
-        along = (strain_rates @ second @ np.swapaxes(strain_rates, -1, -2))[..., 0, 0]
-        accelerations[self._c.section_indices] = along.T
+        accelerations[self._c.section_indices] = self._chain.velocity_product(strain_rates)
         return accelerations
 
     def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
