@@ -132,7 +132,7 @@ class ClosedLoop:
             raise ParameterError("start", start.model, f"an Equilibrium of the model given, {model!r}")
         self._gain = non_negative_number("gain", gain, "1/s")
         self._filter = non_negative_number("filter_time", filter_time, "s")
-        self._load = Load.of(model, None, gravity=gravity)
+        self._gravity = Load.of(model, gravity=gravity).gravity
         self._forget()
 
     def _forget(self) -> None:
@@ -161,7 +161,7 @@ class ClosedLoop:
         else:
             self._felt = self._exerted
         with contextlib.suppress(LoadNotFound):  # where inertia looks like no load: the last estimate
-            self._rest = estimate_load(self.model, q, self._felt, gravity=self._load.gravity, restart=False).equilibrium
+            self._rest = estimate_load(self.model, q, self._felt, gravity=self._gravity, restart=False).equilibrium
         now = min(time, float(self._path.times[-1]))
         target, ahead = (
             np.array([np.interp(t, self._path.times, column) for column in self._path.positions.T])

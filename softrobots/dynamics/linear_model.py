@@ -14,12 +14,10 @@ import numpy as np
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, read_only
 from softrobots.core.errors import DescriptionError, MissingDependency, ParameterError
+from softrobots.dynamics.motor_torque import MOTORS
 from softrobots.dynamics.small_motion import SmallMotion, small_motion
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
-
-MOTORS = ("prescribed", "torque")
-"""What drives the motors of a linear model: given accelerations, or torques."""
 
 _TIP = ("tip_x", "tip_y", "tip_z", "tip_turn_x", "tip_turn_y", "tip_turn_z")
 _TIP_UNITS = ("m",) * 3 + ("rad",) * 3
@@ -32,7 +30,7 @@ class LinearModel:
     equilibrium: Equilibrium
     """The equilibrium from which all quantities deviate."""
     motors: str
-    """What drives the motors, one of `MOTORS`."""
+    """What drives the motors: "prescribed", by given accelerations, or "torque"."""
     A: FloatArray
     """Rates of the states by states, shape (n, n)."""
     B: FloatArray

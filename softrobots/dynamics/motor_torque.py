@@ -23,6 +23,9 @@ from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
 
+MOTORS = ("prescribed", "torque")
+"""What drives motors: a given motion, or torques."""
+
 CREEP = 1e-4
 """Speed at which a joint begins to slide; it creeps by half of it under half of its dry friction [rad/s or m/s]."""
 

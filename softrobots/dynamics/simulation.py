@@ -9,25 +9,22 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
-from softrobots.core.checks import FloatArray, choice, finite_array, non_negative_number, positive_number
+from softrobots.core.checks import FloatArray, choice, non_negative_number, positive_number
 from softrobots.core.errors import NotConverged, ParameterError
 from softrobots.core.progress import with_progress
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.midpoint import MidpointRule
 from softrobots.dynamics.motion import Motion, MotionState
-from softrobots.dynamics.motor_torque import MotorTorque
+from softrobots.dynamics.motor_torque import MOTORS, MotorTorque
 from softrobots.dynamics.recorder import Recorder
 from softrobots.dynamics.starting import first_kick, first_state, grid_with_kicks, steps_and_rows
-from softrobots.dynamics.step_control import NoStep, choose, follow, halved, tip_distances
+from softrobots.dynamics.step_control import NoStep, choose, error_share, follow, halved, tip_distances
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.loads import Load
 
-MOTORS = ("prescribed", "torque")
-"""How motors move."""
-
-_LEAST = 1e-300  # distance that two runs have at least [m]
 _STALLED = 3  # runs in which the error of the tip is to halve at least once
 
 MOST_STEPS = 400_000
@@ -101,27 +98,29 @@ def simulate(
     if drive is not None and q_motors is None and isinstance(start, Equilibrium | Motion | MotionState):
         q_motors = start.end.q_motors if isinstance(start, Motion) else start.q_motors
     path, load = MotorPath(model, q_motors, end), TimeLoad(model, force, wrench, end)
-    weight = None if gravity is None else tuple(finite_array("gravity", gravity, (3,), "m/s^2").tolist())
-    alpha = non_negative_number("mass_damping", mass_damping, "1/s")
+    weight = Load.of(model, gravity=gravity).gravity
     beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
     first = first_state(model, start, path, 0 if drive is None else drive.count)
     h, largest, rows = steps_and_rows(end, model.reach, time_step, output_step, tolerance)
     with one_blas_thread(model.n_springs):
         drives = None if drive is None else model.actuators.drives
-        equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, alpha), drives)
+        equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, mass_damping), drives)
 
         def new_run() -> Recorder:
             """A run from the first state, whose velocities take those with which prescribed motors begin."""
-            controller = None if drive is None else MotorTorque(model, torque, sample_time)
-            rule = MidpointRule(equations, path, load, controller)
+            rule = MidpointRule(equations, path, load, drive)
             change = first_kick(path, first.rates[: model.n_motors])
             return Recorder(rule, first if change is None else rule.kicked(first, change), rows)
 
         if h is not None:
-            grid = grid_with_kicks(end, h, np.array(list(path.kicks)))
-            return _fixed(new_run(), grid if drive is None else drive.with_samples(grid), beta, progress)
-        breaks = np.unique(np.concatenate([[end], path.breaks, load.breaks]))
-        return _controlled(new_run, breaks if drive is None else drive.with_samples(breaks), largest, beta, progress)
+            stops = grid_with_kicks(end, h, np.array(list(path.kicks)))
+        else:
+            stops = np.unique(np.concatenate([[end], path.breaks, load.breaks]))
+        if drive is not None:
+            stops = drive.with_samples(stops)
+        if h is not None:
+            return _fixed(new_run(), stops, beta, progress)
+        return _controlled(new_run, stops, largest, beta, progress)
 
 
 def _fixed(run: Recorder, grid: FloatArray, damping_time: float | None, progress: bool | str) -> Motion:
@@ -146,9 +145,8 @@ def _controlled(
             grid = halved(np.array(run.times))
             _go(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps")
             errors = tip_distances(run, finer)
-            furthest = float(errors.max())
-            errors /= min(max(last / max(furthest, _LEAST), 2.0), 4.0) - 1.0 if math.isfinite(last) else 1.0
-            last = furthest
+            before, last = last, float(errors.max())
+            errors *= error_share(before, last)
             history.append(float(errors.max()))
             facts["tip_error"] = history[-1]
             if history[-1] <= tolerance:

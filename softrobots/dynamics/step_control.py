@@ -33,6 +33,7 @@ _QUIET = 2e-5  # of the tolerance: a block with less drift than this in each ste
 _COARSER = 12.0  # error of the first run over the tolerance, which that of a quarter of its steps meets
 _FADING = 0.9  # of the measured drift, from block to block
 _HALVINGS = 30  # of a step that fails
+_LEAST = 1e-300  # distance that two runs have at least [m]
 
 
 class NoStep(SoftRobotsError):
@@ -93,6 +94,17 @@ def halved(grid: FloatArray) -> FloatArray:
     finer: FloatArray = np.zeros(2 * len(grid) - 1)
     finer[::2], finer[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
     return finer
+
+
+def error_share(before: float, now: float) -> float:
+    """Error of the finer of two runs over the distance of their tips, `1 / (r - 1)`; see the module.
+
+    Args:
+        before: Distance of the tips of the two runs before [m]; infinite if there are none.
+        now: Distance of the tips of the two runs [m].
+    """
+    shrinking = before / max(now, _LEAST) if math.isfinite(before) else 2.0
+    return 1.0 / (min(max(shrinking, 2.0), 4.0) - 1.0)
 
 
 def tip_distances(coarse: Recorder, fine: Recorder) -> FloatArray:

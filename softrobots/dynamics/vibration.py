@@ -209,12 +209,13 @@ def vibration_modes(
             raise ParameterError("servo_stiffness", servo_stiffness, requirement)
     elif rotor_inertia is not None:
         raise ParameterError("rotor_inertia", rotor_inertia, "left out without servo_stiffness: actuators are held")
-    with one_blas_thread(model.n_springs + small.n_placed - first):
-        stiffness = small.stiffness + np.diag(np.concatenate([servos, np.zeros(model.n_springs)]))
-        _refuse_unstable(model, stiffness[first:, first:], servos[first:])
-        frequencies, modes = _modes(0.5 * (stiffness + stiffness.T)[first:, first:], small.mass[first:, first:], model)
-        modes = _signed(model, small.tip[:, first:], frequencies, modes)
-    tip, momentum, damping = small.tip[:, first:], small.momentum[:, first:], small.damping[first:, first:]
+    tip, mass, damping = small.tip[:, first:], small.mass[first:, first:], small.damping[first:, first:]
+    with one_blas_thread(len(mass)):
+        stiffness = (small.stiffness + np.diag(np.concatenate([servos, np.zeros(model.n_springs)])))[first:, first:]
+        stiffness = 0.5 * (stiffness + stiffness.T)
+        _refuse_unstable(model, stiffness, servos[first:])
+        frequencies, modes = _modes(stiffness, mass, model)
+        modes = _signed(model, tip, frequencies, modes)
     motors = np.zeros((model.n_motors, len(frequencies)))
     motors[: small.n_placed - first] = modes[: small.n_placed - first]
     along = np.einsum("ji,jk,ki->i", modes, damping, modes)
@@ -225,10 +226,10 @@ def vibration_modes(
         motor_shapes=read_only(motors),
         tip_shapes=read_only(tip @ modes),
         damping_ratios=read_only(along / (2.0 * frequencies)),
-        mass_matrix=read_only(small.mass[first:, first:]),
+        mass_matrix=read_only(mass),
         damping_matrix=read_only(damping),
-        stiffness_matrix=read_only(stiffness[first:, first:]),
-        participation=read_only(momentum @ modes),
+        stiffness_matrix=read_only(stiffness),
+        participation=read_only(small.momentum[:, first:] @ modes),
         settings={
             "damping_time": damping_time,
             "mass_damping": mass_damping,
@@ -241,7 +242,7 @@ def vibration_modes(
 def _refuse_unstable(model: SoftModel, stiffness: FloatArray, servos: FloatArray) -> None:
     """Refuse a stiffness that is not positive definite in coordinates in which springs and servos have stiffness 1."""
     own = np.concatenate([np.where(servos > 0.0, servos, model.stiffest or 1.0), model.stiffness])
-    softest = float(np.linalg.eigvalsh(scaled(0.5 * (stiffness + stiffness.T), own)).min(initial=1.0))
+    softest = float(np.linalg.eigvalsh(scaled(stiffness, own)).min(initial=1.0))
     if softest <= -POSITIVE:
         raise ParameterError(
             "equilibrium", f"softest stiffness {softest:.3g} of the springs'", "stable, with its servos: it does not vibrate"

@@ -12,6 +12,7 @@ from softrobots.compiled.settings import LARGEST_POSITION
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.step_control import halved
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 
@@ -22,9 +23,7 @@ def motors_of_steps(path: MotorPath, grid: FloatArray) -> FloatArray:
     Raises:
         ParameterError: If a position is too large to compute with.
     """
-    times = np.zeros(2 * len(grid) - 1)
-    times[::2], times[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
-    found = path(0.0)[None] if path.constant else path.at(times)
+    found = path(0.0)[None] if path.constant else path.at(halved(grid))
     if found.size and np.abs(found).max() > LARGEST_POSITION:
         requirement = f"within +-{LARGEST_POSITION:g} rad or m at motor joints, for compiled solvers"
         raise ParameterError("q_motors", float(np.abs(found).max()), requirement)

@@ -19,6 +19,7 @@ from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.midpoint import MidpointRule, State, Step
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.recorder import Recorder
+from softrobots.dynamics.step_control import error_share, halved
 
 _FIRST_STEPS = 400  # of the first of the runs that are compared
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
@@ -63,16 +64,15 @@ def finer_and_finer(
     grid = np.append(np.concatenate([np.linspace(one, other, count)[:-1] for one, other, count in ends]), end)
     before, history, last = take(grid), [math.inf], math.inf
     while not before.interrupted:
-        finer = np.zeros(2 * len(grid) - 1)
-        finer[::2], finer[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
-        now, grid = take(finer), finer
+        grid = halved(grid)
+        now = take(grid)
         if now.interrupted:
             return replace(before, interrupted=True)
         errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1)
         errors = np.where(before.status == Status.CERTIFIED, errors, np.inf)
         counts = (now.status == Status.CERTIFIED) & ~np.asarray(bad)
-        furthest = max(float(errors[counts].max(initial=0.0)), 1e-300)
-        errors /= min(max(last / furthest, 2.0), 4.0) - 1.0 if math.isfinite(last) else 1.0
+        furthest = float(errors[counts].max(initial=0.0))
+        errors *= error_share(last, furthest)
         now, last = replace(now, errors=np.where(counts, errors, np.inf)), furthest
         history.append(float(errors[counts].max(initial=0.0)))
         stalled = len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]
