@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -148,17 +149,17 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(material: str) 
 
 @pytest.mark.study
 @pytest.mark.parametrize("engine", ["general", "compiled"])
-def test_ten_thousand_random_runs_end_with_numbers(engine: str) -> None:
-    """All robots, random starts, loads, motors, damping and steps: each run ends, with numbers."""
+def test_random_runs_end_with_numbers(engine: str) -> None:
+    """Random loads, motors, damping and steps, 600 runs a robot and engine, ten thousand in all: each ends, with numbers."""
     rng, failed, runs = np.random.default_rng(21), 0, 0
     for kind in law_robots.ROBOTS:
         model = law_robots.model(kind)
-        if engine == "compiled" and model.muscles and model.muscle_input == "lengths":
-            continue  # refused there
-        simulate: Any = (
-            sr.compile(model).simulate if engine == "compiled" else lambda *a, model=model, **o: sr.simulate(model, *a, **o)
-        )
-        for _ in range(10_000 // (2 * len(law_robots.ROBOTS)) + 1):
+        simulate: Any = partial(sr.simulate, model)
+        if engine == "compiled":
+            if kind in ("limp", "foreign") or (model.muscles and model.muscle_input == "lengths"):
+                continue  # plateaus, side branches and lengths of muscles are refused there
+            simulate = sr.compile(model).simulate
+        for _ in range(600):
             runs += 1
             push = law_robots.PUSHES[kind] * 10.0 ** rng.uniform(-2.0, 0.5) * rng.normal(size=3)
             step = 10.0 ** rng.uniform(-4.0, -1.5)

@@ -1,0 +1,174 @@
+"""Motion against answers that are not ours: rods of the tests' own (a Cosserat rod, a planar rod to many digits) and MuJoCo."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.export import to_mjcf
+from tests.support import law_robots
+from tests.support.cosserat_rod import CosseratRod
+from tests.support.planar_rod import PlanarRod
+from tests.support.rods import elastica_tip
+
+STEEL = PlanarRod(0.6, 0.8e-3, 200e9, 7850.0, gravity=(0.0, -9.81))
+TPU = PlanarRod(0.4, 5e-3, 70e6, 1200.0, stretches=6, gravity=(0.0, -9.81))
+RELEASED = {"steel": (STEEL, 0.15, (13, 2000)), "TPU": (TPU, 0.1, (11, 1100))}
+"""Rods that stand upright and are released from a sideways force [N]; polynomials and steps per 0.05 s of the reference."""
+SOFT = CosseratRod(0.4, 0.02, 1e6, 1000.0, 24, gravity=(0.0, 0.0, -3.0))
+
+
+def chain(rod: PlanarRod | CosseratRod, count: int, form: str = "sections", **options: Any) -> sr.SoftModel:
+    """Our model of a rod."""
+    stiffness = rod.young * rod.area * rod.radius**2 / 4.0
+    return sr.load_model(
+        sr.PccArm(
+            segment_lengths=(rod.length,), muscle_azimuths=(), radius=rod.radius, linear_density=rod.density * rod.area,
+            bending_stiffness=stiffness, torsional_stiffness=stiffness / 1.5, axial_stiffness=rod.young * rod.area,
+            chain=form, elastic_sections=count, hinges=count, **options,
+        )
+    )  # fmt: skip
+
+
+@pytest.mark.study
+def test_the_planar_rod_is_right() -> None:
+    """Closed forms to rounding of the solvers; free vibration to the same path with more polynomials and shorter steps."""
+    slender = dataclasses.replace(TPU, radius=1e-5, stretches=0, bends=13)
+    speed = np.sqrt(TPU.young / TPU.density)
+    closed = np.array([1.8751040687, 4.6940911330, 7.8547574382]) ** 2 * speed * slender.radius / 2.0 / TPU.length**2
+    assert np.allclose(slender.frequencies()[:3], closed, rtol=1e-7)  # rotary inertia of a radius of 1e-5 m: 1e-9
+    axial = dataclasses.replace(TPU, gravity=(0.0, 0.0)).frequencies() / (speed * np.pi / 2.0 / TPU.length)
+    assert np.abs(axial - 1.0).min() < 1e-7
+    assert np.abs(axial - 3.0).min() < 1e-4
+    weightless = dataclasses.replace(STEEL, gravity=(0.0, 0.0), bends=13)
+    bending = STEEL.young * STEEL.area * STEEL.radius**2 / 4.0
+    x, z, _ = elastica_tip(bending, STEEL.length, 0.6)
+    assert np.allclose(weightless.tip(weightless.equilibrium((0.6, 0.0))), [x, z], atol=1e-10)
+    paths = [_path(dataclasses.replace(STEEL, bends=bends), 0.6, 0.5, 10, steps) for bends, steps in ((9, 500), (10, 1000))]
+    assert np.linalg.norm(paths[0] - paths[1], axis=1).mean() < 1e-4  # of tips 0.5 m apart
+
+
+def _path(rod: PlanarRod, force: float, duration: float, rows: int, steps: int) -> np.ndarray:
+    return rod.tips(rod.equilibrium((force, 0.0)), duration, rows, steps)
+
+
+@pytest.mark.study
+def test_the_cosserat_rod_is_right() -> None:
+    """Frequencies and elastica in closed form, vibration of the planar rod, all to second order in the cells."""
+    speed, errors = np.sqrt(SOFT.young / SOFT.density) * np.pi / 2.0 / SOFT.length, []
+    planar = PlanarRod(SOFT.length, SOFT.radius, SOFT.young, SOFT.density, bends=10, stretches=4, gravity=(0.0, -3.0))
+    bending = dataclasses.replace(planar, stretches=0).frequencies()[0]
+    force, times = 3.0 * SOFT.bending / SOFT.length**2, np.linspace(0.0, 0.2, 3)
+    tip = elastica_tip(SOFT.bending, SOFT.length, force)
+    path = planar.tips(planar.equilibrium((force, 0.0)), 0.2, 2, 2000)
+    for cells in (8, 16):
+        rod = dataclasses.replace(SOFT, cells=cells)
+        found = rod.frequencies()
+        rates = [np.abs(found / rate - 1.0).min() for rate in (speed, speed / np.sqrt(3.0), bending)]
+        stiff = dataclasses.replace(rod, shear=1e3, stretch=1e3, gravity=(0.0, 0.0, 0.0))
+        at_rest = np.linalg.norm(stiff.tips(stiff.equilibrium((force, 0, 0, 0, 0, 0))[None])[0] - [tip[0], 0.0, tip[1]])
+        moved = rod.tips(rod.motion(rod.equilibrium((force, 0, 0, 0, 0, 0)), times))[:, [0, 2]]
+        errors.append([*rates, at_rest, np.linalg.norm(moved - path, axis=1).max()])
+    ratios = np.array(errors[0]) / np.array(errors[1])
+    assert np.all((ratios > 2.8) & (ratios < 5.0)), (ratios, errors)
+    assert max(errors[1]) < 6e-3
+
+
+@pytest.mark.parametrize("counts", [(4, 8), pytest.param((8, 16), marks=pytest.mark.study)])
+def test_sections_move_as_a_cosserat_rod_to_second_order(counts: tuple[int, int]) -> None:
+    """Bent in two planes, twisted and stretched by a wrench that comes and goes within 0.2 s, then free."""
+    bend, twist = SOFT.bending / SOFT.length**2, SOFT.torsion / SOFT.length
+    largest, times = np.array([6.0 * bend, 3.0 * bend, 40.0, 0.0, 0.0, 1.5 * twist]), np.linspace(0.0, 0.4, 9)
+
+    def wrench(t: float) -> np.ndarray:
+        return largest * np.sin(np.pi * t / 0.2) ** 2 * (t < 0.2)
+
+    coarse, fine = (
+        rod.tips(rod.motion(rod.straight, times, wrench))
+        for rod in (dataclasses.replace(SOFT, cells=cells) for cells in (counts[1] * 3 // 2, counts[1] * 3))
+    )
+    path, errors = (4.0 * fine - coarse) / 3.0, []
+    assert np.abs(fine - path).max() < 2e-3
+    for count in counts:
+        moved = sr.simulate(
+            chain(SOFT, count), 0.4, (), wrench=wrench, gravity=SOFT.gravity, damping_time=0.0, time_step=1e-3, output_step=0.05
+        )
+        errors.append(np.abs(moved.tip_position - path).max())
+    assert 2.8 < errors[0] / errors[1] < 5.5, errors  # the time step is 1e-4 m of them
+    assert errors[1] < 0.4 / counts[1] ** 2  # tips move by 0.2 m
+
+
+@pytest.mark.parametrize("twists", [pytest.param(False, marks=pytest.mark.study), True])
+def test_free_vibration_is_that_of_mujoco(twists: bool) -> None:
+    """Runge and Kutta's method of MuJoCo, refined until nothing changes: our error is of second order in time."""
+    mujoco = pytest.importorskip("mujoco")
+    model = chain(SOFT, 6, "lumped", torsion=twists, extension=twists)
+    bend, twist, gravity = SOFT.bending / SOFT.length**2, SOFT.torsion / SOFT.length, (0.0, -4.0, -6.0)
+    start = sr.solve_equilibrium(model, (), wrench=(2.0 * bend, 0, 0, 0, 0, twist if twists else 0.0), gravity=gravity)
+    other = mujoco.MjModel.from_xml_string(to_mjcf(model, damping=0.0, limits=False))
+    other.opt.gravity[:], other.opt.integrator = gravity, mujoco.mjtIntegrator.mjINT_RK4
+    other.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    paths = []
+    for per_row in (100, 200):
+        data, other.opt.timestep, path = mujoco.MjData(other), 0.02 / per_row, []
+        data.qpos[[int(other.joint(name).qposadr[0]) for name in model.spring_joints]] = start.q_springs
+        for _ in range(16):
+            mujoco.mj_forward(other, data)
+            path.append(np.array(data.body(model.tip).xpos))
+            mujoco.mj_step(other, data, nstep=per_row)
+        paths.append(np.array(path))
+    assert np.abs(paths[0] - paths[1]).max() < 1e-6
+    options: dict[str, Any] = {"start": start, "gravity": gravity, "damping_time": 0.0, "output_step": 0.02}
+    errors = [
+        np.abs(sr.simulate(model, 0.3, (), time_step=step, **options).tip_position - paths[1]).max()
+        for step in (5e-4, 2.5e-4, 1.25e-4)
+    ]
+    assert 3.2 < errors[0] / errors[1] < 4.8, errors
+    assert 3.6 < errors[1] / errors[2] < 4.4, errors
+    assert errors[2] < 2e-4  # the tip moves by 0.5 m
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("material", list(RELEASED))
+def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(material: str) -> None:
+    """30 pairs of hinges, undamped, with the steps that are chosen by default; the reference is ten times as good."""
+    rod, force, (bends, steps) = RELEASED[material]
+    fine = _path(dataclasses.replace(rod, bends=bends), force, 10.0, 200, steps)
+    coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, 10.0, 200, steps)
+    assert np.linalg.norm(fine - coarse, axis=1).mean() < 1e-4
+    model = chain(rod, 30, "lumped")
+    start = sr.solve_equilibrium(model, (), force=(force, 0.0, 0.0), gravity=(0.0, 0.0, -9.81))
+    moved = sr.compile(model).simulate(10.0, (), start=start, gravity=(0.0, 0.0, -9.81), damping_time=0.0, output_step=0.05)
+    assert np.linalg.norm(moved.tip_position[:, [0, 2]] - fine, axis=1).mean() < 5e-4
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("engine", ["general", "compiled"])
+def test_ten_thousand_random_runs_end_with_numbers(engine: str) -> None:
+    """All robots, random starts, loads, motors, damping and steps: each run ends, with numbers."""
+    rng, failed, runs = np.random.default_rng(21), 0, 0
+    for kind in law_robots.ROBOTS:
+        model = law_robots.model(kind)
+        if engine == "compiled" and model.muscles and model.muscle_input == "lengths":
+            continue  # refused there
+        simulate: Any = (
+            sr.compile(model).simulate if engine == "compiled" else lambda *a, model=model, **o: sr.simulate(model, *a, **o)
+        )
+        for _ in range(2_500 // (2 * len(law_robots.ROBOTS)) + 1):
+            runs += 1
+            push = law_robots.PUSHES[kind] * 10.0 ** rng.uniform(-2.0, 0.5) * rng.normal(size=3)
+            step = 10.0 ** rng.uniform(-4.0, -1.5)
+            motors = model.relaxed_motors * (1.0 + 0.1 * rng.uniform(-1.0, 1.0, model.n_motors))
+            options = {"force": push, "damping_time": rng.choice([0.0, 1e-3, 0.1]), "gravity": rng.normal(size=3) * 6.0}
+            try:
+                moved = simulate(3.0 * step, motors, time_step=step, **options)
+            except sr.NotConverged:
+                failed += 1
+                continue
+            assert all(np.all(np.isfinite(values)) for values in (moved.q_springs, moved.velocities, moved.tip_position))
+            assert np.all(np.isfinite(moved.energy.balance))
+    assert failed < runs / 100, (failed, runs)
