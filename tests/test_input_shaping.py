@@ -199,8 +199,8 @@ def test_the_sensitivity_is_drawn() -> None:
     assert list(lines) == ["ZV", "ZVD", "EI"]
     drawn = {name: float(np.interp(3.5, *data)) for name, data in lines.items()}
     assert drawn == pytest.approx({"ZV": 0.0, "ZVD": 0.0, "EI": 5.0}, abs=1e-9)
-    with pytest.raises(sr.ParameterError, match=r"^widest "):
-        figures.sensitivity(3.5, widest=1.0)
+    with pytest.raises(sr.ParameterError, match=r"^frequency "):
+        figures.sensitivity(0.0)
 
 
 def test_a_shaped_move_of_the_arm_leaves_less_than_two_per_cent_of_the_vibration() -> None:

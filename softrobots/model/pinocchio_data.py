@@ -54,10 +54,10 @@ class PinocchioData(threading.local):
         return np.array([joint.idx_q for joint in list(self._model.joints)[1:]], dtype=np.intp)
 
     @cached_property
-    def _triangle(self) -> tuple[FloatArray, FloatArray]:
-        """Masks of the diagonal and of what is above it, shape (nv, nv)."""
+    def _upper(self) -> FloatArray:
+        """Mask of the upper triangle with half of the diagonal, shape (nv, nv)."""
         ones = np.ones((self._model.nv, self._model.nv))
-        return read_only(np.eye(len(ones))), read_only(np.triu(ones, 1))
+        return read_only(0.5 * (np.triu(ones) + np.triu(ones, 1)))
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Return the mass matrix at a configuration, shape (nq,), per velocity, shape (nv, nv) [kg m^2, kg m, kg].
@@ -66,10 +66,8 @@ class PinocchioData(threading.local):
             DescriptionError: If the robot has more than `MAX_DOF` coordinates.
         """
         model, data = self.at(None)
-        on_diagonal, above = self._triangle
-        filled = pin.crba(model, data, q)  # its upper triangle
-        upper = filled * above
-        return np.asarray(upper + upper.T + filled * on_diagonal)
+        upper = pin.crba(model, data, q) * self._upper  # it fills the upper triangle
+        return np.asarray(upper + upper.T)
 
     def _pair(self, gravity: tuple[float, float, float] | None) -> tuple[Any, Any]:
         if gravity is None:

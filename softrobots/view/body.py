@@ -12,6 +12,7 @@ from softrobots.core.checks import FloatArray, instance_of, positive_integer
 from softrobots.description.urdf_tags import LineTag, MuscleTag
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.kinematics import backbone
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +112,14 @@ def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:
     """
     instance_of("equilibrium", equilibrium, Equilibrium, "an Equilibrium")
     return body_at(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, points)
+
+
+def robot_line(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, points: int = 12) -> FloatArray:
+    """Points along a robot: the backbone of its body, see `body_at`, or the origins of its joints, shape (n, 3) [m]."""
+    segments = body_at(model, q_motors, q_springs, points)
+    if segments:
+        return np.concatenate([segment.backbone for segment in segments])
+    return backbone(model, model.configuration(q_motors, q_springs))
 
 
 def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, points: int = 12) -> tuple[SegmentBody, ...]:

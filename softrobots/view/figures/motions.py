@@ -13,8 +13,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, finite_array, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.motion import Motion
-from softrobots.statics.kinematics import backbone
-from softrobots.view.body import body_at
+from softrobots.view.body import robot_line
 from softrobots.view.figures.canvas import COLOURS, LINES, new_figure, new_plot, plain_words
 
 _STILL = 1e-9  # of the reach: a coordinate of the tip that moves less is not drawn
@@ -120,7 +119,7 @@ def strobe(motion: Motion, *, shown: int = 8, between: tuple[float, float] | Non
     rows = np.searchsorted(motion.time, np.linspace(ends[0], ends[1], positive_integer("shown", shown, 1000)) - 1e-12)
     chosen = np.unique(rows).tolist()
     first, last = chosen[0], chosen[-1]
-    backbones = [_backbone(motion, row) for row in chosen]
+    backbones = [robot_line(motion.model, motion.q_motors[row], motion.q_springs[row], 4) for row in chosen]
     path = motion.tip_position[first : last + 1]
     sizes = np.linalg.norm(motion.forces[first : last + 1], axis=1)
     strongest = int(np.argmax(sizes))
@@ -152,11 +151,3 @@ def _axes_of(path: FloatArray, points: FloatArray) -> tuple[int, int]:
     spans = np.ptp(path, axis=0) + 0.5 * np.ptp(points, axis=0)
     pairs = ((0, 2), (1, 2), (0, 1))
     return max(pairs, key=lambda pair: float(np.hypot(*spans[list(pair)])))
-
-
-def _backbone(motion: Motion, row: int) -> FloatArray:
-    """Points along the robot: the smooth body of its sections, or the line through its joints, shape (n, 3) [m]."""
-    bodies = body_at(motion.model, motion.q_motors[row], motion.q_springs[row], 4)
-    if bodies:
-        return np.concatenate([one.backbone for one in bodies])
-    return backbone(motion.model, motion.configuration(row))

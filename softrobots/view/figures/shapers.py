@@ -9,20 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import finite_number, positive_number
-from softrobots.core.errors import ParameterError
+from softrobots.core.checks import positive_number
 from softrobots.dynamics.input_shaping import SHAPERS, input_shaper, residual_vibration
 from softrobots.view.figures.canvas import line_style, new_plot
 
 
-def sensitivity(frequency: float, damping_ratio: float = 0.0, *, tolerance: float = 0.05, widest: float = 0.5) -> Any:
+def sensitivity(frequency: float, damping_ratio: float = 0.0, *, tolerance: float = 0.05) -> Any:
     """Vibration that each shaper leaves over the frequency that the robot really has: after [Singhose et al. 1994].
 
     Args:
         frequency: Frequency that the shapers are made for [Hz].
         damping_ratio: Its damping ratio, from 0 to below 1; the robot has it too [-].
         tolerance: Share of the vibration that the shaper "ei" leaves at the frequency [-].
-        widest: Largest error of the frequency that is drawn, as a share of it, above 0 and below 1 [-].
 
     Returns:
         The figure.
@@ -31,10 +29,8 @@ def sensitivity(frequency: float, damping_ratio: float = 0.0, *, tolerance: floa
         ParameterError: If an argument is out of range.
         MissingDependency: If matplotlib is not installed.
     """
-    if not 0.0 < finite_number("widest", widest) < 1.0:
-        raise ParameterError("widest", widest, "above 0 and below 1")
     made = [input_shaper(frequency, damping_ratio, shaper=kind, tolerance=tolerance) for kind in SHAPERS]
-    real = positive_number("frequency", frequency, "Hz") * np.linspace(1.0 - widest, 1.0 + widest, 401)
+    real = positive_number("frequency", frequency, "Hz") * np.linspace(0.5, 1.5, 401)
     title = f"Shapers for {frequency:.4g} Hz, damping ratio {damping_ratio:.2g}"
     figure, axes = new_plot((8.0, 5.0), xlabel="frequency of the robot [Hz]", ylabel="vibration that is left [%]", title=title)
     for number, (kind, shaper) in enumerate(zip(SHAPERS, made, strict=True)):

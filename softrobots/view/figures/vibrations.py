@@ -11,38 +11,34 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, instance_of, positive_integer, positive_number
+from softrobots.core.checks import FloatArray, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.vibration import ModeSwing, VibrationModes
-from softrobots.model.soft_model import SoftModel
-from softrobots.statics.kinematics import backbone
-from softrobots.view.body import body_at
+from softrobots.view.body import robot_line
 from softrobots.view.figures.canvas import COLOURS, new_figure
 
 SWING = 0.12
-"""How far a mode is drawn by default, as a share of the reach."""
+"""How far a mode swings in pictures, as a share of the reach."""
 
 _STILL = 1e-3  # of the swing: a backbone that moves less only twists
 
 
-def mode_shapes(modes: VibrationModes, *, shown: int = 6, size: float | None = None) -> Any:
+def mode_shapes(modes: VibrationModes, *, shown: int = 6) -> Any:
     """Both ends of the swing in each mode, over the robot in equilibrium, seen square to the motion.
 
     Args:
         modes: The modes.
         shown: How many of them are drawn at most, slowest first.
-        size: How far they swing, see `VibrationModes.swing` [m]; by default so far that each is seen.
 
     Returns:
         The figure.
 
     Raises:
-        ParameterError: If they are no modes, or a number is not positive.
+        ParameterError: If they are no modes, or `shown` is not positive.
         MissingDependency: If matplotlib is not installed.
     """
     instance_of("modes", modes, VibrationModes, "VibrationModes (made by softrobots.vibration_modes)")
     count = min(positive_integer("shown", shown), len(modes.frequencies))
-    given = None if size is None else positive_number("size", size, "m")
     columns = min(count, 2)
     rows = math.ceil(count / columns)
     figure = new_figure((3.4 * columns, 0.5 + 2.2 * rows))
@@ -50,7 +46,7 @@ def mode_shapes(modes: VibrationModes, *, shown: int = 6, size: float | None = N
     for panel in panels[count:]:
         panel.set_axis_off()
     for number, panel in enumerate(panels[:count], start=1):
-        _draw(panel, _seen(modes, number) if given is None else modes.swing(number, given))
+        _draw(panel, _seen(modes, number))
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=11)
     return figure
@@ -60,7 +56,7 @@ def _seen(modes: VibrationModes, mode: int) -> ModeSwing:
     """A swing of `SWING`, or up to three times that where the line of the robot moves less."""
     usual = SWING * modes.model.reach
     swing = modes.swing(mode, usual)
-    one, other = (_line(modes.model, *swing.at(share)) for share in (0.25, -0.25))
+    one, other = (robot_line(modes.model, *swing.at(share)) for share in (0.25, -0.25))
     moved = 0.5 * float(np.linalg.norm(one - other, axis=1).max())
     with contextlib.suppress(ParameterError):  # a section beyond its range
         return modes.swing(mode, usual * float(np.clip(usual / max(moved, 1e-12), 1.0, 3.0)))
@@ -70,7 +66,7 @@ def _seen(modes: VibrationModes, mode: int) -> ModeSwing:
 def _draw(panel: Any, swing: ModeSwing) -> None:
     """Draw one mode into one pair of axes."""
     modes, model = swing.modes, swing.model
-    middle, one, other = (_line(model, *swing.at(share)) for share in (0.0, 0.25, -0.25))
+    middle, one, other = (robot_line(model, *swing.at(share)) for share in (0.0, 0.25, -0.25))
     way = one - other
     across, sizes = np.linalg.svd(way, full_matrices=False)[2][0], np.linalg.norm(way, axis=1)
     along = middle - middle.mean(axis=0)
@@ -92,14 +88,6 @@ def _draw(panel: Any, swing: ModeSwing) -> None:
     panel.set_aspect("equal", adjustable="datalim")
     panel.margins(0.1)
     panel.set(xticks=[], yticks=[])
-
-
-def _line(model: SoftModel, motors: FloatArray, springs: FloatArray) -> FloatArray:
-    """Points along the robot, shape (n, 3) [m]."""
-    segments = body_at(model, motors, springs)
-    if segments:
-        return np.concatenate([segment.backbone for segment in segments])
-    return backbone(model, model.configuration(motors, springs))
 
 
 def _words(direction: FloatArray) -> str:
