@@ -410,6 +410,7 @@ def test_what_pybullet_cannot_do_is_refused() -> None:
         to_pybullet(arm(), actuators="free")
     with pytest.raises(sr.ParameterError, match="'file' or 'critical', or a damping time"):
         to_pybullet(arm(), damping="none")
+    assert "Damping of the springs is 1.0 s times their stiffness." in to_pybullet(arm(), damping=1)
     with pytest.raises(sr.ParameterError, match="limits of motor_2"):
         to_pybullet(arm(), (0.1, 3.2, 0.2))
     massless = f'<robot name="a"><link name="base"/>{joint("turn", "base", "end", "0 0 1")}</robot>'.replace(INERTIAL, "")

@@ -115,7 +115,7 @@ def linearize(
     with one_blas_thread(2 * len(small.mass)):
         matrices = _driven(model, small) if driven else _prescribed(model, small)
     names, units = model.motor_joints[: small.n_placed], model.actuators.units[: small.n_placed]
-    coordinates = (*units, *("rad" if turns else "m" for turns in model.springs.turning))
+    coordinates = (*units, *model.springs.units)
     torques = tuple("N m" if unit == "rad" else "N" for unit in units)
     torque_names, rates = tuple(f"{name}_torque" for name in names), tuple(f"{unit}/s" for unit in units)
     accelerations = tuple(f"{name}_acceleration" for name in names), tuple(f"{unit}/s^2" for unit in units)

@@ -18,7 +18,6 @@ from softrobots.statics.loads import Load
 from softrobots.statics.saved_results import pack_model, unpack_model
 
 _NUMBERS = ("damping_time", "tip_error", "tolerance")
-_LOADS = {"rad": "N m", "m": "N", "N": "N"}
 
 
 def _columns(model: SoftModel) -> dict[str, int]:
@@ -67,13 +66,13 @@ def _table(motion: Motion) -> dict[str, FloatArray]:
     """Columns of a CSV file of a motion, each name with its unit."""
     model = motion.model
     motors = list(zip(model.motor_joints, model.actuators.units, strict=True))
-    springs = [(name, "rad" if turns else "m") for name, turns in zip(model.spring_joints, model.springs.turning, strict=True)]
+    springs = list(zip(model.spring_joints, model.springs.units, strict=True))
     blocks: list[tuple[list[str], Any]] = [
         ([f"{name} [{unit}]" for name, unit in motors], motion.q_motors),
         ([f"{name} [{unit}]" for name, unit in springs], motion.q_springs),
         ([f"{name} velocity [{unit}/s]" for name, unit in motors], motion.motor_velocities),
         ([f"{name} velocity [{unit}/s]" for name, unit in springs], motion.velocities),
-        ([f"{name} load [{_LOADS[unit]}]" for name, unit in motors], motion.motor_torques),
+        ([f"{name} load [{'N m' if unit == 'rad' else 'N'}]" for name, unit in motors], motion.motor_torques),
         ([f"tip {axis} [m]" for axis in "xyz"], motion.tip_position),
         ([f"force {axis} [N]" for axis in "xyz"], motion.forces),
     ]

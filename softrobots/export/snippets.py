@@ -19,7 +19,7 @@ from softrobots.description.mesh_files import remove_mesh_shapes
 from softrobots.description.rigid_tree import Body, RigidTree, Shape
 from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
 from softrobots.description.urdf_tags import NAMESPACE
-from softrobots.export.damping import lowest_frequency, mass_matrix, rule_text
+from softrobots.export.damping import lowest_frequency, mass_matrix
 from softrobots.export.held import HeldRobot, hold
 from softrobots.export.prepared import checked_gravity, prepare, tip_body
 from softrobots.export.python_text import assignment, block, filled, table
@@ -97,7 +97,7 @@ def to_pybullet(
     return filled(
         "pybullet_template.txt",
         name=robot.tree.name,
-        description=_pybullet_lines(held, actuators, damping, frequency, limits),
+        description=_pybullet_lines(held, actuators, robot.remarks[-1], limits),
         meshes=str(sum(shape.kind == "mesh" for shape in shapes)),
         joints=str(len(joints)),
         data=block(data),
@@ -204,7 +204,7 @@ def _with_mass(body: Body) -> Body:
     return body if body.mass > 0.0 else replace(body, mass=_TINY_MASS, inertia=_TINY_INERTIA * np.eye(3))
 
 
-def _pybullet_lines(held: HeldRobot, actuators: str, damping: str | float, frequency: float, limits: bool) -> list[str]:
+def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, limits: bool) -> list[str]:
     lines = []
     if actuators == "welded" and held.motors:
         at = ", ".join(f"{name} {position!r}" for name, position in held.motors.items())
@@ -214,7 +214,7 @@ def _pybullet_lines(held: HeldRobot, actuators: str, damping: str | float, frequ
     if held.tensions:
         pulls = ", ".join(f"{name} {tension!r}" for name, tension in held.tensions.items())
         lines.append(f"Muscles pull with [N]: {pulls}. That stands in the springs, exactly.")
-    lines.append(rule_text(damping, frequency))
+    lines.append(damping)
     if not limits:
         lines.append("The springs have no limits.")
     if held.locked:

@@ -157,6 +157,11 @@ class Springs:
                     tangent[row, column] += bending * (one * other)
         return energy, torque, read_only(tangent)
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each elastic coordinate, rad or m."""
+        return tuple("rad" if turns else "m" for turns in self.turning.tolist())
+
     def saturated(self, y: FloatArray) -> frozenset[int]:
         """Return the places of the springs whose hinge is on its plateau at coordinates `y`, shape (n,)."""
         return frozenset(place for hinge in self._softened(y) if hinge.tangent == 0.0 for place in hinge.places)

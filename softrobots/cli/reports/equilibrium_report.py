@@ -23,7 +23,7 @@ _LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
 def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     """Everything about an equilibrium by the names of its attributes, with `units`."""
     model, limits = equilibrium.model, equilibrium.link_limits
-    motors, springs = model.actuators.units, spring_units(model)
+    motors, springs = model.actuators.units, model.springs.units
     facts = [
         *attributes(equilibrium, q_motors=joined_units(motors), motor_torques=joined_units(load_units(motors))),
         *attributes(equilibrium, q_springs=joined_units(springs), spring_torques=joined_units(load_units(springs))),
@@ -58,7 +58,7 @@ def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
     """Tables of the load, of motors, springs and inflated links."""
     model = equilibrium.model
     motors = _table("motor", model.motor_joints, equilibrium.q_motors, model.actuators.units, equilibrium.motor_torques)
-    springs = _table("spring", model.spring_joints, equilibrium.q_springs, spring_units(model), equilibrium.spring_torques)
+    springs = _table("spring", model.spring_joints, equilibrium.q_springs, model.springs.units, equilibrium.spring_torques)
     parts = [motors, springs, _links(equilibrium)]
     return [*head_lines(model, equilibrium.load), *(line for part in parts if part for line in ("", *part))]
 
@@ -135,11 +135,6 @@ def head_lines(model: SoftModel, load: Load) -> list[str]:
     hinges = max((group.n_hinges for group in model.spring_groups), default=1)
     robot = ("robot", f"{model.pinocchio.name}{f', {hinges} hinges a link' if hinges > 1 else ''} (tip: {model.tip})")
     return aligned([robot, *springs, *(rows or [("load", "none")]), ("gravity", gravity)])
-
-
-def spring_units(model: SoftModel) -> tuple[str, ...]:
-    """Unit of each elastic coordinate, rad or m."""
-    return tuple("rad" if turns else "m" for turns in model.springs.turning.tolist())
 
 
 def load_units(units: Sequence[str]) -> tuple[str, ...]:

@@ -16,7 +16,6 @@ from softrobots.cli.reports.equilibrium_report import (
     load_units,
     model_answer,
     slack_words,
-    spring_units,
 )
 from softrobots.core.checks import FloatArray
 from softrobots.statics.inverse_kinematics import IkSolution
@@ -49,7 +48,7 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         *attributes(trajectory, times="s", targets="m", tip_positions="m", tip_error="m"),
         *attributes(trajectory, orientations="-", orientation_error="rad", q_motors=joined_units(model.actuators.units)),
         Fact("motor_torques", _motor_torques(trajectory), joined_units(load_units(model.actuators.units))),
-        Fact("q_springs", trajectory.q_springs, joined_units(spring_units(model))),
+        Fact("q_springs", trajectory.q_springs, joined_units(model.springs.units)),
         Fact("link_moments", trajectory.link_moments, "N m"),
         Fact("wrinkling_moments", [equilibrium.link_limits.wrinkling_moments for equilibrium in equilibria], "N m"),
         Fact("slack_margin", _margin(trajectory, "slack_margins"), "-"),

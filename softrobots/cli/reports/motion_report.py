@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.reports.answers import Fact, aligned, attributes, formatted
-from softrobots.cli.reports.equilibrium_report import head_lines, joined_units, load_units, model_answer, spring_units
+from softrobots.cli.reports.equilibrium_report import head_lines, joined_units, load_units, model_answer
 from softrobots.dynamics.motion import Motion, MotionEnergy
 from softrobots.statics.loads import Load
 
 
 def motion_answer(motion: Motion, load: Load) -> dict[str, Any]:
     """A motion under a load by the names of its attributes, one row an instant, with `units`."""
-    motors, springs = motion.model.actuators.units, spring_units(motion.model)
+    motors, springs = motion.model.actuators.units, motion.model.springs.units
     energies = {one.name: getattr(motion.energy, one.name) for one in fields(MotionEnergy)}
     facts = [
         *attributes(motion, time="s", tip_position="m", forces="N", q_motors=joined_units(motors)),
@@ -31,7 +31,7 @@ def motion_answer(motion: Motion, load: Load) -> dict[str, Any]:
 def motion_lines(motion: Motion, load: Load) -> list[str]:
     """The same for a person: ranges of tip, motors and springs, then energies, steps and the error."""
     model, energy = motion.model, motion.energy
-    motors, springs = model.actuators.units, spring_units(model)
+    motors, springs = model.actuators.units, model.springs.units
     parts = [
         _ranges("tip", "xyz", motion.tip_position, "mmm"),
         _ranges("motor", model.motor_joints, motion.q_motors, motors, motion.motor_torques, load_units(motors)),
