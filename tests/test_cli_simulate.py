@@ -34,7 +34,7 @@ def test_a_release_is_that_of_the_library(arm: sr.SoftModel, tmp_path: Path, cap
     words += ["--release", "0", "10", "-15", "--damping-time", "0.01"]
     drawn = ["plot", "energies", "strobe"]
     pictures = [word for name in drawn for word in (f"--{name}", str(tmp_path / f"{name}.png"))]
-    page = ["--page", str(tmp_path / "a.html"), "--speed", "0.5"]
+    page = ["--page", str(tmp_path / "a.html")]
     assert main([*words, "-o", str(file), *pictures, *page]) == 0
     out, err = capsys.readouterr()
     for told in ("load on tip", "tip error", "energy balance", "10, of 0.01 to 0.01 s", "spring_2_up", "a.html: written"):
@@ -126,7 +126,6 @@ def test_a_saved_motion_is_shown_at_any_speed(arm: sr.SoftModel, tmp_path: Path,
         ("--duration 1 --output-step 0", "--output-step must be positive"),
         ("--duration 1 --damping-time -1", "--damping-time must be zero or positive"),
         ("--duration 1 --mass-damping -1", "--mass-damping must be zero or positive"),
-        ("--duration 1 --speed 2", "given with --page"),
         ("--duration 1 --start relaxed --release 0 0 1", "given with no --start"),
         ("--duration 1 --release nan 0 0", "--release"),
         ("--duration 1 --start no.npz", "cannot read a result from no.npz"),

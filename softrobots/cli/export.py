@@ -43,7 +43,7 @@ def add_parser(subparsers: Any) -> None:
         "damping of the springs: that of the file; a time [s], by which their stiffness is multiplied; or critical, for the "
         "slowest mode, which settles without swinging (file)"
     )
-    parser.add_argument("--damping", metavar="file|TIME|critical", help=help_text)
+    parser.add_argument("--damping", type=_damping, metavar="file|TIME|critical", help=help_text)
     add_gravity(parser)
     parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> None:
     name = arguments.format or guess_format(arguments.output)
     chosen = {
         "actuators": "welded" if arguments.welded else None,
-        "damping": _damping(arguments.damping),
+        "damping": arguments.damping,
         "gravity": gravity_of(arguments),
     }
     options = {option: value for option, value in chosen.items() if value is not None}
@@ -76,9 +76,9 @@ def run(arguments: argparse.Namespace) -> None:
     print_answer(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])
 
 
-def _damping(word: str | None) -> str | float | None:
+def _damping(word: str) -> str | float:
     """A word as it is, a number as a number."""
     try:
-        return None if word is None else float(word)
+        return float(word)
     except ValueError:
         return word

@@ -93,8 +93,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--energies", type=Path, metavar="FILE.png", help=help_text)
     help_text = "draw the robot at several times, later ones darker, into this PNG file (none)"
     parser.add_argument("--strobe", type=Path, metavar="FILE.png", help=help_text)
-    parser.add_argument("--page", type=Path, metavar="FILE.html", help="write an animated page, which works offline (none)")
-    add_numbers(parser, "--speed", "S", "how fast --page plays, relative to real time [-] (1)")
+    help_text = "write an animated page in real time, which works offline (none); `softrobots view` plays at other speeds"
+    parser.add_argument("--page", type=Path, metavar="FILE.html", help=help_text)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -130,7 +130,7 @@ def run(arguments: argparse.Namespace) -> None:
         files += write_plot(arguments, partial(draw, motion), option)
     if arguments.page is not None:
         with Viewer(model) as viewer:
-            viewer.animate(motion, speed=arguments.speed)
+            viewer.animate(motion)
             files.append(viewer.write_html(arguments.page, title=str(model.pinocchio.name), overwrite=arguments.overwrite))
     print_answer(arguments, motion_answer(motion, load), motion_lines(motion, load), files)
     if motion.interrupted:
@@ -145,15 +145,10 @@ def _check_files(arguments: argparse.Namespace) -> None:
     if arguments.page is not None:
         check_ending("--page", arguments.page, ".html")
         new_file(arguments.page, overwrite=arguments.overwrite)
-    given = {
-        "--speed": (arguments.speed is not None and arguments.page is None, "--page"),
-        "--release": (arguments.release is not None and arguments.start is not None, "no --start, because it is one"),
-        "--tolerance": (arguments.tolerance is not None and arguments.time_step is not None, "no --time-step"),
-    }
-    for option, (wrong, requirement) in given.items():
-        if wrong:
-            value = getattr(arguments, option.removeprefix("--"))
-            raise ParameterError(option, value, f"given with {requirement}")
+    if arguments.release is not None and arguments.start is not None:
+        raise ParameterError("--release", arguments.release, "given with no --start, because it is one")
+    if arguments.tolerance is not None and arguments.time_step is not None:
+        raise ParameterError("--tolerance", arguments.tolerance, "given with no --time-step")
 
 
 def _motors(arguments: argparse.Namespace, model: SoftModel) -> tuple[Any, float]:

@@ -116,7 +116,7 @@ class TimeLoad:
                 signal = checked_function(name, value, (size,), "N")
                 breaks += [find_jumps(signal, duration), find_onsets(signal, duration)]
                 self._moving.append((frame, size, signal))
-            elif isinstance(value, tuple | list) and len(value) == 2:
+            elif isinstance(value, tuple | list) and len(value) == 2 and not np.isscalar(value[0]):
                 signal, kinks = _table(name, value, size)
                 breaks.append(kinks)
                 self._moving.append((frame, size, signal))
