@@ -12,7 +12,8 @@ from softrobots.cli.options.command_line import add_gravity, add_numbers, gravit
 from softrobots.cli.options.output_files import add_output, check_output, save
 from softrobots.cli.options.robot_argument import add_model, add_motors, check_one_each, motors_of, statics_model_of
 from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, attributes, formatted, print_answer
-from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines, joined_units, load_units
+from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines, joined_units
+from softrobots.model.actuators import load_units
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load
 
 _EXAMPLES = """examples:

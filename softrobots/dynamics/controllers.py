@@ -56,10 +56,9 @@ class PD:
         if count == 0:
             raise ParameterError("model", model, "a robot with at least one motor joint")
         self._kp, self._kd = one_each("kp", kp, count, "N m/rad"), one_each("kd", kd, count, "N m s/rad")
-        self._reference = _law(model, "reference", reference, model.n_motors, lambda one: one.q_motors)
-        self._feed_forward = _law(
-            model, "feed_forward", np.zeros(count) if feed_forward is None else feed_forward, count, _held
-        )
+        self._reference = _law(model, "reference", reference, (model.n_motors, "rad"), lambda one: one.q_motors)
+        added = np.zeros(count) if feed_forward is None else feed_forward
+        self._feed_forward = _law(model, "feed_forward", added, (count, "N m"), _held)
 
     def __call__(self, time: float, q: FloatArray, qd: FloatArray) -> FloatArray:
         """Return the torques, shape (n,) [N m or N].
@@ -178,16 +177,17 @@ class ClosedLoop:
 
 
 def _law(
-    model: SoftModel, name: str, value: Any, count: int, values_of: Callable[[Trajectory], FloatArray]
+    model: SoftModel, name: str, value: Any, kind: tuple[int, str], values_of: Callable[[Trajectory], FloatArray]
 ) -> Callable[[float], FloatArray]:
-    """A constant, a trajectory or a function as a function of time."""
+    """A constant, a trajectory or a function as a function of time; `kind` is the number of values and their unit."""
+    count, unit = kind
     if isinstance(value, Trajectory):
         if value.model != model:
             raise ParameterError(name, value.model, f"a Trajectory of the model given, {model!r}")
         return curve(value.times - value.times[0], values_of(value))
     if callable(value):
-        return checked_function(name, value, (count,), "rad" if name == "reference" else "N m")
-    constant = finite_array(name, value, (count,), "rad" if name == "reference" else "N m")
+        return checked_function(name, value, (count,), unit)
+    constant = finite_array(name, value, (count,), unit)
     return lambda _: constant
 
 

@@ -45,7 +45,7 @@ class EquationsOfMotion:
         Args:
             model: The robot.
             gravity: Gravity, world axes [m/s^2]; None: weightless.
-            damping: `D`, of the elastic coordinates, shape (n_springs, n_springs), or of all, shape (n, n); None: none.
+            damping: `D` of the elastic coordinates, shape (n_springs, n_springs); None: none.
             drives: Rotors, `A`, and viscous friction of the actuators, where they move by their force; None: neither acts.
         """
         self.model, self.gravity = model, gravity
@@ -56,8 +56,7 @@ class EquationsOfMotion:
         self.damping: FloatArray = np.zeros((self.n, self.n))
         """`D` of all coordinates, shape (n, n)."""
         if damping is not None:
-            first = self.n - len(damping)
-            self.damping[first:, first:] = damping
+            self.damping[self.n_motors :, self.n_motors :] = damping
         self.rotor_inertia: FloatArray = np.zeros(self.n)
         """Diagonal of `A` of all coordinates, shape (n,)."""
         if drives is not None:

@@ -23,7 +23,6 @@ from softrobots.core.checks import (
     finite_number,
     increasing,
     instance_of,
-    listed,
     non_negative_array,
     positive_array,
     read_only,
@@ -107,26 +106,10 @@ def input_shaper(frequencies: Any, damping_ratios: Any = 0.0, *, shaper: str = "
     Raises:
         ParameterError: If an argument is out of range, or shapes do not fit.
     """
-    choice("shaper", shaper, SHAPERS)
     rate, ratio = _modes(frequencies, damping_ratios)
     if rate.ndim > 1 or rate.size == 0:
         raise ParameterError("frequencies", frequencies, "one number or an array of shape (n,), n >= 1 [Hz]")
-    share = finite_number("tolerance", tolerance)
-    if not 0.0 < share <= 0.3:
-        raise ParameterError("tolerance", tolerance, "above 0, at most 0.3")
-    times, amplitudes = np.zeros(1), np.ones(1)
-    for omega, zeta in zip(rate.ravel().tolist(), ratio.ravel().tolist(), strict=True):
-        half = math.pi / (omega * math.sqrt(1.0 - zeta**2))
-        k = math.exp(-zeta * omega * half)
-        c = (2.0 * k**2 - share * (1.0 + k**2)) / (2.0 * (k**2 + share * k)) if shaper == "ei" else 1.0
-        c = c if c > 0.0 else 1.0
-        one = np.array([1.0, k] if shaper == "zv" else [1.0, 2.0 * c * k, k**2])
-        times = np.add.outer(times, half * np.arange(len(one))).ravel()
-        amplitudes = np.multiply.outer(amplitudes, one / one.sum()).ravel()
-    order = np.argsort(times, kind="stable")
-    times, amplitudes = times[order], amplitudes[order]
-    first = np.concatenate([[True], np.diff(times) > 1e-12 * max(times[-1], 1e-300)])  # impulses at one time become one
-    return InputShaper(read_only(times[first]), read_only(np.add.reduceat(amplitudes, np.flatnonzero(first))))
+    return _convolved(rate.ravel(), ratio.ravel(), shaper, tolerance)
 
 
 def residual_vibration(shaper: InputShaper, frequency: Any, damping_ratio: Any = 0.0) -> FloatArray:
@@ -188,22 +171,16 @@ def shape_input(
     if numbers is None:
         chosen = _exciting(path, times, frequencies, ratios, shaper, tolerance)
     else:
-        requirement = f"numbers of modes from 0 to {len(frequencies) - 1}, without repetition"
-        count = len(numbers) if isinstance(numbers, tuple | list) else -1
-        chosen = tuple(listed("numbers", numbers, count, requirement))
-        if len(set(chosen)) < count or any(type(n) is not int or not 0 <= n < len(frequencies) for n in chosen):
-            raise ParameterError("numbers", numbers, requirement)
-    impulses = InputShaper(read_only(np.zeros(1)), read_only(np.ones(1)))
-    if chosen:
-        rows = list(chosen)
-        impulses = input_shaper(frequencies[rows], ratios[rows], shaper=shaper, tolerance=tolerance)
-    else:
-        choice("shaper", shaper, SHAPERS)
+        known = isinstance(numbers, tuple | list) and all(type(n) is int and 0 <= n < len(frequencies) for n in numbers)
+        if not known or len(set(numbers)) < len(numbers):
+            raise ParameterError("numbers", numbers, f"numbers of modes from 0 to {len(frequencies) - 1}, without repetition")
+        chosen = list(numbers)
+    impulses = _convolved(*_modes(frequencies[chosen], ratios[chosen]), shaper, tolerance)
     end = times[-1] + impulses.duration
-    samples = np.linspace(times[0], end, math.ceil((end - times[0]) / np.diff(times).min() - 1e-9) + 1)
+    samples = np.linspace(0.0, end, math.ceil(end / np.diff(times).min() - 1e-9) + 1)
     delayed = [path(samples - t) for t in impulses.times]
     shaped = np.tensordot(impulses.amplitudes, delayed, axes=1).reshape(len(samples), motors.shape[1])
-    return ShapedTrajectory(read_only(samples), read_only(shaped), impulses, chosen, path)
+    return ShapedTrajectory(read_only(samples), read_only(shaped), impulses, tuple(chosen), path)
 
 
 def _modes(frequency: Any, damping_ratio: Any) -> tuple[FloatArray, FloatArray]:
@@ -215,6 +192,27 @@ def _modes(frequency: Any, damping_ratio: Any) -> tuple[FloatArray, FloatArray]:
     except ValueError as error:
         raise ParameterError("damping_ratio", damping_ratio, f"of a shape that broadcasts with {rate.shape}") from error
     return first, second
+
+
+def _convolved(rates: FloatArray, ratios: FloatArray, shaper: str, tolerance: float) -> InputShaper:
+    """The shaper of modes by angular frequencies [rad/s] and damping ratios, each shape (n,); of none a single impulse."""
+    choice("shaper", shaper, SHAPERS)
+    share = finite_number("tolerance", tolerance)
+    if not 0.0 < share <= 0.3:
+        raise ParameterError("tolerance", tolerance, "above 0, at most 0.3")
+    times, amplitudes = np.zeros(1), np.ones(1)
+    for omega, zeta in zip(rates.tolist(), ratios.tolist(), strict=True):
+        half = math.pi / (omega * math.sqrt(1.0 - zeta**2))
+        k = math.exp(-zeta * omega * half)
+        c = (2.0 * k**2 - share * (1.0 + k**2)) / (2.0 * (k**2 + share * k)) if shaper == "ei" else 1.0
+        c = c if c > 0.0 else 1.0
+        one = np.array([1.0, k] if shaper == "zv" else [1.0, 2.0 * c * k, k**2])
+        times = np.add.outer(times, half * np.arange(len(one))).ravel()
+        amplitudes = np.multiply.outer(amplitudes, one / one.sum()).ravel()
+    order = np.argsort(times, kind="stable")
+    times, amplitudes = times[order], amplitudes[order]
+    first = np.concatenate([[True], np.diff(times) > 1e-12 * max(times[-1], 1e-300)])  # impulses at one time become one
+    return InputShaper(read_only(times[first]), read_only(np.add.reduceat(amplitudes, np.flatnonzero(first))))
 
 
 def _phasor(times: FloatArray, amplitudes: FloatArray, rate: FloatArray, ratio: FloatArray) -> Any:
@@ -232,20 +230,19 @@ def _exciting(
     ratios: FloatArray,
     shaper: str,
     tolerance: float,
-) -> tuple[int, ...]:
+) -> list[int]:
     """Numbers of the modes that the path excites, lowest first, each judged after shaping for those before it."""
     vibrating = [int(n) for n in np.argsort(frequencies, kind="stable") if 0.0 <= ratios[n] < 1.0]
     left = {}
     for n in vibrating:
-        samples = math.ceil(16.0 * frequencies[n] * (times[-1] - times[0])) + 8 * len(times)
-        instants = np.linspace(times[0], times[-1], min(samples, _MOST_SAMPLES))
+        samples = math.ceil(16.0 * frequencies[n] * times[-1]) + 8 * len(times)
+        instants = np.linspace(0.0, times[-1], min(samples, _MOST_SAMPLES))
         middles = 0.5 * (instants[1:] + instants[:-1])
         phasor = _phasor(middles, np.diff(path(instants), axis=0), 2.0 * math.pi * frequencies[n], ratios[n])
         left[n] = float(np.linalg.norm(phasor))
     least, chosen = _NEGLIGIBLE * max(left.values(), default=0.0), list[int]()
     for n in vibrating:
-        so_far = input_shaper(frequencies[chosen], ratios[chosen], shaper=shaper, tolerance=tolerance) if chosen else None
-        share = 1.0 if so_far is None else float(residual_vibration(so_far, frequencies[n], ratios[n]))
-        if share * left[n] > least:
+        so_far = _convolved(*_modes(frequencies[chosen], ratios[chosen]), shaper, tolerance)
+        if float(residual_vibration(so_far, frequencies[n], ratios[n])) * left[n] > least:
             chosen.append(n)
-    return tuple(chosen)
+    return chosen

@@ -16,6 +16,7 @@ from softrobots.core.checks import FloatArray, choice, read_only
 from softrobots.core.errors import DescriptionError, MissingDependency, ParameterError
 from softrobots.dynamics.motor_torque import MOTORS
 from softrobots.dynamics.small_motion import SmallMotion, small_motion
+from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 
@@ -116,8 +117,8 @@ def linearize(
         matrices = _driven(model, small) if driven else _prescribed(model, small)
     names, units = model.motor_joints[: small.n_placed], model.actuators.units[: small.n_placed]
     coordinates = (*units, *model.springs.units)
-    torques = tuple("N m" if unit == "rad" else "N" for unit in units)
-    torque_names, rates = tuple(f"{name}_torque" for name in names), tuple(f"{unit}/s" for unit in units)
+    torques, rates = load_units(units), tuple(f"{unit}/s" for unit in units)
+    torque_names = tuple(f"{name}_torque" for name in names)
     accelerations = tuple(f"{name}_acceleration" for name in names), tuple(f"{unit}/s^2" for unit in units)
     moving, moving_units = (torque_names, torques) if driven else accelerations
     told = (*names, *(f"{name}_rate" for name in names)), (*units, *rates)

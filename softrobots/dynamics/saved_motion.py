@@ -13,6 +13,7 @@ from softrobots.core.checks import FloatArray, finite_array, finite_number, incr
 from softrobots.core.errors import FileFormatError
 from softrobots.core.result_file import KINDS, Kind
 from softrobots.dynamics.motion import Motion, MotionEnergy
+from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.loads import Load
 from softrobots.statics.saved_results import pack_model, unpack_model
@@ -65,14 +66,15 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
 def _table(motion: Motion) -> dict[str, FloatArray]:
     """Columns of a CSV file of a motion, each name with its unit."""
     model = motion.model
-    motors = list(zip(model.motor_joints, model.actuators.units, strict=True))
+    units, loads = model.actuators.units, load_units(model.actuators.units)
+    motors = list(zip(model.motor_joints, units, strict=True))
     springs = list(zip(model.spring_joints, model.springs.units, strict=True))
     blocks: list[tuple[list[str], Any]] = [
         ([f"{name} [{unit}]" for name, unit in motors], motion.q_motors),
         ([f"{name} [{unit}]" for name, unit in springs], motion.q_springs),
         ([f"{name} velocity [{unit}/s]" for name, unit in motors], motion.motor_velocities),
         ([f"{name} velocity [{unit}/s]" for name, unit in springs], motion.velocities),
-        ([f"{name} load [{'N m' if unit == 'rad' else 'N'}]" for name, unit in motors], motion.motor_torques),
+        ([f"{name} load [{unit}]" for name, unit in zip(model.motor_joints, loads, strict=True)], motion.motor_torques),
         ([f"tip {axis} [m]" for axis in "xyz"], motion.tip_position),
         ([f"force {axis} [N]" for axis in "xyz"], motion.forces),
     ]

@@ -12,6 +12,8 @@ from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import MuscleTag
 from softrobots.model.muscle_lengths import MuscleLengths
 
+_LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}  # by the unit of the coordinate
+
 
 class Drives(NamedTuple):
     """What actuators add to the motion of their coordinates, arrays of shape (n_motors,); statics does not use it."""
@@ -136,3 +138,8 @@ class Actuators:
             rows.append(normals)
             curvatures.append(bends)
         return np.concatenate(rows), np.concatenate(curvatures)
+
+
+def load_units(units: Sequence[str]) -> tuple[str, ...]:
+    """Return the units of the loads on coordinates of these units; the load on a given tension is the tension."""
+    return tuple(_LOAD_UNITS[unit] for unit in units)

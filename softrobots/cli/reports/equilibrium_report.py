@@ -11,13 +11,11 @@ import pinocchio as pin
 
 from softrobots.cli.reports.answers import Fact, aligned, answer_of, attributes, formatted
 from softrobots.core.checks import FloatArray
+from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.stability import DIVERGENT, FLUTTER, NEUTRAL, STABLE, UNKNOWN
-
-_LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}
-"""Unit of the load on a coordinate, by the unit of the coordinate; the load on a given tension is the tension."""
 
 
 def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
@@ -135,11 +133,6 @@ def head_lines(model: SoftModel, load: Load) -> list[str]:
     hinges = max((group.n_hinges for group in model.spring_groups), default=1)
     robot = ("robot", f"{model.pinocchio.name}{f', {hinges} hinges a link' if hinges > 1 else ''} (tip: {model.tip})")
     return aligned([robot, *springs, *(rows or [("load", "none")]), ("gravity", gravity)])
-
-
-def load_units(units: Sequence[str]) -> tuple[str, ...]:
-    """Units of the loads on coordinates of these units."""
-    return tuple(_LOAD_UNITS[unit] for unit in units)
 
 
 def joined_units(units: Sequence[str]) -> str:

@@ -13,11 +13,11 @@ from softrobots.cli.reports.equilibrium_report import (
     head_lines,
     joined_units,
     known_margins,
-    load_units,
     model_answer,
     slack_words,
 )
 from softrobots.core.checks import FloatArray
+from softrobots.model.actuators import load_units
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.trajectory import Trajectory
 

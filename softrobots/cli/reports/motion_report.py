@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.reports.answers import Fact, aligned, attributes, formatted
-from softrobots.cli.reports.equilibrium_report import head_lines, joined_units, load_units, model_answer
+from softrobots.cli.reports.equilibrium_report import head_lines, joined_units, model_answer
 from softrobots.dynamics.motion import Motion, MotionEnergy
+from softrobots.model.actuators import load_units
 from softrobots.statics.loads import Load
 
 
