@@ -39,7 +39,7 @@ def tracking_figure(followed: Sequence[Followed]) -> Any:
     """Error of the tip over time."""
     title = "The tip on the path of the arm, 2 s, then at rest"
     figure, axes = canvas.new_plot(
-        (9.0, 5.2), xlabel="time [s]", ylabel="distance of the tip from its target [mm]", title=title
+        (6.4, 5.6), xlabel="time [s]", ylabel="distance of the tip from its target [mm]", title=title
     )
     for number, one in enumerate(followed):
         style = canvas.line_style(number) | {"marker": None}
@@ -48,5 +48,5 @@ def tracking_figure(followed: Sequence[Followed]) -> Any:
     axes.axvline(arm_path.DURATION, color="0.45", lw=0.8, ls=":")
     axes.set_yscale("log")
     axes.set(xlim=(0.0, float(followed[0].motion.time[-1])), ylim=(1e-3, 1e3))
-    axes.legend(fontsize=8, loc="lower left", ncols=2)
+    figure.legend(fontsize=10, loc="outside lower center", ncols=1)
     return figure

@@ -32,14 +32,14 @@ def sensitivity(frequency: float, damping_ratio: float = 0.0, *, tolerance: floa
     made = [input_shaper(frequency, damping_ratio, shaper=kind, tolerance=tolerance) for kind in SHAPERS]
     real = positive_number("frequency", frequency, "Hz") * np.linspace(0.5, 1.5, 401)
     title = f"Shapers for {frequency:.4g} Hz, damping ratio {damping_ratio:.2g}"
-    figure, axes = new_plot((8.0, 5.0), xlabel="frequency of the robot [Hz]", ylabel="vibration that is left [%]", title=title)
+    figure, axes = new_plot((6.4, 4.8), xlabel="frequency of the robot [Hz]", ylabel="vibration that is left [%]", title=title)
     for number, (kind, shaper) in enumerate(zip(SHAPERS, made, strict=True)):
         style = line_style(number) | {"marker": None}
         label = f"{kind.upper()}, {shaper.duration:.3g} s longer"
         axes.plot(real, 100.0 * residual_vibration(shaper, real, damping_ratio), lw=2.0, label=label, **style)
     axes.axhline(100.0 * tolerance, color="0.45", lw=0.8)
-    axes.annotate(f"{100.0 * tolerance:g} %", (real[0], 100.0 * tolerance), (4, 4), textcoords="offset points", fontsize=9)
+    axes.annotate(f"{100.0 * tolerance:g} %", (real[0], 100.0 * tolerance), (4, 4), textcoords="offset points", fontsize=10)
     axes.axvline(frequency, color="0.45", lw=0.8, ls=":")
     axes.set(xlim=(real[0], real[-1]), ylim=(0.0, None))
-    axes.legend(fontsize=9, loc="upper center")
+    figure.legend(fontsize=10, loc="outside lower center", ncols=2)
     return figure
