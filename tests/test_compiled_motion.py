@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib.util
 import pickle
@@ -191,6 +192,22 @@ def test_a_batch_has_the_motions_of_its_cases(solver: CompiledModel, rng: np.ran
     one, many = solver.simulate(0.05, stopping, **given), solver.simulations(0.05, [stopping, stopping], **given)
     np.testing.assert_allclose(many.q_springs[1], one.q_springs, rtol=0, atol=1e-10)  # the blow comes between two steps
     np.testing.assert_array_equal(ends.q_springs[:, 0], batch.q_springs[:2, -1])
+
+
+def test_results_are_frozen(solver: CompiledModel) -> None:
+    given: dict[str, Any] = {"gravity": GRAVITY, "damping_time": 1e-3, "tolerance": 1e-2}
+    one, many = solver.simulate(0.02, np.zeros(3), **given), solver.simulations(0.02, np.zeros((2, 3)), **given)
+    for result, name in ((one, "q_springs"), (one, "tip_position"), (one, "energy"), (one, "other"), (many, "tip_error")):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(result, name, 0.0)
+    for array in (one.q_springs, one.tip_position, one.steps, one.motor_torques, many.q_springs, many.steps, many.tip_error):
+        assert array is not None
+        assert not array.flags.writeable
+
+
+def test_a_batch_may_be_empty(solver: CompiledModel) -> None:
+    for steps in ({"time_step": 1e-3}, {"tolerance": 1e-3}):
+        assert solver.simulations(0.02, np.zeros((0, 3)), **steps).q_springs.shape[::2] == (0, 4)
 
 
 def _first(batch: MotionBatch, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -241,11 +241,11 @@ class CompiledDynamics(CompiledStatics):
         found = taken.rows[:, np.searchsorted(looked, rows)]
         fail(taken.status, cases.bad, [], [found])
         batch = MotionBatch(
-            read_only(rows),
+            rows,
             *self._elastic_state(found[..., :-3]),
             np.ascontiguousarray(found[..., -3:]),
             taken.status,
-            read_only(taken.grid),
+            taken.grid,
             taken.errors,
             None if h is not None else largest,
         )
@@ -254,7 +254,7 @@ class CompiledDynamics(CompiledStatics):
                 f"the tips are not known to {largest:.3g} m after a run with {len(taken.grid) - 1} steps; a shorter duration "
                 "or more damping may help, or a time_step",
                 best=batch,
-                residual=math.inf if taken.errors is None else float(taken.errors.max()),
+                residual=math.inf if taken.errors is None else float(taken.errors.max(initial=0.0)),
                 iterations=len(taken.grid) - 1,
             )
         return batch

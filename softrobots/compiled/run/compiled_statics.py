@@ -160,8 +160,9 @@ class CompiledStatics:
         if type(gravity) is np.ndarray and gravity.dtype is DOUBLE and gravity.shape == _THREE:
             return gravity
         if type(gravity) is tuple and all(type(one) is float for one in gravity):
-            self._known_gravity = gravity, gravity_vector(gravity)
-            return self._known_gravity[1]
+            vector = gravity_vector(gravity)
+            self._known_gravity = gravity, vector
+            return vector
         return None
 
     def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:

@@ -14,6 +14,7 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.dynamics.motion import Motion, MotionEnergy
 
 
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class CompiledMotion(Motion):
     """A `Motion` whose torques and energies are computed when they are asked for, from all steps of the same motion again."""
 
@@ -29,12 +30,12 @@ class CompiledMotion(Motion):
         replay: Callable[[FloatArray, FloatArray], Motion] = vars(self)["_replay"]
         return replay(self.steps, self.time)
 
-    @cached_property
+    @cached_property  # type: ignore[misc]
     def motor_torques(self) -> FloatArray:
         """Load that each motor carries, with that of the accelerated masses, shape (n, n_motors) [N m or N]."""
         return self._whole.motor_torques
 
-    @cached_property
+    @cached_property  # type: ignore[misc]
     def energy(self) -> MotionEnergy:
         """Energies and their balance."""
         return self._whole.energy
@@ -78,8 +79,9 @@ class MotionBatch:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for array in (self.time, self.q_springs, self.velocities, self.tip_position, self.status, self.steps):
-            array.setflags(write=False)
+        for array in vars(self).values():
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)
 
     @property
     def certified(self) -> Any:

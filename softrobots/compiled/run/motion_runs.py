@@ -68,7 +68,7 @@ def finer_and_finer(
         now = take(grid)
         if now.interrupted:
             return replace(before, interrupted=True)
-        errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1)
+        errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1, initial=0.0)
         errors = np.where(before.status == Status.CERTIFIED, errors, np.inf)
         counts = (now.status == Status.CERTIFIED) & ~np.asarray(bad)
         furthest = float(errors[counts].max(initial=0.0))
@@ -122,7 +122,7 @@ def take_batch(
     statuses = np.zeros(cases.count, dtype=np.uint8)
     places = tuple(place for place, _ in given)
     most = 4096 if cases.stand_still else max(_SAMPLES // (2 * len(grid)), 1)
-    size = 16 * math.ceil(min(most, cases.count / threads) / 16)
+    size = 16 * max(math.ceil(min(most, cases.count / threads) / 16), 1)
     stops = _stops(grid, cases.kicks).tolist()
 
     def solve(case: int) -> None:
