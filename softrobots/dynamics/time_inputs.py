@@ -102,6 +102,7 @@ class TimeLoad:
             ParameterError: If a value has the wrong shape or is not finite.
             NameNotFound: If a frame does not exist.
         """
+        self._tip = model.tip
         given = [] if force is None else [("force", model.tip, force, 3)]
         if isinstance(wrench, Mapping):
             given += [(f"wrench[{frame!r}]", frame, value, 6) for frame, value in wrench.items()]
@@ -138,6 +139,10 @@ class TimeLoad:
         if wrenches.keys() != self._last.keys() or any(not np.array_equal(w, self._last[f]) for f, w in wrenches.items()):
             self._last = wrenches
         return self._last
+
+    def tip_forces(self, times: FloatArray) -> FloatArray:
+        """Return the force on the tip at many times, shape (n,) [s], as shape (n, 3) [N]."""
+        return np.array([self(time).get(self._tip, np.zeros(6))[:3] for time in times.tolist()]).reshape(-1, 3)
 
     @staticmethod
     def _add(wrenches: dict[str, FloatArray], frame: str, value: FloatArray) -> None:

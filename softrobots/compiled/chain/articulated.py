@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Vector, constants, cross, outer, vector
+from softrobots.compiled.chain.elements import Vector, constants, cross, matrix, outer, vector
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate
 from softrobots.compiled.chain.moving_joints import RigidBody
 from softrobots.compiled.trace.expressions import Scalar
@@ -52,9 +52,7 @@ class JointLine:
 
 def with_body(inertia: Any, body: RigidBody, axes: Any) -> Any:
     """Return an inertia, shape (6, 6), angular part first, with a body added."""
-    x, y, z = axes @ body.moment
-    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]], dtype=object)
-    linear = constants(np.eye(3)) * body.mass
+    lever, linear = _skew(axes @ body.moment), constants(np.eye(3)) * body.mass
     return inertia + np.block([[body.turned(axes), lever], [-lever, linear]])
 
 
@@ -70,13 +68,16 @@ def moved_acceleration(acceleration: Vector, by: Vector) -> Vector:
 
 def moved_inertia(inertia: Any, by: Vector) -> Any:
     """Return an inertia about a point that is `by` nearer to the base."""
-    x, y, z = by
-    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]], dtype=object)
-    linear, before = inertia[3:, 3:], inertia[:3, 3:]
+    lever, linear, before = _skew(by), inertia[3:, 3:], inertia[:3, 3:]
     mixed = before + lever @ linear
-    half = before @ lever
-    angular = inertia[:3, :3] - mixed @ lever - half.T
+    angular = inertia[:3, :3] - mixed @ lever - (before @ lever).T
     return np.block([[_mirrored(angular), mixed], [mixed.T, linear]])
+
+
+def _skew(v: Vector) -> Any:
+    """Return the matrix of the vector product with a vector."""
+    x, y, z = v
+    return matrix([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def symmetric(values: Any) -> Any:

@@ -71,21 +71,8 @@ class GroupLayout:
     def __post_init__(self) -> None:
         """Compute the places."""
         n = self.unknowns
-        sizes = dict(
-            frame=18,
-            origin=3,
-            inertia=len(UPPER),
-            pull=12,
-            wrench=6,
-            sums=6,
-            answer=6,
-            base=18,
-            cosine=n,
-            sine=n,
-            bounds=2,
-            end=0,
-        )
-        assign_places(self, self.first, **sizes)
+        passes = dict(frame=18, origin=3, inertia=len(UPPER), pull=12, wrench=6, sums=6, answer=6)
+        assign_places(self, self.first, **passes, base=18, cosine=n, sine=n, bounds=2, end=0)
 
 
 class _Record:

@@ -65,18 +65,9 @@ class Run:
     def __init__(self, program: Program, functions: Any) -> None:
         """Look up the functions; those that the program lacks are None."""
         self.program, self.layout = program, program.layout
-        single = (
-            "settle",
-            "settle_from",
-            "estimate",
-            "reach",
-            "follow",
-            "look_at_tip",
-            "motion_step",
-            "motion_run",
-            "place_at",
-        )
-        for name in (*single, "settle_batch", "estimate_batch", "reach_batch", "motion_batch"):
+        single, motion = ("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip"), ("motion_step", "motion_run")
+        batches = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch")
+        for name in (*single, *motion, "place_at", *batches):
             setattr(self, name, getattr(functions, name, None))
 
     def workspace(self) -> Any:

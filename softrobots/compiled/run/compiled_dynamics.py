@@ -78,7 +78,7 @@ class CompiledDynamics(CompiledStatics):
         """
         end = positive_number("duration", duration, "s")
         path, load = MotorPath(self._model, q_motors, end), TimeLoad(self._model, force, None, end)
-        course = Course(path, load, self._model.tip, Blows(self._model, self._unknowns.strains))
+        course = Course(path, load, Blows(self._model, self._unknowns.strains))
         run, given, damping = self._motion_code(gravity, damping_time, mass_damping)
         h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         facts: dict[str, Any] = {

@@ -10,10 +10,8 @@ import numpy as np
 from softrobots.compiled.drivers.lane_drivers import Places, Rows
 from softrobots.compiled.motion_settings import EXTRAPOLATION, KEPT_STEPS, MOTION_CORRECTIONS, MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.program.generated_module import Program
+from softrobots.compiled.run.numpy_batches import BLOCK
 from softrobots.compiled.statuses import Status
-
-BLOCK = 4096
-"""Cases in a block: their workspace stays in the cache of a core."""
 
 
 class MotionBatches:

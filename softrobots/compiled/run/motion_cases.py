@@ -30,7 +30,6 @@ class MotionCases:
             starts = starts.q_springs[:, -1], starts.velocities[:, -1]
         springs, rates = starts if isinstance(starts, tuple) and len(starts) == 2 else (starts, None)
         springs = springs.q_springs if isinstance(springs, EquilibriumBatch) else springs
-        self._tip = model.tip
         self._paths = [MotorPath(model, one, end) for one in _moving(q_motors)]
         self._loads = [TimeLoad(model, one, None, end) for one in _moving(forces)]
         arrays = {
@@ -80,7 +79,7 @@ class MotionCases:
 
     def forces(self, grid: FloatArray, rows: slice) -> FloatArray:
         """Return the forces of some cases, shape (n or 1, n_steps or 1, 3) [N]; see `forces_of_steps`."""
-        return _stacked([forces_of_steps(load, self._tip, grid) for load in _some(self._loads, rows)], self._forces[rows])
+        return _stacked([forces_of_steps(load, grid) for load in _some(self._loads, rows)], self._forces[rows])
 
 
 def _moving(given: Any) -> list[Any]:

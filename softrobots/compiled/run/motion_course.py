@@ -30,17 +30,9 @@ def motors_of_steps(path: MotorPath, grid: FloatArray) -> FloatArray:
     return found
 
 
-def forces_at(load: TimeLoad, tip: str, times: Sequence[float]) -> FloatArray:
-    """Return the force on the tip at given times, shape (n, 3) [N]."""
-    none = np.zeros(6)
-    if load.constant:
-        return np.tile(load(0.0).get(tip, none)[:3], (len(times), 1))
-    return np.array([load(time).get(tip, none)[:3] for time in times])
-
-
-def forces_of_steps(load: TimeLoad, tip: str, grid: FloatArray) -> FloatArray:
+def forces_of_steps(load: TimeLoad, grid: FloatArray) -> FloatArray:
     """Return the force on the tip in the middles of steps, shape (n_steps, 3), or one row if it is constant [N]."""
-    return forces_at(load, tip, [0.0] if load.constant else (0.5 * (grid[1:] + grid[:-1])).tolist())
+    return load.tip_forces(grid[:1] if load.constant else 0.5 * (grid[1:] + grid[:-1]))
 
 
 def motors_at(path: MotorPath, times: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -88,8 +80,6 @@ class Course:
     """Positions of the motors."""
     load: TimeLoad
     """Force on the tip."""
-    tip: str
-    """Name of the tip."""
     blows: Blows
     """What springs do when velocities of motors jump."""
 
@@ -101,5 +91,5 @@ class Course:
     def inputs_at(self, time: FloatArray, grid: FloatArray) -> dict[str, Any]:
         """Return the fields of a `Motion` with rows at given times, shape (n,) [s], that the steps of a grid do not compute."""
         motors, rates = motors_at(self.path, time, grid)
-        forces, steps = forces_at(self.load, self.tip, time.tolist()), grid[grid <= time[-1]]
-        return {"time": time, "q_motors": motors, "motor_velocities": rates, "forces": forces, "steps": steps}
+        known = {"time": time, "q_motors": motors, "motor_velocities": rates, "forces": self.load.tip_forces(time)}
+        return known | {"steps": grid[grid <= time[-1]]}

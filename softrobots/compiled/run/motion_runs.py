@@ -96,7 +96,7 @@ def take_one(
     try:
         for first, end in itertools.pairwise(stops.tolist()):
             part, looked = grid[first : end + 1], _looked(times, grid, first, end)
-            motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, course.tip, part)
+            motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, part)
             out = run.flat(rows[0, looked])
             paths = run.flat(motors), len(motors), run.flat(forces), len(forces)
             seen = run.flat(times[looked]), looked.stop - looked.start, out
