@@ -50,9 +50,8 @@ class EquationsOfMotion:
         """
         self.model, self.gravity = model, gravity
         self.n_motors, self.n = model.n_motors, model.n_motors + model.n_springs
-        self._pinocchio, self._data = model.workspace(gravity)
-        if gravity is None:
-            self._pinocchio, self._data = model.workspace((0.0, 0.0, 0.0))  # Pinocchio's own model has gravity
+        weightless = 0.0, 0.0, 0.0  # for the workspace; Pinocchio's own model has gravity
+        self._pinocchio, self._data = model.workspace(weightless if gravity is None else gravity)
         self.damping: FloatArray = np.zeros((self.n, self.n))
         """`D` of all coordinates, shape (n, n)."""
         if damping is not None:

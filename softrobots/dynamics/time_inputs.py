@@ -185,10 +185,8 @@ def find_jumps(signal: Signal, duration: float, *, resolution: float = 0.0, leas
         before, after = times[place], times[place + 1]
         low, high = values[place], values[place + 1]
         rounds = 0
-        while after - before > max(resolution, 4e-16 * duration) and rounds < 60:
+        while after - before > max(resolution, 4e-16 * duration):
             middle = 0.5 * (before + after)
-            if not before < middle < after:
-                break
             value = signal(middle)
             if np.abs(value - low).max() >= np.abs(high - value).max():
                 after, high = middle, value
