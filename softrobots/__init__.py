@@ -31,7 +31,7 @@ from softrobots.dynamics.controllers import PD, ClosedLoop
 from softrobots.dynamics.damping import damping_time_from_decrement, measured_decay
 from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
 from softrobots.dynamics.linear_model import LinearModel, linearize
-from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.model.link_limits import LinkLimits
@@ -82,6 +82,7 @@ __all__ = [
     "LoadNotFound",
     "MissingDependency",
     "Motion",
+    "MotionState",
     "NameNotFound",
     "NeutralEquilibrium",
     "NoCriticalLoad",

@@ -24,7 +24,6 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.run.motion_results import MotionBatch
 from softrobots.core.errors import NotConverged, ParameterError
-from softrobots.dynamics.motion import MotionState
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
 from tests.support.c_libraries import Controller
@@ -181,12 +180,12 @@ def test_a_batch_has_the_motions_of_its_cases(solver: CompiledModel, rng: np.ran
     )
     ends = solver.simulations(0.02, motors[:2], starts=_first(batch, 2), **given)
     for row in (0, 1, 2, 4):
-        state = MotionState(solver.model, 0.0, motors[row], np.zeros(3), starts[0][row], starts[1][row])
+        state = sr.MotionState(solver.model, 0.0, motors[row], np.zeros(3), starts[0][row], starts[1][row])
         one = solver.simulate(0.05, motors[row], start=state, force=forces[row], **given)
         np.testing.assert_allclose(one.time, batch.time, rtol=0, atol=0)
         np.testing.assert_allclose(batch.q_springs[row], one.q_springs, rtol=0, atol=1e-10)  # velocities differ by 1e-10
         np.testing.assert_allclose(batch.tip_position[row], one.tip_position, rtol=0, atol=1e-10)
-    state = MotionState(solver.model, 0.0, swaying(0.0), np.zeros(3), starts[0][0], np.zeros(4))
+    state = sr.MotionState(solver.model, 0.0, swaying(0.0), np.zeros(3), starts[0][0], np.zeros(4))
     one = solver.simulate(0.05, swaying, start=state, force=gust, **given)
     np.testing.assert_allclose(moving.tip_position[0], one.tip_position, rtol=0, atol=1e-10)
     one, many = solver.simulate(0.05, stopping, **given), solver.simulations(0.05, [stopping, stopping], **given)
@@ -225,8 +224,8 @@ def test_undamped_motion_runs_backwards(motors: Any, springs: Any, rates: Any, h
     solver, q = undamped(), np.array(motors)
     y0, v0 = 0.2 * np.array(springs), 2.0 * np.array(rates)
     given: dict[str, Any] = {"gravity": GRAVITY, "damping_time": 0.0, "time_step": h}
-    there = solver.simulate(6 * h, q, start=MotionState(solver.model, 0.0, q, np.zeros(3), y0, v0), **given)
-    back = MotionState(solver.model, 0.0, q, np.zeros(3), there.q_springs[-1], -there.velocities[-1])
+    there = solver.simulate(6 * h, q, start=sr.MotionState(solver.model, 0.0, q, np.zeros(3), y0, v0), **given)
+    back = sr.MotionState(solver.model, 0.0, q, np.zeros(3), there.q_springs[-1], -there.velocities[-1])
     again = solver.simulate(6 * h, q, start=back, **given)
     # Each step is solved to 1e-13 in its middle, and 4e-13 / h in a velocity.
     np.testing.assert_allclose(again.q_springs, there.q_springs[::-1], rtol=0, atol=1e-11)
@@ -245,7 +244,7 @@ def undamped() -> CompiledModel:
 def test_steps_that_do_not_converge_are_halved(solver: CompiledModel) -> None:
     """A step in which motors turn by 1.5 rad and springs by 1 rad: alone, in a batch, and as two halves."""
     state, h = (np.zeros(4), np.array([20.0, 20.0, 10.0, -14.0])), 0.05
-    begin = MotionState(solver.model, 0.0, np.zeros(3), np.zeros(3), *state)
+    begin = sr.MotionState(solver.model, 0.0, np.zeros(3), np.zeros(3), *state)
 
     def turning(time: float) -> np.ndarray:
         return 30.0 * time * np.array([1.0, -0.7, 0.5])

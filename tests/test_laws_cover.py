@@ -32,7 +32,7 @@ WITHOUT = {
     **dict.fromkeys((f"compiled.run.results.Compiled{name}" for name in ("Equilibrium", "LoadEstimate")), _RESULT),
     **dict.fromkeys((f"compiled.run.results.{name}Batch" for name in ("Equilibrium", "Load", "Motor")), _RESULT),
     "dynamics.motion.MotionEnergy": _RESULT,
-    "dynamics.motion.MotionState": _RESULT,
+    "MotionState": _RESULT,
     "view.live.commands.Wanted": _RESULT,
     "view.meshcat_page.page_text.InlinePage": "a page of somebody else's notebook: test_view_command shows it in a browser",
     "view.slider_page.SliderPage": "a page in a browser: test_slider_page moves its sliders",

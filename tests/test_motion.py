@@ -14,7 +14,6 @@ import softrobots as sr
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics import simulation
 from softrobots.dynamics.equations import EquationsOfMotion
-from softrobots.dynamics.motion import MotionState
 from tests.support.laws import law
 
 ROBOTS = (
@@ -224,7 +223,7 @@ def test_steps_end_at_the_knee_of_a_plateau() -> None:
         return np.array([state[1], -np.clip(8.0 * state[0], -2.0, 2.0) / inertia])
 
     begin = np.array([0.0, 1.5 * knee * np.sqrt(8.0 / inertia)])
-    start = MotionState(model, 0.0, np.zeros(0), np.zeros(0), begin[:1], begin[1:])
+    start = sr.MotionState(model, 0.0, np.zeros(0), np.zeros(0), begin[:1], begin[1:])
     events: Any = [lambda t, s: s[0] - knee, lambda t, s: s[0] + knee]
     exact = solve_ivp(slope, (0, 2.0), begin, "DOP853", rtol=1e-12, atol=1e-13, events=events, max_step=1e-3)
     moved = sr.simulate(model, 2.0, (), start=start, damping_time=0.0, tolerance=2e-5)

@@ -75,7 +75,7 @@ PAGES = {
         "Motion",
         "Simulation, vibration modes, linear models for controllers, damping, and motor paths that leave no vibration behind.",
         (
-            *_top("simulate", "Motion", "dynamics.motion.MotionEnergy", "dynamics.motion.MotionState"),
+            *_top("simulate", "Motion", "MotionState", "dynamics.motion.MotionEnergy"),
             *_top("vibration_modes", "VibrationModes", "dynamics.vibration.ModeSwing", "linearize", "LinearModel"),
             *_top("damping_time_from_decrement", "measured_decay", "dynamics.damping.Decay"),
             *_top("PD", "ClosedLoop"),
