@@ -333,7 +333,7 @@ MOTORS = (0.0, 0.0, 0.0)
         ({"q_motors": lambda t: np.full(3, np.nan if t > 0.05 else 0.0)}, r"q_motors\(t=0\.0"),
         ({"q_motors": lambda t: np.full(3, float(t > 0.05))}, "jumps at 0.05 s"),
         ({"q_motors": "home"}, "q_motors"),
-        ({"force": (1, 2)}, r"^force = .* shape \(3,\)"),
+        ({"force": (1, 2)}, r"^force = \(1, 2\): force must be of shape \(3,\) \[N\], a table .*, or a function"),
         ({"force": ([0.0, 1.0], np.zeros((3, 3)))}, "values of force"),
         ({"force": ([1.0, 0.0], np.zeros((2, 3)))}, "times of force"),
         ({"force": lambda t: "down"}, r"force\(t=0\)"),

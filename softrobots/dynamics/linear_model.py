@@ -45,11 +45,13 @@ class LinearModel:
     state_units: tuple[str, ...]
     """Unit of each."""
     input_names: tuple[str, ...]
-    """`<motor>_acceleration` or `<motor>_torque`, `<muscle>_tension` of muscles of given tension, `tip_force_x`, `_y`, `_z`."""
+    """`<motor>_acceleration`, or `<motor>_torque` [N m] and `<motor>_force` [N]; `<muscle>_tension` of muscles of given
+    tension; `tip_force_x`, `_y`, `_z`."""
     input_units: tuple[str, ...]
     """Unit of each."""
     output_names: tuple[str, ...]
-    """`tip_x`, `_y`, `_z`, `tip_turn_x`, `_y`, `_z`, `<motor>_torque`; driven by torques `<motor>`, `<motor>_rate`."""
+    """`tip_x`, `_y`, `_z`, `tip_turn_x`, `_y`, `_z`, `<motor>_torque` and `<motor>_force`; driven by torques `<motor>`,
+    `<motor>_rate`."""
     output_units: tuple[str, ...]
     """Unit of each."""
 
@@ -118,7 +120,7 @@ def linearize(
     names, units = model.motor_joints[: small.n_placed], model.actuators.units[: small.n_placed]
     coordinates = (*units, *model.springs.units)
     torques, rates = load_units(units), tuple(f"{unit}/s" for unit in units)
-    torque_names = tuple(f"{name}_torque" for name in names)
+    torque_names = tuple(f"{name}_{'torque' if unit == 'rad' else 'force'}" for name, unit in zip(names, units, strict=True))
     accelerations = tuple(f"{name}_acceleration" for name in names), tuple(f"{unit}/s^2" for unit in units)
     moving, moving_units = (torque_names, torques) if driven else accelerations
     told = (*names, *(f"{name}_rate" for name in names)), (*units, *rates)

@@ -117,7 +117,7 @@ class TimeLoad:
                 signal = checked_function(name, value, (size,), "N")
                 breaks += [find_jumps(signal, duration), find_onsets(signal, duration)]
                 self._moving.append((frame, size, signal))
-            elif isinstance(value, tuple | list) and len(value) == 2 and not np.isscalar(value[0]):
+            elif isinstance(value, tuple | list) and len(value) == 2:
                 signal, kinks = _table(name, value, size)
                 breaks.append(kinks)
                 self._moving.append((frame, size, signal))
@@ -213,6 +213,9 @@ def find_onsets(signal: Signal, duration: float) -> FloatArray:
 
 def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
     """A table of values over time, linear between its rows and constant beyond; two rows at one time are a jump."""
+    if np.isscalar(value[0]):
+        required = f"of shape ({size},) [N], a table (times (n,), values (n, {size})), or a function of time"
+        raise ParameterError(name, value, required)
     times = finite_array(f"times of {name}", value[0], (None,), "s")
     values = finite_array(f"values of {name}", value[1], (len(times), size), "N")
     if len(times) == 0:

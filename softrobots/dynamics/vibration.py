@@ -244,9 +244,8 @@ def _refuse_unstable(model: SoftModel, stiffness: FloatArray, servos: FloatArray
     own = np.concatenate([np.where(servos > 0.0, servos, model.stiffest or 1.0), model.stiffness])
     softest = float(np.linalg.eigvalsh(scaled(stiffness, own)).min(initial=1.0))
     if softest <= -POSITIVE:
-        raise ParameterError(
-            "equilibrium", f"softest stiffness {softest:.3g} of the springs'", "stable, with its servos: it does not vibrate"
-        )
+        required = "positive, relative to springs and servos: about an unstable one nothing vibrates (linearize takes it)"
+        raise ParameterError("least stiffness of the equilibrium", float(f"{softest:.3g}"), required)
     if softest <= POSITIVE:
         raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has a mode without frequency")
 
