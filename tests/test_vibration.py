@@ -361,3 +361,6 @@ def test_the_figure_has_a_panel_for_each_mode(tool: Callable[[str], ModuleType])
         assert (aside[0] < 1e-3) == ("twists" in panel.get_title())
     with pytest.raises(sr.ParameterError, match="VibrationModes"):
         mode_shapes(robot)
+    rigid = sr.load_model(sr.InflatableArm(), springs=dict.fromkeys(model("arm").spring_joints))
+    with pytest.raises(sr.ParameterError, match="at least one"):
+        mode_shapes(sr.vibration_modes(rigid, sr.solve_equilibrium(rigid, rigid.relaxed_motors)))

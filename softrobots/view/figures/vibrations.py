@@ -34,10 +34,12 @@ def mode_shapes(modes: VibrationModes, *, shown: int = 6) -> Any:
         The figure.
 
     Raises:
-        ParameterError: If they are no modes, or `shown` is not positive.
+        ParameterError: If there are no modes, or `shown` is not positive.
         MissingDependency: If matplotlib is not installed.
     """
     instance_of("modes", modes, VibrationModes, "VibrationModes (made by softrobots.vibration_modes)")
+    if not len(modes.frequencies):
+        raise ParameterError("modes", modes.model, "at least one; a robot without springs has none while its motors are held")
     count = min(positive_integer("shown", shown), len(modes.frequencies))
     columns = min(count, 2)
     rows = math.ceil(count / columns)
