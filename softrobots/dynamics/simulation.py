@@ -108,7 +108,8 @@ def simulate(
 
         def new_run() -> Recorder:
             """A run from the first state, whose velocities take those with which prescribed motors begin."""
-            rule = MidpointRule(equations, path, load, drive)
+            controller = None if drive is None else MotorTorque(model, torque, sample_time)
+            rule = MidpointRule(equations, path, load, controller)
             change = first_kick(path, first.rates[: model.n_motors])
             return Recorder(rule, first if change is None else rule.kicked(first, change), rows)
 
