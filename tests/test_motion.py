@@ -168,7 +168,7 @@ def test_the_tip_stays_within_the_tolerance_over_a_run_with_a_jump_of_the_load(f
         errors = np.linalg.norm(moved.tip_position - tip_of(exact[:, 0], exact[:, 1]), axis=1)
         assert moved.tip_error is not None
         assert errors.max() < tolerance
-        assert errors.max() < 2.0 * moved.tip_error < 2.0 * tolerance  # the estimate is one, not a bound
+        assert 0.4 * moved.tip_error < errors.max() < moved.tip_error <= tolerance
         assert np.abs(moved.steps - 0.31).min() < 1e-12
         assert np.abs(moved.energy.balance).max() < 1e-2 * np.abs(moved.energy.load_work).max()
 
@@ -226,7 +226,7 @@ def test_steps_end_at_the_knee_of_a_plateau() -> None:
     start = sr.MotionState(model, 0.0, np.zeros(0), np.zeros(0), begin[:1], begin[1:])
     events: Any = [lambda t, s: s[0] - knee, lambda t, s: s[0] + knee]
     exact = solve_ivp(slope, (0, 2.0), begin, "DOP853", rtol=1e-12, atol=1e-13, events=events, max_step=1e-3)
-    moved = sr.simulate(model, 2.0, (), start=start, damping_time=0.0, tolerance=2e-5)
+    moved = sr.simulate(model, 2.0, (), start=start, damping_time=0.0, tolerance=2.5e-5)
     assert moved.tolerance is not None
     assert abs(moved.q_springs[-1, 0] - exact.y[0, -1]) * LENGTH < moved.tolerance
     crossings = np.sort(np.concatenate(exact.t_events))

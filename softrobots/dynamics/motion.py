@@ -88,7 +88,8 @@ class Motion:
     steps: FloatArray
     """Times at the ends of all steps that were taken, the first included, shape (m,) [s]."""
     tip_error: float | None = None
-    """Measured error of the tip position, the largest of all steps [m]; None for fixed steps, where it is not measured."""
+    """Measured error of the tip position, the largest of all steps, with a safety factor of 1.2 [m] (see
+    `softrobots.dynamics.step_control`); None for fixed steps, where it is not measured."""
     tolerance: float | None = None
     """Largest `tip_error` that was asked for [m]; None for fixed steps."""
     interrupted: bool = False

@@ -73,7 +73,8 @@ class MotionBatch:
     steps: FloatArray
     """Times at the ends of all steps, the first included, shape (m,) [s]."""
     tip_error: FloatArray | None = None
-    """Measured error of the tip, the largest of all rows, shape (n,) [m]; None for fixed steps, where it is not measured."""
+    """Measured error of the tip, the largest of all rows, with a safety factor of 1.2, shape (n,) [m]; None for fixed steps,
+    where it is not measured."""
     tolerance: float | None = None
     """Largest `tip_error` that was asked for [m]; None for fixed steps."""
 

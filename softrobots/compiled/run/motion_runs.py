@@ -56,8 +56,8 @@ def finer_and_finer(
 ) -> Taken:
     """Halve all steps until the tips of the valid cases are known to a tolerance; return the last run.
 
-    As the scheme is of second order, the finer of two runs has a third of the difference of their tips as its error, or more
-    where the differences shrink more slowly; see `softrobots.dynamics.step_control`. `bad` marks cases that do not count.
+    The error of the finer of two runs is stated from the difference of their tips by `softrobots.dynamics.step_control`, as in
+    `simulate`. `bad` marks cases that do not count.
     """
     stops = np.unique([0.0, *(time for time in breaks.tolist() if 1e-9 * end < time < end * (1.0 - 1e-9)), end])
     ends = zip(stops[:-1], stops[1:], np.ceil(np.diff(stops) / end * _FIRST_STEPS).astype(int) + 1, strict=True)
