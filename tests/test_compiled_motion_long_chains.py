@@ -18,6 +18,7 @@ from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.motion import MotionState
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
 from tests.support.c_libraries import Controller
@@ -135,6 +136,17 @@ def test_a_run_is_that_of_simulate_at_the_same_steps(kind: str, rng: np.random.G
     # A change of 1e-13 in the middle of a step is one of 2e-13 / h in the velocity at its end.
     left = 1e-9 * np.abs(slow.velocities).max() + steps * 2e-13 / (duration / steps)
     np.testing.assert_allclose(rows[:, n : 2 * n], slow.velocities, rtol=0, atol=left)
+
+
+@pytest.mark.parametrize("kind", ["rod", "helix_lumped"])
+def test_small_motions_are_those_of_simulate(kind: str) -> None:
+    """Steps are solved to an absolute accuracy; where all moves by milliradians, that leaves 1e-9 of the motion, too."""
+    model, rng = LONG[kind](), np.random.default_rng(5)
+    springs, rates = model.rest + 2e-3 * rng.normal(size=model.n_springs), 0.02 * rng.normal(size=model.n_springs)
+    start, motors = MotionState(model, 0.0, np.zeros(0), np.zeros(0), springs, rates), np.zeros(0)
+    given = {"start": start, "force": (0.1, -0.1, 0.2), "gravity": GRAVITY, "damping_time": 5e-3, "time_step": 1e-3}
+    slow, fast = sr.simulate(model, 0.04, motors, **given), sr.compile(model, backend="python").simulate(0.04, motors, **given)
+    np.testing.assert_allclose(fast.q_springs, slow.q_springs, rtol=0, atol=1e-9 * np.abs(slow.q_springs).max())
 
 
 def test_locked_strains_stay_at_rest(rng: np.random.Generator) -> None:

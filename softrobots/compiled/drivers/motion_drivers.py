@@ -12,8 +12,11 @@ from softrobots.compiled.motion_settings import *
 
 
 def has_settled(change: float, last: float) -> bool:
-    """Tell whether the corrections have converged: by the last one, by what the next would be, or as far as rounding lets."""
-    if change <= MOTION_TOLERANCE or (change < 0.01 * last and last < 1.0 and change * change <= MOTION_TOLERANCE * last):
+    """Tell whether the corrections have converged: by the last one, by what the next would be, or as far as rounding lets.
+
+    The next one is expected to shrink as the last one did, and up to ten times less, as that one may have had other factors.
+    """
+    if change <= MOTION_TOLERANCE or (change < 0.01 * last and last < 1.0 and change * change <= 0.1 * MOTION_TOLERANCE * last):
         return True
     return change > 0.5 * last and change <= MOTION_ROUNDING
 

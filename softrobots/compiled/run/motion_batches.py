@@ -107,7 +107,7 @@ class MotionBatches:
                 functions.apply_correction(w, i)
             change = w[layout.change]
             settled = (change <= MOTION_TOLERANCE) | ((change > 0.5 * last) & (change <= MOTION_ROUNDING))
-            settled |= (change < 0.01 * last) & (last < 1.0) & (change * change <= MOTION_TOLERANCE * last)
+            settled |= (change < 0.01 * last) & (last < 1.0) & (change * change <= 0.1 * MOTION_TOLERANCE * last)
             if np.all(settled | failed):
                 break
             last = change
