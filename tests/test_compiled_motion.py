@@ -22,6 +22,7 @@ from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run import motion_runs
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.compiled_model import CompiledModel
+from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_results import MotionBatch
 from softrobots.core.errors import NotConverged, ParameterError
 from softrobots.model.soft_model import SoftModel
@@ -306,6 +307,22 @@ def test_an_interrupted_motion_has_what_there_is(solver: CompiledModel, monkeypa
     assert motion.interrupted
     assert motion.time[-1] == pytest.approx(0.06)
     np.testing.assert_array_equal(motion.q_springs, whole.q_springs[: len(motion.time)])
+
+
+def test_long_batches_are_done_in_parts(solver: CompiledModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C ends a batch between two of them."""
+    given: dict[str, Any] = {"forces": np.linspace((0.0, 0.0, 0.0), (0.0, 5.0, 0.0), 64), "time_step": 1e-3}
+    whole, forces, parts = solver.simulations(0.01, np.zeros(3), **given), MotionCases.forces, []
+
+    def looked_at(cases: MotionCases, grid: np.ndarray, rows: slice) -> np.ndarray:
+        parts.append(rows)
+        return forces(cases, grid, rows)
+
+    monkeypatch.setattr(motion_runs, "_CASE_STEPS", 16 * 11)
+    monkeypatch.setattr(MotionCases, "forces", looked_at)
+    found = solver.simulations(0.01, np.zeros(3), **given)
+    np.testing.assert_allclose(found.q_springs, whole.q_springs, rtol=0, atol=1e-14)  # rounding of vector instructions
+    assert parts == [slice(first, first + 16) for first in (0, 16, 32, 48)]
 
 
 REFUSED: list[tuple[Any, str]] = [

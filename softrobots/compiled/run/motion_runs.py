@@ -24,6 +24,7 @@ from softrobots.dynamics.step_control import error_share, halved
 _FIRST_STEPS = 400  # of the first of the runs that are compared
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
 _CHUNK = 2_000  # steps between two looks for Ctrl-C
+_CASE_STEPS = 10_000_000  # steps times cases between two looks for Ctrl-C, a second or so
 _SAMPLES = 2_000_000  # of motor positions in memory
 
 MOST_STEPS = 1_000_000
@@ -121,7 +122,7 @@ def take_batch(
     out = np.full((cases.count, len(times), 2 * n + 3), np.nan)
     statuses = np.zeros(cases.count, dtype=np.uint8)
     places = tuple(place for place, _ in given)
-    most = 4096 if cases.stand_still else max(_SAMPLES // (2 * len(grid)), 1)
+    most = min(4096, (_CASE_STEPS if cases.stand_still else _SAMPLES // 2) // len(grid))
     size = 16 * max(math.ceil(min(most, cases.count / threads) / 16), 1)
     stops = _stops(grid, cases.kicks).tolist()
 
