@@ -128,8 +128,8 @@ def test_the_closed_loop_finds_the_target_under_a_load_that_nobody_told_it(geare
             gravity=sr.EARTH_GRAVITY,
             motors="torque",
             torque=control,
-            sample_time=2e-3,
-            time_step=2e-3,
+            sample_time=4e-3,
+            time_step=4e-3,
             output_step=0.02,
         )
         for duration in (1.6, 0.1)

@@ -161,14 +161,14 @@ def test_the_tip_stays_within_the_tolerance_over_a_run_with_a_jump_of_the_load(f
 
     accurate: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "dense_output": True}
     first = solve_ivp(slope, (0.0, 0.31), np.zeros(4), args=(lambda t: 3.0 * t / 0.31,), **accurate).sol
-    second = solve_ivp(slope, (0.31, 2.0), first(0.31), args=(lambda _: -2.0,), **accurate).sol
+    second = solve_ivp(slope, (0.31, 1.3), first(0.31), args=(lambda _: -2.0,), **accurate).sol
     for tolerance in (1e-3, 1e-4):
-        moved = sr.simulate(model, 2.0, (), force=force, damping_time=0.0, tolerance=tolerance)
+        moved = sr.simulate(model, 1.3, (), force=force, damping_time=0.0, tolerance=tolerance)
         exact = np.array([(first if t <= 0.31 else second)(t) for t in moved.time])
         errors = np.linalg.norm(moved.tip_position - tip_of(exact[:, 0], exact[:, 1]), axis=1)
         assert moved.tip_error is not None
         assert errors.max() < tolerance
-        assert 0.4 * moved.tip_error < errors.max() < moved.tip_error <= tolerance
+        assert 0.25 * moved.tip_error < errors.max() < moved.tip_error <= tolerance  # 1 / 3.6 if two runs are enough
         assert np.abs(moved.steps - 0.31).min() < 1e-12
         assert np.abs(moved.energy.balance).max() < 1e-2 * np.abs(moved.energy.load_work).max()
 
@@ -256,11 +256,11 @@ def test_ctrl_c_returns_what_there_is() -> None:
 
     def force(t: float) -> FloatArray:
         pressed.append(1)
-        if len(pressed) == 6000:
+        if len(pressed) == 2600:  # of which 2003 look for jumps before the first step
             raise KeyboardInterrupt
         return np.array([np.sin(t), 0.0, 0.0])
 
-    for options in ({"time_step": 5e-5}, {"tolerance": 1e-9}):
+    for options in ({"time_step": 1e-3}, {"tolerance": 1e-9}):
         pressed.clear()
         moved = sr.simulate(model, 1.0, (), force=force, **options)
         assert moved.interrupted
