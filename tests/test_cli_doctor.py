@@ -194,8 +194,8 @@ def test_the_packages_are_those_of_pyproject() -> None:
     for line in text[text.index("dependencies = [") : text.index("[project.scripts]")].splitlines():
         head = re.match(r"([\w-]+) = \[", line)
         place = head[1] if head else place
-        for name, least in re.findall(r'"([\w-]+)(?:\[\w+\])?>=([\d.]+)', line):
-            listed.setdefault(name, set()).add(("" if place == "dependencies" else place, least))
+        for name, least in re.findall(r'"([\w-]+)(?:\[\w+\])?(?:>=([\d.]+)|")', line):
+            listed.setdefault(name, set()).add(("" if place == "dependencies" else place, least or "0"))
     ours = {row.name: {(extra, row.minimum) for extra in row.extras or ("",)} for row in required_packages()}
     of_users = {name: {entry for entry in listed[name] if entry[0] not in ("dev", "test")} for name in listed}
     stale = "the installation is older than pyproject.toml: install it again"

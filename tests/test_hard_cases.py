@@ -276,20 +276,28 @@ def test_compiled_code_that_hangs_ends_the_soak_with_a_broken_law(monkeypatch: p
 
 
 def test_every_loop_of_the_compiled_solvers_ends() -> None:
-    """A loop without a count goes on with a share that it halves or doubles, up to a limit that the share itself has."""
+    """A loop without a count goes on with a share that it halves or doubles, up to a limit that the share itself has.
+
+    Those of motion advance by a part of the step, which is halved down to a limit, or by a row of the result.
+    """
     loops = []
     for file in (CHECKOUT / "softrobots" / "compiled").rglob("*drivers.py"):
         tree = ast.parse(file.read_text(encoding="utf-8"))
         for loop in (node for node in ast.walk(tree) if isinstance(node, ast.While)):
             last = loop.test.values[-1] if isinstance(loop.test, ast.BoolOp) else loop.test
             scaled = [ast.unparse(node) for node in ast.walk(loop) if isinstance(node, ast.AugAssign)]
-            loops.append((ast.unparse(last), scaled[0]))
+            loops.append((ast.unparse(last), scaled))
         calls = [node.iter for node in ast.walk(tree) if isinstance(node, ast.For)]
         assert all(isinstance(call, ast.Call) and ast.unparse(call.func) == "range" for call in calls)
-    assert set(loops) == {
-        ("share > 1e-12 * largest", "share *= 0.5"),
-        ("2.0 * share * length < longest", "share *= 2.0"),
+    goes_on_by = {
+        "share > 1e-12 * largest": "share *= 0.5",
+        "2.0 * share * length < longest": "share *= 2.0",
+        "done < 1.0": "part *= 0.5",
+        "times[row] <= grid[step + 1] or step == n_steps - 1": "row += 1",
+        "times[row] <= grid[step + 1] or step == len(grid) - 2": "row += 1",
     }
+    assert {test for test, _ in loops} == set(goes_on_by)
+    assert all(goes_on_by[test] in changed for test, changed in loops)
 
 
 def test_cases_are_the_same_in_every_run_and_cover_what_is_hard() -> None:

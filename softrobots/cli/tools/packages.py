@@ -13,6 +13,7 @@ from softrobots.core.errors import SoftRobotsError
 EXTRAS = {
     "plot": "plots: --plot, the figures of scripts",
     "fast": "compiled solvers by numba",
+    "control": "linear models as state spaces of python-control",
     "viser": "sliders in the browser: softrobots view ROBOT --sliders",
     "pictures": "pictures of the browser view",
     "robots": "the UR5 and other third-party robots",
