@@ -18,8 +18,6 @@ from tests.support.rods import elastica_tip
 
 STEEL = PlanarRod(0.6, 0.8e-3, 200e9, 7850.0, gravity=(0.0, -9.81))
 TPU = PlanarRod(0.4, 5e-3, 70e6, 1200.0, stretches=6, gravity=(0.0, -9.81))
-RELEASED = {"steel": (STEEL, 0.15, (13, 2000)), "TPU": (TPU, 0.1, (11, 1100))}
-"""Rods that stand upright and are released from a sideways force [N]; polynomials and steps per 0.05 s of the reference."""
 SOFT = CosseratRod(0.4, 0.02, 1e6, 1000.0, 24, gravity=(0.0, 0.0, -3.0))
 
 
@@ -79,7 +77,8 @@ def test_the_cosserat_rod_is_right() -> None:
     assert max(errors[1]) < 6e-3
 
 
-@pytest.mark.parametrize(("counts", "push"), [((4, 8), 0.1), pytest.param((8, 16), 0.2, marks=pytest.mark.study)])
+@pytest.mark.study
+@pytest.mark.parametrize(("counts", "push"), [((4, 8), 0.1)])
 def test_sections_move_as_a_cosserat_rod_to_second_order(counts: tuple[int, int], push: float) -> None:
     """Bent in two planes, twisted and stretched by a wrench that comes and goes within `push` seconds, then free as long."""
     bend, twist = SOFT.bending / SOFT.length**2, SOFT.torsion / SOFT.length
@@ -134,10 +133,12 @@ def test_free_vibration_is_that_of_mujoco(twists: bool) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("material", list(RELEASED))
-def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(material: str) -> None:
-    """30 pairs of hinges, undamped, with the steps that are chosen by default; the reference is ten times as good."""
-    rod, force, (bends, steps) = RELEASED[material]
+def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off() -> None:
+    """30 pairs of hinges, undamped, released upright from a sideways force, with the steps that are chosen by default.
+
+    The reference, by its polynomials and its steps in 0.05 s, is ten times as good.
+    """
+    rod, force, bends, steps = TPU, 0.1, 11, 1100
     fine = _path(dataclasses.replace(rod, bends=bends), force, 10.0, 200, steps)
     coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, 10.0, 200, steps)
     assert np.linalg.norm(fine - coarse, axis=1).mean() < 1e-4
@@ -151,7 +152,7 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(material: str) 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("engine", ["general", "compiled"])
 def test_random_runs_end_with_numbers(engine: str) -> None:
-    """Random loads, motors, damping and steps, 600 runs a robot and engine, ten thousand in all: each ends, with numbers."""
+    """More than ten thousand with random loads, motors, damping and steps, most of them compiled: each ends, with numbers."""
     rng, failed, runs = np.random.default_rng(21), 0, 0
     for kind in law_robots.ROBOTS:
         model = law_robots.model(kind)
@@ -160,7 +161,7 @@ def test_random_runs_end_with_numbers(engine: str) -> None:
             if kind in ("limp", "foreign") or (model.muscles and model.muscle_input == "lengths"):
                 continue  # plateaus, side branches and lengths of muscles are refused there
             simulate = sr.compile(model).simulate
-        for _ in range(600):
+        for _ in range(1500 if engine == "compiled" else 200):
             runs += 1
             push = law_robots.PUSHES[kind] * 10.0 ** rng.uniform(-2.0, 0.5) * rng.normal(size=3)
             step = 10.0 ** rng.uniform(-4.0, -1.5)
@@ -172,6 +173,6 @@ def test_random_runs_end_with_numbers(engine: str) -> None:
                 failed += 1
                 continue
             assert all(np.all(np.isfinite(values)) for values in (moved.q_springs, moved.velocities, moved.tip_position))
-            if engine == "general" or runs % 20 == 0:  # Pinocchio computes those of compiled motion, slowly
+            if engine == "general" or runs % 50 == 0:  # Pinocchio computes those of compiled motion, slowly
                 assert np.all(np.isfinite(moved.energy.balance))
     assert failed < runs / 100, (failed, runs)
