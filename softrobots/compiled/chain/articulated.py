@@ -21,13 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Vector, constants, cross, matrix, outer, vector
+from softrobots.compiled.chain.elements import Vector, constants, cross, outer, skew, symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate
 from softrobots.compiled.chain.moving_joints import RigidBody
 from softrobots.compiled.trace.expressions import Scalar
-
-UPPER = [(row, column) for column in range(6) for row in range(column + 1)]
-"""Indices of the upper triangle of an inertia."""
 
 
 @dataclass
@@ -52,7 +49,7 @@ class JointLine:
 
 def with_body(inertia: Any, body: RigidBody, axes: Any) -> Any:
     """Return an inertia, shape (6, 6), angular part first, with a body added."""
-    lever, linear = _skew(axes @ body.moment), constants(np.eye(3)) * body.mass
+    lever, linear = skew(axes @ body.moment), constants(np.eye(3)) * body.mass
     return inertia + np.block([[body.turned(axes), lever], [-lever, linear]])
 
 
@@ -68,29 +65,11 @@ def moved_acceleration(acceleration: Vector, by: Vector) -> Vector:
 
 def moved_inertia(inertia: Any, by: Vector) -> Any:
     """Return an inertia about a point that is `by` nearer to the base."""
-    lever, linear, before = _skew(by), inertia[3:, 3:], inertia[:3, 3:]
+    lever, linear, before = skew(by), inertia[3:, 3:], inertia[:3, 3:]
     mixed = before + lever @ linear
     angular = inertia[:3, :3] - mixed @ lever - (before @ lever).T
-    return np.block([[_mirrored(angular), mixed], [mixed.T, linear]])
-
-
-def _skew(v: Vector) -> Any:
-    """Return the matrix of the vector product with a vector."""
-    x, y, z = v
-    return matrix([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def symmetric(values: Any) -> Any:
-    """Return a symmetric matrix, shape (6, 6), from the elements of its upper triangle by columns."""
-    matrix = constants(np.zeros((6, 6)))
-    for (row, column), value in zip(UPPER, values, strict=True):
-        matrix[row, column] = matrix[column, row] = value
-    return matrix
-
-
-def _mirrored(matrix: Any) -> Any:
-    """Return a matrix with the elements above its diagonal below, too."""
-    return np.array([[matrix[min(i, j), max(i, j)] for j in range(len(matrix))] for i in range(len(matrix))], dtype=object)
+    angular = symmetric([angular[index] for index in upper_triangle(3)], 3)  # its halves are rounded differently
+    return np.block([[angular, mixed], [mixed.T, linear]])
 
 
 @dataclass

@@ -90,6 +90,25 @@ def outer(one: Vector, other: Vector) -> Vector:
     return np.multiply.outer(one, other)
 
 
+def skew(v: Vector) -> Vector:
+    """Return the matrix of the vector product with a vector."""
+    x, y, z = v
+    return matrix([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def upper_triangle(n: int) -> list[tuple[int, int]]:
+    """Return the indices of the upper triangle of a matrix, shape (n, n), by columns: those of fewer rows come first."""
+    return [(row, column) for column in range(n) for row in range(column + 1)]
+
+
+def symmetric(values: Sequence[Scalar], n: int) -> Vector:
+    """Return a symmetric matrix, shape (n, n), from its upper triangle by columns."""
+    full = constants(np.zeros((n, n)))
+    for (row, column), value in zip(upper_triangle(n), values, strict=True):
+        full[row, column] = full[column, row] = value
+    return full
+
+
 def turned(axes: Vector, angle: Scalar) -> Vector:
     """Return axes turned about their own z."""
     c, s = cosine(angle), sine(angle)
@@ -130,9 +149,9 @@ class Screw:
         self._w = w = vector(z[:3])
         self._length = z[3] + length
         self._z = z
-        self._c = stumpff(w @ w, 7 if not _is_zero(w[2]) else 6)
+        self._c = stumpff(w @ w, 7 if not is_zero(w[2]) else 6)
         c, across = self._c, vector([w[1], -w[0], 0.0])
-        turn = matrix([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+        turn = skew(w)
         twice = outer(w, w) - constants(np.eye(3)) * (w @ w)
         self.rotation = constants(np.eye(3)) + turn * c[1] + twice * c[2]
         """Axes of the end in those of the start, shape (3, 3)."""
@@ -205,7 +224,7 @@ class Screw:
         With `s = w . v` the Stumpff functions change by `d_k s`, and that by `e_k s^2 + d_k v . v`.
         """
         w, c, v = self._w, self._c, vector(rates[:3])
-        orders = range(3) if _is_zero(w[2]) else range(4)
+        orders = range(3) if is_zero(w[2]) else range(4)
         d = [k * c[k + 2] - c[k + 1] for k in range(len(orders) + 2)]
         slopes = [d[k] * (w @ v) for k in orders]
         bends = [(k * d[k + 2] - d[k + 1]) * ((w @ v) * (w @ v)) + d[k] * (v @ v) for k in orders]
@@ -246,7 +265,7 @@ class Screw:
         d = [k * c[k + 2] - c[k + 1] for k in range(6 if len(c) > 7 else 5)]
         total = constants(np.zeros((3, 3)))
         for k, value, slope, curve in ((1, g1, slope1, None), (2, g2, slope2, curve2), (3, g3, slope3, curve3)):
-            if k == 3 and _is_zero(w[2]):  # the twist is locked, and the term is constant
+            if k == 3 and is_zero(w[2]):  # the twist is locked, and the term is constant
                 continue
             e = k * d[k + 2] - d[k + 1]
             total = total + unit * (value * d[k]) + outer(w, w) * (value * e)
@@ -267,5 +286,6 @@ class Screw:
         return w * radial + swing * c[2] + vector([0.0, 0.0, pw * c[3]]) + push * (w[2] * c[3])
 
 
-def _is_zero(value: Scalar) -> bool:
+def is_zero(value: Scalar) -> bool:
+    """Tell whether it is the constant zero."""
     return isinstance(value, float) and value == 0.0

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.chain.articulated import (
-    UPPER,
     ArticulatedGroup,
     JointLine,
     Pull,
@@ -22,9 +21,8 @@ from softrobots.compiled.chain.articulated import (
     carried_inward,
     carried_outward,
     moved_wrench,
-    symmetric,
 )
-from softrobots.compiled.chain.elements import Screw, Vector, constants, turned, vector
+from softrobots.compiled.chain.elements import Screw, Vector, constants, symmetric, turned, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Eliminated
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.looped_chain import Kind, TableColumns
@@ -71,7 +69,7 @@ class GroupLayout:
     def __post_init__(self) -> None:
         """Compute the places."""
         n = self.unknowns
-        passes = dict(frame=18, origin=3, inertia=len(UPPER), pull=12, wrench=6, sums=6, answer=6)
+        passes = dict(frame=18, origin=3, inertia=21, pull=12, wrench=6, sums=6, answer=6)
         assign_places(self, self.first, **passes, base=18, cosine=n, sine=n, bounds=2, end=0)
 
 
@@ -193,9 +191,9 @@ def _trace_factors(
 ) -> ArticulatedGroup:
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
     h, pulls = factor.load(plan.layout.time_step), vector(factor.loads(places.pull, 12))
-    inertia, pull = symmetric(factor.loads(places.inertia, len(UPPER))), Pull(pulls[:3], pulls[3:].reshape(3, 3))
+    inertia, pull = symmetric(factor.loads(places.inertia, 21), 6), Pull(pulls[:3], pulls[3:].reshape(3, 3))
     found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, group.own, h * h * 0.25)
-    factor.store_all(places.inertia, [inertia[index] for index in UPPER])
+    factor.store_all(places.inertia, [inertia[index] for index in upper_triangle(6)])
     factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated
     lower, inverses, coupling = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots, one.coupling))

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Screw, Vector, constants, cross, matrix, outer, vector
+from softrobots.compiled.chain.elements import Screw, Vector, constants, cross, is_zero, matrix, outer, vector
 from softrobots.compiled.trace.expressions import Expression, Scalar, cosine, sine, square_root
 
 SECTION_AXES = (0, 1, 2, 0, 1, 2)
@@ -54,17 +54,15 @@ class RigidBody(NamedTuple):
     def is_rod(self) -> bool:
         """Whether it is round about an axis through its centre of mass, as a straight rod with the origin on it."""
         aside = [self.moment[axis] for axis in range(3) if axis != self.round_axis]
-        return all(_is_zero(one) for one in (*self.inertia.ravel(), *aside))
+        return all(is_zero(one) for one in (*self.inertia.ravel(), *aside))
 
     @property
     def needed_axes(self) -> list[int]:
         """The axes of the frame that matter."""
-        if any(not _is_zero(one) for one in self.inertia.ravel()):
+        if any(not is_zero(one) for one in self.inertia.ravel()):
             return [0, 1, 2]
         return [
-            axis
-            for axis in range(3)
-            if not _is_zero(self.moment[axis]) or (axis == self.round_axis and not _is_zero(self.along))
+            axis for axis in range(3) if not is_zero(self.moment[axis]) or (axis == self.round_axis and not is_zero(self.along))
         ]
 
 
@@ -78,10 +76,6 @@ def round_part(inertia: Any) -> tuple[int, float, float] | None:
             if abs(across - other) <= small:
                 return axis, float(across), float(diagonal[axis] - across)
     return None
-
-
-def _is_zero(value: Scalar) -> bool:
-    return isinstance(value, float) and value == 0.0
 
 
 @dataclass
@@ -114,7 +108,7 @@ class MovingFrame:
         """Return the same axes at another origin that moves with them, at coordinates `by` along given ones of these axes."""
         lift = self.lift
         for axis, distance in zip(axes, by, strict=True):
-            if not _is_zero(distance):
+            if not is_zero(distance):
                 lift = lift + self.swing(self.axes[:, axis])[1] * distance
         return replace(self, lift=lift)
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
-from softrobots.compiled.chain.elements import constants, vector
+from softrobots.compiled.chain.elements import symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -59,24 +57,16 @@ class Plan:
         """Read the sums of the outboard elements, with `n` components; return them and the elements of matrix and columns."""
         upper = block.loads(self.recursion.matrix, n * (n + 1) // 2)
         columns = [block.loads(place, n) for place in self.columns]
-        matrix = constants(np.zeros((n, n)))
-        for (row, other), value in zip(_upper(n), upper, strict=True):
-            matrix[row, other] = matrix[other, row] = value
         min_pivot, n_negative_pivots = block.loads(self.recursion.sums + 3, 2)
-        outboard = Outboard(matrix, [vector(column) for column in columns], min_pivot, n_negative_pivots)
+        outboard = Outboard(symmetric(upper, n), [vector(column) for column in columns], min_pivot, n_negative_pivots)
         return outboard, [*upper, *(one for column in columns for one in column)]
 
     def store_outboard(self, block: Block, outboard: Outboard) -> None:
         """Write the sums that an element hands on."""
-        block.store_all(self.recursion.matrix, [outboard.matrix[row, other] for row, other in _upper(len(outboard.matrix))])
+        block.store_all(self.recursion.matrix, [outboard.matrix[index] for index in upper_triangle(len(outboard.matrix))])
         for place, column in zip(self.columns, outboard.columns, strict=True):
             block.store_all(place, column.tolist())
 
 
 def _sides(first: int, others: int | None) -> list[int]:
     return [first] if others is None else [first, *(others + 6 * axis for axis in range(3))]
-
-
-def _upper(n: int) -> list[tuple[int, int]]:
-    """Indices of the upper triangle by columns: those of three rows come first."""
-    return [(row, column) for column in range(n) for row in range(column + 1)]

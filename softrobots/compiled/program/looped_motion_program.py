@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from softrobots.compiled.chain.articulated import UPPER
 from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.chain.motion_groups import motion_groups, reach_behind
@@ -131,7 +130,7 @@ def _bend(plan: MotionPlan, places: GroupLayout) -> Block:
 
 def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_articulate", "Start at the tip with its force, without bodies beyond.")
-    block.store_all(places.inertia, [0.0] * len(UPPER))
+    block.store_all(places.inertia, [0.0] * 21)
     block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9])
     return block
 
