@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
@@ -21,6 +21,7 @@ from softrobots.compiled.program.manual import manual
 from softrobots.compiled.program.motor_program import force_blocks, target_blocks
 from softrobots.compiled.program.unrolled_program import equilibrium_blocks
 from softrobots.compiled.statuses import Status
+from softrobots.compiled.trace.blocks import Block
 
 
 @dataclass(frozen=True)
@@ -73,21 +74,28 @@ def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False) -> Pr
         lane_functions = [one for one in lane_functions if one not in lane_drivers.MOTOR_FUNCTIONS]
     docstring, places = manual(plan, tip)
     names += [*places, *Status.__members__]
-    # A name could end the text.
-    docstring = docstring.replace("\\", "\\\\").replace('"""', r"\"\"\"")
-    title = f'"""{docstring}\n"""'
-    text = "\n\n\n".join(
-        [
-            title + "\n\n" + _constants(unknowns, layout, size, lane_size, tables),
-            *map(text_of, functions_of(trigonometry)),
-            *(block.text() for block in blocks),
-            *loops,
-            *map(text_of, functions),
-        ]
-    )
-    lane_texts = [replace(block, name=f"{block.name}_lanes").text(lanes=True) for block in lanes]
-    lane_text = "\n\n\n".join([*lane_texts, *lane_loops, *map(text_of, lane_functions)])
-    return Program(text + "\n", lane_text + "\n", layout, size, tip, (*entries, *names))
+    text = module_text(docstring, _constants(unknowns, layout, size, lane_size, tables), blocks, loops, functions)
+    return Program(text, lane_text(lanes, lane_loops, lane_functions), layout, size, tip, (*entries, *names))
+
+
+def module_text(
+    docstring: str,
+    values: Mapping[str, object],
+    blocks: Sequence[Block],
+    loops: Sequence[str],
+    functions: Sequence[Callable[..., Any]],
+) -> str:
+    """Return the text of a module: docstring, constants, straight-line functions, loops over elements, drivers."""
+    docstring = docstring.replace("\\", "\\\\").replace('"""', r"\"\"\"")  # a name could end the text
+    head = "\n".join(f"{name} = {value!r}" for name, value in values.items())
+    straight = [*map(_text, functions_of(trigonometry)), *(block.text() for block in blocks)]
+    return "\n\n\n".join([f'"""{docstring}\n"""\n\n{head}', *straight, *loops, *map(_text, functions)]) + "\n"
+
+
+def lane_text(blocks: Sequence[Block], loops: Sequence[str], functions: Sequence[Callable[..., Any]]) -> str:
+    """Return the text that is appended for batches: straight-line functions of lanes, loops over elements, drivers."""
+    straight = [replace(block, name=f"{block.name}_lanes").text(lanes=True) for block in blocks]
+    return "\n\n\n".join([*straight, *loops, *map(_text, functions)]) + "\n"
 
 
 def lane_count(size: int) -> int:
@@ -98,7 +106,7 @@ def lane_count(size: int) -> int:
     return count
 
 
-def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, tables: dict[str, object]) -> str:
+def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, tables: dict[str, object]) -> dict[str, object]:
     chain, strains = unknowns.chain, unknowns.strains
     min_pivot = min((float(chain.stiffness[strain]) for strain in strains), default=1.0)
     group = {strain: row for row, one in enumerate(chain.constrained) for strain in one}
@@ -122,7 +130,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "GROUP": tuple(group.get(strain, -1) for strain in strains),
     }
     # Tables are not empty, even without motor joints or springs.
-    return "\n".join(f"{name} = {(0.0,) if value == () else value!r}" for name, value in (values | tables).items())
+    return {name: (0.0,) if value == () else value for name, value in (values | tables).items()}
 
 
 def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
@@ -146,6 +154,6 @@ def functions_of(module: ModuleType) -> list[Callable[..., Any]]:
     return [one for one in vars(module).values() if inspect.isfunction(one) and one.__module__ == module.__name__]
 
 
-def text_of(function: Callable[..., Any]) -> str:
+def _text(function: Callable[..., Any]) -> str:
     """Return the text of a function."""
     return inspect.getsource(function).rstrip()

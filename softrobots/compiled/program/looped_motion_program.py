@@ -86,12 +86,10 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         _finish_place(plan, places),
     ]
     loops, lane_loops = (
-        "\n\n\n".join(
-            [
-                *(loop_text(name, _PASSES[name], calls[name], back=name in _INWARD, suffix=suffix) for name in _PASSES),
-                _CONTROL.replace("_SUFFIX", suffix),
-            ]
-        )
+        [
+            *(loop_text(name, _PASSES[name], calls[name], back=name in _INWARD, suffix=suffix) for name in _PASSES),
+            _CONTROL.replace("_SUFFIX", suffix),
+        ]
         for suffix in ("", "_lanes")
     )
     return MotionParts([*frame, *(block for kind in kinds for block in kind.blocks)], record, tables, loops, lane_loops)

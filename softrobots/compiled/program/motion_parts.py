@@ -24,10 +24,10 @@ class MotionParts:
     """Size of the workspace."""
     constants: dict[str, object] = field(default_factory=dict)
     """Tables and places that they need."""
-    loops: str = ""
-    """Text of the functions that loop over elements."""
-    lane_loops: str = ""
-    """Text of those for lanes."""
+    loops: list[str] = field(default_factory=list)
+    """Texts of the functions that loop over elements."""
+    lane_loops: list[str] = field(default_factory=list)
+    """Texts of those for lanes."""
 
 
 def unrolled_motion(plan: MotionPlan) -> MotionParts:

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
-
 from softrobots.compiled import motion_settings
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.time_step import step_blocks
 from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers, trigonometry
+from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers
 from softrobots.compiled.drivers.lane_drivers import load_block, load_case
-from softrobots.compiled.program.generated_module import Program, functions_of, lane_count, text_of
+from softrobots.compiled.program.generated_module import Program, functions_of, lane_count, lane_text, module_text
 from softrobots.compiled.program.looped_motion_program import looped_motion
 from softrobots.compiled.program.manual import Place, motor_names, on_a_line, place_table, strain_names
 from softrobots.compiled.program.motion_parts import unrolled_motion
 from softrobots.compiled.statuses import Status
 from softrobots.core.errors import ParameterError
 
-_STATUSES = (Status.CERTIFIED, Status.UNSETTLED)
+_STATUSES = {
+    Status.CERTIFIED: "the step was taken",
+    Status.UNSETTLED: "the step does not converge, even in small parts",
+}
 
 
 def check_motion(unknowns: Unknowns, *, full_damping: bool = False) -> None:
@@ -45,29 +44,15 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False) -> Pr
     parts = unrolled_motion(plan) if unknowns.is_unrolled else looped_motion(plan)
     blocks = [*parts.blocks, *step_blocks(layout)]
     docstring, places = _manual(plan)
-    docstring = docstring.replace("\\", "\\\\").replace('"""', r"\"\"\"")  # a name could end the text
     values: dict[str, object] = {name: value for name, value in vars(motion_settings).items() if name.isupper()}
     values |= layout.constants()
     values |= {"WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size, "LANES": lane_count(parts.size)}
     values |= {status.name: status.value for status in _STATUSES} | parts.constants
-    head = "\n".join(f"{name} = {value!r}" for name, value in values.items())
-    pieces = [
-        f'"""{docstring}\n"""\n\n{head}',
-        *map(text_of, functions_of(trigonometry)),
-        *(block.text() for block in blocks),
-        *([parts.loops] if parts.loops else []),
-        *map(text_of, functions_of(motion_drivers)),
-    ]
-    lane_functions: list[Callable[..., Any]] = [load_block, load_case, *functions_of(motion_lane_drivers)]
-    lane_pieces = [
-        *(replace(block, name=f"{block.name}_lanes").text(lanes=True) for block in blocks),
-        *([parts.lane_loops] if parts.lane_loops else []),
-        *map(text_of, lane_functions),
-    ]
+    text = module_text(docstring, values, blocks, parts.loops, functions_of(motion_drivers))
+    batches = lane_text(blocks, parts.lane_loops, [load_block, load_case, *functions_of(motion_lane_drivers)])
     entries = ("motion_step", "motion_run", "place_at", "WORKSPACE_SIZE", "N", "N_MOTORS", *places)
     entries = (*entries, *(status.name for status in _STATUSES))
-    text, lane_text = "\n\n\n".join(pieces) + "\n", "\n\n\n".join(lane_pieces) + "\n"
-    return Program(text, lane_text, layout, parts.size, None, entries)
+    return Program(text, batches, layout, parts.size, None, entries)
 
 
 def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
@@ -102,8 +87,7 @@ def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
         "It holds the state, and accelerations of the steps before, from which the next one is guessed.",
         "motion_step and motion_run return a status; the results are valid only if it is 0:",
         "",
-        "    0  CERTIFIED      the step was taken",
-        "    2  UNSETTLED      the step does not converge, even in small parts",
+        *(f"    {status.value}  {status.name:<14} {meaning}" for status, meaning in _STATUSES.items()),
         *place_table(given, found, layout.constants()),
     ]
     return "\n".join(lines), list(dict.fromkeys(row.name for row in (*given, *found)))
