@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots.cli import main as cli
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from tests.support.law_robots import model
+from tests.support.rods import cantilever_frequencies
 
 LENGTH, BENDING, DENSITY = 0.6, 0.8, 0.3  # [m], [N m^2], [kg/m]
 
@@ -25,7 +25,7 @@ LENGTH, BENDING, DENSITY = 0.6, 0.8, 0.3  # [m], [N m^2], [kg/m]
 @cache
 def rod(sections: int, chain: str, tip_mass: float = 0.0) -> sr.SoftModel:
     """A thin rod, so that turning its sections takes no part, and one that does not stretch; clamped, upright."""
-    made = sr.PccArm(
+    robot = sr.PccArm(
         segment_lengths=(LENGTH,),
         muscle_azimuths=(),
         bending_stiffness=BENDING,
@@ -42,31 +42,14 @@ def rod(sections: int, chain: str, tip_mass: float = 0.0) -> sr.SoftModel:
         '<joint name="ball_joint" type="fixed"><parent link="tip"/><child link="ball"/></joint><link name="ball"><inertial>'
         f'<mass value="{tip_mass}"/><inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial></link>'
     )
-    text = made.urdf()
+    text = robot.urdf()
     return sr.load_model(text.replace("</robot>", f"{ball}</robot>") if tip_mass else text, tip="tip")
 
 
 def rod_frequencies(tip_mass: float) -> np.ndarray:
-    """First three of a clamped rod with a mass at its end: `1 + cos b cosh b + mu b (cos b sinh b - sin b cosh b) = 0` [Hz].
-
-    Blevins, Formulas for Natural Frequency and Mode Shape, 1979, tables 8-1 and 8-8.
-    """
-    share = tip_mass / (DENSITY * LENGTH)
-
-    def closed_form(b: float) -> float:  # over cosh b
-        return float(1.0 / np.cosh(b) + np.cos(b) + share * b * (np.cos(b) * np.tanh(b) - np.sin(b)))
-
-    grid = np.linspace(0.2, 9.0, 200)
-    signs = [closed_form(b) for b in grid]
-    roots = [brentq(closed_form, grid[i], grid[i + 1]) for i in range(199) if signs[i] * signs[i + 1] < 0.0]
-    return np.array(roots[:3]) ** 2 * np.sqrt(BENDING / (DENSITY * LENGTH**4)) / (2.0 * np.pi)
-
-
-@pytest.mark.parametrize("tip_mass", [0.0, 0.09])
-def test_a_clamped_rod_without_a_mass_has_the_roots_of_the_textbook(tip_mass: float) -> None:
-    roots = 2.0 * np.pi * rod_frequencies(0.0) * np.sqrt(DENSITY * LENGTH**4 / BENDING)
-    assert np.sqrt(roots) == pytest.approx([1.8751, 4.6941, 7.8548], abs=5e-5)
-    assert np.all(rod_frequencies(tip_mass) <= rod_frequencies(0.0))
+    """First three of the rod with a mass at its end, in closed form [Hz]."""
+    unit = np.sqrt(BENDING / (DENSITY * LENGTH**4)) / (2.0 * np.pi)
+    return cantilever_frequencies(tip_mass / (DENSITY * LENGTH)) * unit
 
 
 @pytest.mark.parametrize("tip_mass", [0.0, 0.09])
@@ -135,10 +118,10 @@ def test_effective_masses_sum_to_the_mass_that_shakes() -> None:
     shares = []
     for sections in (6, 12):
         upright = rod(sections, "sections")
-        made = sr.vibration_modes(upright, sr.solve_equilibrium(upright, ())).effective_masses
-        first = made[:2, :2].sum() / (2.0 * DENSITY * LENGTH)
+        masses = sr.vibration_modes(upright, sr.solve_equilibrium(upright, ())).effective_masses
+        first = masses[:2, :2].sum() / (2.0 * DENSITY * LENGTH)
         assert first == pytest.approx(0.6131, rel=0.3 / sections**2 + 2e-4)  # of the first bending mode, Blevins table 8-1
-        shares.append(1.0 - made[:, 0].sum() / (DENSITY * LENGTH))
+        shares.append(1.0 - masses[:, 0].sum() / (DENSITY * LENGTH))
     assert 0.0 < shares[1] < 0.6 * shares[0] < 0.1
 
 

@@ -17,6 +17,8 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.sparse import csc_matrix
 
+from tests.support.round_rods import RoundRod
+
 NO_LOAD = (0.0,) * 6
 
 
@@ -74,14 +76,10 @@ def _rates(y, wrench, gravity, h, stiff, mass, inertia, tau, drag):  # type: ign
 
 
 @dataclass(frozen=True)
-class CosseratRod:
-    """A round uniform rod.
+class CosseratRod(RoundRod):
+    """A round rod, and its discretisation.
 
     Attributes:
-        length: [m].
-        radius: [m].
-        young: Young's modulus [Pa].
-        density: [kg/m^3].
         cells: of the grid.
         poisson: Poisson's ratio, of the torsional stiffness.
         shear: shear stiffness over axial stiffness; a large one makes a rod that does not shear.
@@ -90,26 +88,12 @@ class CosseratRod:
         gravity: [m/s^2].
     """
 
-    length: float
-    radius: float
-    young: float
-    density: float
     cells: int
     poisson: float = 0.5
     shear: float = 100.0
     stretch: float = 1.0
     retardation: float = 0.0
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @property
-    def area(self) -> float:
-        """[m^2]."""
-        return float(np.pi * self.radius**2)
-
-    @property
-    def bending(self) -> float:
-        """EI [N m^2]."""
-        return self.young * self.area * self.radius**2 / 4.0
 
     @property
     def torsion(self) -> float:

@@ -18,6 +18,8 @@ from numpy.polynomial import legendre
 from scipy.linalg import eigh
 from scipy.optimize import root
 
+from tests.support.round_rods import RoundRod
+
 
 @njit(cache=True)
 def _out_of_balance(y, v, force, grid, constants):  # type: ignore[no-untyped-def]
@@ -69,33 +71,20 @@ def _runge_kutta(y, v, force, grid, constants, step, steps, stride):  # type: ig
 
 
 @dataclass(frozen=True)
-class PlanarRod:
-    """A round uniform rod.
+class PlanarRod(RoundRod):
+    """A round rod, and its discretisation.
 
     Attributes:
-        length: [m].
-        radius: [m].
-        young: Young's modulus [Pa].
-        density: [kg/m^3].
         bends: polynomials of the angle.
         stretches: polynomials of the stretch; none for an inextensible rod.
         retardation: of Kelvin and Voigt, damping over stiffness [s].
         gravity: along x and z [m/s^2].
     """
 
-    length: float
-    radius: float
-    young: float
-    density: float
     bends: int = 12
     stretches: int = 0
     retardation: float = 0.0
     gravity: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def area(self) -> float:
-        """[m^2]."""
-        return float(np.pi * self.radius**2)
 
     @cached_property
     def _grid(self) -> tuple[np.ndarray, ...]:
@@ -112,7 +101,7 @@ class PlanarRod:
         stiffness = np.zeros((self.bends + self.stretches,) * 2)
         w = half * weights
         axial = self.young * self.area
-        stiffness[: self.bends, : self.bends] = axial * self.radius**2 / 4.0 * curvature.T @ (w[:, None] * curvature)
+        stiffness[: self.bends, : self.bends] = self.bending * curvature.T @ (w[:, None] * curvature)
         stiffness[self.bends :, self.bends :] = axial * stretch.T @ (w[:, None] * stretch)
         return w, half * integrals @ fit, np.ascontiguousarray(bend), np.ascontiguousarray(stretch), stiffness
 

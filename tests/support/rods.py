@@ -88,6 +88,28 @@ def elastica_moment_tip(bending_stiffness: float, length: float, moment: float) 
     return float(x), float(length * np.sinc(angle / np.pi)), float(angle)
 
 
+def cantilever_frequencies(tip_mass: float) -> np.ndarray:
+    """First three bending frequencies of a clamped Euler-Bernoulli rod with a point mass at its tip.
+
+    Squares of the zeros of 1 + cos x cosh x + mu x (cos x sinh x - sin x cosh x), with mu the mass over that of the rod
+    [Blevins, Formulas for Natural Frequency and Mode Shape, 1979, tables 8-1 and 8-8]; it is divided by cosh x here.
+
+    Args:
+        tip_mass: over the mass of the rod.
+
+    Returns:
+        Angular frequencies in the unit sqrt(EI / (rho A L^4)), ascending, shape (3,).
+    """
+
+    def characteristic(x: float) -> float:
+        return float(1.0 / np.cosh(x) + np.cos(x) + tip_mass * x * (np.cos(x) * np.tanh(x) - np.sin(x)))
+
+    x = np.linspace(0.2, 9.0, 200)
+    values = [characteristic(one) for one in x]
+    changes = [i for i in range(len(x) - 1) if values[i] * values[i + 1] < 0.0]
+    return np.array([brentq(characteristic, x[i], x[i + 1], xtol=1e-14) for i in changes[:3]]) ** 2
+
+
 @dataclass(frozen=True)
 class Rod:
     """A uniform straight rod with equal bending stiffnesses, without shear.
