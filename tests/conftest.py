@@ -92,7 +92,7 @@ def missing(reason: str) -> None:
 
 
 OPTIONAL = re.compile(
-    r"(PIL|build|dask|daqp|distributed|example_robot_data|ikpy|latex2mathml|matplotlib|mkdocs|mujoco|mypy|nbclient|nbformat|numba"
+    r"(PIL|build|control|dask|daqp|distributed|example_robot_data|ikpy|latex2mathml|matplotlib|mkdocs|mujoco|mypy|nbclient|nbformat|numba"
     r"|pink|playwright|pybullet|pydrake|roboticstoolbox|twine|urchin|uv|viser)\b"
 )
 """What the extras bring besides `test`, as imported."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pickle
 import timeit
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -339,15 +341,15 @@ def test_drives_of_motors_are_those_of_the_file() -> None:
 
 
 @pytest.mark.parametrize(("write", "module"), [("to_mjcf", "mujoco"), ("to_sdf", "pydrake")])
-def test_rotors_and_friction_pass_through_other_formats(write: str, module: str) -> None:
-    tool = pytest.importorskip(module)
+def test_rotors_and_friction_pass_through_other_formats(write: str, module: str, tool: Callable[[str], ModuleType]) -> None:
+    other = tool(module)
     urdf = sr.InflatableArm(rotor_inertia=0.05).urdf().replace('friction="0.0"', 'friction="0.5"', 1)
     text = getattr(sr.export, write)(sr.load_model(urdf), damping="file")
     drives = sr.load_model(text).actuators.drives
     assert drives.rotor_inertia == pytest.approx([0.05] * 3, rel=1e-15)
     if module == "mujoco":  # Drake drops dry friction
         assert drives.friction.tolist() == [0.5, 0.0, 0.0]
-        spec = tool.MjModel.from_xml_string(text)
+        spec = other.MjModel.from_xml_string(text)
         assert sorted(spec.dof_armature.tolist()) == [0.0] * 4 + [0.05] * 3
     else:
         assert "<friction>0.5</friction>" in text

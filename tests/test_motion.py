@@ -103,7 +103,7 @@ def test_a_motion_runs_backwards_to_its_start() -> None:
     options: dict[str, Any] = {"gravity": sr.EARTH_GRAVITY, "damping_time": 0.0, "time_step": 5e-3}
     there = sr.simulate(model, 1.0, (), start=start, **options)
     end = there.end
-    turned = type(end)(model, 0.0, end.q_motors, end.motor_velocities, end.q_springs, -end.velocities)
+    turned = sr.MotionState(model, 0.0, end.q_motors, end.motor_velocities, end.q_springs, -end.velocities)
     back = sr.simulate(model, 1.0, (), start=turned, **options)
     assert np.abs(there.q_springs[-1] - start.q_springs).max() > 0.1
     assert np.abs(back.q_springs[-1] - start.q_springs).max() < 1e-8

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -234,9 +236,9 @@ def test_chosen_steps_keep_their_tolerance_and_end_at_every_sample(geared: sr.So
         assert np.abs(chosen.steps - instant).min() < 1e-9
 
 
-def test_mujoco_moves_the_exported_arm_as_we_do() -> None:
+def test_mujoco_moves_the_exported_arm_as_we_do(tool: Callable[[str], ModuleType]) -> None:
     """With its armature, springs, their damping and weight, under torques over time; Runge-Kutta at a tenth of our step."""
-    mujoco = pytest.importorskip("mujoco")
+    mujoco = tool("mujoco")
     model = sr.load_model(sr.InflatableArm(rotor_inertia=0.05))
     start = sr.solve_equilibrium(model, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY)
 

@@ -136,7 +136,6 @@ def test_systems_of_six_equations(rng: np.random.Generator) -> None:
 @pytest.mark.study
 def test_both_back_ends_reach_the_same_poses(wristed: sr.SoftModel, solver: CompiledModel, rng: np.random.Generator) -> None:
     """Five hundred poses by numba, lanes and single cases; its first call compiles for half a minute."""
-    pytest.importorskip("numba")
     motors, forces, poses = made(wristed, rng, 500, sr.EARTH_GRAVITY)
     begins = np.clip(motors + rng.uniform(-0.1, 0.1, motors.shape), *wristed.motor_limits.T)
     fast = sr.compile(wristed, backend="numba").inverse_kinematics(poses, forces, q_motors0=begins, gravity=sr.EARTH_GRAVITY)
