@@ -117,16 +117,17 @@ def linearize(
     small = small_motion(model, equilibrium, damping_time=damping_time, mass_damping=mass_damping, rotor_inertia=rotor_inertia)
     with one_blas_thread(2 * len(small.mass)):
         matrices = _driven(model, small) if driven else _prescribed(model, small)
-    names, units = model.motor_joints[: small.n_placed], model.actuators.units[: small.n_placed]
-    coordinates = (*units, *model.springs.units)
-    torques, rates = load_units(units), tuple(f"{unit}/s" for unit in units)
-    torque_names = tuple(f"{name}_{'torque' if unit == 'rad' else 'force'}" for name, unit in zip(names, units, strict=True))
-    accelerations = tuple(f"{name}_acceleration" for name in names), tuple(f"{unit}/s^2" for unit in units)
-    moving, moving_units = (torque_names, torques) if driven else accelerations
-    told = (*names, *(f"{name}_rate" for name in names)), (*units, *rates)
-    felt, felt_units = told if driven else (torque_names, torques)
+    placed, units = model.motor_joints[: small.n_placed], model.actuators.units[: small.n_placed]
+    torques = tuple(f"{name}_{'torque' if unit == 'rad' else 'force'}" for name, unit in zip(placed, units, strict=True))
+    if driven:
+        motor_inputs, motor_input_units = torques, load_units(units)
+        motor_outputs, motor_output_units = _with_rates(placed, units)
+    else:
+        motor_inputs = tuple(f"{name}_acceleration" for name in placed)
+        motor_input_units = tuple(f"{unit}/s^2" for unit in units)
+        motor_outputs, motor_output_units = torques, load_units(units)
     tensions = tuple(f"{name}_tension" for name in model.motor_joints[small.n_placed :])
-    states = (*names, *model.spring_joints)
+    states, state_units = _with_rates((*placed, *model.spring_joints), (*units, *model.springs.units))
     a, b, c, d = map(read_only, matrices)
     return LinearModel(
         equilibrium=equilibrium,
@@ -135,23 +136,28 @@ def linearize(
         B=b,
         C=c,
         D=d,
-        state_names=(*states, *(f"{name}_rate" for name in states)),
-        state_units=(*coordinates, *(f"{unit}/s" for unit in coordinates)),
-        input_names=(*moving, *tensions, *(f"tip_force_{axis}" for axis in "xyz")),
-        input_units=(*moving_units, *("N" for _ in tensions), *("N" for _ in "xyz")),
-        output_names=(*_TIP, *felt),
-        output_units=(*_TIP_UNITS, *felt_units),
+        state_names=states,
+        state_units=state_units,
+        input_names=(*motor_inputs, *tensions, *(f"tip_force_{axis}" for axis in "xyz")),
+        input_units=(*motor_input_units, *("N" for _ in tensions), *("N" for _ in "xyz")),
+        output_names=(*_TIP, *motor_outputs),
+        output_units=(*_TIP_UNITS, *motor_output_units),
     )
+
+
+def _with_rates(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names and units of coordinates and of their rates."""
+    return (*names, *(f"{name}_rate" for name in names)), (*units, *(f"{unit}/s" for unit in units))
 
 
 def _driven(model: SoftModel, small: SmallMotion) -> tuple[FloatArray, ...]:
     """A, B, C, D of motors that exert torques."""
     m, n = small.n_placed, len(small.mass)
     forces = np.hstack([np.eye(n, m), small.by_tension, small.tip[:3].T])
-    a, b = _first_order(_solved(model, small.mass, np.hstack([-small.stiffness, -small.damping, forces])), n)
-    told = np.zeros((2 * m, 2 * n))
-    told[:m, :m] = told[m:, n : n + m] = np.eye(m)
-    c = np.vstack([np.hstack([small.tip, np.zeros((6, n))]), told])
+    a, b = _first_order(_accelerations(model, small.mass, np.hstack([-small.stiffness, -small.damping, forces])), n)
+    motors = np.zeros((2 * m, 2 * n))  # coordinates and rates of the motors by states
+    motors[:m, :m] = motors[m:, n : n + m] = np.eye(m)
+    c = np.vstack([np.hstack([small.tip, np.zeros((6, n))]), motors])
     return a, b, c, np.zeros((len(c), b.shape[1]))
 
 
@@ -163,7 +169,7 @@ def _prescribed(model: SoftModel, small: SmallMotion) -> tuple[FloatArray, ...]:
     elastic = np.hstack([unforced[m:], -small.mass[m:, :m], forces[m:]])
     moved = np.zeros((n, 2 * n + m + forces.shape[1]))  # accelerations by states and inputs
     moved[:m, 2 * n : 2 * n + m] = np.eye(m)
-    moved[m:] = _solved(model, small.mass[m:, m:], elastic)
+    moved[m:] = _accelerations(model, small.mass[m:, m:], elastic)
     carried = np.hstack([unforced[:m], np.zeros((m, m)), forces[:m]]) - small.mass[:m] @ moved
     a, b = _first_order(moved, n)
     tip = np.hstack([small.tip, np.zeros((6, n + b.shape[1]))])
@@ -178,9 +184,10 @@ def _first_order(accelerations: FloatArray, n: int) -> tuple[FloatArray, FloatAr
     return a, b
 
 
-def _solved(model: SoftModel, mass: FloatArray, right: FloatArray) -> FloatArray:
+def _accelerations(model: SoftModel, mass: FloatArray, loads: FloatArray) -> FloatArray:
+    """Accelerations by columns of loads; DescriptionError if a coordinate has no mass."""
     try:
         np.linalg.cholesky(mass)
     except np.linalg.LinAlgError:
         raise DescriptionError(f"a coordinate of {model.pinocchio.name} moves no mass; give its links mass") from None
-    return np.asarray(np.linalg.solve(mass, right))
+    return np.asarray(np.linalg.solve(mass, loads))

@@ -153,8 +153,8 @@ class MidpointRule:
             if solve is None or iteration == _RENEWED or (torque is not None and shrinking > _SLOW):
                 solve = self._factorised(middle_time, x, rates, wrenches, h)
             change = solve(residual)
-            if torque is not None and torque.rubs:
-                change = torque.rubbed(solve, change, (v0 + h * a)[: torque.count], h)
+            if torque is not None and torque.has_friction:
+                change = torque.with_friction(solve, change, (v0 + h * a)[: torque.count], h)
             a = a - change
             moved = 0.25 * h * h * math.sqrt(change.dot(change)) / size
             if moved <= _CHANGE or (moved >= 0.5 * last and last <= _ROUNDED):

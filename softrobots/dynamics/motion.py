@@ -34,8 +34,8 @@ class MotionEnergy:
     @cached_property
     def balance(self) -> FloatArray:
         """Energy that the scheme has made, minus its first value: zero to the order of the scheme, shape (n,) [J]."""
-        kept = self.kinetic + self.elastic + self.potential
-        total = kept + self.dissipated - self.load_work - self.motor_work
+        stored = self.kinetic + self.elastic + self.potential
+        total = stored + self.dissipated - self.load_work - self.motor_work
         return read_only(total - total[0])
 
 

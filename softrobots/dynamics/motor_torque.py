@@ -97,11 +97,11 @@ class MotorTorque:
         return self._evaluated(time, x, rates) if self.sample_time is None else self._held
 
     @property
-    def rubs(self) -> bool:
+    def has_friction(self) -> bool:
         """Whether there is dry friction."""
         return bool(self._friction.any())
 
-    def rubbed(
+    def with_friction(
         self, solve: Callable[[FloatArray], FloatArray], change: FloatArray, rates: FloatArray, step: float
     ) -> FloatArray:
         """Return the change of the accelerations with dry friction, shape (n,), and keep the friction as `resistance`.
@@ -116,9 +116,9 @@ class MotorTorque:
         columns = np.column_stack([solve(unit) for unit in np.eye(m, len(change))])  # all at once, threads of BLAS take longer
         free, gain = rates - step * change[:m], step * columns[:m]
         most = self._friction
-        friction, rubbing = self.resistance, np.flatnonzero(most)
-        yielding = gain[np.ix_(rubbing, rubbing)] + np.diag(CREEP / most[rubbing])
-        free, most, held = free[rubbing], most[rubbing], friction[rubbing]
+        friction, places = self.resistance, np.flatnonzero(most)
+        yielding = gain[np.ix_(places, places)] + np.diag(CREEP / most[places])
+        free, most, held = free[places], most[places], friction[places]
         diagonal = np.diag(yielding)
         for attempt in range(_ATTEMPTS):
             trial = held + (free - yielding @ held) / diagonal
@@ -129,7 +129,7 @@ class MotorTorque:
             held = found if attempt < _WHOLE else np.clip(0.5 * (held + found), -most, most)
             if settled:
                 break
-        friction[rubbing] = held
+        friction[places] = held
         return np.asarray(change + columns @ friction)
 
     def slopes(self, time: float, x: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -143,7 +143,7 @@ class MotorTorque:
                     state = [x.copy(), rates.copy()]
                     step = _DIFFERENCE * max(1.0, abs(state[which][joint]))
                     state[which][joint] += step
-                    matrix[:, joint] += (self._evaluated(time, *state) - here) / step
+                    matrix[:, joint] = (self._evaluated(time, *state) - here) / step
         return by_x, by_rates
 
     def _evaluated(self, time: float, x: FloatArray, rates: FloatArray) -> FloatArray:

@@ -27,13 +27,13 @@ class Recorder:
         self._x, self._rates = np.zeros((len(rows), len(start.x))), np.zeros((len(rows), len(start.x)))
         self.rows = 0
         """Number of rows so far."""
-        self._most = 0
+        self._most_rows = 0
         self.times, self.tips = [start.time], [self.tip(start.x)]
         """Times of the steps, and positions of the tip then, shape (3,) [m]."""
         self._middles: list[float] = []
         self._exerted: list[FloatArray] = []
         self._works = [(0.0, 0.0, 0.0)]
-        self._driven: FloatArray = np.zeros((len(rows), rule.torque.count if rule.torque else 0))
+        self._motor_torques: FloatArray = np.zeros((len(rows), rule.torque.count if rule.torque else 0))
 
     def tip(self, x: FloatArray) -> FloatArray:
         """Position of the tip, shape (3,) [m]."""
@@ -59,14 +59,14 @@ class Recorder:
                 rates[prescribed] = (middle.rates + (time - middle.time) * step.accelerations)[prescribed]
             self._x[row], self._rates[row] = x, rates
             if self.rule.torque is not None:
-                self._driven[row] = self.rule.torque.exerted(time, x, rates)
+                self._motor_torques[row] = self.rule.torque.exerted(time, x, rates)
         self._middles.append(middle.time)  # all is known; where Ctrl-C comes now, what is longer than `times` does not count
         self._exerted.append(step.actuator_forces)
         self._works.append((dissipated, load_work, motor_work))
         self.tips.append(tip)
         self.times.append(step.end.time)
-        self.state, self.rows, more = step.end, last, max(last - self._most, 0)
-        self._most += more
+        self.state, self.rows, more = step.end, last, max(last - self._most_rows, 0)
+        self._most_rows += more
         return more
 
     def kick(self, change: FloatArray) -> None:
@@ -96,13 +96,13 @@ class Recorder:
             self._x[0], self._rates[0] = self.state.x, self.state.rates
         x, rates = self._x[:n], self._rates[:n]
         exerted = self._at_rows(times, m)
-        exerted[:, : self._driven.shape[1]] = self._driven[:n]
-        kept = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
+        exerted[:, : self._motor_torques.shape[1]] = self._motor_torques[:n]
+        stored = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
         works = np.array(self._works[: len(self.times)])
-        flown = np.column_stack([np.interp(times, self.times, work) for work in works.T])
+        exchanged = np.column_stack([np.interp(times, self.times, work) for work in works.T])
         load, tip = self.rule.load, equations.model.tip
         forces = np.array([load(float(time)).get(tip, np.zeros(6))[:3] for time in times])
-        columns = [read_only(np.ascontiguousarray(column)) for column in np.concatenate([kept, flown], axis=1).T]
+        columns = [read_only(np.ascontiguousarray(column)) for column in np.concatenate([stored, exchanged], axis=1).T]
         return Motion(
             model=equations.model,
             time=read_only(np.array(times)),

@@ -13,7 +13,6 @@ from softrobots.core.result_file import KINDS, Kind
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 
 _SAME = 1e-6  # relative difference of frequencies that rounding on another machine explains, of fast modes too
-_AXES = ("x", "y", "z")
 
 
 def _pack(modes: VibrationModes) -> dict[str, Any]:
@@ -40,10 +39,10 @@ def _table(modes: VibrationModes) -> dict[str, FloatArray]:
         "frequency [Hz]": modes.frequencies,
         "damping ratio [-]": modes.damping_ratios,
     }
-    table |= {f"effective mass {axis} [kg]": masses[:, place] for place, axis in enumerate(_AXES)}
-    table |= {f"effective inertia about {axis} [kg m^2]": masses[:, 3 + place] for place, axis in enumerate(_AXES)}
-    table |= {f"tip {axis} [1/sqrt(kg)]": modes.tip_shapes[place] for place, axis in enumerate(_AXES)}
-    table |= {f"tip turn {axis} [rad/(sqrt(kg) m)]": modes.tip_shapes[3 + place] for place, axis in enumerate(_AXES)}
+    table |= {f"effective mass {axis} [kg]": masses[:, place] for place, axis in enumerate("xyz")}
+    table |= {f"effective inertia about {axis} [kg m^2]": masses[:, 3 + place] for place, axis in enumerate("xyz")}
+    table |= {f"tip {axis} [1/sqrt(kg)]": modes.tip_shapes[place] for place, axis in enumerate("xyz")}
+    table |= {f"tip turn {axis} [rad/(sqrt(kg) m)]": modes.tip_shapes[3 + place] for place, axis in enumerate("xyz")}
     shapes = np.concatenate([modes.motor_shapes, modes.shapes])
     turning = np.concatenate([model.actuators.turning, model.springs.turning])
     for name, turns, row in zip((*model.motor_joints, *model.spring_joints), turning, shapes, strict=True):

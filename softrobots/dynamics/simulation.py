@@ -127,7 +127,7 @@ def simulate(
 def _fixed(run: Recorder, grid: FloatArray, damping_time: float | None, progress: bool | str) -> Motion:
     """Motion with given steps."""
     try:
-        _go(run, follow(run, grid), damping_time, progress, "motion")
+        _take(run, follow(run, grid), damping_time, progress, "motion")
         return run.motion(damping_time=damping_time)
     except KeyboardInterrupt:
         return run.motion(damping_time=damping_time, interrupted=True)
@@ -140,11 +140,11 @@ def _controlled(
     facts: dict[str, Any] = {"damping_time": damping_time, "tolerance": tolerance, "tip_error": None}
     run, history, last = new_run(), [math.inf], math.inf
     try:
-        _go(run, choose(run, breaks, tolerance), damping_time, progress, "motion")
+        _take(run, choose(run, breaks, tolerance), damping_time, progress, "motion")
         while True:
             finer = new_run()
             grid = halved(np.array(run.times))
-            _go(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps")
+            _take(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps")
             errors = tip_distances(run, finer)
             before, last = last, float(errors.max())
             errors *= error_share(before, last)
@@ -172,7 +172,7 @@ def _controlled(
         return run.motion(**facts, interrupted=True)
 
 
-def _go(run: Recorder, steps: Iterable[int], damping_time: float | None, progress: bool | str, label: str) -> None:
+def _take(run: Recorder, steps: Iterable[int], damping_time: float | None, progress: bool | str, label: str) -> None:
     """Take all steps of a run.
 
     Raises:

@@ -111,10 +111,10 @@ class VibrationModes:
             ParameterError: If there is no such mode, or the size is not positive or bends a section beyond its range.
         """
         positive_integer("mode", mode, len(self.frequencies))
-        made = ModeSwing(self, mode, positive_number("size", size, "m"))
-        if not all(self.model.coordinates.at(*made.at(share)).valid for share in (0.25, -0.25)):
+        swing = ModeSwing(self, mode, positive_number("size", size, "m"))
+        if not all(self.model.coordinates.at(*swing.at(share)).valid for share in (0.25, -0.25)):
             raise ParameterError("size", size, "small enough for every section (see strain_chain.in_range)")
-        return made
+        return swing
 
 
 @dataclass(frozen=True, eq=False)
