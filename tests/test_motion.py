@@ -256,7 +256,7 @@ def test_ctrl_c_returns_what_there_is() -> None:
 
     def force(t: float) -> FloatArray:
         pressed.append(1)
-        if len(pressed) == 2600:  # of which 2003 look for jumps before the first step
+        if len(pressed) == 1600:  # of which 1002 look for jumps before the first step
             raise KeyboardInterrupt
         return np.array([np.sin(t), 0.0, 0.0])
 

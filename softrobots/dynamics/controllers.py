@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,7 @@ class PD:
         self._reference = _law(model, "reference", reference, (model.n_motors, "rad"), lambda one: one.q_motors)
         added = np.zeros(count) if feed_forward is None else feed_forward
         self._feed_forward = _law(model, "feed_forward", added, (count, "N m"), _held)
+        self._desired = lru_cache(maxsize=1)(self._desired_at)  # a step of time asks for many states at one time
 
     def __call__(self, time: float, q: FloatArray, qd: FloatArray) -> FloatArray:
         """Return the torques, shape (n,) [N m or N].
@@ -71,9 +73,14 @@ class PD:
         Raises:
             ParameterError: If a function of time returns something else than it must.
         """
-        before, here, after = (self._reference(time + shift)[: len(q)] for shift in (-_DIFFERENCE, 0.0, _DIFFERENCE))
-        speed = (after - before) / (2.0 * _DIFFERENCE)
-        return np.asarray(self._kp * (here - q) + self._kd * (speed - qd) + self._feed_forward(time))
+        position, velocity, torque = self._desired(time)
+        return np.asarray(self._kp * (position - q) + self._kd * (velocity - qd) + torque)
+
+    def _desired_at(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Positions and velocities of the motor joints in the reference, and the feed-forward."""
+        count = len(self._kp)
+        before, here, after = (self._reference(time + shift)[:count] for shift in (-_DIFFERENCE, 0.0, _DIFFERENCE))
+        return here, (after - before) / (2.0 * _DIFFERENCE), self._feed_forward(time)
 
 
 class ClosedLoop:

@@ -71,7 +71,8 @@ class EquationsOfMotion:
         """The robot at coordinates, shape (n,); the last one is kept."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self.model.coordinates.at(*np.split(x.copy(), [self.n_motors]))
+            kept = x.copy()
+            self._last = key, self.model.coordinates.at(kept[: self.n_motors], kept[self.n_motors :])
         return self._last[1]
 
     def balance(self, x: FloatArray, rates: FloatArray, accelerations: FloatArray, wrenches: Mapping[str, FloatArray]) -> Any:

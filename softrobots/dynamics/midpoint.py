@@ -25,7 +25,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motor_torque import MotorTorque
-from softrobots.dynamics.time_inputs import MotorPath
+from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 
 _CHANGE = 1e-13  # of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step
 _ROUNDED = 1e-9  # the same, below which an iteration that no longer shrinks has reached rounding
@@ -88,7 +88,7 @@ class MidpointRule:
         self,
         equations: EquationsOfMotion,
         path: MotorPath,
-        load: Callable[[float], Wrenches],
+        load: TimeLoad,
         torque: MotorTorque | None = None,
     ) -> None:
         """Take the equations of motion and what drives them.
@@ -96,7 +96,7 @@ class MidpointRule:
         Args:
             equations: Equations of motion.
             path: Actuators over time; the entries of free ones are not used.
-            load: Load at a time; the same object while it is the same.
+            load: Load over time.
             torque: What acts on the motor joints, which are free then; None: they are prescribed.
         """
         self.equations, self.path, self.load, self.torque = equations, path, load, torque

@@ -100,8 +100,6 @@ class Recorder:
         stored = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
         works = np.array(self._works[: len(self.times)])
         exchanged = np.column_stack([np.interp(times, self.times, work) for work in works.T])
-        load, tip = self.rule.load, equations.model.tip
-        forces = np.array([load(float(time)).get(tip, np.zeros(6))[:3] for time in times])
         columns = [read_only(np.ascontiguousarray(column)) for column in np.concatenate([stored, exchanged], axis=1).T]
         return Motion(
             model=equations.model,
@@ -111,7 +109,7 @@ class Recorder:
             q_springs=read_only(np.array(x[:, m:])),
             velocities=read_only(np.array(rates[:, m:])),
             motor_torques=read_only(-exerted),
-            forces=read_only(forces),
+            forces=read_only(self.rule.load.tip_forces(times)),
             gravity=equations.gravity,
             energy=MotionEnergy(*columns),
             steps=read_only(np.array(self.times)),

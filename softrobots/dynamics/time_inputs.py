@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,8 @@ class MotorPath:
 
     def _find_kicks(self, model: SoftModel, duration: float) -> None:
         """Find the jumps of tensions and of velocities; positions have none."""
-        placed, signal, near = model.actuators.n_placed, self._signal, _NEAR * duration
+        placed, near = model.actuators.n_placed, _NEAR * duration
+        signal = cache(self._signal)  # jumps, tensions and onsets look at the same times
         jumps = find_jumps(lambda time: signal(time)[:placed], duration)
         if len(jumps):
             text = f"a continuous function of time; it jumps at {jumps[0]:.6g} s"
@@ -115,7 +117,8 @@ class TimeLoad:
             model.frame_id(frame)
             if callable(value):
                 signal = checked_function(name, value, (size,), "N")
-                breaks += [find_jumps(signal, duration), find_onsets(signal, duration)]
+                known = cache(signal)  # both look at the same times
+                breaks += [find_jumps(known, duration), find_onsets(known, duration)]
                 self._moving.append((frame, size, signal))
             elif isinstance(value, tuple | list) and len(value) == 2:
                 signal, kinks = _table(name, value, size)

@@ -88,6 +88,8 @@ class DirectCoordinates:
         self.motor_indices, self.elastic_indices, self._count = motor_indices, elastic_indices, count
         self.entries = Entries.of(elastic_indices, np.concatenate([motor_indices, elastic_indices]), count)
         """Rows of the elastic coordinates, columns of both, in a matrix over the joints."""
+        self.motor_entries = Entries.of(motor_indices, np.concatenate([motor_indices, elastic_indices]), count)
+        """Rows of the actuators, the same columns."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> DirectPoint:
         """Return the robot at given coordinates."""
@@ -114,11 +116,8 @@ class DirectPoint(NamedTuple):
 
     def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
         """Select the rows and columns of the derivative that belong to motors, and to motors and elastic coordinates."""
-        c, n = self.coordinates, len(self.joints)
-        by_motors, by_elastic = (
-            load.derivative(Entries.of(c.motor_indices, columns, n)) for columns in (c.motor_indices, c.elastic_indices)
-        )
-        return by_motors, by_elastic
+        rows, n = load.derivative(self.coordinates.motor_entries), len(self.coordinates.motor_indices)
+        return rows[:, :n], rows[:, n:]
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Select the columns of actuators and of elastic coordinates."""
