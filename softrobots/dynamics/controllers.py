@@ -14,9 +14,9 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, non_negative_number, one_each
 from softrobots.core.errors import LoadNotFound, ParameterError
-from softrobots.dynamics.time_inputs import checked_function, curve
+from softrobots.dynamics.time_inputs import checked_function, waypoint_curve
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.load_estimation import estimate_load
 from softrobots.statics.loads import Load
@@ -57,9 +57,9 @@ class PD:
         if count == 0:
             raise ParameterError("model", model, "a robot with at least one motor joint")
         self._kp, self._kd = one_each("kp", kp, count, "N m/rad"), one_each("kd", kd, count, "N m s/rad")
-        self._reference = _law(model, "reference", reference, (model.n_motors, "rad"), lambda one: one.q_motors)
+        self._reference = _time_function(model, "reference", reference, (model.n_motors, "rad"), lambda one: one.q_motors)
         added = np.zeros(count) if feed_forward is None else feed_forward
-        self._feed_forward = _law(model, "feed_forward", added, (count, "N m"), _held)
+        self._feed_forward = _time_function(model, "feed_forward", added, (count, "N m"), _exerted_torques)
         self._desired = lru_cache(maxsize=1)(self._desired_at)  # a step of time asks for many states at one time
 
     def __call__(self, time: float, q: FloatArray, qd: FloatArray) -> FloatArray:
@@ -133,9 +133,8 @@ class ClosedLoop:
             raise ParameterError("model", model, "a robot with three motor joints or more, and no muscles")
         self._path = instance_of("path", path, Path3D, "a Path3D, e.g. of softrobots.straight_line")
         self._kp, self._kd = one_each("kp", kp, count, "N m/rad"), one_each("kd", kd, count, "N m s/rad")
-        self._start = instance_of("start", start, Equilibrium, "an Equilibrium")
-        if start.model != model:
-            raise ParameterError("start", start.model, f"an Equilibrium of the model given, {model!r}")
+        check_same_model(model, start, "start")
+        self._start = start
         self._gain = non_negative_number("gain", gain, "1/s")
         self._filter = non_negative_number("filter_time", filter_time, "s")
         self._gravity = Load.of(model, gravity=gravity).gravity
@@ -183,22 +182,20 @@ class ClosedLoop:
         return np.asarray(torque)
 
 
-def _law(
+def _time_function(
     model: SoftModel, name: str, value: Any, kind: tuple[int, str], values_of: Callable[[Trajectory], FloatArray]
 ) -> Callable[[float], FloatArray]:
     """A constant, a trajectory or a function as a function of time; `kind` is the number of values and their unit."""
     count, unit = kind
     if isinstance(value, Trajectory):
-        if value.model != model:
-            raise ParameterError(name, value.model, f"a Trajectory of the model given, {model!r}")
-        return curve(value.times - value.times[0], values_of(value))
+        return waypoint_curve(name, value, model, values_of(value))
     if callable(value):
         return checked_function(name, value, (count,), unit)
     constant = finite_array(name, value, (count,), unit)
     return lambda _: constant
 
 
-def _held(trajectory: Trajectory) -> FloatArray:
+def _exerted_torques(trajectory: Trajectory) -> FloatArray:
     """What the motor joints exert in the equilibria of a trajectory, shape (n, n_joints)."""
     count = len(trajectory.model.structure.motor_joints)
     return np.array([-equilibrium.motor_torques[:count] for equilibrium in trajectory.equilibria])

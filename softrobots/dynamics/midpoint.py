@@ -141,9 +141,14 @@ class MidpointRule:
         if torque is not None:
             torque.begin(start.time, start.x, start.rates)
         a, size = self._predicted(middle_time, len(y0)), max(1.0, math.sqrt(y0.dot(y0)))
+
+        def move_middle(a: FloatArray) -> None:
+            """Set the free coordinates of the middle state, which has these accelerations, shape (n_free,)."""
+            x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
+
         solve, last, shrinking = None, np.inf, 0.0
         for iteration in range(1, _ITERATIONS + 1):
-            x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
+            move_middle(a)
             forces = equations.balance(x, rates, accelerations, wrenches)
             residual = forces[free]
             if torque is not None:
@@ -164,7 +169,7 @@ class MidpointRule:
             shrinking, last = moved / last, moved
         else:
             return None
-        x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
+        move_middle(a)
         ends, end_rates = np.zeros(n), np.zeros(n)
         ends[:m], end_rates[:m] = after, rates[:m] + 0.5 * h * accelerations[:m]
         ends[free], end_rates[free] = y0 + h * v0 + 0.5 * h * h * a, v0 + h * a

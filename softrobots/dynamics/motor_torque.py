@@ -21,6 +21,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.errors import ParameterError
+from softrobots.dynamics.time_grid import refuse_too_short, time_grid
 from softrobots.model.soft_model import SoftModel
 
 MOTORS = ("prescribed", "torque")
@@ -31,7 +32,6 @@ CREEP = 1e-4
 
 _DIFFERENCE = 1e-6  # of the derivatives of a controller, in its arguments
 _ON_TIME = 1e-9  # of a sampling interval
-_MOST_SAMPLES = 10_000_000  # of a motion, for which memory suffices
 _ATTEMPTS, _WHOLE = 60, 20  # to find which joints stick, and those whose change is not halved
 _SETTLED = 1e-13  # change of the friction, over itself, that ends them
 
@@ -77,11 +77,9 @@ class MotorTorque:
         """
         if self.sample_time is None:
             return grid
-        if grid[-1] / self.sample_time > _MOST_SAMPLES:
-            requirement = f"at least {grid[-1] / _MOST_SAMPLES:.3g} s, {_MOST_SAMPLES} of which make the duration"
-            raise ParameterError("sample_time", self.sample_time, requirement)
-        instants = self.sample_time * np.arange(math.ceil(grid[-1] / self.sample_time - _ON_TIME))
-        every = np.unique(np.concatenate([grid, instants]))
+        end = float(grid[-1])
+        refuse_too_short("sample_time", self.sample_time, end)
+        every = np.unique(np.concatenate([grid, time_grid(end, self.sample_time)]))
         return np.asarray(every[np.append(np.diff(every) > _ON_TIME * self.sample_time, True)])
 
     def begin(self, time: float, x: FloatArray, rates: FloatArray) -> None:

@@ -18,8 +18,9 @@ from softrobots.dynamics.midpoint import MidpointRule
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MOTORS, MotorTorque
 from softrobots.dynamics.recorder import Recorder
-from softrobots.dynamics.starting import first_kick, first_state, grid_with_kicks, steps_and_rows
+from softrobots.dynamics.starting import first_kick, first_state
 from softrobots.dynamics.step_control import NoStep, choose, error_share, follow, halved, tip_distances
+from softrobots.dynamics.time_grid import grid_with_kicks, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium

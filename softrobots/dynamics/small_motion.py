@@ -67,7 +67,7 @@ def small_motion(
     load, x = equilibrium.load, np.concatenate([equilibrium.q_motors, equilibrium.q_springs])
     equations = EquationsOfMotion(model, load.gravity, drives=drives)
     point, whole, stiffness = equations.point(x), equations.mass_matrix(x), equations.stiffness(x, load.wrenches)
-    damping = equations.damping
+    damping = equations.damping.copy()
     damping[m:, m:] = damping_matrix(model, damping_time, mass_damping, whole[m:, m:])
     kept = np.r_[:placed, m : len(x)]
 

@@ -39,10 +39,8 @@ class MotorPath:
         """Whether nothing moves."""
         self._is_curve = isinstance(q_motors, Trajectory)
         if isinstance(q_motors, Trajectory):
-            if q_motors.model != model:
-                raise ParameterError("q_motors", q_motors.model, f"a Trajectory of the model given, {model!r}")
-            times = q_motors.times - q_motors.times[0]
-            self._signal, self.breaks = curve(times, q_motors.q_motors), times[-1:]
+            self._signal = waypoint_curve("q_motors", q_motors, model, q_motors.q_motors)
+            self.breaks = q_motors.times[-1:] - q_motors.times[0]
         elif callable(q_motors):
             self._signal = checked_function("q_motors", q_motors, (model.n_motors,), "rad")
             for time in np.linspace(0.0, duration, 21).tolist():
@@ -256,3 +254,14 @@ def curve(times: FloatArray, values: FloatArray) -> Callable[[Any], FloatArray]:
 
     spline = CubicSpline(times, values, bc_type="clamped")
     return lambda time: np.asarray(spline(np.clip(time, times[0], times[-1])))
+
+
+def waypoint_curve(name: str, trajectory: Trajectory, model: SoftModel, values: FloatArray) -> Callable[[Any], FloatArray]:
+    """Return the `curve` through values at the waypoints of a trajectory, shape (n, m); the first waypoint is at time zero.
+
+    Raises:
+        ParameterError: If the trajectory is not one of the model.
+    """
+    if trajectory.model != model:
+        raise ParameterError(name, trajectory.model, f"a Trajectory of the model given, {model!r}")
+    return curve(trajectory.times - trajectory.times[0], values)

@@ -279,16 +279,16 @@ def equilibrium_from_state(
     )
 
 
-def check_same_model(model: SoftModel, equilibrium: Any) -> None:
-    """Check that an argument is an equilibrium of a model.
+def check_same_model(model: SoftModel, equilibrium: Any, name: str = "equilibrium") -> None:
+    """Check that an argument of a name is an equilibrium of a model.
 
     Raises:
         ParameterError: If it is something else.
     """
     check_model(model)
-    instance_of("equilibrium", equilibrium, Equilibrium, "an Equilibrium of the model")
+    instance_of(name, equilibrium, Equilibrium, "an Equilibrium of the model")
     if equilibrium.model != model:
-        raise ParameterError("equilibrium", equilibrium.model, f"an equilibrium of the model given, {model!r}")
+        raise ParameterError(name, equilibrium.model, f"an equilibrium of the model given, {model!r}")
 
 
 def _within(values: FloatArray, limits: FloatArray) -> bool:

@@ -22,7 +22,8 @@ from softrobots.core.errors import NotConverged
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
-from softrobots.dynamics.starting import first_kick, first_state, grid_with_kicks, steps_and_rows
+from softrobots.dynamics.starting import first_kick, first_state
+from softrobots.dynamics.time_grid import grid_with_kicks, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 
