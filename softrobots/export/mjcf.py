@@ -245,7 +245,8 @@ def _command(muscle: Muscle) -> float:
 
 
 def _head(robot: PreparedRobot, meshes: MeshFiles, limits: bool) -> list[str]:
-    lines = [f"{robot.tree.name}, for MuJoCo; written by softrobots from its URDF. SI units and radians.", *robot.remarks]
+    lines = [f"{robot.tree.name}, for MuJoCo; written by softrobots from its URDF. SI units and radians."]
+    lines += [*robot.remarks, robot.damping_rule]
     if robot.motors:
         lines.append(
             f"Position actuators of motors give all their torque at an error of {ANGLE_ERROR} rad; statics holds exactly."

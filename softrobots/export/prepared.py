@@ -41,7 +41,9 @@ class PreparedRobot:
     frequency: float | None
     """Lowest frequency at rest [rad/s], if it sets the damping; else None."""
     remarks: tuple[str, ...]
-    """Remarks on motors, muscles and damping for the head of the file."""
+    """Remarks on motors and muscles for the head of the file."""
+    damping_rule: str
+    """Where the damping of the springs comes from, in words, for the head of the file."""
 
 
 def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damping: str | float = "file") -> PreparedRobot:
@@ -83,7 +85,8 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
         muscles=() if welded else muscles_of(checked, values[len(positions) :], mass),
         home=_home(checked, tree, values),
         frequency=frequency,
-        remarks=(*_remarks(checked, values, welded), rule_text(rule, frequency)),
+        remarks=_remarks(checked, values, welded),
+        damping_rule=rule_text(rule, frequency),
     )
 
 

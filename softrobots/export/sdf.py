@@ -235,7 +235,7 @@ def _write_number(element: ElementTree.Element, name: str, value: float) -> None
 
 def _head(robot: PreparedRobot, meshes: MeshFiles, limits: bool) -> list[str]:
     lines = [f"{robot.tree.name}, SDF 1.9 for Drake and Gazebo; written by softrobots from its URDF. SI units and radians."]
-    lines += [*robot.remarks, "Gravity is not in this file: it is the world's."]
+    lines += [*robot.remarks, robot.damping_rule, "Gravity is not in this file: it is the world's."]
     if not limits:
         lines.append("The springs have no limits here.")
     return [*lines, *meshes.remark("to collide and not OBJ, glTF or VTK, which alone Drake reads")]

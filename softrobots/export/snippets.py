@@ -97,7 +97,7 @@ def to_pybullet(
     return filled(
         "pybullet_template.txt",
         name=robot.tree.name,
-        description=_pybullet_lines(held, actuators, robot.remarks[-1], limits),
+        description=_pybullet_lines(held, actuators, robot.damping_rule, limits),
         meshes=str(sum(shape.kind == "mesh" for shape in shapes)),
         joints=str(len(joints)),
         data=block(data),
@@ -204,7 +204,7 @@ def _with_mass(body: Body) -> Body:
     return body if body.mass > 0.0 else replace(body, mass=_TINY_MASS, inertia=_TINY_INERTIA * np.eye(3))
 
 
-def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, limits: bool) -> list[str]:
+def _pybullet_lines(held: HeldRobot, actuators: str, damping_rule: str, limits: bool) -> list[str]:
     lines = []
     if actuators == "welded" and held.motors:
         at = ", ".join(f"{name} {position!r}" for name, position in held.motors.items())
@@ -214,7 +214,7 @@ def _pybullet_lines(held: HeldRobot, actuators: str, damping: str, limits: bool)
     if held.tensions:
         pulls = ", ".join(f"{name} {tension!r}" for name, tension in held.tensions.items())
         lines.append(f"Muscles pull with [N]: {pulls}. That stands in the springs, exactly.")
-    lines.append(damping)
+    lines.append(damping_rule)
     if not limits:
         lines.append("The springs have no limits.")
     if held.locked:
