@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.options.command_line import add_numbers
+from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.output_files import (
     add_output,
@@ -48,8 +48,7 @@ def add_parser(subparsers: Any) -> None:
     add_model(parser)
     add_motors(parser)
     add_loads(parser)
-    add_numbers(parser, "--damping-time", "T", "damping of springs over their stiffness [s] (damping of the file)")
-    add_numbers(parser, "--mass-damping", "A", "damping in proportion to the mass [1/s] (0)", default=0.0)
+    add_damping(parser)
     help_text = "stiffness with which motors hold their place, one for all or one for each [N m/rad or N/m] (they are held)"
     add_numbers(parser, "--servo-stiffness", "K", help_text, nargs="+")
     help_text = "how many modes are shown, drawn and animated, slowest first [-] (%(default)s)"

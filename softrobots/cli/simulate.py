@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.options.command_line import add_numbers
+from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.output_files import (
     add_output,
@@ -31,7 +31,7 @@ from softrobots.core.files import new_file
 from softrobots.core.result_file import load_result
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.simulation import simulate
-from softrobots.dynamics.time_inputs import TimeLoad, curve
+from softrobots.dynamics.time_inputs import MotorPath, TimeLoad, curve
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import Load
@@ -82,8 +82,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--start", metavar="relaxed|equilibrium|FILE", help=help_text)
     help_text = "start in equilibrium with this force more on the tip, and let go, world axes [N] (none)"
     add_numbers(parser, "--release", "FX FY FZ", help_text)
-    add_numbers(parser, "--damping-time", "T", "damping of springs over their stiffness [s] (damping of the file)")
-    add_numbers(parser, "--mass-damping", "A", "damping in proportion to the mass [1/s] (0)", default=0.0)
+    add_damping(parser)
     add_numbers(parser, "--time-step", "T", "fixed steps of this length [s] (steps chosen for the tolerance)")
     add_numbers(parser, "--tolerance", "D", "largest error of the tip [m] (5e-4 of the reach); not with --time-step")
     add_numbers(parser, "--output-step", "T", "time between two rows of the result [s] (a 200th of the duration)")
@@ -107,16 +106,13 @@ def run(arguments: argparse.Namespace) -> None:
     motors, duration = _motors(arguments, model)
     table = arguments.force_table
     gust = None if table is None else _columns(read_table(table, ("t", "fx", "fy", "fz")))
-    wrench = dict(load.wrenches)
-    begin = motors(0.0) if callable(motors) else motors.q_motors[0] if isinstance(motors, Trajectory) else motors
-    first = Load(TimeLoad(model, gust, wrench, duration)(0.0), load.gravity)
     motion = simulate(
         model,
         duration,
         motors,
-        start=_start(arguments, model, begin, first),
+        start=_start(arguments, model, motors, duration, gust, load),
         force=gust,
-        wrench=wrench,
+        wrench=dict(load.wrenches),
         gravity=load.gravity,
         damping_time=arguments.damping_time,
         mass_damping=arguments.mass_damping,
@@ -177,18 +173,25 @@ def _columns(table: Table) -> tuple[FloatArray, FloatArray]:
     return table.numbers[:, 0], table.numbers[:, 1:]
 
 
-def _start(arguments: argparse.Namespace, model: SoftModel, motors: FloatArray, load: Load) -> Any:
-    """The state that the motion starts from; None: relaxed."""
+def _start(arguments: argparse.Namespace, model: SoftModel, motors: Any, duration: float, gust: Any, load: Load) -> Any:
+    """The state from which the motion starts; None: relaxed."""
+    if arguments.release is None:
+        if arguments.start in (None, "relaxed"):
+            return None
+        if arguments.start != "equilibrium":
+            return _saved_start(arguments.start)
+    wrenches = TimeLoad(model, gust, load.wrenches, duration)(0.0)
+    first = Load(wrenches, load.gravity)
     if arguments.release is not None:
-        load = load.plus(model.tip, np.append(finite_array("--release", arguments.release, (3,), "N"), np.zeros(3)))
-    elif arguments.start in (None, "relaxed"):
-        return None
-    elif arguments.start != "equilibrium":
-        found = load_result(arguments.start)
-        if not isinstance(found, Equilibrium | Motion):
-            kind = type(found).__name__
-            raise ParameterError(
-                "--start", arguments.start, f"relaxed, equilibrium, or a saved equilibrium or motion, not a {kind}"
-            )
-        return found
-    return solve_equilibrium(model, motors, wrench=dict(load.wrenches), gravity=load.gravity)
+        first = first.plus(model.tip, np.append(finite_array("--release", arguments.release, (3,), "N"), np.zeros(3)))
+    begin = MotorPath(model, motors, duration)(0.0)
+    return solve_equilibrium(model, begin, wrench=dict(first.wrenches), gravity=first.gravity)
+
+
+def _saved_start(file: str) -> Equilibrium | Motion:
+    """The equilibrium or motion of a file."""
+    found = load_result(file)
+    if not isinstance(found, Equilibrium | Motion):
+        kind = type(found).__name__
+        raise ParameterError("--start", file, f"relaxed, equilibrium, or a saved equilibrium or motion, not a {kind}")
+    return found

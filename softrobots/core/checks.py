@@ -92,9 +92,12 @@ def non_negative_array(name: str, value: Any, unit: str) -> FloatArray:
     return array
 
 
-def one_each(name: str, value: Any, count: int, unit: str) -> FloatArray:
-    """Return one number for all or one for each of `count`, zero or positive, as an array, or raise ParameterError."""
-    given = non_negative_array(name, value, unit)
+def one_each(name: str, value: Any, count: int, unit: str, *, positive: bool = False) -> FloatArray:
+    """Return one number for all, or one for each of `count`, as shape (count,), or raise ParameterError.
+
+    The numbers are zero or positive; if `positive` is true, zero is refused, too.
+    """
+    given = positive_array(name, value, unit) if positive else non_negative_array(name, value, unit)
     if given.shape not in ((), (count,)):
         raise ParameterError(name, value, f"one number, or of shape ({count},) [{unit}] (it has shape {given.shape})")
     return np.array(np.broadcast_to(given, (count,)))

@@ -68,8 +68,10 @@ def json_of_arrays(name: str, arrays: Mapping[str, Any]) -> str:
     Raises:
         ParameterError: If a number is not finite, or the text is longer than `LARGEST_ARRAYS`; names that parameter.
     """
-    made = {key: np.asarray(value) for key, value in arrays.items()}
-    rows = {key: {"type": _TYPES[a.dtype.kind], "shape": a.shape, "values": a.ravel().tolist()} for key, a in made.items()}
+    rows = {}
+    for key, value in arrays.items():
+        array = np.asarray(value)
+        rows[key] = {"type": _TYPES[array.dtype.kind], "shape": array.shape, "values": array.ravel().tolist()}
     try:
         text = json.dumps(rows, allow_nan=False, separators=(",", ":")) + "\n"
     except ValueError as error:

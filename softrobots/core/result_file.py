@@ -114,7 +114,7 @@ def save_csv(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
         The path of the file.
 
     Raises:
-        ParameterError: If it is neither, or the path is none.
+        ParameterError: If the result is none of them, or the path is not one.
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """

@@ -1,4 +1,4 @@
-"""What the command and the scripts share: options of the load, the limit of size, and the exit status of a run."""
+"""What the command and the scripts share: options of load and damping, the limit of size, and the exit status of a run."""
 
 from __future__ import annotations
 
@@ -42,6 +42,12 @@ def add_gravity(parser: argparse.ArgumentParser) -> None:
     """Add `--gravity` [m/s^2], which takes negative numbers in any form; see `gravity_of`."""
     take_negative_numbers(parser)
     add_numbers(parser, "--gravity", "G", "gravity, three numbers [m/s^2]; without numbers: 0 0 -9.81 (weightless)", nargs="*")
+
+
+def add_damping(parser: argparse.ArgumentParser) -> None:
+    """Add `--damping-time` [s] and `--mass-damping` [1/s]; see `softrobots.dynamics.damping`."""
+    add_numbers(parser, "--damping-time", "T", "damping of springs over their stiffness [s] (damping of the file)")
+    add_numbers(parser, "--mass-damping", "A", "damping in proportion to the mass [1/s] (0)", default=0.0)
 
 
 def gravity_of(arguments: argparse.Namespace) -> Any:

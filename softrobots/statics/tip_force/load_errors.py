@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, positive_array, read_only
+from softrobots.core.checks import FloatArray, one_each, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState
@@ -91,7 +91,4 @@ def _shared(model: SoftModel) -> FloatArray:
 def _spread(name: str, value: Any, count: int, unit: str) -> FloatArray | None:
     if value is None:
         return None
-    given = positive_array(name, value, unit)
-    if given.shape not in ((), (count,)):
-        raise ParameterError(name, value, f"one number, or of shape ({count},) [{unit}] (it has shape {given.shape})")
-    return read_only(np.array(np.broadcast_to(given, (count,))))
+    return read_only(one_each(name, value, count, unit, positive=True))

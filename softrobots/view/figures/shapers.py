@@ -15,10 +15,10 @@ from softrobots.view.figures.canvas import line_style, new_plot
 
 
 def sensitivity(frequency: float, damping_ratio: float = 0.0, *, tolerance: float = 0.05) -> Any:
-    """Vibration that each shaper leaves over the frequency that the robot really has: after [Singhose et al. 1994].
+    """Vibration that each shaper leaves, over the true frequency of the robot, after [Singhose et al. 1994].
 
     Args:
-        frequency: Frequency that the shapers are made for [Hz].
+        frequency: Frequency that the shapers are designed for [Hz].
         damping_ratio: Its damping ratio, from 0 to below 1; the robot has it too [-].
         tolerance: Share of the vibration that the shaper "ei" leaves at the frequency [-].
 
@@ -29,11 +29,11 @@ def sensitivity(frequency: float, damping_ratio: float = 0.0, *, tolerance: floa
         ParameterError: If an argument is out of range.
         MissingDependency: If matplotlib is not installed.
     """
-    made = [input_shaper(frequency, damping_ratio, shaper=kind, tolerance=tolerance) for kind in SHAPERS]
+    designed = [input_shaper(frequency, damping_ratio, shaper=kind, tolerance=tolerance) for kind in SHAPERS]
     real = positive_number("frequency", frequency, "Hz") * np.linspace(0.5, 1.5, 401)
     title = f"Shapers for {frequency:.4g} Hz, damping ratio {damping_ratio:.2g}"
     figure, axes = new_plot((6.4, 4.8), xlabel="frequency of the robot [Hz]", ylabel="vibration that is left [%]", title=title)
-    for number, (kind, shaper) in enumerate(zip(SHAPERS, made, strict=True)):
+    for number, (kind, shaper) in enumerate(zip(SHAPERS, designed, strict=True)):
         style = line_style(number) | {"marker": None}
         label = f"{kind.upper()}, {shaper.duration:.3g} s longer"
         axes.plot(real, 100.0 * residual_vibration(shaper, real, damping_ratio), lw=2.0, label=label, **style)
