@@ -24,8 +24,9 @@ FRAME_RATE = 30
 """Frames a second."""
 
 _MOST_BODIES = 90  # shapes of a continuous body in one animation
-_MOST_INSTANTS = (600, 50)  # of a motion of rigid links, and of a body that bends: pages of about a megabyte at most
-_SWING = 2.0  # [s], of a mode: most are too fast to be seen
+_MOST_RIGID = 600  # frames of a motion of rigid links
+_MOST_BENDING = 50  # frames of a motion whose body bends; a page has about a megabyte at most
+_SWING_TIME = 2.0  # [s], of a mode: most are too fast to be seen
 _MOST_FRAMES = 2**31 - 1  # a browser's largest frame number
 
 
@@ -64,7 +65,7 @@ def playing_time(model: SoftModel, movement: Movement, duration: float | None, s
     if duration is not None:
         return positive_number("duration", duration, "s")
     if isinstance(movement, ModeSwing):
-        return _SWING if speed is None else movement.period / positive_number("speed", speed)
+        return _SWING_TIME if speed is None else movement.period / positive_number("speed", speed)
     times = movement.time if isinstance(movement, Motion) else movement.times
     return (float(times[-1] - times[0]) or 1.0) / (1.0 if speed is None else positive_number("speed", speed))
 
@@ -96,14 +97,14 @@ def even_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
 
 
 def motion_frames(motion: Motion, seconds: float) -> list[Frame]:
-    """Return evenly spaced frames of a motion, interpolated by the cubics that its velocities tell.
+    """Return evenly spaced frames of a motion, interpolated by cubics with its positions and velocities.
 
     There are as many as the frame rate asks for, but at most 600, or 50 of a body that bends.
     """
     from scipy.interpolate import CubicHermiteSpline
 
     model, rows = motion.model, motion.time
-    numbers, total = _spread(seconds, _MOST_INSTANTS[bool(model.structure.section_table)])
+    numbers, total = _spread(seconds, _MOST_BENDING if model.structure.section_table else _MOST_RIGID)
     times = rows[0] + (rows[-1] - rows[0]) * numbers / total
     paths = ((motion.q_motors, motion.motor_velocities), (motion.q_springs, motion.velocities))
     motors, springs = (CubicHermiteSpline(rows, *path)(times) if len(rows) > 1 else path[0] for path in paths)
@@ -121,7 +122,7 @@ def motion_frames(motion: Motion, seconds: float) -> list[Frame]:
 
 def swing_frames(swing: ModeSwing, seconds: float) -> list[Frame]:
     """Return evenly spaced frames of one swing in a mode, coloured as its equilibrium."""
-    numbers, total = _spread(seconds, _MOST_INSTANTS[1])
+    numbers, total = _spread(seconds, _MOST_BENDING)
     return [Frame(number, *swing.at(number / total), swing.modes.equilibrium) for number in numbers.tolist()]
 
 
