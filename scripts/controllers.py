@@ -3,7 +3,7 @@
 - A move of 0.5 s under weight, bare and with each input shaper for the modes of the pose where it ends: vibration that is left.
 - The path that stands for that of Troise et al. 2021, followed under its load by motors that move by their torque: by PD
   control with the angles of the rigid arm and those of solve_ik, with elastostatic feed-forward, and by the paper's closed
-  loop; then with a load that is heavier than they are told.
+  loop; then under a larger load than they assume.
 
 Prints Markdown tables; about a minute.
 """

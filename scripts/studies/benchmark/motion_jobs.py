@@ -59,7 +59,9 @@ def _rod(settings: Settings, pairs: int, target: float) -> Outcome:
     job, comparison = f"motion of a rod, {pairs} pairs with twist", Comparison(settings, f"motion of {pairs} pairs")
     solver, expected = compiled(model, "numba"), reference(released.duration, released.rows)
     step, error = _longest_step(solver, released, expected, np.inf if settings.quick else TIP_ERROR)
-    notes = [f"{job}: steps of {1e3 * step:g} ms, the tip is {1e3 * error:.2g} mm off a rod in {released.duration:g} s"]
+    notes = [
+        f"{job}: steps of {1e3 * step:g} ms, the tip is {1e3 * error:.2g} mm from that of a rod in {released.duration:g} s"
+    ]
     comparison.add(COMPILED, lambda: Workload(1, _run(partial(solver.simulate, released.duration, ()), released, step)))
     comparison.run()
     rows = [_real_time(comparison, job, released.duration, target)]

@@ -31,7 +31,7 @@ def tracking_table(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [line(["controller", "load", *(f"{one} [mm]" for one in head)]), "|---|---:" + "|---:" * len(head) + "|"]
     for row in rows:
         numbers = [f"{1e3 * row[key]:.1f}" if row[key] >= 1e-3 else f"{1e3 * row[key]:.2f}" for key in keys]
-        lines.append(line([row["controller"], "as told" if row["load"] == 1.0 else f"{row['load']:g} times", *numbers]))
+        lines.append(line([row["controller"], "as assumed" if row["load"] == 1.0 else f"{row['load']:g} times", *numbers]))
     return "\n".join(lines)
 
 
@@ -43,7 +43,7 @@ def tracking_figure(followed: Sequence[Followed]) -> Any:
     )
     for number, one in enumerate(followed):
         style = canvas.line_style(number) | {"marker": None}
-        load = "" if one.load == 1.0 else f", load {one.load:g} times as told"
+        load = "" if one.load == 1.0 else f", {one.load:g} times the load"
         axes.plot(one.motion.time, 1e3 * one.error, lw=1.8, label=one.name.replace("`", "") + load, **style)
     axes.axvline(arm_path.DURATION, color="0.45", lw=0.8, ls=":")
     axes.set_yscale("log")

@@ -14,7 +14,7 @@ ROTOR = 0.05
 KP, KD = 400.0, 30.0
 """Gains of the motors, ours [N m/rad, N m s/rad]."""
 HEAVIER = 1.2
-"""A load that the controllers are not told, over that which they are."""
+"""Load on the tip over the load that the controllers assume."""
 SAMPLE, STEP, AFTER = 1e-3, 2e-3, 2.0
 """Sampling time of the closed loop, step of time of the others, and time after the end of the path [s]."""
 
@@ -25,7 +25,7 @@ class Followed(NamedTuple):
     name: str
     """Name of the controller."""
     load: float
-    """Load on the tip over that of the paper."""
+    """Load on the tip over that of the paper, which the controllers assume."""
     motion: sr.Motion
     """The motion."""
     targets: Any
@@ -52,7 +52,7 @@ class Followed(NamedTuple):
 
 
 def study() -> list[Followed]:
-    """Follow the path with each controller, and with two of them under a load that they are not told."""
+    """Follow the path with each controller, and with two of them under a larger load than they assume."""
     model = sr.load_model(sr.InflatableArm(rotor_inertia=ROTOR))
     path = sr.straight_line(START, END, DURATION, steps=100)
     loaded, rigid = (

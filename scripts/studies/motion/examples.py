@@ -40,7 +40,7 @@ def release(duration: float = 2.0) -> sr.Motion:
 
 
 def turns(duration: float = 2.0) -> dict[str, sr.Motion]:
-    """The arm turns its base in half a second: as told, and shaped for its modes where the turn ends; by name."""
+    """The arm turns its base in half a second: unshaped, and shaped for its modes where the turn ends; by name."""
     arm, share = sr.load_model(sr.InflatableArm()), np.linspace(0.0, 1.0, 51)
     ends = np.array([MOTORS, MOTORS]) - [(TURN, 0.0, 0.0), (0.0, 0.0, 0.0)]
     path = Path(TURN_TIME * share, ends[0] + sr.quintic(share)[:, None] * (ends[1] - ends[0]))
@@ -48,7 +48,7 @@ def turns(duration: float = 2.0) -> dict[str, sr.Motion]:
     modes = sr.vibration_modes(arm, last, damping_time=LIGHT_DAMPING)
     bare = sr.shape_input(path, modes, numbers=())  # the same path as a function of time
     paths = {
-        "as told": bare,
+        "unshaped": bare,
         "shaped, ZV": sr.shape_input(path, modes, shaper="zv"),
         "shaped, EI": sr.shape_input(path, modes, shaper="ei"),
     }
