@@ -9,6 +9,7 @@ import json
 import os
 import pickle
 import re
+import select
 import struct
 import threading
 import time
@@ -151,7 +152,13 @@ def test_a_pipe_that_somebody_writes_to_is_read(tmp_path: Path) -> None:
     file = pipe(tmp_path / "pipe")
     descriptor = os.open(file, os.O_RDWR)  # or opening it for writing would wait for the reader
     os.write(descriptor, PATH.encode())
-    threading.Timer(0.05, os.close, (descriptor,)).start()
+
+    def close_once_read() -> None:  # what nobody has read is lost with the last descriptor
+        while select.select([descriptor], [], [], 0.0)[0]:
+            time.sleep(0.01)
+        os.close(descriptor)
+
+    threading.Thread(target=close_once_read, daemon=True).start()
     assert sr.read_waypoints(file).positions[1].tolist() == [1.0, 2.0, 4.0]
 
 
