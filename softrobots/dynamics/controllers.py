@@ -143,12 +143,12 @@ class ClosedLoop:
     def _forget(self) -> None:
         self._time, self._command = 0.0, np.array(self._start.q_motors)
         self._exerted = self._felt = np.array(self._start.motor_torques)
-        self._rest = self._start
+        self._estimated = self._start
 
     @property
     def estimate(self) -> Equilibrium:
         """The robot under the load that was estimated last."""
-        return self._rest
+        return self._estimated
 
     def __call__(self, time: float, q: FloatArray, qd: FloatArray) -> FloatArray:
         """Return the torques until the next sample, shape (n,) [N m or N].
@@ -166,15 +166,15 @@ class ClosedLoop:
         else:
             self._felt = self._exerted
         with contextlib.suppress(LoadNotFound):  # where inertia looks like no load: the last estimate
-            self._rest = estimate_load(self.model, q, self._felt, gravity=self._gravity, restart=False).equilibrium
+            self._estimated = estimate_load(self.model, q, self._felt, gravity=self._gravity, restart=False).equilibrium
         now = min(time, float(self._path.times[-1]))
         target, ahead = (
             np.array([np.interp(t, self._path.times, column) for column in self._path.positions.T])
             for t in (now, now + _DIFFERENCE)
         )
-        wanted = (ahead - target) / _DIFFERENCE + self._gain * (target - self._rest.tip_position)
-        point = self.model.coordinates.at(self._rest.q_motors, self._rest.q_springs)
-        columns = np.concatenate(point.columns(frame_jacobian(self.model, self._rest.q, self.model.tip)[:3]), axis=1)
+        wanted = (ahead - target) / _DIFFERENCE + self._gain * (target - self._estimated.tip_position)
+        point = self.model.coordinates.at(self._estimated.q_motors, self._estimated.q_springs)
+        columns = np.concatenate(point.columns(frame_jacobian(self.model, self._estimated.q, self.model.tip)[:3]), axis=1)
         rate = np.linalg.pinv(columns)[: len(q)] @ wanted
         self._command = np.clip(self._command + passed * rate, *self.model.motor_limits.T)
         torque = self._kp * (self._command - q) + self._kd * (rate - qd) - self._felt

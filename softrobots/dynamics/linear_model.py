@@ -13,9 +13,9 @@ import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, read_only
-from softrobots.core.errors import DescriptionError, MissingDependency, ParameterError
+from softrobots.core.errors import MissingDependency, ParameterError
 from softrobots.dynamics.motor_torque import MOTORS
-from softrobots.dynamics.small_motion import SmallMotion, small_motion
+from softrobots.dynamics.small_motion import SmallMotion, mass_factor, small_motion
 from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
@@ -185,9 +185,6 @@ def _first_order(accelerations: FloatArray, n: int) -> tuple[FloatArray, FloatAr
 
 
 def _accelerations(model: SoftModel, mass: FloatArray, loads: FloatArray) -> FloatArray:
-    """Accelerations by columns of loads; DescriptionError if a coordinate has no mass."""
-    try:
-        np.linalg.cholesky(mass)
-    except np.linalg.LinAlgError:
-        raise DescriptionError(f"a coordinate of {model.pinocchio.name} moves no mass; give its links mass") from None
+    """Accelerations by columns of loads; DescriptionError if a coordinate moves no mass."""
+    mass_factor(model, mass)
     return np.asarray(np.linalg.solve(mass, loads))

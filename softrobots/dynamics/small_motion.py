@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, one_each
+from softrobots.core.errors import DescriptionError
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.model.soft_model import SoftModel
@@ -83,6 +84,18 @@ def small_motion(
         tip=columns(frame_jacobian(model, equilibrium.q, model.tip)),
         momentum=columns(_momentum(model, equilibrium.q)),
     )
+
+
+def mass_factor(model: SoftModel, mass: FloatArray) -> FloatArray:
+    """Return the lower Cholesky factor of the mass matrix of coordinates of the model, shape (n, n).
+
+    Raises:
+        DescriptionError: If one of the coordinates moves no mass.
+    """
+    try:
+        return np.asarray(np.linalg.cholesky(mass))
+    except np.linalg.LinAlgError:
+        raise DescriptionError(f"a coordinate of {model.pinocchio.name} moves no mass; give its links mass") from None
 
 
 def _momentum(model: SoftModel, q: FloatArray) -> FloatArray:

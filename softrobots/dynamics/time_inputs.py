@@ -15,8 +15,8 @@ from softrobots.statics.trajectory import Trajectory
 
 _SAMPLES = 1000  # of a function of time, among which its jumps are searched
 _NEAR = 1e-7  # of the duration: how far apart a function is compared for its velocity
-_KINK = 1e-3  # of the largest velocity: jumps of the velocity that count
-_KINKS = 200  # rows up to which steps end at each row of a table
+_LEAST_KINK = 1e-3  # of the largest velocity: jumps of the velocity that count
+_MOST_KINKS = 200  # rows up to which steps end at each row of a table
 _SHARP = 10.0  # times as much as a row of a longer table usually bends, at which steps end
 
 Signal = Callable[[float], FloatArray]
@@ -74,10 +74,11 @@ class MotorPath:
             return np.asarray((signal(after) - signal(before))[:placed] / (after - before))
 
         fastest = float(np.abs([velocity(time) for time in np.linspace(0.0, duration, 101).tolist()]).max(initial=0.0))
-        kinks = find_jumps(velocity, duration, resolution=4.0 * near, least=_KINK * fastest) if fastest > 0.0 else np.zeros(0)
+        least = _LEAST_KINK * fastest
+        kinks = find_jumps(velocity, duration, resolution=4.0 * near, least=least) if fastest > 0.0 else np.zeros(0)
         if len(kinks):  # one at a sample is found on both sides of it
             kinks = np.array([part.mean() for part in np.split(kinks, np.flatnonzero(np.diff(kinks) > 20.0 * near) + 1)])
-        self.kicks = {0.0: velocity(0.0)} if np.abs(velocity(0.0)).max(initial=0.0) > _KINK * fastest else {}
+        self.kicks = {0.0: velocity(0.0)} if np.abs(velocity(0.0)).max(initial=0.0) > least else {}
         for time in kinks.tolist():
             low, high = time - 8.0 * near, time + 8.0 * near
             before, after = velocity(low), velocity(high)
@@ -209,7 +210,7 @@ def find_onsets(signal: Signal, duration: float) -> FloatArray:
     times = np.linspace(0.0, duration, _SAMPLES + 1)
     changes = np.abs(np.diff([signal(time) for time in times.tolist()], axis=0)).max(axis=1, initial=0.0)
     onsets = times[1:-1][np.diff(changes > 1e-6 * changes.max(initial=0.0))]
-    return onsets if len(onsets) <= _KINKS else np.zeros(0)
+    return onsets if len(onsets) <= _MOST_KINKS else np.zeros(0)
 
 
 def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
@@ -230,7 +231,7 @@ def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
         share = (time - times[row - 1]) / (times[row] - times[row - 1])
         return np.asarray(values[row - 1] + share * (values[row] - values[row - 1]))
 
-    return signal, times if len(times) <= _KINKS else times[_sharpest(times, values)]
+    return signal, times if len(times) <= _MOST_KINKS else times[_sharpest(times, values)]
 
 
 def _sharpest(times: FloatArray, values: FloatArray) -> Any:
@@ -239,7 +240,7 @@ def _sharpest(times: FloatArray, values: FloatArray) -> Any:
     slopes = np.diff(values, axis=0) / np.where(gaps > 1e-12 * (times[-1] - times[0]), gaps, 1.0)
     bends = np.abs(np.diff(slopes, axis=0, prepend=0.0, append=0.0)).max(axis=1)
     much = np.flatnonzero(bends > _SHARP * np.median(bends))
-    much = much[np.argsort(bends[much], kind="stable")[-_KINKS:]]
+    much = much[np.argsort(bends[much], kind="stable")[-_MOST_KINKS:]]
     return np.union1d(much, np.flatnonzero(gaps[:, 0] == 0.0) + 1)
 
 

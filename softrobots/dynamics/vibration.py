@@ -24,8 +24,8 @@ import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, one_each, positive_integer, positive_number, read_only
-from softrobots.core.errors import DescriptionError, NeutralEquilibrium, ParameterError
-from softrobots.dynamics.small_motion import small_motion
+from softrobots.core.errors import NeutralEquilibrium, ParameterError
+from softrobots.dynamics.small_motion import mass_factor, small_motion
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled
@@ -253,13 +253,7 @@ def _refuse_unstable(model: SoftModel, stiffness: FloatArray, servos: FloatArray
 def _modes(stiffness: FloatArray, mass: FloatArray, model: SoftModel) -> tuple[FloatArray, FloatArray]:
     """Angular frequencies, ascending [rad/s], and mass-normalised modes, a column each."""
     lower: Any = np.linalg.cholesky(stiffness)
-    try:
-        upper: Any = np.linalg.cholesky(mass).T
-    except np.linalg.LinAlgError:
-        raise DescriptionError(
-            f"an elastic coordinate of {model.pinocchio.name} moves no mass, so that it has no natural frequency; give its "
-            "links mass"
-        ) from None
+    upper = mass_factor(model, mass).T
     _, periods, vectors = np.linalg.svd(np.linalg.solve(lower, upper.T).T)
     frequencies = 1.0 / periods
     return frequencies, np.asarray(np.linalg.solve(lower.T, vectors.T) * frequencies)
