@@ -79,7 +79,7 @@ class MotionLayout:
     last_change: int = field(init=False)
     """The same of the correction before."""
     settled: int = field(init=False)
-    """1 where the corrections have converged, 0 where they have not; of a lane."""
+    """1 where the corrections have converged, 0 where they have not."""
     failed: int = field(init=False)
     """1 for a lane that has not converged in some step."""
     prepared: int = field(init=False)

@@ -1,4 +1,4 @@
-r"""The implicit midpoint rule, traced: functions of one unknown or one motor.
+r"""The implicit midpoint rule, traced: functions of one unknown or one motor, and the test of convergence.
 
 With the acceleration `a` in the middle of a step of length `h`
 
@@ -11,16 +11,17 @@ Motors move along the parabola through their positions at the beginning, in the 
 from __future__ import annotations
 
 from softrobots.compiled.chain.motion_layout import MotionLayout
-from softrobots.compiled.motion_settings import KEPT_STEPS
+from softrobots.compiled.motion_settings import KEPT_STEPS, MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
 
 
 def step_blocks(layout: MotionLayout) -> list[Block]:
-    """Return the functions of an unknown `i`, and that of a motor `i`."""
+    """Return the functions of an unknown `i`, that of a motor `i`, and the test of convergence."""
     return [
         _guess(layout, Block("guess_unknown", "Extrapolate the middle of an unknown, and its acceleration.", ("i",))),
         _apply(layout, Block("apply_correction", "Correct an acceleration, and its unknown in the middle.", ("i",))),
+        _judge(layout, Block("judge_corrections", "Write `SETTLED`: whether the corrections of a step have converged.")),
         _finish(layout, Block("finish_unknown", "Go to the end of the step, and remember the middle.", ("i",))),
         _interpolate(layout, Block("interpolate_unknown", "Place an unknown at `SHARE` of the step taken last.", ("i",))),
         _place_motor(layout, Block("place_motor", "Place a motor at `SHARE` of the whole step.", ("i",))),
@@ -57,6 +58,19 @@ def _place_middle(layout: MotionLayout, block: Block, acceleration: Scalar) -> B
     block.store(layout.rate, rate, "i")
     middle = block.load(layout.position, "i") + half * (velocity + half * acceleration)
     block.store(layout.unknown, middle, "i")
+    return block
+
+
+def _judge(layout: MotionLayout, block: Block) -> Block:
+    """By the last correction, by what the next would be, or as far as rounding lets.
+
+    The next one is expected to shrink as the last one did, and up to ten times less, as that one may have had other factors.
+    """
+    change, last = block.load(layout.change), block.load(layout.last_change)
+    next_is_small = if_less(0.1 * MOTION_TOLERANCE * last, change * change, 0.0, 1.0)
+    shrinking = if_less(change, 0.01 * last, if_less(last, 1.0, next_is_small, 0.0), 0.0)
+    rounded = if_less(0.5 * last, change, if_less(MOTION_ROUNDING, change, 0.0, 1.0), 0.0)
+    block.store(layout.settled, if_less(MOTION_TOLERANCE, change, larger(shrinking, rounded), 1.0))
     return block
 
 

@@ -11,16 +11,6 @@ from softrobots.compiled.drivers.intrinsics import Array, fabs
 from softrobots.compiled.motion_settings import *
 
 
-def has_settled(change: float, last: float) -> bool:
-    """Tell whether the corrections have converged: by the last one, by what the next would be, or as far as rounding lets.
-
-    The next one is expected to shrink as the last one did, and up to ten times less, as that one may have had other factors.
-    """
-    if change <= MOTION_TOLERANCE or (change < 0.01 * last and last < 1.0 and change * change <= 0.1 * MOTION_TOLERANCE * last):
-        return True
-    return change > 0.5 * last and change <= MOTION_ROUNDING
-
-
 def weigh_history(w: Array) -> None:
     """Set the weights of the extrapolation; steps of another length do not count."""
     if fabs(w[TIME_STEP] - w[LAST_STEP]) > 1e-9 * w[TIME_STEP]:
@@ -46,16 +36,17 @@ def settle_middle(w: Array) -> bool:
         motion_factor(w)
     else:
         motion_correct(w)
-    last = 1e300
+    w[LAST_CHANGE] = 1e300
     for step in range(MOTION_CORRECTIONS):
         w[CHANGE] = 0.0
         for i in range(N):
             apply_correction(w, i)
-        if has_settled(w[CHANGE], last):
+        judge_corrections(w)
+        if w[SETTLED] > 0.5:
             return True
-        if w[CHANGE] > 1e3 * last:
+        if w[CHANGE] > 1e3 * w[LAST_CHANGE]:
             return False
-        last = w[CHANGE]
+        w[LAST_CHANGE] = w[CHANGE]
         if step == 0:
             motion_factor(w)
         else:

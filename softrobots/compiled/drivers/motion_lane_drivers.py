@@ -10,7 +10,7 @@ from typing import Any
 from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array, fabs, where, zeros
 from softrobots.compiled.drivers.lane_drivers import Places, Rows, load_block, load_case
-from softrobots.compiled.drivers.motion_drivers import has_settled, motion_run
+from softrobots.compiled.drivers.motion_drivers import motion_run
 from softrobots.compiled.motion_settings import *
 
 
@@ -22,12 +22,10 @@ def fill_lanes(w: Array, place: int, value: float) -> None:
 
 def lanes_to_settle(w: Array) -> float:
     """Return the number of lanes whose corrections have not converged, without those that have failed before."""
+    judge_corrections_lanes(w)
     count = 0.0
     for lane in range(LANES):
-        change = w[CHANGE * LANES + lane]
-        last = w[LAST_CHANGE * LANES + lane]
-        w[SETTLED * LANES + lane] = where(has_settled(change, last), 1.0, 0.0)
-        w[LAST_CHANGE * LANES + lane] = change
+        w[LAST_CHANGE * LANES + lane] = w[CHANGE * LANES + lane]
         count += (1.0 - w[SETTLED * LANES + lane]) * (1.0 - w[FAILED * LANES + lane])
     return count
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.drivers.lane_drivers import Places, Rows
-from softrobots.compiled.motion_settings import EXTRAPOLATION, KEPT_STEPS, MOTION_CORRECTIONS, MOTION_ROUNDING, MOTION_TOLERANCE
+from softrobots.compiled.motion_settings import EXTRAPOLATION, KEPT_STEPS, MOTION_CORRECTIONS
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.run.numpy_batches import BLOCK
 from softrobots.compiled.statuses import Status
@@ -96,7 +96,7 @@ class MotionBatches:
         functions.motion_prepare(w)
         for i in range(layout.unknowns):
             functions.guess_unknown(w, i)
-        last = np.full(len(failed), 1e300)
+        w[layout.last_change] = np.full(len(failed), 1e300)
         for correction in range(MOTION_CORRECTIONS):
             if correction == 1 or correction + n_history == 0:
                 functions.motion_factor(w)
@@ -105,12 +105,11 @@ class MotionBatches:
             w[layout.change] = np.zeros(len(failed))
             for i in range(layout.unknowns):
                 functions.apply_correction(w, i)
-            change = w[layout.change]
-            settled = (change <= MOTION_TOLERANCE) | ((change > 0.5 * last) & (change <= MOTION_ROUNDING))
-            settled |= (change < 0.01 * last) & (last < 1.0) & (change * change <= 0.1 * MOTION_TOLERANCE * last)
+            functions.judge_corrections(w)
+            settled = w[layout.settled] > 0.5
             if np.all(settled | failed):
                 break
-            last = change
+            w[layout.last_change] = w[layout.change]
         for i in range(layout.unknowns):
             functions.finish_unknown(w, i)
         return settled
