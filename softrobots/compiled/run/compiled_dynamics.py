@@ -13,9 +13,9 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
-from softrobots.compiled.run.motion_course import Blows, Course
+from softrobots.compiled.run.motion_course import Course, SpringKicks
 from softrobots.compiled.run.motion_results import CompiledMotion, MotionBatch, StepEnd
-from softrobots.compiled.run.motion_runs import Taken, finer_and_finer, replay, take_batch, take_one
+from softrobots.compiled.run.motion_runs import StepsTaken, halve_to_tolerance, replay, take_batch, take_one
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
 from softrobots.core.errors import NotConverged
@@ -27,7 +27,7 @@ from softrobots.dynamics.time_grid import grid_with_kicks, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 
-_LOOKED = 401  # times at which tips of two runs are compared, besides those of the rows
+_COMPARED = 401  # times at which tips of two runs are compared, besides those of the rows
 
 
 class CompiledDynamics(CompiledStatics):
@@ -67,7 +67,7 @@ class CompiledDynamics(CompiledStatics):
             damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
             mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
             time_step: Length of each step [s]; by default steps are halved until the tip is within the tolerance.
-            output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
+            output_step: Time between two rows of the result [s]; by default 200 rows, or fewer with given steps.
             tolerance: Largest error of the tip [m], measured with steps twice as long; by default 5e-4 of the reach.
 
         Returns:
@@ -79,7 +79,7 @@ class CompiledDynamics(CompiledStatics):
         """
         end = positive_number("duration", duration, "s")
         path, load = MotorPath(self._model, q_motors, end), TimeLoad(self._model, force, None, end)
-        course = Course(path, load, Blows(self._model, self._unknowns.strains))
+        course = Course(path, load, SpringKicks(self._model, self._unknowns.strains))
         run, given, damping = self._motion_code(gravity, damping_time, mass_damping)
         h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         facts: dict[str, Any] = {
@@ -88,23 +88,23 @@ class CompiledDynamics(CompiledStatics):
             "tip_error": None,
         }
         state = self._first_state(course, start)
-        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _LOOKED))
+        times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
-        def take(grid: FloatArray) -> Taken:
-            return take_one(run, state, given, course, grid, looked)
+        def take(grid: FloatArray) -> StepsTaken:
+            return take_one(run, state, given, course, grid, times)
 
         if h is not None:
-            taken = take(grid_with_kicks(end, h, np.array(list(path.kicks))))
+            taken = take(grid_with_kicks(end, h, course.kicks))
         else:
-            taken = finer_and_finer(take, end, course.breaks, largest)
+            taken = halve_to_tolerance(take, end, course.breaks, largest)
             facts["tip_error"] = None if taken.errors is None else float(taken.errors[0])
-        at_rows = replace(taken, rows=taken.rows[:, np.searchsorted(looked, rows)])
+        at_rows = replace(taken, rows=taken.rows[:, np.searchsorted(times, rows)])
         down = None if gravity is None else tuple(gravity_vector(gravity).tolist())
 
-        def again(steps: FloatArray, times: FloatArray) -> Motion:
+        def again(steps: FloatArray, row_times: FloatArray) -> Motion:
             ends = take_one(run, state, given, course, steps, steps)
             ends = replace(ends, rows=np.concatenate(self._elastic_state(ends.rows[..., :-3]), axis=-1))
-            return replay(EquationsOfMotion(self._model, down, damping), course, ends, times, facts)
+            return replay(EquationsOfMotion(self._model, down, damping), course, ends, row_times, facts)
 
         found = at_rows.rows[0][np.isfinite(at_rows.rows[0, :, -1])]
         springs, rates = self._elastic_state(found[:, :-3])
@@ -210,7 +210,7 @@ class CompiledDynamics(CompiledStatics):
             damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
             mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
             time_step: Length of each step [s]; by default steps are halved until all tips are within the tolerance.
-            output_step: Time between two rows of the result [s]; by default 200 rows or a few more.
+            output_step: Time between two rows of the result [s]; by default 200 rows, or fewer with given steps.
             tolerance: Largest error of the tip in a row [m], measured with steps twice as long; by default 5e-4 of the reach.
             threads: Number of threads; more than one speeds up numba only.
 
@@ -226,20 +226,20 @@ class CompiledDynamics(CompiledStatics):
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
         h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         cases = MotionCases(self._model, self._actuation, end, q_motors, forces, starts)
-        strains, blows = list(self._unknowns.strains), Blows(self._model, self._unknowns.strains)
+        strains, spring_kicks = list(self._unknowns.strains), SpringKicks(self._model, self._unknowns.strains)
         springs, rates = (np.array(one[:, strains]) for one in cases.state)
-        cases.strike(blows, 0.0, slice(None), springs, rates)
+        cases.kick(spring_kicks, 0.0, slice(None), springs, rates)
         values = [(run.layout.position, springs), (run.layout.velocity, rates), *((place, one[None]) for place, one in given)]
-        looked = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _LOOKED))
+        times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
-        def take(grid: FloatArray) -> Taken:
-            return take_batch(run, values, cases, blows, grid, looked, threads)
+        def take(grid: FloatArray) -> StepsTaken:
+            return take_batch(run, values, cases, spring_kicks, grid, times, threads)
 
         if h is not None:
             taken = take(grid_with_kicks(end, h, cases.kicks))
         else:
-            taken = finer_and_finer(take, end, cases.breaks, largest, cases.bad)
-        found = taken.rows[:, np.searchsorted(looked, rows)]
+            taken = halve_to_tolerance(take, end, cases.breaks, largest, cases.bad)
+        found = taken.rows[:, np.searchsorted(times, rows)]
         fail(taken.status, cases.bad, [], [found])
         batch = MotionBatch(
             rows,
@@ -282,7 +282,7 @@ class CompiledDynamics(CompiledStatics):
         first, m, strains = first_state(self._model, start, course.path), self._motors, list(self._unknowns.strains)
         springs, rates = first.x[m:][strains], first.rates[m:][strains]
         change = first_kick(course.path, first.rates[:m])
-        return springs, rates if change is None else rates + course.blows.at(first.x[:m], springs, change)
+        return springs, rates if change is None else rates + course.spring_kicks.at(first.x[:m], springs, change)
 
     def _elastic_state(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return elastic coordinates and rates, each shape (..., n_springs), from unknowns and their rates."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.batches import batch_rows, unusable, without
-from softrobots.compiled.run.motion_course import Blows, forces_of_steps, motors_of_steps
+from softrobots.compiled.run.motion_course import SpringKicks, forces_of_steps, motors_of_steps
 from softrobots.compiled.run.motion_results import MotionBatch
 from softrobots.compiled.run.results import EquilibriumBatch
 from softrobots.core.checks import FloatArray
@@ -66,12 +66,12 @@ class MotionCases:
         """Times at which velocities of motors of any case jump, shape (n,) [s]."""
         return np.unique([time for path in self._paths for time in path.kicks])
 
-    def strike(self, blows: Blows, time: float, rows: slice, unknowns: FloatArray, rates: FloatArray) -> None:
+    def kick(self, spring_kicks: SpringKicks, time: float, rows: slice, unknowns: FloatArray, rates: FloatArray) -> None:
         """Let the rates of some cases, shape (n, N), jump where velocities of their motors do."""
         for place, case in enumerate(range(self.count)[rows] if self._paths else ()):
             path = self._paths[min(case, len(self._paths) - 1)]
             if time in path.kicks and np.all(np.isfinite(unknowns[place])):
-                rates[place] += blows.at(path(time), unknowns[place], path.kicks[time])
+                rates[place] += spring_kicks.at(path(time), unknowns[place], path.kicks[time])
 
     def motors(self, grid: FloatArray, rows: slice) -> FloatArray:
         """Return the motors of some cases, shape (n or 1, 2 n_steps + 1 or 1, n_motors); see `motors_of_steps`."""

@@ -48,7 +48,7 @@ def motors_at(path: MotorPath, times: FloatArray, grid: FloatArray) -> tuple[Flo
     return path.at(times), rates
 
 
-class Blows:
+class SpringKicks:
     """What springs do when velocities of motors jump; see `MidpointRule.kicked`."""
 
     def __init__(self, model: SoftModel, strains: Sequence[int]) -> None:
@@ -80,8 +80,13 @@ class Course:
     """Positions of the motors."""
     load: TimeLoad
     """Force on the tip."""
-    blows: Blows
+    spring_kicks: SpringKicks
     """What springs do when velocities of motors jump."""
+
+    @property
+    def kicks(self) -> FloatArray:
+        """Times at which velocities of motors jump, shape (n,) [s]."""
+        return np.array(list(self.path.kicks))
 
     @property
     def breaks(self) -> FloatArray:

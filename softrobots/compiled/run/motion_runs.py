@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.motion_cases import MotionCases
-from softrobots.compiled.run.motion_course import Blows, Course, forces_of_steps, motors_of_steps
+from softrobots.compiled.run.motion_course import Course, SpringKicks, forces_of_steps, motors_of_steps
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.equations import EquationsOfMotion
@@ -35,26 +35,26 @@ Given = Sequence[tuple[int, FloatArray]]
 
 
 @dataclass(frozen=True)
-class Taken:
+class StepsTaken:
     """Steps that were taken by one case or many."""
 
     grid: FloatArray
     """Ends of the steps, the first included, shape (m,) [s]."""
     rows: FloatArray
-    """Unknowns, rates and tip at the times looked at, NaN where they were not reached, shape (n, t, 2 N + 3)."""
+    """Unknowns, rates and tip at the times of the rows, NaN where they were not reached, shape (n, t, 2 N + 3)."""
     status: Any
     """Status of each case, shape (n,)."""
     interrupted: bool = False
     """Whether Ctrl-C ended it."""
     errors: FloatArray | None = None
-    """Measured error of the tip, the largest of all times looked at, shape (n,) [m]."""
+    """Measured error of the tip, the largest of all rows, shape (n,) [m]."""
     is_within: bool = True
     """Whether that is within the tolerance; so are fixed steps."""
 
 
-def finer_and_finer(
-    take: Callable[[FloatArray], Taken], end: float, breaks: FloatArray, tolerance: float, bad: Any = False
-) -> Taken:
+def halve_to_tolerance(
+    take: Callable[[FloatArray], StepsTaken], end: float, breaks: FloatArray, tolerance: float, bad: Any = False
+) -> StepsTaken:
     """Halve all steps until the tips of the valid cases are known to a tolerance; return the last run.
 
     The error of the finer of two runs is stated from the difference of their tips by `softrobots.dynamics.step_control`, as in
@@ -85,38 +85,38 @@ def finer_and_finer(
 
 def take_one(
     run: Any, state: tuple[FloatArray, FloatArray], given: Given, course: Course, grid: FloatArray, times: FloatArray
-) -> Taken:
-    """Take the steps of a grid from a state, unknowns and rates; `times` are looked at."""
+) -> StepsTaken:
+    """Take the steps of a grid from a state, unknowns and rates; `times` are those of the rows."""
     w, layout = run.workspace(), run.layout
     n, last = layout.unknowns, len(grid) - 1
     for place, values in [(layout.position, state[0]), (layout.velocity, state[1]), *given]:
         run.put(w, place, values)
     rows, status, interrupted = np.full((1, len(times), 2 * n + 3), np.nan), Status.CERTIFIED, False
     rows[0, 0] = np.concatenate([*state, np.zeros(3)])  # even if no step is taken
-    stops = np.union1d(_stops(grid, np.array(list(course.path.kicks))), np.arange(0, last, _CHUNK))
+    stops = np.union1d(_stops(grid, course.kicks), np.arange(0, last, _CHUNK))
     try:
         for first, end in itertools.pairwise(stops.tolist()):
-            part, looked = grid[first : end + 1], _looked(times, grid, first, end)
+            part, within = grid[first : end + 1], _times_within(times, grid, first, end)
             motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, part)
-            out = run.flat(rows[0, looked])
+            out = run.flat(rows[0, within])
             paths = run.flat(motors), len(motors), run.flat(forces), len(forces)
-            seen = run.flat(times[looked]), looked.stop - looked.start, out
+            seen = run.flat(times[within]), within.stop - within.start, out
             status = Status(run.motion_run(w, *paths, run.flat(part), len(part) - 1, *seen))
-            rows[0, looked] = np.reshape(out, (-1, 2 * n + 3))
+            rows[0, within] = np.reshape(out, (-1, 2 * n + 3))
             if status != Status.CERTIFIED:
                 break
             if end < last and grid[end] in course.path.kicks:
                 y, v = (np.array(w[place : place + n]) for place in (layout.position, layout.velocity))
                 time = float(grid[end])
-                run.put(w, layout.velocity, v + course.blows.at(course.path(time), y, course.path.kicks[time]))
+                run.put(w, layout.velocity, v + course.spring_kicks.at(course.path(time), y, course.path.kicks[time]))
     except KeyboardInterrupt:
         interrupted = True
-    return Taken(grid, rows, np.array([status]), interrupted)
+    return StepsTaken(grid, rows, np.array([status]), interrupted)
 
 
 def take_batch(
-    run: Any, given: Given, cases: MotionCases, blows: Blows, grid: FloatArray, times: FloatArray, threads: int
-) -> Taken:
+    run: Any, given: Given, cases: MotionCases, spring_kicks: SpringKicks, grid: FloatArray, times: FloatArray, threads: int
+) -> StepsTaken:
     """Take the steps of a grid with many cases; `given` has positions, velocities and what is the same for all cases."""
     n = run.layout.unknowns
     out = np.full((cases.count, len(times), 2 * n + 3), np.nan)
@@ -133,19 +133,19 @@ def take_batch(
         ]  # all of one type for numba
         count = rows.stop - case
         for first, end in itertools.pairwise(stops):
-            part, looked = grid[first : end + 1], _looked(times, grid, first, end)
-            seen = np.append(times[looked], grid[end])
+            part, within = grid[first : end + 1], _times_within(times, grid, first, end)
+            seen = np.append(times[within], grid[end])
             found, status = np.full((count, len(seen), 2 * n + 3), np.nan), np.zeros(count, dtype=np.uint8)
             driven = cases.motors(part, rows), cases.forces(part, rows), part, seen
             run.motion_batch(tuple(own), places, *driven, found, status, 0, count)
-            out[rows, looked] = found[:, :-1]
+            out[rows, within] = found[:, :-1]
             statuses[rows] = np.maximum(statuses[rows], status)
             own[:2] = [found[:, -1, :n].copy(), found[:, -1, n : 2 * n].copy()]
-            cases.strike(blows, float(grid[end]), rows, own[0], own[1])
+            cases.kick(spring_kicks, float(grid[end]), rows, own[0], own[1])
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(solve, range(0, cases.count, size)))
-    return Taken(grid, out, statuses)
+    return StepsTaken(grid, out, statuses)
 
 
 def _stops(grid: FloatArray, kicks: FloatArray) -> Any:
@@ -154,19 +154,19 @@ def _stops(grid: FloatArray, kicks: FloatArray) -> Any:
     return np.unique([0, *np.searchsorted(grid, inside).tolist(), len(grid) - 1])
 
 
-def _looked(times: FloatArray, grid: FloatArray, first: int, end: int) -> slice:
+def _times_within(times: FloatArray, grid: FloatArray, first: int, end: int) -> slice:
     """Which of the times are within steps `first` to `end`, without the beginning but of the first."""
     begin = 0 if first == 0 else int(np.searchsorted(times, grid[first], "right"))
     return slice(begin, len(times) if end == len(grid) - 1 else int(np.searchsorted(times, grid[end], "right")))
 
 
-def replay(equations: EquationsOfMotion, course: Course, taken: Taken, rows: FloatArray, facts: dict[str, Any]) -> Motion:
+def replay(equations: EquationsOfMotion, course: Course, taken: StepsTaken, rows: FloatArray, facts: dict[str, Any]) -> Motion:
     """Return the motion with torques and energies, by Pinocchio, from the states at the ends of all steps.
 
     Args:
         equations: Equations of motion.
         course: What drove it.
-        taken: The steps, looked at at their ends; elastic coordinates and rates instead of unknowns and theirs.
+        taken: The steps, with a row at each end of a step; elastic coordinates and rates instead of unknowns and theirs.
         rows: Times of the rows, shape (n,) [s].
         facts: Other fields of the motion.
     """
