@@ -309,6 +309,9 @@ def test_modes_are_saved_drawn_and_played(tmp_path: Path, capsys: pytest.Capture
     assert rows[0].startswith("mode,frequency [Hz],damping ratio [-]")
     assert [float(cell) for cell in rows[3].split(",")[:3]] == [3.0, modes.frequencies[2], modes.damping_ratios[2]]
     assert cli.main(["modes", "inflatable_arm", "--force", "-500", "0", "0.1", "--count", "0"]) == 2
+    capsys.readouterr()
+    assert cli.main(["modes", "inflatable_arm", "--servo-stiffness", "1", "2"]) == 2
+    assert "motor_3 [N m/rad]" in capsys.readouterr().err
 
 
 def test_a_swing_reaches_its_size_and_passes_the_equilibrium() -> None:

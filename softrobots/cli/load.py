@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.output_files import add_output, check_output, save
-from softrobots.cli.options.robot_argument import add_model, add_motors, check_one_each, motors_of, statics_model_of
+from softrobots.cli.options.robot_argument import (
+    add_model,
+    add_motors,
+    check_one_each,
+    motors_of,
+    one_or_each,
+    statics_model_of,
+)
 from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, attributes, formatted, print_answer
 from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines, joined_units
 from softrobots.model.actuators import load_units
@@ -70,9 +76,9 @@ def run(arguments: argparse.Namespace) -> None:
     units = load_units(model.actuators.units)
     check_one_each("--torques", arguments.torques, model.motor_joints, units)
     deviations = {
-        "torque_std": _one_or_each("--torque-std", arguments.torque_std, model.motor_joints, units),
-        "stiffness_std": _one_or_each("--stiffness-std", arguments.stiffness_std, model.springs.names, ["-"] * model.n_springs),
-        "motor_angle_std": _one_or_each(
+        "torque_std": one_or_each("--torque-std", arguments.torque_std, model.motor_joints, units),
+        "stiffness_std": one_or_each("--stiffness-std", arguments.stiffness_std, model.springs.names, ["-"] * model.n_springs),
+        "motor_angle_std": one_or_each(
             "--motor-angle-std", arguments.motor_angle_std, model.motor_joints, model.actuators.units
         ),
     }
@@ -90,14 +96,6 @@ def run(arguments: argparse.Namespace) -> None:
     files = save(arguments, estimate)
     lines = [*equilibrium_lines(estimate.equilibrium), "", *_lines(estimate)]
     print_answer(arguments, _answer(estimate), lines, files)
-
-
-def _one_or_each(option: str, values: Any, names: Sequence[str], units: Sequence[str]) -> Any:
-    """A number for all or numbers for each of some joints, as the library takes them; None if not given."""
-    if values is None or len(values) == 1:
-        return None if values is None else values[0]
-    check_one_each(option, values, names, units)
-    return values
 
 
 def _answer(estimate: LoadEstimate) -> dict[str, Any]:

@@ -19,11 +19,12 @@ from softrobots.cli.options.output_files import (
     save,
     write_plot,
 )
-from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
+from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, one_or_each, statics_model_of
 from softrobots.cli.reports.answers import add_json, aligned, print_answer
 from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.core.files import new_file
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
+from softrobots.model.actuators import load_units
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.view.figures.vibrations import SWING, mode_shapes
 from softrobots.view.viewer import Viewer
@@ -68,14 +69,17 @@ def run(arguments: argparse.Namespace) -> None:
     positive_integer("--count", arguments.count)
     model = statics_model_of(arguments)
     pages = _pages(arguments, model.n_springs)
+    placed = slice(model.actuators.n_placed)
+    coordinates = model.actuators.units[placed]
+    units = [f"{load}/{coordinate}" for load, coordinate in zip(load_units(coordinates), coordinates, strict=True)]
+    servos = one_or_each("--servo-stiffness", arguments.servo_stiffness, model.motor_joints[placed], units)
     equilibrium = solve_equilibrium(model, motors_of(model, arguments.motors), **loads_of(arguments, model))
-    servos = arguments.servo_stiffness
     modes = vibration_modes(
         model,
         equilibrium,
         damping_time=arguments.damping_time,
         mass_damping=arguments.mass_damping,
-        servo_stiffness=servos[0] if servos is not None and len(servos) == 1 else servos,
+        servo_stiffness=servos,
     )
     files = save(arguments, modes) + write_plot(arguments, lambda: mode_shapes(modes, shown=arguments.count))
     if pages:
@@ -112,12 +116,13 @@ def _answer(modes: VibrationModes) -> dict[str, Any]:
 
 def _lines(modes: VibrationModes, count: int) -> list[str]:
     """A table of the slowest modes."""
+    shown = min(count, len(modes.frequencies))
     rows = [("mode", "frequency [Hz]", "damping ratio", "tip moves along", "effective mass x, y, z [kg]")]
-    for place in range(min(count, len(modes.frequencies))):
+    for place in range(shown):
         masses = "  ".join(f"{mass:.4f}" for mass in modes.effective_masses[place, :3])
         numbers = f"{modes.frequencies[place]:.6g}", f"{modes.damping_ratios[place]:.4g}"
         rows.append((str(place + 1), *numbers, _direction(modes.tip_shapes[:, place], modes.model.reach), masses))
-    left = len(modes.frequencies) - len(rows) + 1
+    left = len(modes.frequencies) - shown
     more = [f"and {left} faster ones, up to {modes.frequencies[-1]:.6g} Hz"] if left else []
     shaken = "  ".join(f"{mass:.4f}" for mass in modes.effective_masses.sum(axis=0)[:3])
     return [*aligned(rows), *more, "", f"mass that shakes with the base along x, y, z, in all modes: {shaken} kg"]

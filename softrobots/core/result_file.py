@@ -118,9 +118,8 @@ def save_csv(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
-    tables = {name: kind for name, kind in KINDS.items() if kind.to_table is not None}
-    to_table = tables[_kind_of(result, tables)].to_table
-    columns = {} if to_table is None else to_table(result)
+    tables = {name: kind.to_table for name, kind in KINDS.items() if kind.to_table is not None}
+    columns = tables[_kind_of(result, {name: KINDS[name] for name in tables})](result)
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return write_text(path, csv_text(columns, rows), overwrite=overwrite)
 

@@ -168,16 +168,18 @@ class SceneBuilder:
             segments=body_at(model, frame.q_motors, frame.q_springs, points),
             grown=frame.grown,
         )
-        load = frame.load if equilibrium is None else equilibrium.load
-        if load is None:
+        if equilibrium is not None:
+            load, tensions = equilibrium.load, equilibrium.muscle_forces
+            levels = [wrinkling_level(equilibrium, link) for link in range(len(model.spring_groups))]
+        elif frame.load is not None:
+            load, tensions = frame.load, frame.tensions
+            levels = self._moving_levels(frame, load, q)
+        else:
             return scene
-        muscles = zip(model.muscles, frame.tensions if equilibrium is None else equilibrium.muscle_forces, strict=True)
         return dataclasses.replace(
             scene,
-            wrinkling=self._moving_levels(frame, load, q)
-            if equilibrium is None
-            else [wrinkling_level(equilibrium, link) for link in range(len(model.spring_groups))],
-            pushing=frozenset(muscle.name for muscle, tension in muscles if tension < 0.0),
+            wrinkling=levels,
+            pushing=frozenset(muscle.name for muscle, tension in zip(model.muscles, tensions, strict=True) if tension < 0.0),
             arrows=_arrows(model, load, q),
         )
 

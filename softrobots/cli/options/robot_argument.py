@@ -172,6 +172,18 @@ def check_one_each(option: str, words: Sequence[float], names: Sequence[str], un
         )
 
 
+def one_or_each(option: str, numbers: Sequence[float] | None, names: Sequence[str], units: Sequence[str]) -> Any:
+    """Return one number for all, or numbers for each of some coordinates, as the library takes them; None if not given.
+
+    Raises:
+        ParameterError: If there are several, but not one for each; lists the coordinates with their units.
+    """
+    if numbers is None or len(numbers) == 1:
+        return None if numbers is None else numbers[0]
+    check_one_each(option, numbers, names, units)
+    return numbers
+
+
 def robot_file(name: str) -> Path:
     """Return the path of a robot's file.
 

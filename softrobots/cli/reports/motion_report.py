@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -9,13 +10,14 @@ import numpy as np
 
 from softrobots.cli.reports.answers import Fact, aligned, attributes, formatted
 from softrobots.cli.reports.equilibrium_report import head_lines, joined_units, model_answer
+from softrobots.core.checks import FloatArray
 from softrobots.dynamics.motion import Motion, MotionEnergy
 from softrobots.model.actuators import load_units
 from softrobots.statics.loads import Load
 
 
 def motion_answer(motion: Motion, load: Load) -> dict[str, Any]:
-    """A motion under a load by the names of its attributes, one row an instant, with `units`."""
+    """A motion under a load by the names of its attributes, one row for each instant, with `units`."""
     motors, springs = motion.model.actuators.units, motion.model.springs.units
     energies = {one.name: getattr(motion.energy, one.name) for one in fields(MotionEnergy)}
     facts = [
@@ -71,7 +73,14 @@ def _error(motion: Motion) -> str:
     return f"{motion.tip_error:.2g} m ({motion.tolerance:.2g} m allowed)"
 
 
-def _ranges(what: str, names: Any, values: Any, units: Any, loads: Any = None, load_names: Any = ()) -> list[str]:
+def _ranges(
+    what: str,
+    names: Sequence[str],
+    values: FloatArray,
+    units: Sequence[str],
+    loads: FloatArray | None = None,
+    units_of_loads: Sequence[str] = (),
+) -> list[str]:
     """A table of the first, last, least and largest value of each column, and of the largest load in size."""
     if not len(names):
         return []
@@ -80,6 +89,6 @@ def _ranges(what: str, names: Any, values: Any, units: Any, loads: Any = None, l
     ]
     for place, (name, column, unit) in enumerate(zip(names, values.T, units, strict=True)):
         ends = (f"{value:.6f}" for value in (column[0], column[-1], column.min(), column.max()))
-        load = () if loads is None else (formatted(np.abs(loads[:, place]).max()), load_names[place])
+        load = () if loads is None else (formatted(np.abs(loads[:, place]).max()), units_of_loads[place])
         rows.append((name, *ends, unit, *load))
     return aligned(rows, right=(1, 2, 3, 4, 6))
