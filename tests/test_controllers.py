@@ -70,14 +70,14 @@ def test_feed_forward_ends_on_target_where_proportional_control_alone_sags(loade
     model, kp = loaded.model, 300.0
     exact = follow(model, loaded.equilibria[0], sr.PD(model, loaded, kp, 25.0, feed_forward=loaded))
     assert np.linalg.norm(exact.tip_position[-1] - END) < 5e-5  # the rest of the vibration after 1.2 s
-    assert np.linalg.norm(exact.tip_position - np.array(END), axis=1).max() < 0.3
+    assert np.linalg.norm(exact.tip_position - np.array(END), axis=1).max() < 0.25  # the start is 0.245 m away
     sagging = follow(model, loaded.equilibria[0], sr.PD(model, loaded, kp, 25.0))
     motors = loaded.q_motors[-1].copy()
     for _ in range(60):  # q = reference - what they carry / kp
         rest = sr.solve_equilibrium(model, motors, FORCE, gravity=sr.EARTH_GRAVITY)
         motors = 0.5 * motors + 0.5 * (loaded.q_motors[-1] + rest.motor_torques / kp)
     assert np.linalg.norm(rest.tip_position - END) > 0.02
-    assert np.linalg.norm(sagging.tip_position[-1] - rest.tip_position) < 2e-4
+    assert np.linalg.norm(sagging.tip_position[-1] - rest.tip_position) < 5e-5  # as above
 
 
 @law("ClosedLoop")

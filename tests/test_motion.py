@@ -93,11 +93,15 @@ def test_a_double_pendulum_with_springs_swings_as_dop853_says_to_second_order() 
         errors.append([np.abs(end - solution).max(), np.abs(moved.energy.balance).max()])
     ratios = np.array(errors[:-1]) / np.array(errors[1:])
     assert np.all((ratios > 3.8) & (ratios < 4.2)), ratios
-    assert errors[-1][0] < 1e-3
+    # Phases are late by (omega h)^2 / 12 omega t: 1e-6 of the slow swing, at 2 rad/s, and 3e-4 of the small fast one, at 16.
+    assert errors[-1][0] < 1e-5
 
 
 def test_a_motion_runs_backwards_to_its_start() -> None:
-    """The rule is symmetric: from the end with reversed rates it returns to the start, to the rounding of 200 steps."""
+    """The rule is symmetric: from the end with reversed rates it returns to the start, but for what 200 steps leave.
+
+    Each is solved to 1e-13 in its middle, and to 4e-13 / h in a velocity.
+    """
     model = pendulum(3, 4.0)
     start = sr.solve_equilibrium(model, (), force=(6.0, 0.0, 0.0))
     options: dict[str, Any] = {"gravity": sr.EARTH_GRAVITY, "damping_time": 0.0, "time_step": 5e-3}
@@ -106,8 +110,8 @@ def test_a_motion_runs_backwards_to_its_start() -> None:
     turned = sr.MotionState(model, 0.0, end.q_motors, end.motor_velocities, end.q_springs, -end.velocities)
     back = sr.simulate(model, 1.0, (), start=turned, **options)
     assert np.abs(there.q_springs[-1] - start.q_springs).max() > 0.1
-    assert np.abs(back.q_springs[-1] - start.q_springs).max() < 1e-8
-    assert np.abs(back.velocities[-1]).max() < 1e-7
+    assert np.abs(back.q_springs[-1] - start.q_springs).max() < 1e-10
+    assert np.abs(back.velocities[-1]).max() < 1e-8
 
 
 @settings(max_examples=40)
@@ -180,7 +184,7 @@ def test_a_short_pulse_in_a_long_table_is_not_passed_over() -> None:
     long = as_table(list(rows), list(np.where(np.arange(4001) == 1506, 40.0, 0.0)))
     moved = [sr.simulate(model, 2.0, (), force=force, tolerance=1e-4) for force in (short, long)]
     assert np.ptp(moved[0].tip_position[:, 0]) > 0.01
-    assert np.abs(moved[0].tip_position - moved[1].tip_position).max() < 2e-4
+    assert np.abs(moved[0].tip_position - moved[1].tip_position).max() < 2e-4  # the tolerance of each
 
 
 def test_a_motor_that_stops_at_once_gives_the_robot_a_blow() -> None:
@@ -206,8 +210,8 @@ def test_a_motor_that_stops_at_once_gives_the_robot_a_blow() -> None:
     for options in ({"time_step": 1e-3}, {"tolerance": 1e-4}):
         moved = sr.simulate(model, 1.0, path, gravity=sr.EARTH_GRAVITY, damping_time=0.0, **options)
         assert moved.velocities[0, 0] == pytest.approx(-2.0 * speed, abs=1e-6)
-        assert moved.q_springs[-1, 0] + speed * stop == pytest.approx(after[0], abs=2e-4)
-        assert moved.velocities[-1, 0] == pytest.approx(after[1], abs=2e-3)
+        assert moved.q_springs[-1, 0] + speed * stop == pytest.approx(after[0], abs=2e-4)  # tolerance over length
+        assert moved.velocities[-1, 0] == pytest.approx(after[1], abs=2e-3)  # that times omega = 6 rad/s
         assert np.abs(moved.energy.balance).max() < 1e-3 * np.abs(moved.energy.motor_work).max()
 
 
@@ -385,7 +389,10 @@ def test_a_robot_without_springs_and_one_without_joints_move_as_they_are_told() 
 
 
 def test_a_short_push_in_a_long_quiet_time_is_not_missed() -> None:
-    """A half sine of 20 ms after a second of rest gives the impulse that it has, and the swing that follows from it."""
+    """A half sine of 20 ms after a second of rest gives the impulse that it has, and the swing that follows from it.
+
+    It is not quite a blow, (omega 20 ms)^2 / 12 = 0.4 %, and the tip is known to the tolerance.
+    """
     model, stiffness, inertia = pendulum(1, 8.0), 8.0, MASS * LENGTH**2
 
     def push(t: float) -> FloatArray:
