@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +15,7 @@ from softrobots.cli.tools.known_tools import TOOLS
 from softrobots.cli.tools.packages import EXTRAS, Package, missing_of_extras, required_packages
 from softrobots.compiled.run.backends import available_backend, cache_folder, cache_is_kept
 from softrobots.description.paths import urdf_folder, xacro_folder
-from softrobots.view.meshcat_page.server import end_server, start_server
+from softrobots.view.meshcat_page.server import ServerProcess
 from tests.conftest import CHECKOUT
 
 ARM = urdf_folder() / "inflatable_arm.urdf"
@@ -59,21 +60,19 @@ def test_doctor_asks_every_tool_if_told_and_answers_machines(told) -> None:
 
 def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A server that starts and ends, one that does not start, and one that serves something else."""
-    started, ended = [], []
+    started: list[ServerProcess] = []
     monkeypatch.setattr("softrobots.cli.doctor.ROBOTS", {})
     monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # nobody is there; loopback needs no proxy
-    monkeypatch.setattr("softrobots.cli.doctor.start_server", lambda: started.append(start_server()) or started[-1])
-    monkeypatch.setattr("softrobots.cli.doctor.end_server", lambda server: ended.append(end_server(server)))
+    monkeypatch.setattr("softrobots.cli.doctor.ServerProcess", lambda: started.append(ServerProcess()) or started[-1])
     status, out, _ = told("doctor", "--json")
-    assert (status, len(started), len(ended)) == (0, 1, 1)
-    process, _, url = started[0]
-    assert json.loads(out)["page"] == {"served": True, "url": url, "problem": ""}
-    assert process.poll() is not None  # its port may be somebody else's by now
+    assert (status, len(started)) == (0, 1)
+    assert json.loads(out)["page"] == {"served": True, "url": started[0].web_url, "problem": ""}
+    assert not started[0].running  # its port may be somebody else's by now
 
     def no_server() -> None:
         raise sr.ViewerError("the meshcat server ended before it served: no reason")
 
-    monkeypatch.setattr("softrobots.cli.doctor.start_server", no_server)
+    monkeypatch.setattr("softrobots.cli.doctor.ServerProcess", no_server)
     status, out, _ = told("doctor")
     assert status == 1
     assert "  not served  the meshcat server ended before it served: no reason" in out
@@ -81,16 +80,17 @@ def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: 
 
     page = tmp_path / "page.html"
     page.write_text("<p>nothing of ours</p>", encoding="utf-8")
-    monkeypatch.setattr("softrobots.cli.doctor.end_server", ended.append)
+    ended = []
     for url, told_of_it in (
         (page.as_uri(), "answers with something else than"),
         ("http://127.0.0.1:9/", "http://127.0.0.1:9/: "),
     ):
-        monkeypatch.setattr("softrobots.cli.doctor.start_server", lambda url=url: ("a server", "", url))
+        server = SimpleNamespace(web_url=url, end=lambda url=url: ended.append(url))
+        monkeypatch.setattr("softrobots.cli.doctor.ServerProcess", lambda server=server: server)
         status, out, _ = told("doctor")
         assert status == 1
         assert told_of_it in out
-    assert ended[1:] == ["a server", "a server"]
+    assert ended == [page.as_uri(), "http://127.0.0.1:9/"]
 
 
 def test_doctor_tells_what_is_missing_and_what_to_type(told, monkeypatch: pytest.MonkeyPatch) -> None:

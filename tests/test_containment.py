@@ -226,7 +226,7 @@ def servers(hostile: Viewer) -> Iterator[dict[str, tuple[int, str, int]]]:
 
     with SliderPage(hostile._model) as sliders:
         yield {
-            "meshcat": (hostile.port, "/static/", hostile._server.pid),
+            "meshcat": (hostile.port, "/static/", hostile._server.process.pid),
             "sliders": (sliders.port, "/", os.getpid()),
         }
 

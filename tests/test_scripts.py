@@ -79,7 +79,7 @@ def test_ik_trajectory_serves_until_interrupted(tmp_path: Path, monkeypatch: pyt
     from softrobots.view.viewer import Viewer
 
     served: list[bool] = []
-    monkeypatch.setattr(Viewer, "wait", lambda self: served.append(self._server.poll() is None))
+    monkeypatch.setattr(Viewer, "wait", lambda self: served.append(self.serving))
     assert run_script("ik_trajectory", ["--output", str(tmp_path / "a"), "--no-plots", "--steps", "5", "--meshcat"]) == 0
     assert served == [True]
     out = capsys.readouterr().out

@@ -35,7 +35,7 @@ def trajectory(arm: sr.SoftModel) -> sr.Trajectory:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_server_listens_on_loopback_only_and_ends(arm: sr.SoftModel) -> None:
     with Viewer(arm) as viewer:
-        process = viewer._server
+        process = viewer._server.process
         assert listening(process.pid) == {"127.0.0.1"}
         assert viewer.url == f"http://127.0.0.1:{viewer.port}/static/"
         assert viewer.tunnel.startswith(f"ssh -L {viewer.port}:127.0.0.1:{viewer.port} ")
@@ -65,10 +65,10 @@ def test_a_server_keeps_the_last_value_of_a_property_only(arm: sr.SoftModel) -> 
 def test_a_server_that_does_not_answer_is_an_error_of_ours(arm: sr.SoftModel) -> None:
     with Viewer(arm) as viewer:
         viewer._page.window.zmq_socket.rcvtimeo = 200  # [ms], for 30 s
-        viewer._server.send_signal(signal.SIGSTOP)
+        viewer._server.process.send_signal(signal.SIGSTOP)
         with pytest.raises(sr.ViewerError, match="does not answer"):
             viewer.trace([(0, 0, 0)])
-        viewer._server.send_signal(signal.SIGCONT)
+        viewer._server.process.send_signal(signal.SIGCONT)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -76,7 +76,7 @@ def test_a_server_that_does_not_answer_is_an_error_of_ours(arm: sr.SoftModel) ->
 def test_server_ends_when_its_parent_is_killed(how: int) -> None:
     code = (
         "import softrobots as sr, time; from softrobots.view.viewer import Viewer\n"
-        "v = Viewer(sr.load_model(sr.InflatableArm())); print(v._server.pid, flush=True); time.sleep(60)"
+        "v = Viewer(sr.load_model(sr.InflatableArm())); print(v._server.process.pid, flush=True); time.sleep(60)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:
         child = int(parent.stdout.readline())

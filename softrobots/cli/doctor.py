@@ -19,7 +19,7 @@ from softrobots.core.errors import SoftRobotsError, ViewerError
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.robots import ROBOTS
 from softrobots.view.browser import find_chromium
-from softrobots.view.meshcat_page.server import end_server, start_server
+from softrobots.view.meshcat_page.server import ServerProcess
 
 _PAGE_TIME = 10.0  # [s], longest wait for the page
 
@@ -120,14 +120,15 @@ def _page(report: _Report) -> None:
     """Whether the page of the viewer can be served: start a server, request its page, end it."""
     url, problem = "", ""
     try:
-        server, _, url = start_server()
+        server = ServerProcess()
     except ViewerError as error:
         problem = str(error)
     else:
+        url = server.web_url
         try:
             problem = _fetch(url)
         finally:
-            end_server(server)
+            server.end()
     report.answer["page"] = {"served": not problem, "url": url, "problem": problem}
     report.add("Page of the viewer", [("served" if not problem else "not served", problem or f"at {url}, and ended again")])
     if problem:

@@ -19,7 +19,7 @@ from softrobots.statics.trajectory import Trajectory
 from softrobots.view.animation_frames import Movement, playing_time
 from softrobots.view.meshcat_page.page_text import InlinePage, legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
-from softrobots.view.meshcat_page.server import connect, end_server, send_html, start_server
+from softrobots.view.meshcat_page.server import ServerProcess, connect, send_html
 from softrobots.view.meshcat_page.stage import Stage
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import ServedPage
@@ -47,9 +47,10 @@ class Viewer(ServedPage):
         """
         self._model = check_model(model)
         self._scenes = SceneBuilder(model)
-        self._server, zmq_url, self._url = start_server(None if port is None else positive_integer("port", port, 65535))
+        self._server = ServerProcess(None if port is None else positive_integer("port", port, 65535))
+        self._url = self._server.web_url
         try:
-            self._page = connect(zmq_url, self._url)
+            self._page = connect(self._server.zmq_url, self._url)
             root = self._page["softrobots"]
             self._robot = RobotDrawing(root, self._scenes.robot, self._scenes.relaxed(), self._scenes.extent.size)
             self._stage = Stage(self._page, root, self._scenes.extent)
@@ -63,7 +64,7 @@ class Viewer(ServedPage):
     @property
     def serving(self) -> bool:
         """Whether the server runs."""
-        return self._server.poll() is None
+        return self._server.running
 
     def show(self, equilibrium: Equilibrium) -> None:
         """Show a loaded robot: deformed and rigid, its forces as arrows, its links coloured.
@@ -250,7 +251,7 @@ class Viewer(ServedPage):
         page = getattr(self, "_page", None)
         if page is not None:
             page.window.zmq_socket.close(linger=0)
-        end_server(self._server)
+        self._server.end()
 
     def _show_legend(self) -> None:
         """Update the legend of the served page."""

@@ -1,7 +1,8 @@
-"""Start and end the meshcat server of a viewer, on loopback only, and connect to it."""
+"""The meshcat server of a viewer, on loopback only, and the connection to it."""
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import threading
@@ -17,45 +18,61 @@ _REPLY_TIME = 30_000  # [ms], longest wait for a reply of the server
 _RUN = f"import runpy; runpy.run_path({str(Path(__file__).with_name('server_process.py'))!r}, run_name='__main__')"
 
 
-def start_server(port: int | None = None) -> tuple[subprocess.Popen[bytes], str, str]:
-    """Start a server process.
+class ServerProcess:
+    """A running server process, and its ZeroMQ and web addresses.
 
-    Args:
-        port: Port of the page; by default the first free one from 7000.
-
-    Returns:
-        The process, its ZeroMQ address and its web address.
-
-    Raises:
-        ViewerError: If it ends before it serves, e.g. because the port is taken.
+    A thread of its own waits for its end. The main thread, where Ctrl-C raises, never asks `Popen` for the status: a
+    KeyboardInterrupt inside of `Popen.poll` leaves its lock held, and every later wait hangs.
     """
-    port_argument = [] if port is None else [str(port)]
-    server = subprocess.Popen(
-        [sys.executable, "-u", "-c", _RUN, LOOPBACK, *port_argument],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    watchdog = threading.Timer(_REPLY_TIME / 1000.0, server.kill)  # a silent server is killed, which ends the wait
-    watchdog.start()
-    line = next((line for line in server.stdout or () if line.startswith(b"serves ")), b"")
-    watchdog.cancel()
-    if not line:
-        message = server.stderr.read().decode("utf-8", "replace")[-800:] if server.stderr is not None else ""
-        end_server(server)
-        raise ViewerError(f"the meshcat server ended before it served: {message}")
-    _, zmq_url, web_url = line.decode().split()
-    return server, zmq_url, web_url
 
+    def __init__(self, port: int | None = None) -> None:
+        """Start a server.
 
-def end_server(server: subprocess.Popen[bytes]) -> None:
-    """End a server process and wait for its end."""
-    with server:  # closes its streams and waits
-        server.terminate()
-        try:
-            server.wait(5.0)
-        except subprocess.TimeoutExpired:
-            server.kill()
+        Args:
+            port: Port of the page; by default the first free one from 7000.
+
+        Raises:
+            ViewerError: If it ends before it serves, e.g. because the port is taken.
+        """
+        port_argument = [] if port is None else [str(port)]
+        self.process = subprocess.Popen(
+            [sys.executable, "-u", "-c", _RUN, LOOPBACK, *port_argument],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        self._ended = threading.Event()
+        threading.Thread(target=self._wait, daemon=True).start()
+        watchdog = threading.Timer(_REPLY_TIME / 1000.0, self.process.kill)  # a silent server is killed, which ends the wait
+        watchdog.start()
+        line = next((line for line in self.process.stdout or () if line.startswith(b"serves ")), b"")
+        watchdog.cancel()
+        if not line:
+            errors = self.process.stderr
+            message = errors.read().decode("utf-8", "replace")[-800:] if errors is not None else ""
+            self.end()
+            raise ViewerError(f"the meshcat server ended before it served: {message}")
+        _, self.zmq_url, self.web_url = line.decode().split()
+
+    @property
+    def running(self) -> bool:
+        """Whether the process runs."""
+        return not self._ended.is_set()
+
+    def end(self) -> None:
+        """End the process, wait for its end, and close its streams."""
+        self.process.terminate()
+        if not self._ended.wait(5.0):
+            self.process.kill()
+            self._ended.wait()
+        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
+            if stream is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    stream.close()
+
+    def _wait(self) -> None:
+        self.process.wait()
+        self._ended.set()
 
 
 def connect(zmq_url: str, web_url: str) -> Any:

@@ -1,4 +1,4 @@
-"""The meshcat server as a separate process, which `server.start_server` runs; it imports nothing of this package.
+"""The meshcat server as a separate process, which `server.ServerProcess` runs; it imports nothing of this package.
 
 Meshcat's own server listens on every address of the machine and outlives a killed parent. This one binds the given address,
 refuses foreign pages, and ends when its standard input closes, which happens however the parent ends. It serves the page that
