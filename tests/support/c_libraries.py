@@ -1,4 +1,4 @@
-"""Shared libraries of generated C."""
+"""Shared libraries of generated C, and a controller that calls one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the hinges of a lumped segment stand, from what their places are for."""
+"""Where the hinges of a lumped segment stand, from the conditions that their places meet."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ def hinge_places(count: int, rule: str) -> np.ndarray:
 
     Corrected, from four hinges on: two are moved at each end so that the sum over the hinges of any number of sections is the
     integral for 1, s, s^2 and s^3. By symmetry that is one condition for each number n, linear in the sum S and the sum of
-    squares Q of the two distances from an end: 2 Q - 2 n S + 2 n^2 + (those between) = n^3 / 3. Four and five sections give
-    both.
-    With two or three, one is moved by the boundary term of Euler and Maclaurin's formula, 1/24.
+    squares Q of the two distances from an end: 2 Q - 2 n S + 2 n^2 + (those between) = n^3 / 3. Those of 4 and 5 give both.
+    With two or three, one is moved at each end by the boundary term of Euler and Maclaurin's formula, 1/24.
     """
     places = np.arange(count) + 0.5
     if rule == "midpoint" or count == 1:
