@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softrobots.compiled.chain.composite_body import CompositeBody
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.looped_chain import TableColumns, element_signature, table_element
 from softrobots.compiled.chain.motion_layout import MotionPlan
@@ -189,12 +190,9 @@ def moving_bodies(unknowns: Unknowns) -> list[list[ChainBody]]:
             mass, along = bodies[row][0].mass, np.diag([0.0, 0.0, part[1] + part[2]])
             bodies[row] = [ChainBody(0.0, np.zeros(3), along)]
             if row > unknowns.leading_motors:
-                before, shift, turned_moment = bodies[row - 1][-1], element.translation, element.rotation @ moment
-                shifted = np.eye(3) * (shift @ (mass * shift + 2.0 * turned_moment))
-                mixed = np.outer(shift, turned_moment + 0.5 * mass * shift)
-                across = element.rotation @ np.diag([part[1], part[1], 0.0]) @ element.rotation.T
-                inertia = before.inertia + across + shifted - mixed - mixed.T
-                first_moment = before.first_moment + turned_moment + mass * shift
+                own, before = CompositeBody(mass, moment, np.diag([part[1], part[1], 0.0])), bodies[row - 1][-1]
+                own = own.seen_from(element.rotation, element.translation)
+                first_moment, inertia = before.first_moment + own.moment, before.inertia + own.inertia
                 bodies[row - 1][-1] = ChainBody(before.mass + mass, first_moment, inertia)
     return bodies
 

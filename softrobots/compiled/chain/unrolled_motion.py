@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softrobots.compiled.chain.composite_body import CompositeBody
 from softrobots.compiled.chain.elements import Vector, constants, cross, turned, vector
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.recursion import TracedElement
@@ -30,20 +31,6 @@ from softrobots.compiled.trace.expressions import Scalar
 _UP = constants([0.0, 0.0, 1.0])
 
 
-class _Body(NamedTuple):
-    """A rigid body, or several that move as one, seen from the frame of an element."""
-
-    mass: Scalar
-    """Mass [kg]."""
-    moment: Vector
-    """First moment, shape (3,) [kg m]."""
-    inertia: Any
-    """Rotational inertia about the origin, shape (3, 3) [kg m^2]."""
-
-    def __add__(self, other: Any) -> _Body:
-        return _Body(self.mass + other.mass, self.moment + other.moment, self.inertia + other.inertia)
-
-
 class _Joint(NamedTuple):
     """An element at its coordinate."""
 
@@ -53,7 +40,7 @@ class _Joint(NamedTuple):
     """Its axes in those of the element before, shape (3, 3)."""
     origin: Vector
     """Its origin there, shape (3,) [m]."""
-    body: _Body
+    body: CompositeBody
     """The body fixed to it."""
 
     @property
@@ -70,7 +57,7 @@ def joints_of(plan: MotionPlan, block: Block) -> list[_Joint]:
     joints = []
     for element, given in zip(with_slack_hinges(unknowns, traced), unknowns.chain.elements, strict=True):
         (body,) = bodies_of(given)
-        inertia = _Body(float(body.mass), constants(body.first_moment), constants(body.inertia))
+        inertia = CompositeBody(float(body.mass), constants(body.first_moment), constants(body.inertia))
         axes, origin = element.rotation, element.translation
         if element.kind == "slide":
             origin = origin + axes[:, 2] * element.coordinates[0]
@@ -132,7 +119,7 @@ def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> A
     n, h = layout.unknowns, block.load(layout.time_step)
     place = {row: unknowns.place[unknowns.moving(row)[0]] for row, joint in enumerate(joints) if joint.element.moving}
     matrix = constants(np.zeros((n, n)))
-    beyond = _Body(0.0, constants(np.zeros(3)), constants(np.zeros((3, 3))))
+    beyond = CompositeBody(0.0, constants(np.zeros(3)), constants(np.zeros((3, 3))))
     for row in reversed(range(len(joints))):
         if row < min(place):
             break
@@ -149,7 +136,7 @@ def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> A
                     matrix[place[row], place[inner]] = matrix[place[inner], place[row]] = entry
                 push = joints[inner].axes @ push
                 turn = joints[inner].axes @ turn + cross(joints[inner].origin, push)
-        beyond = _seen_from_before(beyond, joint)
+        beyond = beyond.seen_from(joint.axes, joint.origin)
     for row, at in place.items():
         law = joints[row].element.law
         stiffness = joints[row].element.stiffness[0] if law is None else law.stiffness
@@ -207,16 +194,3 @@ def _carried(element: TracedElement) -> Scalar:
     if element.law is not None:
         return element.law.torque
     return (element.coordinates[0] - element.rest[0]) * element.stiffness[0]
-
-
-def _seen_from_before(body: _Body, joint: _Joint) -> _Body:
-    """Return the bodies beyond an element in the frame of the one before.
-
-    With `c` the first moment and `p` the origin, `I' = R I R^T - p^ c^ - c^ p^ - m p^ p^`, where `v^ w = v x w`.
-    """
-    moment, origin = joint.axes @ body.moment, joint.origin
-    inertia = joint.axes @ body.inertia @ joint.axes.T
-    shifted = 2.0 * (origin @ moment) + body.mass * (origin @ origin)
-    mixed = np.multiply.outer(origin, moment + origin * (body.mass * 0.5))
-    inertia = inertia + constants(np.eye(3)) * shifted - mixed - mixed.T
-    return _Body(body.mass, moment + origin * body.mass, inertia)
