@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 import softrobots as sr
+from studies.motion.examples import point_to_point, swing
 
 FROM, TO = (0.3, 0.6, -0.8), (0.8, 0.3, -0.3)
 """Motor angles where the move begins and ends [rad]."""
@@ -23,8 +23,7 @@ def move(model: sr.SoftModel, size: float, name: str) -> tuple[sr.ShapedTrajecto
     """Simulate the move with a shaper of `CASES`, under weight, until `AFTER` its end."""
     end = np.array(TO)
     begin = end + size * (np.array(FROM) - end)
-    share = np.linspace(0.0, 1.0, 201)
-    bare = SimpleNamespace(times=DURATION * share, q_motors=begin + sr.quintic(share)[:, None] * (end - begin))
+    bare = point_to_point(begin, end, DURATION, 201)
     settled = sr.solve_equilibrium(model, end, gravity=sr.EARTH_GRAVITY)
     shaper, numbers = CASES[name]
     shaped = sr.shape_input(bare, sr.vibration_modes(model, settled), shaper=shaper, numbers=numbers)
@@ -33,22 +32,15 @@ def move(model: sr.SoftModel, size: float, name: str) -> tuple[sr.ShapedTrajecto
     return shaped, sr.simulate(model, float(shaped.times[-1]) + AFTER, shaped, **options)
 
 
-def left(shaped: sr.ShapedTrajectory, moved: sr.Motion, rest: Any) -> float:
-    """Largest distance of the tip from where it comes to rest, after the motors have stopped [m]."""
-    after = moved.time >= shaped.times[-1] - 1e-9
-    return float(np.linalg.norm(moved.tip_position[after] - rest, axis=1).max())
-
-
 def study() -> list[dict[str, Any]]:
     """A row for each shaper: time that it adds, modes, and for each size the vibration [m] and its share of the bare one."""
     model = sr.load_model(sr.InflatableArm())
-    rest = sr.solve_equilibrium(model, TO, gravity=sr.EARTH_GRAVITY).tip_position
     rows: list[dict[str, Any]] = []
     for name in CASES:
         row: dict[str, Any] = {"shaper": name, "left_m": []}
         for size in SIZES:
             shaped, moved = move(model, size, name)
-            row["left_m"].append(left(shaped, moved, rest))
+            row["left_m"].append(swing(moved))
         row |= {"longer_s": shaped.shaper.duration, "modes": [number + 1 for number in shaped.numbers]}
         row["percent"] = [100.0 * a / b for a, b in zip(row["left_m"], (rows or [row])[0]["left_m"], strict=True)]
         rows.append(row)

@@ -32,6 +32,12 @@ class Path(NamedTuple):
     """Motor angles, shape (n, n_motors) [rad]."""
 
 
+def point_to_point(begin: Any, end: Any, duration: float, rows: int) -> Path:
+    """A path of motors from rest to rest in so many rows; angles of shape (n_motors,) [rad], duration [s]."""
+    share = np.linspace(0.0, 1.0, rows)
+    return Path(duration * share, np.add(begin, sr.quintic(share)[:, None] * np.subtract(end, begin)))
+
+
 def release(duration: float = 2.0) -> sr.Motion:
     """The inflatable arm that hangs under its weight and a load, which is taken away."""
     arm = sr.load_model(sr.InflatableArm())
@@ -41,10 +47,9 @@ def release(duration: float = 2.0) -> sr.Motion:
 
 def turns(duration: float = 2.0) -> dict[str, sr.Motion]:
     """The arm turns its base in half a second: unshaped, and shaped for its modes where the turn ends; by name."""
-    arm, share = sr.load_model(sr.InflatableArm()), np.linspace(0.0, 1.0, 51)
-    ends = np.array([MOTORS, MOTORS]) - [(TURN, 0.0, 0.0), (0.0, 0.0, 0.0)]
-    path = Path(TURN_TIME * share, ends[0] + sr.quintic(share)[:, None] * (ends[1] - ends[0]))
-    first, last = (sr.solve_equilibrium(arm, motors, gravity=sr.EARTH_GRAVITY) for motors in ends)
+    arm, begin = sr.load_model(sr.InflatableArm()), np.subtract(MOTORS, (TURN, 0.0, 0.0))
+    path = point_to_point(begin, MOTORS, TURN_TIME, 51)
+    first, last = (sr.solve_equilibrium(arm, motors, gravity=sr.EARTH_GRAVITY) for motors in (begin, MOTORS))
     modes = sr.vibration_modes(arm, last, damping_time=LIGHT_DAMPING)
     bare = sr.shape_input(path, modes, numbers=())  # the same path as a function of time
     paths = {
