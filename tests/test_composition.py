@@ -128,7 +128,7 @@ def test_two_arms_of_muscles_are_one_arm_of_twice_the_segments() -> None:
     half = sr.PccArm(**two)
     whole = sr.load_model(sr.mount(half, "tip", half, rpy=(0.0, 0.0, 0.4), prefix="upper_"))
     one = sr.load_model(sr.PccArm(**(two | {"segment_lengths": (0.5, 0.4, 0.5, 0.4)})))
-    assert [tag.segment for tag in read_tags(whole.urdf).muscles] == sorted([1, 2, 3, 4] * 3)
+    assert [tag.segments[0] for tag in read_tags(whole.urdf).muscles] == sorted([1, 2, 3, 4] * 3)
     assert whole.motor_joints == (*(m.name for m in half_muscles(half)), *(f"upper_{m.name}" for m in half_muscles(half)))
     lengths = one.relaxed_motors * np.linspace(0.96, 1.03, 12)
     found, expected = (sr.solve_equilibrium(model, lengths, (1.0, -2.0, 0.5)) for model in (whole, one))

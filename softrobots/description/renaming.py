@@ -1,8 +1,8 @@
 """Prefixes for all names in a robot description, so that two descriptions fit into one.
 
-Names of links, joints, materials, sections, muscles and lines are prefixed where they are defined and referred to: in `parent`,
-`child` and `mimic`, in the tags of this package, as the reference of a `gazebo` tag, and in tags outside URDF (transmissions,
-plugins, collision filters), where an attribute or text that equals a name counts as that name.
+Names of links, joints, materials, sections, actuators and lines are prefixed where they are defined and referred to: in
+`parent`, `child` and `mimic`, in the tags of this package, as the reference of a `gazebo` tag, and in tags outside URDF
+(transmissions, plugins, collision filters), where an attribute or text that equals a name counts as that name.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from xml.dom import minidom
 
 from softrobots.description.urdf_tags import COORDINATES, NAMESPACE
 
-_NAMED_BY_US = ("section", "lumped_section", "muscle", "line")
+_NAMED_BY_US = ("section", "lumped_section", "actuator", "muscle", "line")
 _LISTS = ("name", "springs", "joints", "link", *COORDINATES)  # attributes of our tags that hold names, one or several
 _NO_NAMES = ("type", "value", "filename")  # attributes of foreign tags that hold none
 
@@ -73,7 +73,8 @@ def shift_segments(robot: minidom.Element, shift: int) -> None:
     """Add `shift` to the number of every segment of a description, in place."""
     for tag in _NAMED_BY_US:
         for element in package_tags(robot, tag):
-            element.setAttribute("segment", str(int(element.getAttribute("segment")) + shift))
+            for placed in package_tags(element, "route") if tag == "actuator" else [element]:
+                placed.setAttribute("segment", str(int(placed.getAttribute("segment")) + shift))
 
 
 def _plain(element: minidom.Element) -> Iterator[minidom.Element]:

@@ -1,26 +1,28 @@
-"""Reader of the tags of this package in a URDF: springs, sections, muscles and roles."""
+"""Reader of the tags of this package in a URDF: springs, sections, actuators and roles."""
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import number_in
+from softrobots.description.actuator_reader import read_actuators
 from softrobots.description.expansion import XACRO_NAMESPACE
+from softrobots.description.tag_numbers import described, number, positive, segment_number
 from softrobots.description.urdf_structure import check_structure, urdf_root
 from softrobots.description.urdf_tags import (
     COORDINATES,
     MOMENT_LAWS,
     NAMESPACE,
     ROLES,
+    AnySectionTag,
     InflatedLinkTag,
     LineTag,
     LumpedSectionTag,
-    MuscleTag,
     RobotTags,
     SectionTag,
     SpringTag,
@@ -52,7 +54,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         inflated_links=tuple(_inflated_link(element, source, elastic) for element in _ours(root, "inflated_link")),
         sections=sections,
         lumped_sections=tuple(_lumped_section(element, source, springs) for element in _ours(root, "lumped_section")),
-        muscles=tuple(_muscle(element, source) for element in _ours(root, "muscle")),
+        muscles=(),
         lines=tuple(_line(element, source) for element in _ours(root, "line")),
         mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
         tip=_tip(root, source),
@@ -60,7 +62,9 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
     )
     _check_together(tags, source)
     check_structure(root, source)
-    return tags
+    muscles = read_actuators(root, _base_to_tip(root, tags), source)
+    _unique("muscle", [*(tag.name for tag in muscles), *(tag.name for tag in tags.lines)], source)
+    return replace(tags, muscles=muscles)
 
 
 def _ours(element: ElementTree.Element, name: str) -> list[ElementTree.Element]:
@@ -76,9 +80,9 @@ def _read_joint(
             raise DescriptionError(f"joint {name} in {source} has more than one {tag_name}; one is required")
     for spring in _ours(joint, "spring"):
         where = f"the spring of joint {name} in {source}"
-        springs[name] = SpringTag(_positive(spring, "stiffness", where), _number(spring, "rest", where))
+        springs[name] = SpringTag(positive(spring, "stiffness", where), number(spring, "rest", where))
     for rotor in _ours(joint, "rotor"):
-        rotors[name] = _positive(rotor, "inertia", f"the rotor of joint {name} in {source}")
+        rotors[name] = positive(rotor, "inertia", f"the rotor of joint {name} in {source}")
     for role in _ours(joint, "role"):
         value = role.get("value", "")
         if value not in ROLES:
@@ -101,14 +105,14 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
     where, hinges = f"the inflated_link of {' '.join(names)} in {source}", element.get("hinges", "1")
     if hinges not in map(str, range(1, len(names) + 1)) or len(names) % int(hinges):
         raise DescriptionError(f"{where} has hinges = {hinges!r}; a divisor of {len(names)} is required")
-    most = _positive(element, "max_moment", where) if "max_moment" in element.attrib else None
+    most = positive(element, "max_moment", where) if "max_moment" in element.attrib else None
     law = element.get("moment_law", "linear" if most is None else "plateau")
     if law not in MOMENT_LAWS or (law == "plateau") != (most is not None):
         raise DescriptionError(
             f"{where} has moment_law {law!r} and {'no max_moment' if most is None else f'max_moment {most}'}; required: one of "
             f"{', '.join(MOMENT_LAWS)}, with max_moment for a plateau only"
         )
-    radius, pressure = _number(element, "radius", where), _number(element, "pressure", where)
+    radius, pressure = number(element, "radius", where), number(element, "pressure", where)
     tag = InflatedLinkTag(names, radius, pressure, most, int(hinges), twist, law == "slack_wall")
     if tag.radius <= 0.0 or tag.pressure < 0.0:
         raise DescriptionError(f"{where} has radius {tag.radius} and pressure {tag.pressure}; required > 0 and >= 0")
@@ -118,19 +122,19 @@ def _inflated_link(element: ElementTree.Element, source: str, springs: Sequence[
 
 
 def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]) -> SectionTag:
-    where = _where(element, "section", source)
+    where = described(element, "section", source)
     joints = tuple(element.get("joints", "").split())
     if len(joints) != 6 or any(roles.get(joint) != "section" for joint in joints):
         raise DescriptionError(
             f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
         )
-    ei, gj, ea = (_positive(element, key, where) for key in ("EI", "GJ", "EA"))
+    ei, gj, ea = (positive(element, key, where) for key in ("EI", "GJ", "EA"))
     facts = _facts_of_section(element, where)
     return SectionTag(joints=joints, bending_stiffness=ei, torsional_stiffness=gj, axial_stiffness=ea, **facts)
 
 
 def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> LumpedSectionTag:
-    where = _where(element, "lumped section", source)
+    where = described(element, "lumped section", source)
     joints = {key: element.get(key, "") for key in COORDINATES if element.get(key)}
     complete = {"bend_x", "bend_y"} <= joints.keys() and springs.keys() >= set(joints.values())
     if not complete or len(set(joints.values())) != len(joints):
@@ -138,7 +142,7 @@ def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[
             f"{where} names the joints {joints}; different spring joints bend_x and bend_y are required; "
             "twist and stretch are optional"
         )
-    return LumpedSectionTag(joints=joints, hinge=_positive(element, "hinge", where), **_facts_of_section(element, where))
+    return LumpedSectionTag(joints=joints, hinge=positive(element, "hinge", where), **_facts_of_section(element, where))
 
 
 def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any]:
@@ -147,28 +151,14 @@ def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any
     strains = tuple(number_in(text) for text in rest)
     if len(strains) != 4 or any(map(math.isnan, strains)) or strains[3] <= 0.0:
         raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
-    sizes = {key: _positive(element, key, where) for key in ("length", "radius")}
-    return {"name": element.get("name", ""), "segment": _segment(element, where), "rest": strains, **sizes}
+    sizes = {key: positive(element, key, where) for key in ("length", "radius")}
+    return {"name": element.get("name", ""), "segment": segment_number(element, where), "rest": strains, **sizes}
 
 
-def _muscle(element: ElementTree.Element, source: str) -> MuscleTag:
-    where = _where(element, "muscle", source)
-    keys = ("rest_length", "shortest", "longest", "strongest")
-    limits: dict[str, Any] = {key: _positive(element, key, where) for key in keys}
-    if not limits["shortest"] < limits["longest"]:
-        raise DescriptionError(f"{where} is shortest at {limits['shortest']} and longest at {limits['longest']} m")
-    return MuscleTag(**vars(_line(element, source, "muscle")), **limits)
-
-
-def _line(element: ElementTree.Element, source: str, kind: str = "line") -> LineTag:
-    where = _where(element, kind, source)
-    azimuth, distance = _number(element, "azimuth", where), _positive(element, "distance", where)
-    return LineTag(name=element.get("name", ""), segment=_segment(element, where), azimuth=azimuth, distance=distance)
-
-
-def _where(element: ElementTree.Element, kind: str, source: str) -> str:
-    """A part, for errors."""
-    return f"the {kind} {element.get('name', '')!r} of {source}"
+def _line(element: ElementTree.Element, source: str) -> LineTag:
+    where = described(element, "line", source)
+    azimuth, distance = number(element, "azimuth", where), positive(element, "distance", where)
+    return LineTag(name=element.get("name", ""), segment=segment_number(element, where), azimuth=azimuth, distance=distance)
 
 
 def _tip(root: ElementTree.Element, source: str) -> str | None:
@@ -182,12 +172,11 @@ def _tip(root: ElementTree.Element, source: str) -> str | None:
 
 
 def _check_together(tags: RobotTags, source: str) -> None:
-    """Check that names are unique, no joint is in two sections, and muscles run along segments that exist."""
+    """Check that names are unique, no joint is in two sections, and lines run along segments that exist."""
     if tags.sections and tags.lumped_sections:
         raise DescriptionError(f"{source} has sections and lumped sections; one kind is required")
-    sections, lines = (*tags.sections, *tags.lumped_sections), (*tags.muscles, *tags.lines)
+    sections = (*tags.sections, *tags.lumped_sections)
     _unique("section", [tag.name for tag in sections], source)
-    _unique("muscle", [tag.name for tag in lines], source)
     used = [joint for tag in tags.sections for joint in tag.joints]
     used += [joint for lumped in tags.lumped_sections for joint in lumped.joints.values()]
     _unique("joint of a section", used, source)
@@ -195,39 +184,35 @@ def _check_together(tags: RobotTags, source: str) -> None:
     if orphans:
         raise DescriptionError(f"{source} has joints with the role 'section' that no section names: {', '.join(orphans)}")
     segments = {tag.segment for tag in sections}
-    for tag in lines:
+    for tag in tags.lines:
         if tag.segment not in segments:
-            what = "muscle" if isinstance(tag, MuscleTag) else "line"
             raise DescriptionError(
-                f"the {what} {tag.name!r} of {source} runs along segment {tag.segment}; "
+                f"the line {tag.name!r} of {source} runs along segment {tag.segment}; "
                 f"available: {', '.join(map(str, sorted(segments))) or 'none'}"
             )
+
+
+def _base_to_tip(root: ElementTree.Element, tags: RobotTags) -> list[AnySectionTag]:
+    """The sections in the order of their joints along the robot, which is a tree."""
+    above: dict[str, tuple[str, str]] = {}
+    links: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        ends = [joint.find(end) for end in ("parent", "child")]
+        parent, child = ("" if end is None else end.get("link", "") for end in ends)
+        above[joint.get("name", "")], links[child] = (parent, child), joint.get("name", "")
+
+    def depth(joint: str) -> int:
+        count = 0
+        while joint in above:
+            joint, count = links.get(above[joint][0], ""), count + 1
+        return count
+
+    first = [(tag.joints[0], tag) for tag in tags.sections]
+    lumped = [(tag.joints["bend_x"], tag) for tag in tags.lumped_sections]
+    return [tag for _, tag in sorted([*first, *lumped], key=lambda pair: depth(pair[0]))]
 
 
 def _unique(what: str, names: Sequence[str], source: str) -> None:
     twice = {name for name in names if names.count(name) > 1}
     if twice or "" in names:
         raise DescriptionError(f"{source} has a {what} name twice or an empty one: {', '.join(sorted(twice)) or '(empty)'}")
-
-
-def _segment(element: ElementTree.Element, where: str) -> int:
-    text = element.get("segment", "")
-    if not text.isascii() or not text.isdigit() or not 0 < int(text) < 10_000:
-        raise DescriptionError(f"{where} has segment = {text!r}; a number from 1 is required")
-    return int(text)
-
-
-def _positive(element: ElementTree.Element, attribute: str, where: str) -> float:
-    value = _number(element, attribute, where)
-    if value < 1.0 / LARGEST:
-        raise DescriptionError(f"{where} has {attribute} {value}; a positive number is required")
-    return value
-
-
-def _number(element: ElementTree.Element, attribute: str, where: str) -> float:
-    text = element.get(attribute)
-    value = number_in(text)
-    if math.isnan(value):
-        shown = text if text is None else text[:100]
-        raise DescriptionError(f"{where} has {attribute} = {shown!r}; a finite number is required, at most {LARGEST:g} in size")
-    return value

@@ -1,7 +1,8 @@
-"""The tags of this package in a URDF as plain data: springs, sections, muscles and roles (`tag_reader` reads them)."""
+"""The tags of this package in a URDF as plain data: springs, sections, actuators and roles (`tag_reader` reads them)."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -16,6 +17,10 @@ COORDINATES = ("bend_x", "bend_y", "twist", "stretch")
 
 MOMENT_LAWS = ("linear", "plateau", "slack_wall")
 """Laws of the moment of an inflated link: `inflated_beam.moment` is that with a plateau, `slack_wall_moment` the last one."""
+
+
+KINDS = ("length", "tension", "elastic", "pressure", "mckibben")
+"""Kinds of actuators, by what is given: its length, its tension, the length of a motor behind a spring, or a pressure."""
 
 
 @dataclass(frozen=True)
@@ -103,17 +108,78 @@ class LineTag:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MuscleTag(LineTag):
-    """A muscle along such a line."""
+class RouteTag:
+    """The way of an actuator along one segment: offsets from the backbone at given places, linear between them."""
 
+    segment: int
+    """Number of the segment, from 1."""
+    at: tuple[float, ...]
+    """Places along its rest length, ascending, two or more [m]; what is beyond its ends only continues the table."""
+    distance: tuple[float, ...]
+    """Distance from the backbone at each [m]."""
+    azimuth: tuple[float, ...]
+    """Azimuth at each, from the x axis of the segment towards y, not wrapped: two that differ make a helix [rad]."""
+
+    @property
+    def straight(self) -> bool:
+        """Whether distance and azimuth are the same everywhere."""
+        return len(set(self.distance)) == 1 and len(set(self.azimuth)) == 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActuatorTag:
+    """An actuator along a route through the body; `softrobots.model.actuator_laws` has the laws of the kinds."""
+
+    name: str
+    """Name of the actuator."""
+    route: tuple[RouteTag, ...]
+    """Its way, base to tip."""
+    kind: str = "length"
+    """One of `KINDS`."""
     rest_length: float
-    """Length with the segment straight at its rest length [m]."""
-    shortest: float
-    """Lower limit of its length [m]."""
-    longest: float
-    """Upper limit of its length [m]."""
-    strongest: float
-    """Largest tension and push [N]."""
+    """Length with the robot at rest [m]."""
+    shortest: float = 0.0
+    """Lower limit of its length, or of that of its motor [m]."""
+    longest: float = math.inf
+    """Upper limit of the same [m]."""
+    weakest: float = 0.0
+    """Least tension; negative if it can push [N]."""
+    strongest: float = math.inf
+    """Largest tension [N]."""
+    max_pressure: float = math.inf
+    """Largest pressure [Pa]."""
+    stiffness: float = 0.0
+    """Stiffness between motor and anchor [N/m]."""
+    pretension: float = 0.0
+    """Tension where its length is that of the motor [N]."""
+    area: float = 0.0
+    """Cross-section of a chamber [m^2]."""
+    diameter: float = 0.0
+    """Diameter of a braided muscle at rest [m]."""
+    braid_angle: float = 0.0
+    """Angle between its braid and its axis at rest [rad]."""
+    friction: float = 0.0
+    """Coefficient of friction in its guides [-]."""
+
+    @property
+    def straight(self) -> bool:
+        """Whether it runs parallel to the backbone within each segment."""
+        return all(piece.straight for piece in self.route)
+
+    @property
+    def segments(self) -> tuple[int, ...]:
+        """Numbers of the segments that it runs along, base to tip."""
+        return tuple(dict.fromkeys(piece.segment for piece in self.route))
+
+    @property
+    def distance(self) -> float:
+        """Distance from the backbone where it begins; everywhere, if it is straight along one segment [m]."""
+        return self.route[0].distance[0]
+
+    @property
+    def azimuth(self) -> float:
+        """Azimuth where it begins, as for `distance` [rad]."""
+        return self.route[0].azimuth[0]
 
 
 @dataclass(frozen=True)
@@ -130,8 +196,8 @@ class RobotTags:
     """Sections of constant strain, in the order of the file."""
     lumped_sections: tuple[LumpedSectionTag, ...]
     """Lumped sections, in the order of the file."""
-    muscles: tuple[MuscleTag, ...]
-    """Muscles, in the order of the file."""
+    muscles: tuple[ActuatorTag, ...]
+    """Actuators along the body, in the order of the file."""
     lines: tuple[LineTag, ...]
     """Lines, in the order of the file."""
     mimics: tuple[str, ...]

@@ -21,7 +21,7 @@ import numpy as np
 
 from softrobots.core.checks import LARGEST, FloatArray
 from softrobots.description.rigid_tree import Joint
-from softrobots.description.urdf_tags import MuscleTag
+from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.soft_model import SoftModel
 
 ANGLE_ERROR = 1e-2
@@ -66,7 +66,7 @@ class Motor:
 class Muscle:
     """A driven muscle, whose length is linear in joint coordinates."""
 
-    tag: MuscleTag
+    tag: ActuatorTag
     """Its course and limits."""
     arms: Mapping[str, float]
     """Derivative of its length by joint [m/rad, or 1 at a prismatic joint]; only joints that change it."""

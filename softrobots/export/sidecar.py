@@ -178,7 +178,7 @@ class _Parts:
         units = {"azimuth": "rad", **dict.fromkeys(("distance", "rest_length", "shortest", "longest"), "m"), "strongest": "N"}
         arms = self._model.structure.moment_arms
         return [
-            {"name": tag.name, "segment": tag.segment, **self._numbers(tag, "muscle", **units), "arms": arms[tag.name]}
+            {"name": tag.name, "segment": tag.segments[0], **self._numbers(tag, "muscle", **units), "arms": arms[tag.name]}
             for tag in self._model.structure.muscles
         ]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
-from softrobots.description.urdf_tags import MuscleTag
+from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.muscle_lengths import MuscleLengths
 
 _LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}  # by the unit of the coordinate
@@ -36,7 +36,7 @@ class Actuators:
         joints: Sequence[str],
         joint_limits: FloatArray,
         turning: Sequence[bool],
-        muscles: Sequence[MuscleTag],
+        muscles: Sequence[ActuatorTag],
         softness: FloatArray,
         lengths: MuscleLengths | None,
         drives: FloatArray,

@@ -102,7 +102,9 @@ def assemble(
         _joint_limits(rigid, motor_joints),
         [_kind(rigid, name).startswith("JointModelR") for name in motor_joints],
         tags.muscles,
-        np.array([float((1.0 / strain_springs.stiffness[list(segments[m.segment]["bend_x"])]).sum()) for m in tags.muscles]),
+        np.array(
+            [float((1.0 / strain_springs.stiffness[list(segments[m.segments[0]]["bend_x"])]).sum()) for m in tags.muscles]
+        ),
         given_lengths,
         _drives(rigid, motor_joints, tags.rotors),
     )

@@ -133,7 +133,7 @@ def _axial_forces(
             axial.append(stretches[f"{section.name}_stretch"])
             continue
         muscles = zip(model.muscles, tensions.tolist(), strict=True)
-        pull = sum(tension for muscle, tension in muscles if muscle.segment == group.segment)
+        pull = sum(tension for muscle, tension in muscles if group.segment in muscle.segments)
         for hinge in group.hinges:
             joint, axis = _axis(rigid, data, jacobian, [rigid.getJointId(model.spring_joints[place]) for place in hinge])
             beyond = data.mass[joint] * gravity + sum((force for inside, force in forces if joint in inside), np.zeros(3))

@@ -24,7 +24,7 @@ import numpy as np
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError
-from softrobots.description.urdf_tags import MuscleTag
+from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.coordinates import Coordinates
 from softrobots.model.muscle_length_point import MuscleLengthPoint
 from softrobots.model.muscle_paths import MUSCLE_STRAINS, MusclePaths, MusclePathsAt, muscle_arms
@@ -46,7 +46,7 @@ class MuscleLengths:
     def __init__(
         self,
         inner: Coordinates,
-        tags: Sequence[MuscleTag],
+        tags: Sequence[ActuatorTag],
         sections: Sequence[SectionRow],
         springs: Springs,
         paths: MusclePaths,
@@ -72,10 +72,10 @@ class MuscleLengths:
         self._misfit = np.zeros((len(tags), len(tags)))
         groups, slopes, modes, names, turning = [], [], [], [], []
         self._bent: list[tuple[int, Any, Any]] = []
-        for segment in sorted({tag.segment for tag in tags}):
+        for segment in sorted({tag.segments[0] for tag in tags}):
             about_x, about_y = (np.array(segments[segment][key], dtype=int) for key in ("bend_x", "bend_y"))
             self._bent.append((segment, about_x, about_y))
-            rows = [row for row, tag in enumerate(tags) if tag.segment == segment]
+            rows = [row for row, tag in enumerate(tags) if tag.segments[0] == segment]
             places = {key: list(segments[segment][key]) for key in MUSCLE_STRAINS if key in segments[segment]}
             arms = muscle_arms([tags[row] for row in rows])[:, [MUSCLE_STRAINS.index(key) for key in places]]
             if np.linalg.matrix_rank(arms, tol=1e-9 * float(np.abs(arms).max())) < len(places):
@@ -187,7 +187,7 @@ class MuscleLengths:
         change = self._change(motors)
         misfit = np.abs(self._misfit @ change)
         if misfit.max() > CONSISTENT:
-            segment = self._tags[int(np.argmax(misfit))].segment
+            segment = self._tags[int(np.argmax(misfit))].segments[0]
             stretch = "" if "stretch" in self._segments[segment] else ", without elongation (this chain has no stretch joints)"
             return (
                 f"muscle lengths that one arc a segment explains{stretch}; those of segment {segment} miss the nearest arc by "
@@ -214,8 +214,8 @@ class MuscleLengths:
         first = len(motors) - len(self._tags)
         for segment, bending, _ in self._bendings(motors):
             if bending > self._largest_bending:
-                rows = [first + row for row, tag in enumerate(self._tags) if tag.segment == segment]
-                arms = muscle_arms([tag for tag in self._tags if tag.segment == segment])
+                rows = [first + row for row, tag in enumerate(self._tags) if tag.segments[0] == segment]
+                arms = muscle_arms([tag for tag in self._tags if tag.segments[0] == segment])
                 rest = self.paths.rest[[row - first for row in rows]]
                 sums = np.linalg.lstsq(arms, limited[rows] - rest, rcond=None)[0]
                 limited[rows] -= arms[:, :2] @ sums[:2] * (1.0 - self._largest_bending / bending)

@@ -22,7 +22,7 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import FloatArray, read_only
-from softrobots.description.urdf_tags import MuscleTag
+from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.sections import SectionRow
 
 MUSCLE_STRAINS = ("bend_x", "bend_y", "stretch")
@@ -32,7 +32,7 @@ _SHORTEST = 1e-3  # length of a muscle along a section without twist, relative t
 _TWIST = STRAINS.index("twist")
 
 
-def muscle_arms(tags: Sequence[MuscleTag]) -> FloatArray:
+def muscle_arms(tags: Sequence[ActuatorTag]) -> FloatArray:
     """Derivative of the lengths with respect to the sums of bending and elongation, shape (n, 3) [m/rad, m/rad, -]."""
     return np.array([(tag.distance * np.sin(tag.azimuth), -tag.distance * np.cos(tag.azimuth), 1.0) for tag in tags])
 
@@ -40,9 +40,9 @@ def muscle_arms(tags: Sequence[MuscleTag]) -> FloatArray:
 class MusclePaths:
     """The muscles of a robot, each along the sections of its segment."""
 
-    def __init__(self, tags: Sequence[MuscleTag], sections: Sequence[SectionRow], count: int) -> None:
+    def __init__(self, tags: Sequence[ActuatorTag], sections: Sequence[SectionRow], count: int) -> None:
         """Take the muscles, all sections of the robot, and the number of its strains."""
-        pairs = [(m, tag, row) for m, tag in enumerate(tags) for row in sections if row.segment == tag.segment]
+        pairs = [(m, tag, row) for m, tag in enumerate(tags) for row in sections if row.segment in tag.segments]
         self.sections = tuple(row.name for *_, row in pairs)
         """Name of the section of each path, (n_paths)."""
         self.rest = read_only(np.array([tag.rest_length for tag in tags]))

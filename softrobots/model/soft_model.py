@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
-from softrobots.description.urdf_tags import MuscleTag
+from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.actuators import Actuators
 from softrobots.model.chain_reader import read_chain
 from softrobots.model.coordinates import Coordinates
@@ -86,7 +86,7 @@ class SoftModel:
         return self.actuators.names
 
     @property
-    def muscles(self) -> tuple[MuscleTag, ...]:
+    def muscles(self) -> tuple[ActuatorTag, ...]:
         """The muscles; the last actuators."""
         return self.structure.muscles
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import STRAINS, in_range
 from softrobots.core.checks import FloatArray
-from softrobots.description.urdf_tags import LineTag, MuscleTag, RobotTags, SpringTag
+from softrobots.description.urdf_tags import ActuatorTag, LineTag, RobotTags, SpringTag
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.sections import SectionRow
@@ -42,7 +42,7 @@ class Structure:
     """Every section."""
     strain_springs: Springs
     """Springs of the strains, without the plateaus of inflated links."""
-    muscles: tuple[MuscleTag, ...]
+    muscles: tuple[ActuatorTag, ...]
     """Muscles."""
     muscle_input: str
     """What `q_motors` holds of the muscles, "lengths" or "forces"."""

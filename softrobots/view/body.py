@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from softrobots.constant_curvature.screws import Screw
 from softrobots.core.checks import FloatArray, instance_of, positive_integer
-from softrobots.description.urdf_tags import LineTag, MuscleTag
+from softrobots.description.urdf_tags import ActuatorTag, LineTag
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone
@@ -161,13 +161,13 @@ def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, point
             poses.append(pose @ steps)
             pose = poses[-1][-1]
         frames = np.concatenate(poses)
-        muscles = {tag.name: _along(frames, tag) for tag in structure.muscles if tag.segment == number}
+        muscles = {tag.name: _along(frames, tag) for tag in structure.muscles if number in tag.segments}
         lines = {tag.name: _along(frames, tag) for tag in structure.lines if tag.segment == number}
         bodies.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles, lines))
     return tuple(bodies)
 
 
-def _along(frames: FloatArray, tag: MuscleTag | LineTag) -> FloatArray:
+def _along(frames: FloatArray, tag: ActuatorTag | LineTag) -> FloatArray:
     """Points beside a backbone, shape (n, 3)."""
     aside = np.cos(tag.azimuth) * frames[:, :3, 0] + np.sin(tag.azimuth) * frames[:, :3, 1]
     return np.asarray(frames[:, :3, 3] + tag.distance * aside)

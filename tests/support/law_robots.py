@@ -186,7 +186,7 @@ def muscle_lengths(robot: sr.SoftModel, strains: np.ndarray) -> np.ndarray:
     for tag in robot.muscles:
         length, (x, y) = tag.rest_length, tag.distance * np.array([np.sin(tag.azimuth), -np.cos(tag.azimuth)])
         for row in robot.structure.section_table:
-            if row.segment == tag.segment:
+            if row.segment in tag.segments:
                 z = {name: strains[place] for name, place in row.places.items()}
                 change = x * z["bend_x"] + y * z["bend_y"] + z.get("stretch", 0.0)
                 twist = tag.distance * z.get("twist", 0.0)

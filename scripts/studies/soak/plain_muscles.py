@@ -27,10 +27,10 @@ class PlainMuscles:
                 "stretch": 1.0,
             }
             for tag in tags.sections:
-                for strain, arm in arms.items() if tag.segment == muscle.segment else ():
+                for strain, arm in arms.items() if tag.segment in muscle.segments else ():
                     row[self._names.index(f"{tag.name}_{strain}")] = arm
             for lumped in tags.lumped_sections:
-                for strain, arm in arms.items() if lumped.segment == muscle.segment else ():
+                for strain, arm in arms.items() if lumped.segment in muscle.segments else ():
                     if strain in lumped.joints:
                         row[self._names.index(lumped.joints[strain])] = arm
 
@@ -43,7 +43,7 @@ class PlainMuscles:
         slopes = np.tile(self.rows, (len(strains), 1, 1))
         for m, muscle in enumerate(self._tags.muscles):
             for tag in self._tags.sections:
-                if tag.segment == muscle.segment:
+                if tag.segment in muscle.segments:
                     first = self._names.index(f"{tag.name}_bend_x")
                     here, arms = slice(first, first + 4), self.rows[m, first : first + 4]
                     along, across = tag.length + strains[:, here] @ arms, muscle.distance * strains[:, first + 2]
@@ -52,7 +52,7 @@ class PlainMuscles:
                     slopes[:, m, here] = (along / size)[:, None] * arms
                     slopes[:, m, first + 2] = muscle.distance * across / size
             for lumped in self._tags.lumped_sections:
-                if lumped.segment == muscle.segment and "twist" in lumped.joints:
+                if lumped.segment in muscle.segments and "twist" in lumped.joints:
                     place, rest = self._names.index(lumped.joints["twist"]), lumped.rest[2] * lumped.length
                     twist = strains[:, place] + rest
                     lengths[:, m] += muscle.distance**2 * (twist**2 - rest**2) / (2.0 * lumped.length)
