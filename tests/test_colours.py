@@ -10,9 +10,10 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from softrobots.view.appearance import FORCE_COLOUR, PATH_COLOUR, PULL_COLOUR, PUSH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
+from softrobots.view.appearance import FORCE_COLOUR, LINE_COLOUR, PATH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
 from softrobots.view.figures import canvas, helix_sheet, trajectories, workspaces
 from softrobots.view.scene import WRINKLING_COLOURS
+from softrobots.view.tension_scale import tension_colour
 
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A physiologically-based model for simulation of color vision deficiency,
 # IEEE Trans. Vis. Comput. Graph. 15(6), 2009: severity 1.0, on linear RGB.
@@ -62,11 +63,12 @@ def lightness(colours: list[object]) -> list[float]:
 
 
 WRINKLING = [colour for _, colour in WRINKLING_COLOURS]
+TENSIONS = [tension_colour(share, 1.0) for share in (-1.0, -0.5, -0.01, 0.0, 0.01, 0.5, 1.0)]
 PALETTES = {
     "lines": list(canvas.COLOURS),
     "wrinkling": WRINKLING,
-    "page of a muscle arm": [PULL_COLOUR, PUSH_COLOUR, TUBE_COLOUR, PATH_COLOUR, FORCE_COLOUR],
-    "page of a growing tube": [PULL_COLOUR, TUBE_COLOUR, TAIL_COLOUR],
+    "page of a muscle arm": [*TENSIONS, TUBE_COLOUR, PATH_COLOUR, FORCE_COLOUR],
+    "page of a growing tube": [LINE_COLOUR, TUBE_COLOUR, TAIL_COLOUR],
     "maps": list(workspaces.SHADES),
     "helices": [helix_sheet.WALL, helix_sheet.WALL_IN_CONTACT, helix_sheet.ACTUATOR, helix_sheet.OPPOSITE],
 }
@@ -93,8 +95,14 @@ def test_wrinkling_goes_from_light_to_dark() -> None:
     assert steps.min() > APART_IN_GREY
 
 
+def test_tensions_go_from_light_to_dark() -> None:
+    """In grey a stronger pull is darker, and so is a stronger push."""
+    for side in (TENSIONS[2::-1], TENSIONS[4:]):
+        assert (-np.diff(lightness(side))).min() > APART_IN_GREY
+
+
 def test_areas_of_maps_and_helices_differ_in_grey() -> None:
-    for areas in (PALETTES["maps"], PALETTES["helices"], [PULL_COLOUR, PUSH_COLOUR]):
+    for areas in (PALETTES["maps"], PALETTES["helices"]):
         assert min(b - a for a, b in pairwise(sorted(lightness(areas)))) > APART_IN_GREY
 
 

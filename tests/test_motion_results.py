@@ -149,10 +149,8 @@ def test_bodies_have_fewer_frames_and_muscles_their_tension(bending: sr.Motion) 
     assert np.allclose(frames[-1].tensions, bending.motor_torques[-1])
     scene = SceneBuilder(bending.model).movement(bending, 0.1)[0]
     assert scene.arrows["tip"].force == 3.0
-    pushing = {
-        muscle.name for muscle, tension in zip(bending.model.muscles, bending.motor_torques[0], strict=True) if tension < 0
-    }
-    assert scene.pushing == pushing
+    assert [actuator.tension for actuator in scene.actuators] == bending.motor_torques[0].tolist()
+    assert [actuator.curve.name for actuator in scene.actuators] == [muscle.name for muscle in bending.model.muscles]
 
 
 def test_arrows_of_a_motion_are_as_long_as_the_force(released: sr.Motion) -> None:

@@ -28,7 +28,8 @@ from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import PccArm
 from softrobots.statics.kinematics import frame_placement
-from softrobots.view.body import body, body_at
+from softrobots.view.actuator_curves import actuator_curves
+from softrobots.view.body import BentSections, body, body_at
 from tests.support.laws import law
 from tests.support.tables import each_row
 from tests.support.urdf_reading import (
@@ -897,10 +898,9 @@ def test_curves_of_the_muscles_are_as_long_as_the_muscles() -> None:
     model = sr.load_model(PccArm())
     errors = []
     for points in (4, 8, 16):
-        segments = body_at(model, LENGTHS, np.zeros(model.n_springs), points)
-        curves = {name: curve for segment in segments for name, curve in segment.muscles.items()}
-        assert tuple(curves) == model.motor_joints
-        lengths = np.array([np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() for curve in curves.values()])
+        curves = actuator_curves(BentSections(model, LENGTHS, np.zeros(model.n_springs)), model.muscles, points)
+        assert tuple(curve.name for curve in curves) == model.motor_joints
+        lengths = np.array([np.linalg.norm(np.diff(curve.points, axis=0), axis=1).sum() for curve in curves])
         assert np.all(lengths < LENGTHS)
         errors.append(LENGTHS - lengths)
     assert np.allclose(orders(errors), 2.0, atol=0.01)

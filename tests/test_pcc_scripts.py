@@ -12,7 +12,8 @@ import pytest
 import softrobots as sr
 from softrobots import constant_curvature
 from softrobots.statics.workspace import workspace_at
-from softrobots.view.body import body
+from softrobots.view.actuator_curves import actuator_curves
+from softrobots.view.body import BentSections
 from softrobots.view.figures import loaded_robot, workspaces
 from tests.conftest import CHECKOUT
 from tests.support.oracles import central_difference
@@ -182,12 +183,12 @@ def test_figures_show_what_they_say(pcc: sr.SoftModel) -> None:
     lines = [np.array(line.get_data_3d()) for line in axes.lines]
     ends = [line[:, -1] for line in lines]
     assert any(np.allclose(end, loaded.tip_position, atol=1e-12) for end in ends)
-    for segment in body(loaded):
-        for points in segment.muscles.values():
-            assert any(line.shape == points.T.shape and np.allclose(line, points.T, atol=1e-12) for line in lines)
+    for curve in actuator_curves(BentSections(pcc, loaded.q_motors, loaded.q_springs), pcc.muscles):
+        points = curve.points.T
+        assert any(line.shape == points.shape and np.allclose(line, points, atol=1e-12) for line in lines)
     assert (axes.get_xlabel(), axes.get_zlabel()) == ("x [m]", "z [m]")
     texts = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert {"backbone", "muscle that pulls", "muscle that pushes", "without load, same muscle lengths"} <= set(texts)
+    assert {"backbone", "end of a segment", "without load, same muscle lengths"} <= set(texts)
     found = sr.sample_workspace(pcc, 30)
     views = workspaces.workspace(found).axes
     dots = views[0].collections[0].get_offsets()

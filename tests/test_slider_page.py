@@ -22,8 +22,9 @@ from softrobots.view.body import body
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 from softrobots.view.slider_page import SliderPage
+from softrobots.view.tension_scale import round_down, round_up, scale_end, tension_colour
 from softrobots.view.viser_page.drawing import triangles
-from softrobots.view.viser_page.slider_panel import round_down, slider_grid
+from softrobots.view.viser_page.slider_panel import slider_grid
 from tests.support.pictures import listening, pixels
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
@@ -169,6 +170,7 @@ def test_steps_are_round_numbers_within_the_limits() -> None:
         assert abs(first / step - round(first / step)) < 1e-9
     assert slider_grid(0.3, 0.3) == (0.3, 0.3, 1.0)
     assert [round_down(x) for x in (1.0, 0.99, 29.0, 5e-4, 0.3)] == [1.0, 0.5, 20.0, 5e-4, 0.2]
+    assert [round_up(x) for x in (1.0, 0.99, 29.0, 5e-4, 0.3)] == [1.0, 1.0, 50.0, 5e-4, 0.5]
 
 
 # What is drawn
@@ -246,9 +248,11 @@ def test_a_body_bends_without_becoming_another_object() -> None:
         assert page._drawing.handles["body/segment_1/tube"] is tube
         corners, _ = body(shown)[0].surface()
         assert np.allclose(tube.vertices, corners, atol=1e-6)  # viser holds single precision
-        colours = {tuple(handle.color) for path, handle in page._drawing.handles.items() if "/lines/" in path}
-        pulls = shown.muscle_forces >= 0.0
-        assert len(colours) == len(set(pulls.tolist()))  # blue pulls, orange pushes
+        forces = shown.muscle_forces.tolist()
+        for name, force in zip(pcc.motor_joints, forces, strict=True):
+            expected = np.array(tension_colour(force, scale_end(forces))[:3])
+            assert np.allclose(np.array(page._drawing.handles[f"body/actuators/{name}"].color) / 255, expected, atol=0.5 / 255)
+            assert f"{name}: {'pulls' if force > 0.0 else 'pushes'} {abs(force):.3g} N" in panel_html(page)
 
 
 def test_the_rigid_arm_and_the_path_can_be_switched(page: SliderPage) -> None:

@@ -1,31 +1,29 @@
-"""How a robot looks on a page, whatever draws it: its colours, the parts of its body, the size of its arrows, its legend."""
+"""How a robot looks on a page, whatever draws it: its colours, the parts of its body, the size of its arrows."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
-import numpy as np
-
 from softrobots.core.checks import FloatArray
+from softrobots.view.actuator_curves import THREAD
 from softrobots.view.body import SegmentBody, tube
-from softrobots.view.robot_shapes import Shape
-from softrobots.view.scene import WRINKLING_COLOURS, Scene
+from softrobots.view.scene import Scene
+from softrobots.view.tension_scale import scale_end, tension_colour
 
 RIGID_COLOUR = (0.40, 0.50, 0.62, 0.20)
 """Red, green, blue, opacity of the rigid arm."""
 PATH_COLOUR = 0x1A1A1A
-"""Near black of the path: none of the colours of wrinkling and muscles."""
+"""Near black of the path: none of the colours of wrinkling and tensions."""
 FORCE_COLOUR = 0x009E73
 """Green of the forces."""
 FLOOR_COLOUR = 0xB8C0C8
 """Light grey of the lines on the floor."""
 TUBE_COLOUR = (0.85, 0.74, 0.50, 0.32)
 """Red, green, blue, opacity of the tube, through which the chain is seen."""
-PULL_COLOUR = (0.00, 0.45, 0.70, 1.0)
-"""Blue of muscles that pull."""
-PUSH_COLOUR = (0.90, 0.45, 0.00, 1.0)
-"""Orange of muscles that push; the two differ in lightness too."""
+LINE_COLOUR = (0.00, 0.45, 0.70, 1.0)
+"""Blue of lines that are only drawn, as the actuator of a helix."""
 TAIL_COLOUR = (0.25, 0.25, 0.28, 0.8)
 """Dark grey of the wall inside a growing tube."""
 
@@ -34,12 +32,8 @@ ARROW_LENGTH = 0.2
 ARROW_WIDTH = 0.009
 """Radius of the shaft of an arrow, relative to the size of the robot; its head is 2.5 times as wide and 7 times as long."""
 
-_MUSCLE_RADIUS = 0.09  # of the radius of the body
-
 Colour = tuple[float, ...] | int
 """Red, green, blue and perhaps opacity in [0, 1], or a number as in HTML."""
-LegendEntry = tuple[Colour, str]
-"""Colour and meaning of something that is drawn."""
 
 
 def rgb(colour: Colour) -> tuple[int, int, int]:
@@ -51,71 +45,38 @@ def rgb(colour: Colour) -> tuple[int, int, int]:
 
 
 class BodyPart(NamedTuple):
-    """A tube, a muscle or a line of a continuous body."""
+    """A tube, an actuator or a line of a continuous body."""
 
-    segment: SegmentBody
-    """Its segment."""
-    line: str | None
-    """Name of the muscle or line; None: the tube."""
+    path: str
+    """A name that is unique in the robot, with slashes; parts of one path have as many corners in every shape of the robot."""
     colour: tuple[float, float, float, float]
     """Red, green, blue, opacity."""
-    meaning: str
-    """Text of the legend."""
-
-    @property
-    def path(self) -> str:
-        """A name that is unique in the robot, with slashes."""
-        return f"segment_{self.segment.number}/" + ("tube" if self.line is None else f"lines/{self.line}")
-
-    def surface(self, sides: int = 24) -> tuple[FloatArray, FloatArray]:
-        """Return corners and triangles, as `SegmentBody.surface`; lines have six sides."""
-        segment = self.segment
-        if self.line is None:
-            return segment.surface(sides)
-        points = (segment.muscles | segment.lines)[self.line]
-        return tube(segment.poses[:, :3, :3], points, _MUSCLE_RADIUS * segment.radius, 6)
+    surface: Callable[[], tuple[FloatArray, FloatArray]]
+    """Returns corners and triangles, as `SegmentBody.surface`."""
 
 
-def body_parts(scene: Scene, segments: Sequence[SegmentBody] | None = None) -> Iterator[BodyPart]:
-    """Yield the parts of the body of a scene, or of other segments with the same muscles."""
-    for segment in scene.segments if segments is None else segments:
-        yield BodyPart(segment, None, TUBE_COLOUR, "body")
-        for name in segment.muscles:
-            pushes = name in scene.pushing
-            meaning = "muscle that pushes" if pushes else "muscle that pulls"
-            yield BodyPart(segment, name, PUSH_COLOUR if pushes else PULL_COLOUR, meaning)
-        for name in segment.lines:
-            yield BodyPart(segment, name, PULL_COLOUR, name)
-
-
-def legend(
-    shapes: Iterable[Shape], scene: Scene, animated: Iterable[Scene] = (), *, path: bool = False, target: bool = False
-) -> list[LegendEntry]:
-    """Return colour and meaning of everything that is drawn.
+def body_parts(
+    scene: Scene, end: float | None = None, segments: Sequence[SegmentBody] | None = None, sides: int = 24
+) -> Iterator[BodyPart]:
+    """Yield the parts of the body of a scene.
 
     Args:
-        shapes: The shapes of the robot.
-        scene: What is shown.
-        animated: The scenes of an animation.
-        path: Whether the path of the tip is drawn.
-        target: Whether a target is drawn.
+        scene: The scene.
+        end: End of the scale of tensions [N]; that of the scene by default.
+        segments: Segments that are drawn in place of those of the scene.
+        sides: Corners of the cross-section of the body; actuators and lines have six.
     """
-    shapes = tuple(shapes)
-    entries: list[LegendEntry] = [(RIGID_COLOUR, scene.reference)] * any(shape.elastic for shape in shapes)
-    if all(shape.inflated_link is None for shape in shapes):
-        entries += [(shape.colour, "equivalent rigid chain") for shape in shapes if shape.of_section][:1]
-    body: dict[str, Colour] = {}
-    states = (scene, *animated)
-    for state in states:
-        body |= {part.meaning: part.colour for part in body_parts(state)}
-        if state.segments and state.grown is not None and state.grown < 1.0:
-            body["wall that has not come out"] = TAIL_COLOUR
-    entries += [(colour, meaning) for meaning, colour in body.items()]
-    entries += [(PATH_COLOUR, "path of the tip")] * path + [(PATH_COLOUR, "target (cross)")] * target
-    entries += [(FORCE_COLOUR, "force")] * any(state.arrows for state in states)
-    above = 1.0
-    for least, rgb in WRINKLING_COLOURS if scene.wrinkling else ():
-        text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"
-        entries.append((rgb, text))
-        above = least
-    return entries
+    for segment in scene.segments if segments is None else segments:
+        yield BodyPart(f"segment_{segment.number}/tube", TUBE_COLOUR, partial(segment.surface, sides))
+        for name, points in segment.lines.items():
+            surface = partial(tube, segment.poses[:, :3, :3], points, THREAD * segment.radius, 6)
+            yield BodyPart(f"segment_{segment.number}/lines/{name}", LINE_COLOUR, surface)
+    end = shared_scale([scene]) if end is None else end
+    for curve, tension, slack in scene.actuators:
+        path = f"actuators/{curve.name}{'/slack' * slack}"
+        yield BodyPart(path, tension_colour(tension, end), curve.dashed_surface if slack else curve.surface)
+
+
+def shared_scale(scenes: Iterable[Scene]) -> float:
+    """Return the end of the scale of tensions of some scenes [N]."""
+    return scale_end(actuator.tension for scene in scenes for actuator in scene.actuators)

@@ -1,4 +1,4 @@
-"""The continuous body of a robot with sections: its backbone, its surface and its muscles, for pictures and measurements."""
+"""The continuous body of a robot with sections: its backbone and its surface, for pictures and measurements."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pinocchio as pin
 
 from softrobots.constant_curvature.screws import Screw
 from softrobots.core.checks import FloatArray, instance_of, positive_integer
-from softrobots.description.urdf_tags import ActuatorTag, LineTag
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone
@@ -25,8 +24,6 @@ class SegmentBody:
     """Frames along the backbone, z along it, from the start to the end of the segment, shape (n, 4, 4) [m], world axes."""
     radius: float
     """Radius of the body [m]."""
-    muscles: dict[str, FloatArray]
-    """Points along each muscle, by name, shape (n, 3) [m]."""
     lines: dict[str, FloatArray]
     """Points along each line that is only drawn, by name, shape (n, 3) [m]."""
 
@@ -58,8 +55,7 @@ class SegmentBody:
                 run = 0.0
         if kept[-1] != len(steps):  # the last frame replaces the one before it, unless that is the first
             kept[max(len(kept) - 1, 1) :] = [len(steps)]
-        chosen = {name: points[kept] for name, points in self.muscles.items()}
-        return SegmentBody(self.number, self.poses[kept], self.radius, chosen, {n: p[kept] for n, p in self.lines.items()})
+        return SegmentBody(self.number, self.poses[kept], self.radius, {n: p[kept] for n, p in self.lines.items()})
 
     def dome(self) -> tuple[FloatArray, FloatArray]:
         """Return the triangles of a hemisphere on the end of the tube, for the tip of an everting tube, as in `surface`."""
@@ -140,37 +136,85 @@ def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, point
     Raises:
         ParameterError: If `points` is not positive.
     """
-    positive_integer("points", points, 10_000)
-    structure = model.structure
-    sections = structure.section_table
-    if not sections:
-        return ()
-    pin_model, data = model.workspace(None)
-    pin.forwardKinematics(pin_model, data, model.embed(model.coordinates.at(q_motors, q_springs).joints))
-    coordinates = structure.section_coordinates(q_motors, q_springs)
-    shares = np.arange(1, points + 1) / points
-    bodies = []
-    for number in dict.fromkeys(section.segment for section in sections):
-        rows = [row for row, section in enumerate(sections) if section.segment == number]
-        pose = _start(model, data, rows[0])
-        poses = [pose[None]]
-        for row in rows:
-            along = Screw(shares[:, None] * coordinates[row], shares * sections[row].length)
-            steps = np.tile(np.eye(4), (points, 1, 1))
-            steps[:, :3, :3], steps[:, :3, 3] = along.rotation, along.position
-            poses.append(pose @ steps)
-            pose = poses[-1][-1]
-        frames = np.concatenate(poses)
-        muscles = {tag.name: _along(frames, tag) for tag in structure.muscles if number in tag.segments}
-        lines = {tag.name: _along(frames, tag) for tag in structure.lines if tag.segment == number}
-        bodies.append(SegmentBody(number, frames, sections[rows[0]].radius, muscles, lines))
-    return tuple(bodies)
+    return BentSections(model, q_motors, q_springs).segments(points)
 
 
-def _along(frames: FloatArray, tag: ActuatorTag | LineTag) -> FloatArray:
-    """Points beside a backbone, shape (n, 3)."""
-    aside = np.cos(tag.azimuth) * frames[:, :3, 0] + np.sin(tag.azimuth) * frames[:, :3, 1]
-    return np.asarray(frames[:, :3, 3] + tag.distance * aside)
+class BentSections:
+    """The sections of a robot at given coordinates, each a screw motion: the frames of its body anywhere along it."""
+
+    def __init__(self, model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> None:
+        """Place the sections; arguments as in `body_at`."""
+        structure = self._structure = model.structure
+        self._table = structure.section_table
+        self.segment_numbers = tuple(dict.fromkeys(section.segment for section in self._table))
+        """Numbers of the segments, base to tip."""
+        if not self._table:
+            return
+        pin_model, data = model.workspace(None)
+        pin.forwardKinematics(pin_model, data, model.embed(model.coordinates.at(q_motors, q_springs).joints))
+        self._coordinates = structure.section_coordinates(q_motors, q_springs)
+        self._lengths = np.array([section.length for section in self._table])
+        ends = Screw(self._coordinates, self._lengths)
+        starts: list[FloatArray] = []
+        for row, section in enumerate(self._table):
+            if row == 0 or section.segment != self._table[row - 1].segment:
+                starts.append(_start(model, data, row))
+            else:
+                starts.append(starts[-1] @ _pose(ends.rotation[row - 1], ends.position[row - 1]))
+        self._starts = np.array(starts)
+
+    def rows(self, segment: int) -> list[int]:
+        """Places of the sections of a segment in the table of sections."""
+        return [row for row, section in enumerate(self._table) if section.segment == segment]
+
+    def bounds(self, segment: int) -> FloatArray:
+        """Rest lengths from the start of a segment to its start and to the end of each section, shape (n_sections + 1,) [m]."""
+        return np.concatenate([[0.0], np.cumsum(self._lengths[self.rows(segment)])])
+
+    def radius(self, segment: int) -> float:
+        """Radius of the body of a segment [m]."""
+        return self._table[self.rows(segment)[0]].radius
+
+    def frames(self, segment: int, at: FloatArray) -> FloatArray:
+        """Return the frames at rest lengths from the start of a segment, shape (n,) [m], shape (n, 4, 4) [m], world axes."""
+        rows, bounds = np.array(self.rows(segment)), self.bounds(segment)
+        place = np.clip(np.searchsorted(bounds, at) - 1, 0, len(rows) - 1)
+        row = rows[place]
+        share = (at - bounds[place]) / self._lengths[row]
+        along = Screw(share[:, None] * self._coordinates[row], share * self._lengths[row])
+        return np.asarray(self._starts[row] @ _pose(along.rotation, along.position))
+
+    def segments(self, points: int) -> tuple[SegmentBody, ...]:
+        """Return the bodies of the segments; see `body_at`.
+
+        Raises:
+            ParameterError: If `points` is not positive.
+        """
+        shares = np.arange(1, positive_integer("points", points, 10_000) + 1) / points
+        bodies = []
+        for number in self.segment_numbers:
+            bounds = self.bounds(number)
+            frames = self.frames(number, np.append(0.0, bounds[:-1, None] + shares * np.diff(bounds)[:, None]))
+            lines = {
+                tag.name: beside(frames, np.full(len(frames), tag.distance), np.full(len(frames), tag.azimuth))
+                for tag in self._structure.lines
+                if tag.segment == number
+            }
+            bodies.append(SegmentBody(number, frames, self.radius(number), lines))
+        return tuple(bodies)
+
+
+def beside(frames: FloatArray, distance: FloatArray, azimuth: FloatArray) -> FloatArray:
+    """Return points beside a backbone at polar coordinates in its cross-sections, shapes (n,) [m, rad], shape (n, 3) [m]."""
+    across = np.cos(azimuth)[:, None] * frames[:, :3, 0] + np.sin(azimuth)[:, None] * frames[:, :3, 1]
+    return np.asarray(frames[:, :3, 3] + distance[:, None] * across)
+
+
+def _pose(rotation: FloatArray, position: FloatArray) -> FloatArray:
+    """Rotations and positions as poses, shape (..., 4, 4)."""
+    pose = np.zeros((*position.shape[:-1], 4, 4))
+    pose[..., :3, :3], pose[..., :3, 3], pose[..., 3, 3] = rotation, position, 1.0
+    return pose
 
 
 def _start(model: SoftModel, data: object, row: int) -> FloatArray:

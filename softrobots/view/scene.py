@@ -18,6 +18,7 @@ from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
+from softrobots.view.actuator_curves import actuator_curves
 from softrobots.view.animation_frames import (
     Frame,
     Movement,
@@ -27,8 +28,9 @@ from softrobots.view.animation_frames import (
     swing_frames,
     waypoint_frames,
 )
-from softrobots.view.body import SegmentBody, body_at
+from softrobots.view.body import BentSections, SegmentBody
 from softrobots.view.robot_shapes import RobotShapes
+from softrobots.view.tension_scale import DrawnActuator, drawn_actuators
 
 WRINKLING_COLOURS = (
     (0.8, (1.00, 0.96, 0.66)),
@@ -67,9 +69,9 @@ class Scene:
     wrinkling: Sequence[int] | None = None
     """Place in `WRINKLING_COLOURS` of each inflated link; None without load."""
     segments: Sequence[SegmentBody] = ()
-    """The continuous body of sections: tubes with their muscles."""
-    pushing: frozenset[str] = frozenset()
-    """Names of the muscles that push."""
+    """The continuous body of sections."""
+    actuators: Sequence[DrawnActuator] = ()
+    """Its actuators, with their tensions under load."""
     arrows: Mapping[str, Arrow] = field(default_factory=dict)
     """Forces by the frame that they act on."""
     grown: float | None = None
@@ -161,11 +163,14 @@ class SceneBuilder:
         model, equilibrium = self._model, frame.equilibrium
         q = model.embed(model.coordinates.at(frame.q_motors, frame.q_springs).joints)
         rigid = model.embed(model.coordinates.at(frame.q_motors, model.rest).joints)
+        sections = BentSections(model, frame.q_motors, frame.q_springs)
+        curves = actuator_curves(sections, model.muscles, points)
         scene = Scene(
             self.robot.transforms(q),
             self.robot.transforms(rigid),
             self._reference() if frame.grown is None else "the whole tube",
-            segments=body_at(model, frame.q_motors, frame.q_springs, points),
+            segments=sections.segments(points),
+            actuators=[DrawnActuator(curve) for curve in curves],
             grown=frame.grown,
         )
         if equilibrium is not None:
@@ -179,7 +184,7 @@ class SceneBuilder:
         return dataclasses.replace(
             scene,
             wrinkling=levels,
-            pushing=frozenset(muscle.name for muscle, tension in zip(model.muscles, tensions, strict=True) if tension < 0.0),
+            actuators=drawn_actuators(model.muscles, curves, tensions),
             arrows=_arrows(model, load, q),
         )
 

@@ -14,12 +14,13 @@ from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
 from softrobots.statics.sensitivity import compliance
-from softrobots.view.appearance import legend
+from softrobots.view.legend import legend
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import LOOPBACK, ServedPage
+from softrobots.view.tension_scale import round_down
 from softrobots.view.viser_page.drawing import ViserDrawing
 from softrobots.view.viser_page.server import start_server
-from softrobots.view.viser_page.slider_panel import Setting, SliderPanel, round_down
+from softrobots.view.viser_page.slider_panel import Setting, SliderPanel
 from softrobots.view.warm_start import next_equilibrium
 
 _BENDING = 0.25  # linear deflection of the relaxed tip under the largest force, of the robot's size

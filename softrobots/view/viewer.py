@@ -30,8 +30,8 @@ class Viewer(ServedPage):
 
     The deformed robot is opaque; the rigid one, with the same motors and relaxed springs, is translucent. Inflated links are
     coloured by the share of the wrinkling moment that is left. Segments with sections are drawn as smooth translucent tubes,
-    with their muscles (blue pulls, orange pushes) and the equivalent chain inside. As the last expression of a cell of a
-    notebook it is shown there, as it is at that moment.
+    with the equivalent chain inside, and actuators along their routes (blue pulls, orange pushes, grey is zero, dashed is
+    slack). As the last expression of a cell of a notebook it is shown there, as it is at that moment.
     """
 
     def __init__(self, model: SoftModel, *, port: int | None = None) -> None:

@@ -10,10 +10,14 @@ from softrobots.core.checks import FloatArray, instance_of
 from softrobots.core.errors import ParameterError
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone
-from softrobots.view.body import body, body_at
+from softrobots.view.actuator_curves import actuator_curves
+from softrobots.view.body import BentSections, body_at
 from softrobots.view.figures.canvas import COLOURS, equal_box, force_arrow, new_space, plain_words
+from softrobots.view.legend import tension_entries
+from softrobots.view.tension_scale import drawn_actuators, scale_end, tension_colour
 
-_PULL, _PUSH = COLOURS[0], COLOURS[1]
+_LINE = COLOURS[0]
+_DASHED = (0, (2.5, 2))
 _LOADED = "#303030"
 _RELAXED = "#7f7f7f"
 
@@ -46,7 +50,7 @@ def loaded_shape(equilibrium: Equilibrium) -> Any:
 
 
 def shape(equilibrium: Equilibrium) -> Any:
-    """Backbone, outline and muscles of a loaded robot with sections; dotted: its backbone without load.
+    """Backbone, outline and actuators of a loaded robot with sections; dotted: its backbone without load; dashed: slack.
 
     Args:
         equilibrium: The loaded robot.
@@ -61,8 +65,10 @@ def shape(equilibrium: Equilibrium) -> Any:
     if not isinstance(equilibrium, Equilibrium) or not equilibrium.model.structure.section_table:
         raise ParameterError("equilibrium", equilibrium, "an Equilibrium of a robot with sections")
     figure, axes = new_space((7.0, 7.0), "Shape under load")
-    forces = dict(zip((muscle.name for muscle in equilibrium.model.muscles), equilibrium.muscle_forces, strict=True))
-    segments, model = body(equilibrium), equilibrium.model
+    model = equilibrium.model
+    sections = BentSections(model, equilibrium.q_motors, equilibrium.q_springs)
+    segments, curves = sections.segments(12), actuator_curves(sections, model.muscles)
+    actuators = drawn_actuators(model.muscles, curves, equilibrium.muscle_forces)
     lengths_given = model.muscle_input == "lengths" or not model.muscles
     unloaded = body_at(model, equilibrium.q_motors, model.rest) if lengths_given else ()
     meaning = "without load, same muscle lengths" if model.muscles else "without load"
@@ -70,17 +76,18 @@ def shape(equilibrium: Equilibrium) -> Any:
         axes.plot(*segment.backbone.T, color="0.5", lw=1.5, ls=":", label=meaning)
     for segment in segments:
         axes.plot(*segment.backbone.T, color="0.15", lw=3.0, label="backbone")
-        for name, points in segment.muscles.items():
-            pushes = forces[name] < 0.0
-            text = "muscle that pushes" if pushes else "muscle that pulls"
-            axes.plot(*points.T, color=_PUSH if pushes else _PULL, lw=1.6, ls="--" if pushes else "-", label=text)
         for name, points in segment.lines.items():
-            axes.plot(*points.T, color=_PULL, lw=1.6, label=name)
+            axes.plot(*points.T, color=_LINE, lw=1.6, label=name)
         turned = float(np.arccos(np.clip(np.sum(segment.poses[1:, :3, 2] * segment.poses[:-1, :3, 2], axis=1), -1, 1)).sum())
         rings = max(6, round(turned / 0.7))
         for pose in segment.poses[:: max(1, len(segment.poses) // rings)]:
             axes.plot(*_circle(pose, segment.radius).T, color="0.7", lw=0.8)
         axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label="end of a segment")
+    end = scale_end(equilibrium.muscle_forces.tolist())
+    for curve, tension, slack in actuators:
+        axes.plot(*curve.points.T, color=tension_colour(tension, end), lw=1.6, ls=_DASHED if slack else "-")
+    for colour, meaning, dashed in tension_entries([actuators]):
+        axes.plot([], [], [], color=colour, lw=1.6, ls=_DASHED if dashed else "-", label=plain_words(meaning))
     arrow = force_arrow(axes, equilibrium)
     equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
     handles, labels = axes.get_legend_handles_labels()

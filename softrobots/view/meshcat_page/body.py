@@ -1,4 +1,4 @@
-"""The continuous body of a robot on a meshcat page: smooth tubes with their muscles."""
+"""The continuous body of a robot on a meshcat page: smooth tubes with their actuators."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.view.appearance import TAIL_COLOUR, TUBE_COLOUR, BodyPart, body_parts
+from softrobots.view.appearance import TAIL_COLOUR, TUBE_COLOUR, BodyPart, body_parts, shared_scale
 from softrobots.view.body import SegmentBody, tube
 from softrobots.view.meshcat_page.shapes import material
 from softrobots.view.scene import Scene
@@ -17,7 +17,7 @@ _MARKS = 24  # marks on the whole wall
 
 
 class BodyDrawing:
-    """The tubes and muscles under one node of a page."""
+    """The tubes and actuators under one node of a page."""
 
     def __init__(self, root: Any) -> None:
         """Draw under `root`."""
@@ -35,17 +35,17 @@ class BodyDrawing:
         given by number of frame.
         """
         self._root.delete()
-        numbers = sorted(scenes)
+        numbers, end = sorted(scenes), shared_scale(scenes.values())
         for place, number in enumerate(numbers):
             node = self._root[f"frame_{place}"]
             if place > 0:  # hidden before its shapes arrive, or they flash. A saved page starts to play before it sets
                 node.set_property("visible", False)  # properties: the first body must not be made visible after that
             scene = scenes[number]
             if scene.grown is None:
-                _draw(node, body_parts(scene), 16)
+                _draw(node, body_parts(scene, end, sides=16))
             else:
                 short = [segment.thinned(0.1 * segment.radius) for segment in scene.segments]
-                _draw(node, body_parts(scene, short), 14)
+                _draw(node, body_parts(scene, end, short, 14))
                 _draw_eversion(node, short[-1], scene.grown)
             # All tracks last as long as the animation: meshcat restarts a shorter one when the time is set beyond its end.
             # Bodies change half a frame early: the chain inside, which moves in between, is never far from them.
@@ -55,9 +55,9 @@ class BodyDrawing:
                 animation.at_frame(node, when).set_property("visible", "boolean", begin <= when < end)
 
 
-def _draw(node: Any, parts: Iterable[BodyPart], sides: int = 24) -> None:
+def _draw(node: Any, parts: Iterable[BodyPart]) -> None:
     for part in parts:
-        node[part.path].set_object(_mesh(*part.surface(sides)), material(part.colour))
+        node[part.path].set_object(_mesh(*part.surface()), material(part.colour))
 
 
 def _draw_eversion(node: Any, segment: SegmentBody, share: float) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 from string import Template
 
 from softrobots.version import __version__
-from softrobots.view.appearance import Colour, LegendEntry, rgb
+from softrobots.view.appearance import Colour, rgb
+from softrobots.view.legend import LegendEntry
 from softrobots.view.meshcat_page.page_commands import packed, read_page, tidied
 
 _HINT = "Drag: turn. Wheel or two fingers: nearer."
@@ -72,7 +73,7 @@ def live_page(title: str) -> str:
 
 def legend_rows(legend: Sequence[LegendEntry]) -> str:
     """Return the HTML of a legend: one line for each colour and meaning, the colour as background of an empty `span`."""
-    rows = (f'\n<div><span style="background:{_css(colour)}"></span>{html.escape(text)}</div>' for colour, text in legend)
+    rows = (f'\n<div><span style="background:{_swatch(entry)}"></span>{html.escape(entry.meaning)}</div>' for entry in legend)
     return "".join(rows)
 
 
@@ -86,6 +87,12 @@ def _filled(template: str, **values: str) -> str:
     folder = Path(__file__).parent
     fit = folder.joinpath("fit.js").read_text(encoding="utf-8").rstrip("\n")
     return Template(folder.joinpath(template).read_text(encoding="utf-8").rstrip("\n")).substitute(values, fit=fit)
+
+
+def _swatch(entry: LegendEntry) -> str:
+    """The background of an entry of the legend in CSS."""
+    colour = _css(entry.colour)
+    return f"repeating-linear-gradient(90deg,{colour} 0 4px,#fff 4px 7px)" if entry.dashed else colour
 
 
 def _css(colour: Colour) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.view import appearance
 from softrobots.view.animation_frames import FRAME_RATE
+from softrobots.view.legend import LegendEntry, legend
 from softrobots.view.meshcat_page.body import BodyDrawing
 from softrobots.view.meshcat_page.shapes import material, meshcat_geometry
 from softrobots.view.robot_shapes import RobotShapes, Shape
@@ -93,9 +94,9 @@ class RobotDrawing:
         self._animated = tuple(scenes.values())
         return animation
 
-    def legend(self) -> list[appearance.LegendEntry]:
+    def legend(self) -> list[LegendEntry]:
         """Return colour and meaning of what is drawn."""
-        return appearance.legend(self._shapes, self._scene, self._animated, path=self._traced, target=self._marked)
+        return legend(self._shapes, self._scene, self._animated, path=self._traced, target=self._marked)
 
     def _add_frame(self, animation: Any, number: int, scene: Scene) -> None:
         self._chain.add_frame(animation, number, scene)

@@ -11,8 +11,9 @@ import numpy as np
 
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
-from softrobots.view.appearance import LegendEntry
+from softrobots.view.legend import LegendEntry
 from softrobots.view.meshcat_page.page_text import legend_rows
+from softrobots.view.tension_scale import round_down
 
 _STEPS = 400  # least number of steps of a slider
 _LISTED = 6  # most inflated links that are listed one by one
@@ -123,12 +124,6 @@ class SliderPanel:
     async def _pressed(self, _: Any) -> None:
         self._reset = True
         self._changed()
-
-
-def round_down(number: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is not above a positive number (to rounding)."""
-    power = math.floor(math.log10(number * (1.0 + 1e-9)))
-    return max(float(f"{digit}e{power}") for digit in (1, 2, 5) if digit * 10.0**power <= number * (1.0 + 1e-9))
 
 
 def slider_grid(low: float, high: float) -> tuple[float, float, float]:

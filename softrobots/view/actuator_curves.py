@@ -1,0 +1,112 @@
+"""The curves of actuators along their routes in the bent body, for pictures and measurements."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.description.urdf_tags import ActuatorTag, RouteTag
+from softrobots.view.body import BentSections, beside, tube
+
+THREAD = 0.09
+"""Radius of the curve of an actuator that has no thickness of its own, relative to the radius of the body."""
+
+_COARSEST = 0.3  # turn about the backbone from point to point [rad]
+_DASHES = 24  # along the whole robot, gaps between them as long
+_SAME = 1e-9  # of the length of a curve: points nearer to the last one are left out
+
+
+@dataclass(frozen=True, eq=False)
+class ActuatorCurve:
+    """The curve of one actuator, from the start of its route to its end, in world axes."""
+
+    name: str
+    """Name of the actuator."""
+    points: FloatArray
+    """Points along it, shape (n, 3) [m]."""
+    frames: FloatArray
+    """Axes of the cross-section of the body at each point, shape (n, 3, 3)."""
+    radius: float
+    """Half its thickness [m]: of a McKibben muscle at rest, of a round chamber of its area, else that of a thread."""
+
+    def surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
+        """Return corners and triangles of the tube around the curve, as `softrobots.view.body.tube`."""
+        return self._tube(self.points, self.frames, sides)
+
+    def dashes(self) -> list[FloatArray]:
+        """Return the ends of straight dashes along the curve, each shape (2, 3) [m]; gaps are as long as dashes."""
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
+        places = along[-1] * np.arange(2 * _DASHES) / (2 * _DASHES - 1)  # begins and ends with a dash
+        ends = np.column_stack([np.interp(places, along, axis) for axis in self.points.T])
+        return list(ends.reshape(_DASHES, 2, 3))
+
+    def dashed_surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
+        """Return corners and triangles of the dashes; as many whatever the shape of the robot."""
+        nearest = np.rint(np.linspace(0, len(self.frames) - 1, _DASHES)).astype(int)
+        pieces = [self._tube(ends, self.frames[[at, at]], sides) for ends, at in zip(self.dashes(), nearest, strict=True)]
+        count = len(pieces[0][0])
+        triangles = [faces + number * count for number, (_, faces) in enumerate(pieces)]
+        return np.concatenate([corners for corners, _ in pieces]), np.concatenate(triangles)
+
+    def _tube(self, points: FloatArray, frames: FloatArray, sides: int) -> tuple[FloatArray, FloatArray]:
+        """A tube whose cross-sections stand across the curve rather than across the body."""
+        z = np.gradient(points, axis=0)
+        z /= np.linalg.norm(z, axis=1)[:, None]
+        y = np.cross(z, frames[:, :, 0])
+        y /= np.linalg.norm(y, axis=1)[:, None]
+        return tube(np.stack([np.cross(y, z), y, z], axis=-1), points, self.radius, sides)
+
+
+def actuator_curves(sections: BentSections, actuators: tuple[ActuatorTag, ...], points: int = 12) -> tuple[ActuatorCurve, ...]:
+    """Return the curves of actuators in the bent body.
+
+    Args:
+        sections: The body at some coordinates.
+        actuators: The actuators, as `softrobots.SoftModel.muscles`.
+        points: Points for each section; more where a route winds.
+
+    Returns:
+        A curve for each actuator.
+    """
+    curves = []
+    for tag in actuators:
+        places = [route_places(sections, route, points) for route in tag.route]
+        frames = np.concatenate([sections.frames(route.segment, at) for route, at in zip(tag.route, places, strict=True)])
+        curve = np.concatenate([route_points(sections, route, at) for route, at in zip(tag.route, places, strict=True)])
+        steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+        kept = np.append(True, steps > _SAME * steps.sum())
+        curves.append(ActuatorCurve(tag.name, curve[kept], frames[kept, :3, :3], _radius(tag, sections)))
+    return tuple(curves)
+
+
+def route_places(sections: BentSections, route: RouteTag, points: int) -> FloatArray:
+    """Return the places at which a route is drawn: rest lengths from the start of its segment, shape (n,) [m]."""
+    bounds = sections.bounds(route.segment)
+    grid = np.linspace(0.0, 1.0, points, endpoint=False) * np.diff(bounds)[:, None] + bounds[:-1, None]
+    first, last = max(route.at[0], 0.0), min(route.at[-1], float(bounds[-1]))
+    inside = np.concatenate([np.ravel(grid), route.at])
+    corners = np.unique([first, *inside[(inside > first) & (inside < last)], last])
+    turns = np.abs(np.diff(np.interp(corners, route.at, route.azimuth)))
+    pieces = [
+        np.linspace(begin, end, math.ceil(turn / _COARSEST) or 1, endpoint=False)
+        for begin, end, turn in zip(corners[:-1], corners[1:], turns, strict=True)
+    ]
+    return np.concatenate([*pieces, [last]])
+
+
+def route_points(sections: BentSections, route: RouteTag, at: FloatArray) -> FloatArray:
+    """Return the points of a route at rest lengths from the start of its segment, shape (n,) [m], shape (n, 3) [m]."""
+    distance, azimuth = np.interp(at, route.at, route.distance), np.interp(at, route.at, route.azimuth)
+    return beside(sections.frames(route.segment, at), distance, azimuth)
+
+
+def _radius(tag: ActuatorTag, sections: BentSections) -> float:
+    """Half the thickness of an actuator [m]."""
+    if tag.kind == "mckibben" and tag.diameter is not None:
+        return 0.5 * tag.diameter
+    if tag.kind == "pressure" and tag.area is not None:
+        return math.sqrt(tag.area / math.pi)
+    return THREAD * sections.radius(tag.route[0].segment)

@@ -1,0 +1,101 @@
+"""The legend of a page or figure: colour and meaning of everything that is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.view.appearance import FORCE_COLOUR, LINE_COLOUR, PATH_COLOUR, RIGID_COLOUR, TAIL_COLOUR, TUBE_COLOUR, Colour
+from softrobots.view.robot_shapes import Shape
+from softrobots.view.scene import WRINKLING_COLOURS, Scene
+from softrobots.view.tension_scale import ZERO_COLOUR, DrawnActuator, scale_end, tension_colour
+
+_MOST_NAMED = 12  # actuators that are listed one by one
+_ZERO = 1e-9  # of the end of the scale: tensions below are told as zero
+
+
+class LegendEntry(NamedTuple):
+    """Something that is drawn."""
+
+    colour: Colour
+    """Its colour."""
+    meaning: str
+    """What it is."""
+    dashed: bool = False
+    """Whether it is a dashed line."""
+
+
+def legend(
+    shapes: Iterable[Shape], scene: Scene, animated: Iterable[Scene] = (), *, path: bool = False, target: bool = False
+) -> list[LegendEntry]:
+    """Return colour and meaning of everything that is drawn.
+
+    Args:
+        shapes: The shapes of the robot.
+        scene: What is shown.
+        animated: The scenes of an animation.
+        path: Whether the path of the tip is drawn.
+        target: Whether a target is drawn.
+    """
+    shapes, played = tuple(shapes), tuple(animated)
+    states = (scene, *played)
+    entries = [LegendEntry(RIGID_COLOUR, scene.reference)] * any(shape.elastic for shape in shapes)
+    if all(shape.inflated_link is None for shape in shapes):
+        entries += [LegendEntry(shape.colour, "equivalent rigid chain") for shape in shapes if shape.of_section][:1]
+    entries += [LegendEntry(TUBE_COLOUR, "body")] * any(state.segments for state in states)
+    lines = dict.fromkeys(name for state in states for segment in state.segments for name in segment.lines)
+    entries += [LegendEntry(LINE_COLOUR, name) for name in lines]
+    if any(state.segments and state.grown is not None and state.grown < 1.0 for state in states):
+        entries.append(LegendEntry(TAIL_COLOUR, "wall that has not come out"))
+    entries += tension_entries([state.actuators for state in played or (scene,)])
+    entries += [LegendEntry(PATH_COLOUR, "path of the tip")] * path + [LegendEntry(PATH_COLOUR, "target (cross)")] * target
+    entries += [LegendEntry(FORCE_COLOUR, "force")] * any(state.arrows for state in states)
+    above = 1.0
+    for least, colour in WRINKLING_COLOURS if scene.wrinkling else ():
+        text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"
+        entries.append(LegendEntry(colour, text))
+        above = least
+    return entries
+
+
+def tension_entries(states: Sequence[Sequence[DrawnActuator]]) -> list[LegendEntry]:
+    """Return colour and meaning of the actuators of some states of a robot.
+
+    Up to a dozen are told by name, coloured by their largest tension. Colours that change, or are those of more actuators,
+    are told by their scale.
+
+    Args:
+        states: The actuators in each state.
+    """
+    drawn = [actuator for state in states for actuator in state]
+    known = [actuator.tension for actuator in drawn if actuator.tension is not None]
+    if not known:
+        return [LegendEntry(ZERO_COLOUR, "actuator")] * bool(drawn)
+    end, entries = scale_end(known), []
+    names = dict.fromkeys(actuator.curve.name for actuator in drawn)
+    if len(states) > 1 or len(names) > _MOST_NAMED:
+        shares = [1.0, 0.5] * (max(known) > 0.0) + [0.0] + [-0.5, -1.0] * (min(known) < 0.0)
+        entries += [LegendEntry(tension_colour(share * end, end), _words(share * end, share * end)) for share in shares]
+    if len(names) <= _MOST_NAMED:
+        return entries + [_entry(name, [one for one in drawn if one.curve.name == name], end) for name in names]
+    return entries + [LegendEntry(ZERO_COLOUR, "slack", dashed=True)] * any(actuator.slack for actuator in drawn)
+
+
+def _entry(name: str, states: Sequence[DrawnActuator], end: float) -> LegendEntry:
+    """The entry of one actuator in some states, on a scale with an end [N]."""
+    tensions = [0.0 if abs(one.tension) < _ZERO * end else one.tension for one in states if one.tension is not None]
+    slack = [one.slack for one in states]
+    words = "slack" if all(slack) else _words(min(tensions), max(tensions)) + ", dashed where slack" * any(slack)
+    return LegendEntry(tension_colour(max(tensions, key=abs), end), f"{name}: {words}", all(slack))
+
+
+def _words(least: float, most: float) -> str:
+    """Tensions from the least to the most in words [N]."""
+    low, high = (f"{number:.3g}" if abs(number) < 1000.0 else f"{number:.0f}" for number in (least, most))
+    if least < 0.0 < most:
+        return f"{low} N (pushes) to {high} N (pulls)"
+    way = "pulls " if most > 0.0 else "pushes " if least < 0.0 else ""
+    low, high = sorted((low.removeprefix("-"), high.removeprefix("-")), key=float)
+    return f"{way}{high} N" if low == high else f"{way}{low} to {high} N"

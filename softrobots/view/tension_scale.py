@@ -1,0 +1,64 @@
+"""The colours of tensions: one scale from pushes over zero to pulls for pages and figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from softrobots.core.checks import FloatArray
+from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.view.actuator_curves import ActuatorCurve
+
+PULL_COLOURS = ((0.44, 0.70, 0.91), (0.00, 0.20, 0.48))
+"""Red, green, blue of the weakest and of the strongest pull: blue, from light to dark."""
+PUSH_COLOURS = ((0.97, 0.62, 0.25), (0.62, 0.20, 0.00))
+"""Those of the weakest and of the strongest push: orange, from light to dark."""
+ZERO_COLOUR = (0.55, 0.55, 0.55)
+"""Grey of an actuator without tension."""
+
+_NEUTRAL = 1e-3  # of the end of the scale: weaker tensions are grey
+
+
+class DrawnActuator(NamedTuple):
+    """An actuator of a scene."""
+
+    curve: ActuatorCurve
+    """Its curve."""
+    tension: float | None = None
+    """Its tension, negative where it pushes [N]; None without load."""
+    slack: bool = False
+    """Whether it is a tendon that hangs slack."""
+
+
+def drawn_actuators(tags: Sequence[ActuatorTag], curves: Sequence[ActuatorCurve], tensions: FloatArray) -> list[DrawnActuator]:
+    """Return actuators on their curves with their tensions, shape (n,) [N]; an elastic tendon without tension is slack."""
+    rows = zip(tags, curves, tensions.tolist(), strict=True)
+    return [DrawnActuator(curve, tension, tag.kind == "elastic" and tension <= 0.0) for tag, curve, tension in rows]
+
+
+def round_up(number: float) -> float:
+    """The smallest of 1, 2 and 5 times a power of ten that is not below a positive number (to rounding)."""
+    return 1.0 / round_down(1.0 / number)
+
+
+def round_down(number: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above a positive number (to rounding)."""
+    power = math.floor(math.log10(number * (1.0 + 1e-9)))
+    return max(float(f"{digit}e{power}") for digit in (1, 2, 5) if digit * 10.0**power <= number * (1.0 + 1e-9))
+
+
+def scale_end(tensions: Iterable[float | None]) -> float:
+    """Return the tension at both ends of the scale [N]: a round number that no tension exceeds."""
+    largest = max((abs(tension) for tension in tensions if tension is not None), default=0.0)
+    return round_up(largest) if largest > 1e-12 else 1.0
+
+
+def tension_colour(tension: float | None, end: float) -> tuple[float, float, float, float]:
+    """Return the colour of a tension [N] on a scale with an end [N]; grey where it is not known."""
+    share = 0.0 if tension is None else min(abs(tension) / end, 1.0)
+    if tension is None or share < _NEUTRAL:
+        return *ZERO_COLOUR, 1.0
+    ends = zip(*(PULL_COLOURS if tension > 0.0 else PUSH_COLOURS), strict=True)
+    red, green, blue = (light + share * (dark - light) for light, dark in ends)
+    return red, green, blue, 1.0
