@@ -105,8 +105,8 @@ def route_points(sections: BentSections, route: RouteTag, at: FloatArray) -> Flo
 
 def _radius(tag: ActuatorTag, sections: BentSections) -> float:
     """Half the thickness of an actuator [m]."""
-    if tag.kind == "mckibben" and tag.diameter is not None:
+    if tag.kind == "mckibben":
         return 0.5 * tag.diameter
-    if tag.kind == "pressure" and tag.area is not None:
+    if tag.kind == "pressure":
         return math.sqrt(tag.area / math.pi)
     return THREAD * sections.radius(tag.route[0].segment)

@@ -14,7 +14,7 @@ PULL_COLOURS = ((0.44, 0.70, 0.91), (0.00, 0.20, 0.48))
 """Red, green, blue of the weakest and of the strongest pull: blue, from light to dark."""
 PUSH_COLOURS = ((0.97, 0.62, 0.25), (0.62, 0.20, 0.00))
 """Those of the weakest and of the strongest push: orange, from light to dark."""
-ZERO_COLOUR = (0.55, 0.55, 0.55)
+ZERO_COLOUR = (0.45, 0.45, 0.45)
 """Grey of an actuator without tension."""
 
 _NEUTRAL = 1e-3  # of the end of the scale: weaker tensions are grey

@@ -65,6 +65,8 @@ def shape(equilibrium: Equilibrium) -> Any:
     if not isinstance(equilibrium, Equilibrium) or not equilibrium.model.structure.section_table:
         raise ParameterError("equilibrium", equilibrium, "an Equilibrium of a robot with sections")
     figure, axes = new_space((7.0, 7.0), "Shape under load")
+    from matplotlib.lines import Line2D
+
     model = equilibrium.model
     sections = BentSections(model, equilibrium.q_motors, equilibrium.q_springs)
     segments, curves = sections.segments(12), actuator_curves(sections, model.muscles)
@@ -86,12 +88,12 @@ def shape(equilibrium: Equilibrium) -> Any:
     end = scale_end(equilibrium.muscle_forces.tolist())
     for curve, tension, slack in actuators:
         axes.plot(*curve.points.T, color=tension_colour(tension, end), lw=1.6, ls=_DASHED if slack else "-")
-    for colour, meaning, dashed in tension_entries([actuators]):
-        axes.plot([], [], [], color=colour, lw=1.6, ls=_DASHED if dashed else "-", label=plain_words(meaning))
     arrow = force_arrow(axes, equilibrium)
     equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
     handles, labels = axes.get_legend_handles_labels()
     named = dict(zip(labels, handles, strict=True))  # one line of each meaning
+    for colour, meaning, dashed in tension_entries([actuators]):
+        named[plain_words(meaning)] = Line2D([], [], color=colour, lw=1.6, ls=_DASHED if dashed else "-")
     axes.legend(named.values(), named.keys(), loc="upper left", fontsize=9)
     return figure
 
