@@ -23,7 +23,7 @@ FONTS = ("DejaVuSerif.ttf", "STIXGeneral.ttf", "LICENSE_DEJAVU", "LICENSE_STIX")
 SHELL = re.compile(r'<div class="language-(?:sh|console) highlight">.*?</pre>', re.DOTALL)
 SOURCES = {"scripts/*.py": "python", "xacro/**/*.xacro": "xml", "urdf/*.urdf": "xml", "docs/examples/**/*.*": ""}
 """Files of the checkout that become pages, and their languages."""
-LANGUAGES = {".py": "python", ".xacro": "xml", ".urdf": "xml", ".csv": "text"}
+LANGUAGES = {".py": "python", ".xacro": "xml", ".urdf": "xml"}
 TOP = {"README.md": "index.md", "CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 """Files beside docs/, and the pages that stand for them."""
 
