@@ -143,3 +143,8 @@ class Actuators:
 def load_units(units: Sequence[str]) -> tuple[str, ...]:
     """Return the units of the loads on coordinates of these units; the load on a given tension is the tension."""
     return tuple(_LOAD_UNITS[unit] for unit in units)
+
+
+def slack_tendons(actuators: Sequence[ActuatorTag], tensions: FloatArray) -> tuple[bool, ...]:
+    """Return which of some actuators at these tensions, shape (n,) [N], are slack: elastic tendons without tension."""
+    return tuple(one.kind == "elastic" and tension <= 0.0 for one, tension in zip(actuators, tensions.tolist(), strict=True))

@@ -1,7 +1,4 @@
-"""Static equilibrium of a robot with joint springs, as a certified result.
-
-The solvers are in `softrobots.statics.elastostatics`.
-"""
+"""Static equilibrium of a robot with joint springs, as a certified result; `softrobots.statics.elastostatics` solves."""
 
 from __future__ import annotations
 
@@ -14,6 +11,7 @@ import numpy as np
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.model.actuators import slack_tendons
 from softrobots.model.link_limits import LinkLimits, link_limits, link_moments
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual
@@ -115,6 +113,11 @@ class Equilibrium:
     def muscle_forces(self) -> FloatArray:
         """Tension that each muscle must exert, negative where it pushes, shape (n_muscles,) [N]."""
         return self.motor_torques[len(self.motor_torques) - len(self.model.muscles) :]
+
+    @property
+    def muscle_slack(self) -> tuple[bool, ...]:
+        """Which muscles are slack: elastic tendons without tension."""
+        return slack_tendons(self.model.muscles, self.muscle_forces)
 
     @cached_property
     def strains(self) -> FloatArray:

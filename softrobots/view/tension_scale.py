@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from softrobots.core.checks import FloatArray
 from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.model.actuators import slack_tendons
 from softrobots.view.actuator_curves import ActuatorCurve
 
 PULL_COLOURS = ((0.44, 0.70, 0.91), (0.00, 0.20, 0.48))
@@ -32,9 +33,8 @@ class DrawnActuator(NamedTuple):
 
 
 def drawn_actuators(tags: Sequence[ActuatorTag], curves: Sequence[ActuatorCurve], tensions: FloatArray) -> list[DrawnActuator]:
-    """Return actuators on their curves with their tensions, shape (n,) [N]; an elastic tendon without tension is slack."""
-    rows = zip(tags, curves, tensions.tolist(), strict=True)
-    return [DrawnActuator(curve, tension, tag.kind == "elastic" and tension <= 0.0) for tag, curve, tension in rows]
+    """Return actuators on their curves with their tensions, shape (n,) [N]."""
+    return [DrawnActuator(*row) for row in zip(curves, tensions.tolist(), slack_tendons(tags, tensions), strict=True)]
 
 
 def round_up(number: float) -> float:

@@ -32,7 +32,7 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
         Fact("slack_margins", known_margins(limits.slack_margins), "-"),
         Fact("wrinkling_moments", limits.wrinkling_moments, "N m"),
         Fact("wrinkling_margins", known_margins(limits.wrinkling_margins), "-"),
-        *attributes(equilibrium, wrinkled="", saturated="", muscle_lengths="m", muscle_forces="N", stable=""),
+        *attributes(equilibrium, wrinkled="", saturated="", muscle_lengths="m", muscle_forces="N", muscle_slack="", stable=""),
         Fact("stability", equilibrium.stability.kind),
         Fact("growth_rate", equilibrium.stability.growth_rate, "1/s"),
         *attributes(equilibrium, conservative="", within_limits="", residual="N m", tolerance="N m", iterations="-", method=""),
@@ -48,16 +48,18 @@ def model_answer(model: SoftModel, load: Load, facts: Sequence[Fact]) -> dict[st
 
 
 def equilibrium_lines(equilibrium: Equilibrium) -> list[str]:
-    """The same for a person: tables of motors, springs and inflated links, then pose of the tip and certificates."""
+    """The same for a person: tables of motors, actuators, springs and inflated links, then pose of the tip and certificates."""
     return [*coordinate_lines(equilibrium), "", *summary_lines(equilibrium)]
 
 
 def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
-    """Tables of the load, of motors, springs and inflated links."""
+    """Tables of the load, of motors, actuators, springs and inflated links."""
     model = equilibrium.model
-    motors = _table("motor", model.motor_joints, equilibrium.q_motors, model.actuators.units, equilibrium.motor_torques)
+    names, units = model.structure.motor_joints, model.actuators.units
+    n = len(names)
+    motors = _table("motor", names, equilibrium.q_motors[:n], units[:n], equilibrium.motor_torques[:n])
     springs = _table("spring", model.spring_joints, equilibrium.q_springs, model.springs.units, equilibrium.spring_torques)
-    parts = [motors, springs, _links(equilibrium)]
+    parts = [motors, _actuators(equilibrium), springs, _links(equilibrium)]
     return [*head_lines(model, equilibrium.load), *(line for part in parts if part for line in ("", *part))]
 
 
@@ -70,6 +72,7 @@ def summary_lines(equilibrium: Equilibrium) -> list[str]:
         ("tip roll, pitch, yaw", f"{formatted(np.where(abs(rpy) < 1e-15, 0.0, rpy))} rad"),
         ("stable", stability_words(equilibrium)),
         ("within limits", "yes" if equilibrium.within_limits else "NO: a motor, a muscle or a spring is beyond its limits"),
+        *_slack(equilibrium),
         *_walls(equilibrium),
         ("conservative", "yes" if equilibrium.conservative else "no: a world-fixed moment has no potential"),
         ("residual", f"{equilibrium.residual:.2g} N m ({equilibrium.tolerance:.2g} N m allowed), {steps}"),
@@ -92,6 +95,13 @@ def stability_words(equilibrium: Equilibrium) -> str:
 def known_margins(margins: FloatArray) -> list[float | None]:
     """Margins of inflated links as a list [-]; None for a link whose wall has no tension."""
     return [margin if math.isfinite(margin) else None for margin in margins.tolist()]
+
+
+def _slack(equilibrium: Equilibrium) -> list[tuple[str, str]]:
+    """Which tendons are slack; nothing without elastic tendons."""
+    muscles = equilibrium.model.muscles
+    slack = [muscle.name for muscle, hangs in zip(muscles, equilibrium.muscle_slack, strict=True) if hangs]
+    return [("slack tendons", ", ".join(slack) or "none")] * any(muscle.kind == "elastic" for muscle in muscles)
 
 
 def _walls(equilibrium: Equilibrium) -> list[tuple[str, str]]:
@@ -146,6 +156,25 @@ def _table(what: str, names: tuple[str, ...], values: Any, units: tuple[str, ...
     rows = zip(names, values, units, loads, load_units(units), strict=True)
     cells = [(name, _fixed(value), unit, _fixed(load), load_unit) for name, value, unit, load, load_unit in rows]
     return aligned([(what, "position", "", "load", ""), *cells], right=(1, 3))
+
+
+def _actuators(equilibrium: Equilibrium) -> list[str]:
+    """Kind and coordinate of each actuator, its length, tension, and whether it is slack."""
+    model = equilibrium.model
+    if not model.muscles:
+        return []
+    first = model.n_motors - len(model.muscles)
+    columns = (
+        equilibrium.q_motors[first:],
+        model.actuators.units[first:],
+        equilibrium.muscle_lengths,
+        equilibrium.muscle_forces,
+    )
+    cells = [
+        (muscle.name, muscle.kind, _fixed(given), unit, _fixed(length), "m", _fixed(tension), "N", "slack" * slack)
+        for muscle, given, unit, length, tension, slack in zip(model.muscles, *columns, equilibrium.muscle_slack, strict=True)
+    ]
+    return aligned([("actuator", "kind", "given", "", "length", "", "tension", "", ""), *cells], right=(2, 4, 6))
 
 
 def _links(equilibrium: Equilibrium) -> list[str]:

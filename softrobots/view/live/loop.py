@@ -123,10 +123,15 @@ def follow(live: LiveView, commands: Commands, tell: Callable[[str], object], co
 
 
 def state_line(equilibrium: Equilibrium) -> str:
-    """Return one line about a loaded robot: tip, actuators, stability, wrinkling, residual."""
+    """Return one line about a loaded robot: tip, actuators, tensions, slack, stability, wrinkling, residual."""
     words = [f"tip {_spelled(equilibrium.tip_position)} m"]
     if len(equilibrium.q_motors):
         words.append(f"motors {_spelled(equilibrium.q_motors)}" + ("" if equilibrium.within_limits else " (beyond limits)"))
+    if len(equilibrium.muscle_forces):
+        words.append(f"tensions {_spelled(equilibrium.muscle_forces)} N")
+    if any(equilibrium.muscle_slack):
+        rows = zip(equilibrium.model.muscles, equilibrium.muscle_slack, strict=True)
+        words.append("slack " + " ".join(muscle.name for muscle, slack in rows if slack))
     words.append("stable" if equilibrium.stable else equilibrium.stability.kind)
     if equilibrium.model.spring_groups:
         words.append("wrinkled" if equilibrium.wrinkled else "not wrinkled")
@@ -147,4 +152,5 @@ def tip_force(equilibrium: Equilibrium) -> FloatArray:
 
 
 def _spelled(values: FloatArray) -> str:
-    return " ".join(f"{value:.4f}" for value in (values.round(4) + 0.0).tolist())  # no negative zero
+    rounded = (values.round(4) + 0.0).tolist()  # no negative zero
+    return " ".join(f"{value:.4f}" if abs(value) < 100.0 else f"{value:.7g}" for value in rounded)
