@@ -126,7 +126,7 @@ def body_at(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, point
 
     Args:
         model: The robot.
-        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+        q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa].
         q_springs: Elastic coordinates, shape (n_springs,) [rad or m].
         points: Points for each section, besides the start of the segment.
 

@@ -50,7 +50,7 @@ class SliderPage(ServedPage):
 
         Args:
             model: The robot.
-            q_motors: Actuator coordinates at the start, shape (n_motors,) [rad, m or N]; relaxed by default.
+            q_motors: Actuator coordinates at the start, shape (n_motors,) [rad, m, N or Pa]; relaxed by default.
             force: Force on the tip at the start, shape (3,) [N], world axes; none by default.
             gravity: Gravity, shape (3,) [m/s^2], world axes, which can be switched off; by default it is off, and the Earth's
                 when it is switched on.
@@ -109,7 +109,7 @@ class SliderPage(ServedPage):
         """Move the sliders, solve and draw; what is left out stays.
 
         Args:
-            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa].
             force: Force on the tip, shape (3,) [N], world axes.
             gravity: Whether there is gravity.
 

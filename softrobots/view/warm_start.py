@@ -18,7 +18,7 @@ def next_equilibrium(last: Equilibrium, q_motors: Any, force: Any = None, *, gra
 
     Args:
         last: The equilibrium to start from.
-        q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+        q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa].
         force: Force on the tip, shape (3,) [N], world axes.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
 

@@ -11,7 +11,7 @@ from softrobots.statics.loads import EARTH_GRAVITY
 
 GRAMMAR = """\
 target X Y Z        put the loaded tip there [m]; it stays there when the load changes
-motors Q [Q ...]    actuator coordinates, base to tip [rad, m or N]
+motors Q [Q ...]    actuator coordinates, base to tip [rad, m, N or Pa]
 force FX FY FZ      force on the tip [N]
 gravity on|off      the Earth's, or none; or three numbers [m/s^2]
 reset               as at the start
@@ -32,7 +32,7 @@ class Wanted(NamedTuple):
     """The state that a live view shows or shall show; arrays are read-only."""
 
     motors: FloatArray
-    """Actuator coordinates, shape (n_motors,) [rad, m or N]; with a target, those found for it."""
+    """Actuator coordinates, shape (n_motors,) [rad, m, N or Pa]; with a target, those found for it."""
     target: FloatArray | None
     """Target of the tip, shape (3,) [m]; None: the actuator coordinates are given instead."""
     force: FloatArray

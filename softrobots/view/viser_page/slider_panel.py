@@ -17,7 +17,7 @@ from softrobots.view.tension_scale import round_down
 
 _STEPS = 400  # least number of steps of a slider
 _LISTED = 6  # most inflated links that are listed one by one
-_SLIDE = 1.0  # [m], half the range of a prismatic joint without limits
+_AROUND = {"rad": math.pi, "m": 1.0, "N": 100.0, "Pa": 1e5}  # half the range of an actuator without limits, by its unit
 
 _STYLE = (
     "<style>#softrobots-panel{font:13px/1.5 sans-serif;padding:0 1em .5em} #softrobots-note{font-weight:bold;color:#8b0000}"
@@ -30,7 +30,7 @@ class Setting(NamedTuple):
     """Values of all sliders."""
 
     q_motors: tuple[float, ...]
-    """Actuator coordinates [rad, m or N]."""
+    """Actuator coordinates [rad, m, N or Pa]."""
     force: tuple[float, ...]
     """Force on the tip [N], world axes."""
     gravity: bool
@@ -52,9 +52,11 @@ class SliderPanel:
         """
         self._gui, self._changed = gui, changed
         self._reset = False
-        rows = zip(model.motor_joints, model.actuators.units, model.motor_limits.tolist(), start.q_motors, strict=True)
+        limits = zip(model.motor_limits.tolist(), model.actuators.units, model.relaxed_motors.tolist(), strict=True)
+        ends = [_ends(low, high, unit, relaxed) for (low, high), unit, relaxed in limits]
         with gui.add_folder("muscles" if model.n_motors == len(model.muscles) > 0 else "motors", visible=model.n_motors > 0):
-            self._motors = [self._slider(name, unit, *_ends(limits, unit), value) for name, unit, limits, value in rows]
+            rows = zip(model.motor_joints, model.actuators.units, ends, start.q_motors, strict=True)
+            self._motors = [self._slider(name, unit, *between, value) for name, unit, between, value in rows]
         with gui.add_folder("load"):
             force = zip("xyz", start.force, strict=True)
             self._force = [self._slider(f"force {axis}", "N", -full_force, full_force, value) for axis, value in force]
@@ -145,12 +147,17 @@ def slider_grid(low: float, high: float) -> tuple[float, float, float]:
     return round(first * step, digits), round(last * step, digits), step
 
 
-def _ends(limits: Sequence[float], unit: str) -> tuple[float, float]:
-    """Limits of a slider: those of the motor; a missing one lies a default range from the other, or from zero."""
-    (low, high), around = limits, math.pi if unit == "rad" else _SLIDE
+def _ends(low: float, high: float, unit: str, relaxed: float) -> tuple[float, float]:
+    """Ends of a slider: the limits of the actuator; a missing one lies a default range from the other, or from zero.
+
+    The default range of a length is that around the length at rest.
+    """
+    around = 0.5 * relaxed if unit == "m" and relaxed > 0.0 else _AROUND[unit]
     if math.isinf(low) and math.isinf(high):
         return -around, around
-    return high - 2.0 * around if math.isinf(low) else low, low + 2.0 * around if math.isinf(high) else high
+    if math.isinf(high):
+        return low, max(low, relaxed - around) + 2.0 * around
+    return high - 2.0 * around if math.isinf(low) else low, high
 
 
 def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:
