@@ -34,11 +34,10 @@ class PushedArm:
 
     def balance(self, springs: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residual (n, 4), tangent stiffness (n, 4, 4) and derivative of the residual by the force (n, 4)."""
-        straight, pushes = np.zeros((len(springs), 3)), np.stack([-forces, 0 * forces, 0 * forces], axis=1)
-        load, tangent, _ = arm_balance(straight, springs, pushes, 0.0)
-        by_force = arm_balance(straight, springs, np.tile([-1.0, 0.0, 0.0], (len(springs), 1)), 0.0)[0]
-        residual = load + self.stiffness * springs
-        tangent = tangent + np.diag(self.stiffness)
+        unit = np.tile([-1.0, 0.0, 0.0], (len(springs), 1))
+        by_force, curvature, _ = arm_balance(np.zeros((len(springs), 3)), springs, unit, 0.0)  # both are linear in the force
+        residual = forces[:, None] * by_force + self.stiffness * springs
+        tangent = forces[:, None, None] * curvature + np.diag(self.stiffness)
         for places, largest in zip(([0, 1], [2, 3]), self.plateaus, strict=True):
             angles, stiffness = springs[:, places], self.stiffness[places[0]]
             bend = np.linalg.norm(angles, axis=1)
@@ -74,7 +73,7 @@ class PushedArm:
         """
         count = len(springs)
         here = np.tile(np.column_stack([springs, np.full(count, force / self.unit)]), (2, 1))
-        along = self._null_vectors(here)
+        along = null_vectors(self._augmented(here)[1])
         along[count:] *= -1.0
         step, alive = np.full(2 * count, 0.01), np.ones(2 * count, dtype=bool)
         points = [[place] for place in here]
@@ -87,9 +86,10 @@ class PushedArm:
                 residual, jacobian = self._augmented(there)
                 gram = jacobian @ np.swapaxes(jacobian, 1, 2) + 1e-14 * np.eye(4)
                 there = there - (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(gram, residual[..., None]))[..., 0]
-            moved, settled = there - here[rows], np.linalg.norm(self._augmented(there)[0], axis=1) < 1e-9
+            residual, jacobian = self._augmented(there)
+            moved, settled = there - here[rows], np.linalg.norm(residual, axis=1) < 1e-9
             length = np.linalg.norm(moved, axis=1)
-            ahead = self._null_vectors(there)
+            ahead = null_vectors(jacobian)
             short = step[rows] <= KINK
             # Beyond the knee of a link the force may fall at once, but the robot bends on.
             onward = np.where(short, (ahead[:, :4] * moved[:, :4]).sum(axis=1), (ahead * moved).sum(axis=1))
@@ -111,8 +111,10 @@ class PushedArm:
         jacobian = np.concatenate([tangent, self.unit * by_force[..., None]], axis=2)
         return residual / self.stiffness, jacobian / self.stiffness[:, None]
 
-    def _null_vectors(self, places: np.ndarray) -> np.ndarray:
-        return np.linalg.svd(self._augmented(places)[1])[2][:, -1].copy()
+
+def null_vectors(jacobian: np.ndarray) -> np.ndarray:
+    """Unit vectors (n, 5) that matrices (n, 4, 5) take to zero."""
+    return np.linalg.svd(jacobian)[2][:, -1].copy()
 
 
 def distance(polyline: np.ndarray, places: np.ndarray) -> np.ndarray:
