@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+import xacro
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.description.expansion import declared_arguments, expand
+from softrobots.description.expansion import XACRO_NAMESPACE, declared_arguments, expand
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import NAMESPACE
@@ -294,6 +295,27 @@ def test_collision_shapes_across_a_hinge_do_not_touch(arm: sr.SoftModel) -> None
 def test_bad_arguments_of_the_xacro_file_are_refused(arguments: dict, message: str) -> None:
     with pytest.raises(sr.DescriptionError, match=message):
         expand(XACRO, arguments)
+
+
+def test_texts_are_evaluated_as_by_xacro_itself(tmp_path: Path) -> None:
+    """Escapes, lone dollars, several expressions, lazy properties, arguments, calls with other values of the same text."""
+    texts = ("", " ", "a$b", "$", "$${x}", "$$$(arg size)", "${x}", "${x}${y}m", "$(arg size) m", "${'%.3f' % z} ${[x, y][1]}")
+    links = "".join(f"<link name='${{tag}}_{number}' text=\"{text}\">{text}</link>" for number, text in enumerate(texts))
+    file = tmp_path / "texts.xacro"
+    file.write_text(
+        f"<robot name='r' xmlns:xacro='{XACRO_NAMESPACE}'><xacro:arg name='size' default='2'/>"
+        "<xacro:property name='z' value='${x / 7}'/><xacro:property name='x' value='$(arg size)'/>"
+        f"<xacro:macro name='row' params='tag y:=${{z}}'><xacro:property name='x' value='${{y + 1}}'/>{links}</xacro:macro>"
+        "<xacro:row tag='a'/><xacro:row tag='b' y='3'/><!-- xacro:eval-comments --><!-- ${x} --></robot>",
+        encoding="utf-8",
+    )
+    for size in ("2", "0.5", "2"):
+        own = xacro.process_file(str(file), mappings={"size": size}).toprettyxml(indent="  ")
+        assert expand(file, {"size": size}) == without_banner(own)
+    file.write_text(file.read_text(encoding="utf-8").replace("${x / 7}", "${x.__class__}"), encoding="utf-8")
+    for _ in range(2):
+        with pytest.raises(sr.DescriptionError, match=r"invalid name.*__class__"):
+            expand(file)
 
 
 def test_files_that_are_no_robot_are_refused(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import itertools
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -93,12 +94,12 @@ def _checked_files() -> Iterator[None]:
     """Let xacro read every file, also included ones, by `read_xml`, stop at `MOST_STEPS`, and take linear time.
 
     xacro itself reads in the encoding of the system, expands entities and waits for pipes; a macro that doubles itself takes
-    minutes.
+    minutes; and a text is taken apart, and its expressions compiled, each time that a macro comes to it.
     """
     import xacro
 
-    own = xacro.parse, xacro.eval_all, xacro.resolve_macro, xacro.replace_node
-    parse, evaluate, resolve, _ = own
+    own = {name: getattr(xacro, name) for name in ("parse", "eval_all", "resolve_macro", "replace_node", "eval_text")}
+    own |= {name: getattr(xacro, name) for name in ("is_valid_name", "safe_eval", "QuickLexer")}
     steps = 0
 
     def count(more: int) -> None:
@@ -112,22 +113,70 @@ def _checked_files() -> Iterator[None]:
         if content is None and file.exists():  # xacro reports missing files, which may be optional
             content = read_xml(file)
             parse_xml(content, str(file))
-        return parse(content, filename)
+        return own["parse"](content, filename)
 
     def evaluated(*arguments: Any) -> Any:
         count(1)
-        return evaluate(*arguments)
+        return own["eval_all"](*arguments)
 
     def resolved(*arguments: Any) -> Any:
-        macro = resolve(*arguments)
+        macro = own["resolve_macro"](*arguments)
         count(len(macro[2].body.getElementsByTagName("*")))  # all of it is copied, also branches that are not taken
         return macro
 
-    xacro.parse, xacro.eval_all, xacro.resolve_macro, xacro.replace_node = checked, evaluated, resolved, _replace_node
+    def text_of(text: Any, symbols: Any) -> Any:
+        return text if isinstance(text, str) and "$" not in text else own["eval_text"](text, symbols)
+
+    ours = {"parse": checked, "eval_all": evaluated, "resolve_macro": resolved, "replace_node": _replace_node}
+    ours |= {"eval_text": text_of, "is_valid_name": lru_cache(own["is_valid_name"]), "safe_eval": _value, "QuickLexer": _Lexer}
+    vars(xacro).update(ours)
     try:
         yield
     finally:
-        xacro.parse, xacro.eval_all, xacro.resolve_macro, xacro.replace_node = own
+        vars(xacro).update(own)
+
+
+@lru_cache(maxsize=2048)
+def _code(expression: str) -> Any:
+    return compile(expression.strip(), "<expression>", "eval")
+
+
+def _value(expression: str, symbols: Any) -> Any:
+    """`safe_eval` of xacro with compiled expressions that are kept."""
+    code = _code(expression)
+    forbidden = [name for name in code.co_names if name.startswith("__")]
+    if forbidden:
+        raise DescriptionError(f"use of invalid names: {', '.join(forbidden)}")
+    symbols.update(__builtins__={})  # no functions but those of xacro
+    return eval(code, symbols)
+
+
+@lru_cache(maxsize=2048)
+def _tokens(text: str) -> tuple[tuple[int, str], ...]:
+    """Parts of a text between and in `${...}` and `$(...)`, each with its kind, by xacro's own lexer."""
+    import xacro
+
+    found = []
+    xacro.LEXER.lex(text)
+    while xacro.LEXER.peek():
+        found.append(xacro.LEXER.next())
+    return tuple(found)
+
+
+class _Lexer:
+    """`QuickLexer` of xacro with parts that are kept."""
+
+    def __init__(self, own: Any) -> None:
+        vars(self).update(vars(own))
+
+    def lex(self, text: str) -> None:
+        self._left = list(reversed(_tokens(text)))
+
+    def peek(self) -> tuple[int, str] | None:
+        return self._left[-1] if self._left else None
+
+    def next(self) -> tuple[int, str] | None:
+        return self._left.pop() if self._left else None
 
 
 def _replace_node(node: Any, by: Any, content_only: bool = False) -> None:
