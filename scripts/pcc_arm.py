@@ -18,7 +18,7 @@ import numpy as np
 import softrobots as sr
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large
 from softrobots.core.files import make_folder, write_text
-from softrobots.robots.pcc_arm import CHAINS
+from softrobots.robots.continuum_arm import CHAINS
 from softrobots.statics.loads import Load
 from softrobots.view.figures import canvas, loaded_robot
 from studies.shared.command_line import serve, tell_written

@@ -38,7 +38,7 @@ from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup
-from softrobots.robots import ROBOTS, AssumedStiffnessWarning, HelixTube, InflatableArm, PccArm
+from softrobots.robots import ROBOTS, AssumedStiffnessWarning, HelixTube, InflatableArm, PccArm, Route, TendonArm
 from softrobots.robots.growth import grown_coordinates
 from softrobots.statics.critical_load import critical_load
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
@@ -92,6 +92,7 @@ __all__ = [
     "ParameterError",
     "Path3D",
     "PccArm",
+    "Route",
     "SelfIntersection",
     "ShapedTrajectory",
     "SoftModel",
@@ -100,6 +101,7 @@ __all__ = [
     "Stability",
     "StraightTube",
     "TargetUnreachable",
+    "TendonArm",
     "Trajectory",
     "VibrationModes",
     "Viewer",

@@ -23,7 +23,7 @@ from softrobots.description.expansion import XACRO_NAMESPACE, declared_arguments
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import NAMESPACE
-from softrobots.robots import HelixTube, PccArm
+from softrobots.robots import HelixTube, PccArm, TendonArm
 from softrobots.robots.fields import argument_text, default_text, facts_of
 from tests.conftest import CHECKOUT
 from tests.support.laws import law
@@ -31,8 +31,9 @@ from tests.support.oracles import tube_points
 from tests.support.tables import each_row
 
 XACRO = xacro_folder() / sr.InflatableArm.XACRO
-KINDS = (sr.InflatableArm, PccArm, HelixTube)
-SOURCES = {"Troise", "PCC", "Blumenschein", "assumed", "chosen"}
+KINDS = (sr.InflatableArm, PccArm, TendonArm, HelixTube)
+SHARED = {PccArm: "continuum_arm_macro.xacro", TendonArm: "continuum_arm_macro.xacro"}  # macros of several robots
+SOURCES = {"Troise", "PCC", "Blumenschein", "OpenCR", "assumed", "chosen"}
 ODD = {
     "link_lengths": (0.5, 0.4, 0.3),
     "hinge_offset": (0.03, 0.05, 0.02),
@@ -57,6 +58,27 @@ ODD_PCC = {
     "bending_stiffness": (2.0, 1.5, 0.5),
     "rgba": ((1.0, 0.5, 0.25, 1.0), (0.5, 0.25, 1.0, 1.0), (0.1, 0.2, 0.3, 0.4)),
     "elastic_sections": 2,
+}
+ODD_MUSCLES = {
+    "segment_lengths": (0.5, 0.4),
+    "elastic_sections": 1,
+    "kind": ("mckibben", "elastic"),
+    "routing": [
+        sr.Route(at=(0.1, 0.9), azimuth=(0.2, 6.0), distance=(0.04, 0.03)),
+        {"at": (0, 0.5), "azimuth": 0, "distance": 0.02},
+    ],
+    "muscle_braid_angle": 0.5,
+    "muscle_pretension": (0.0, 3.0),
+    "muscle_least_tension": (0.0, -2.0),
+}
+ODD_TENDONS = {
+    "segment_lengths": (0.1, 0.08, 0.05),
+    "offset": (0.1, -1.0, 2.0),
+    "routing": ("segment", "base", 2),
+    "kind": ("tension", "elastic", "tension"),
+    "tendon_azimuths": (0.0, 3.0),
+    "backbone_radius": (1e-3, 8e-4, 5e-4),
+    "axial_stiffness": (900.0, 800.0, 700.0),
 }
 ODD_LUMPED = {"chain": "lumped", "hinges": 3, "hinge_rule": "midpoint", "torsion": False, "radius": (0.05, 0.03)}
 ODD_TUBE = {
@@ -99,6 +121,9 @@ def test_committed_urdf_is_what_xacro_generates(name: str) -> None:
         (PccArm, ODD_PCC),
         (PccArm, ODD_LUMPED),
         (PccArm, {"chain": "lumped"}),
+        (PccArm, ODD_MUSCLES),
+        (TendonArm, {}),
+        (TendonArm, ODD_TENDONS),
         (HelixTube, {}),
         (HelixTube, ODD_TUBE),
         (HelixTube, LUMPED_TUBE),
@@ -133,6 +158,8 @@ def test_the_arguments_of_the_xacro_file_are_the_fields_of_the_dataclass(kind: t
 def test_the_xacro_files_check_the_bounds_of_the_dataclass(kind: type) -> None:
     """Lower bounds, and upper ones where the macros state them; the xacro files are used alone, too."""
     macros = Path(str(xacro_folder() / kind.XACRO).replace(".urdf.xacro", "_macro.xacro")).read_text(encoding="utf-8")
+    if kind in SHARED:
+        macros += (xacro_folder() / SHARED[kind]).read_text(encoding="utf-8")
     bounded = {name for name, facts in facts_of(kind).items() if facts.unit and facts.bounds}
     assert {name for name in bounded if re.search(rf'<xacro:number(?:_list|_or)? name="{name}"', macros)} == bounded
     for name, facts in facts_of(kind).items():

@@ -44,6 +44,16 @@ ROBOTS: dict[str, XacroRobot] = {
     ),
     "midpoint pcc": sr.PccArm(chain="lumped", hinges=3, hinge_rule="midpoint", torsion=False, extension=False),
     "one hinge": sr.PccArm(chain="lumped", hinges=1),
+    "chambers": sr.PccArm(kind=("pressure", "mckibben"), elastic_sections=2, muscle_azimuths=(0.0, 2.0, 4.0)),
+    "muscles from the base": sr.PccArm(
+        segment_lengths=(0.5, 0.3, 0.2),
+        offset=(0.1, 0.4, -0.7),
+        routing=("segment", "base", 2),
+        kind="elastic",
+        elastic_sections=1,
+    ),
+    "tendons": sr.TendonArm(elastic_sections=2, offset=0.3),
+    "measured tendons": sr.TendonArm(chain="lumped", hinges=2, bending_stiffness=(3e-3, 2e-3, 1e-3), kind="tension"),
     "helix": sr.HelixTube(length=0.6, elastic_sections=4),
     "lumped helix": sr.HelixTube(chain="lumped", hinges=4, handedness="left", torsional_stiffness=0.01),
     "straight tube": sr.HelixTube(contraction=1.0, angle=0.0, elastic_sections=4),
@@ -147,7 +157,8 @@ def test_a_foreign_robot() -> None:
 def test_a_file_of_ours_without_its_parameters() -> None:
     model = sr.load_model(urdf_folder() / "pcc_arm_lumped.urdf", muscles="forces")
     content = read(to_json(model))
-    assert {number["source"] for number in numbers(content["muscles"])} == {"<softrobots:muscle> of the URDF"}
+    sources = {number["source"] for number in numbers(content["muscles"])}
+    assert sources == {"<softrobots:actuator> of the URDF", "<softrobots:route> of the URDF"}
     assert {number["source"] for number in numbers(content["lumped_sections"])} == {"<softrobots:lumped_section> of the URDF"}
     arms = content["muscles"][1]["arms"]
     assert len(arms) == 36  # two bendings and the stretch of twelve hinges
@@ -272,7 +283,7 @@ def test_what_does_not_belong_together_is_refused() -> None:
     model = sr.load_model(sr.InflatableArm())
     with pytest.raises(sr.ParameterError, match="the robot that the model was loaded from"):
         to_json(model, sr.InflatableArm(stiffness=150.0))
-    with pytest.raises(sr.ParameterError, match="an InflatableArm, a PccArm or a HelixTube"):
+    with pytest.raises(sr.ParameterError, match="a robot of this package"):
         to_json(model, model)
     with pytest.raises(sr.ParameterError, match="SoftModel"):
         to_json(sr.InflatableArm())

@@ -657,6 +657,23 @@ def two_hinges() -> str:
     return PccArm(segment_lengths=(0.3,), chain="lumped", hinges=2).urdf()
 
 
+def muscles_of_before(text: str) -> str:
+    """A description of straight actuators of given length along one segment each, by the tags that described them before."""
+    root = ElementTree.fromstring(text)
+    for place, element in [(place, element) for place, element in enumerate(root) if element.tag == f"{{{NAMESPACE}}}actuator"]:
+        (piece,) = element
+        kept = ("name", "rest_length", "shortest", "longest", "strongest")
+        numbers = {name: piece.get(name).split()[0] for name in ("azimuth", "distance")}
+        attributes = {name: element.get(name) for name in kept} | numbers | {"segment": piece.get("segment")}
+        root[place] = ElementTree.Element(f"{{{NAMESPACE}}}muscle", attributes)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+@functools.cache
+def one_section_before() -> str:
+    return muscles_of_before(one_section())
+
+
 def without(element: str, *names: str) -> Callable[[ElementTree.Element], None]:
     def change(root: ElementTree.Element) -> None:
         for name in names:
@@ -670,6 +687,10 @@ def with_mimic(name: str, master: str) -> Callable[[ElementTree.Element], None]:
         ElementTree.SubElement(root.find(f"joint[@name='{name}']"), "mimic", {"joint": master})
 
     return change
+
+
+def turned_muscle(root: ElementTree.Element) -> None:
+    root.find(f"{{{NAMESPACE}}}actuator[@name='muscle_1_1']/*").set("azimuth", "2.0943951023932 2.0943951023932")
 
 
 JOINTS_ = "section_1_1_u1 section_1_1_u2 section_1_1_c section_1_1_r1 section_1_1_r2 section_1_1_r3"
@@ -712,17 +733,17 @@ TAGS = [
     (two_hinges, changed("lumped_section", "section_1_1", radius="0"), "has radius 0.0; a positive number"),
     (two_hinges, changed("lumped_section", "section_1_1", segment="one"), "a number from 1"),
     (two_hinges, changed("lumped_section", "section_1_2", name="section_1_1"), "a section name twice"),
-    (one_section, changed("muscle", "muscle_1_1", distance="0"), "has distance 0.0; a positive number"),
-    (one_section, changed("muscle", "muscle_1_1", azimuth="nan"), "has azimuth = 'nan'; a finite number"),
-    (one_section, changed("muscle", "muscle_1_1", azimuth=None), "has azimuth = None; a finite number"),
-    (one_section, changed("muscle", "muscle_1_1", rest_length="-1"), "has rest_length -1.0; a positive number"),
-    (one_section, changed("muscle", "muscle_1_1", shortest="9"), "shortest at 9.0 and longest at"),
-    (one_section, changed("muscle", "muscle_1_1", longest="inf"), "has longest = 'inf'; a finite number"),
-    (one_section, changed("muscle", "muscle_1_1", strongest="0"), "has strongest 0.0; a positive number"),
-    (one_section, changed("muscle", "muscle_1_1", segment="2"), "runs along segment 2; available: 1"),
-    (one_section, changed("muscle", "muscle_1_1", segment="a"), "a number from 1"),
-    (one_section, changed("muscle", "muscle_1_1", name="muscle_1_2"), "a muscle name twice.*muscle_1_2"),
-    (one_section, changed("muscle", "muscle_1_1", name=""), "a muscle name twice or an empty one"),
+    (one_section_before, changed("muscle", "muscle_1_1", distance="0"), "has distance 0.0; a positive number"),
+    (one_section_before, changed("muscle", "muscle_1_1", azimuth="nan"), "has azimuth = 'nan'; a finite number"),
+    (one_section_before, changed("muscle", "muscle_1_1", azimuth=None), "has azimuth = None; a finite number"),
+    (one_section_before, changed("muscle", "muscle_1_1", rest_length="-1"), "has rest_length -1.0; a positive number"),
+    (one_section_before, changed("muscle", "muscle_1_1", shortest="9"), "shortest at 9.0 and longest at"),
+    (one_section_before, changed("muscle", "muscle_1_1", longest="inf"), "has longest = 'inf'; a finite number"),
+    (one_section_before, changed("muscle", "muscle_1_1", strongest="0"), "has strongest 0.0; a positive number"),
+    (one_section_before, changed("muscle", "muscle_1_1", segment="2"), "runs along segment 2; available: 1"),
+    (one_section_before, changed("muscle", "muscle_1_1", segment="a"), "a number from 1"),
+    (one_section_before, changed("muscle", "muscle_1_1", name="muscle_1_2"), "a muscle name twice.*muscle_1_2"),
+    (one_section_before, changed("muscle", "muscle_1_1", name=""), "a muscle name twice or an empty one"),
 ]
 
 
@@ -757,9 +778,9 @@ CHAINS_ = [
     (changed("section", "section_1_1", rest="0.0 0.0 0.0 1.1"), "section_1_1_c .* not where the rest shape"),
     (within_joint("section_1_1_r2", ".", type="fixed"), "spring or a section on section_1_1_r2, which cannot move"),
     (with_mimic("section_1_1_r2", "section_1_1_u2"), "joints that mimic others"),
-    (without("muscle", "muscle_1_1"), "the 2 muscles of segment 1 do not fix its bending"),
-    (without("muscle", "muscle_1_1", "muscle_1_2"), "the 1 muscles of segment 1 do not fix its bending"),
-    (changed("muscle", "muscle_1_1", azimuth="2.0943951023932"), "the 3 muscles of segment 1 do not fix its bending"),
+    (without("actuator", "muscle_1_1"), "the 2 muscles of segment 1 do not fix its bending"),
+    (without("actuator", "muscle_1_1", "muscle_1_2"), "the 1 muscles of segment 1 do not fix its bending"),
+    (turned_muscle, "the 3 muscles of segment 1 do not fix its bending"),
 ]
 
 
@@ -783,7 +804,7 @@ def test_a_section_with_a_rest_shape_is_accepted_where_it_says(rest: tuple) -> N
     for name, rpy in angles.items():
         root.find(f"joint[@name='section_1_1_{name}']/origin").set("rpy", " ".join(map(repr, map(float, rpy))))
     root.find("joint[@name='section_1_1_c']/origin").set("xyz", f"0 0 {chord!r}")
-    without("muscle", "muscle_1_1", "muscle_1_2", "muscle_1_3")(root)
+    without("actuator", "muscle_1_1", "muscle_1_2", "muscle_1_3")(root)
     root.find(f"{{{NAMESPACE}}}section").set("rest", " ".join(map(repr, rest)))
     model = sr.load_model(ElementTree.tostring(root, encoding="unicode"))
     q = model.configuration([])
@@ -802,6 +823,7 @@ def test_a_section_with_a_rest_shape_is_accepted_where_it_says(rest: tuple) -> N
     ("options", "error", "message"),
     [
         ({"muscles": "tensions"}, sr.ParameterError, "muscles.*'lengths', 'forces'"),
+        ({"muscles": None}, sr.ParameterError, "muscles.*'lengths', 'forces'"),
         ({"springs": {"section_1_1_u1": 10.0}}, sr.NameNotFound, "no movable joint is called 'section_1_1_u1'"),
         ({"motors": ["section_1_1_c"]}, sr.NameNotFound, "no movable joint is called 'section_1_1_c'"),
         ({"tip": "segment_2"}, sr.NameNotFound, "no frame is called 'segment_2'.*did you mean 'segment_1'"),
@@ -818,6 +840,20 @@ def test_muscles_along_hinges_without_springs_are_refused() -> None:
 
 
 # --- Loading
+
+
+@pytest.mark.parametrize("chain", ["sections", "lumped"])
+def test_a_file_from_before_is_the_same_robot(chain: str) -> None:
+    """Muscles were tags with a segment, an azimuth and a distance; all that a model holds of them is equal."""
+    robot = PccArm(segment_lengths=(0.4, 0.3), chain=chain, elastic_sections=2, hinges=3)
+    before, now = sr.load_model(muscles_of_before(robot.urdf())), sr.load_model(robot)
+    assert ":muscle " in before.urdf
+    assert before.muscles == now.muscles
+    assert before.motor_joints == now.motor_joints
+    lengths = now.relaxed_motors * [1.02, 0.99, 1.0, 0.98, 1.01, 1.0]
+    force, weight = (1.0, 2.0, -0.5), sr.EARTH_GRAVITY
+    one, two = (sr.solve_equilibrium(model, now.checked_motors(lengths), force, gravity=weight) for model in (before, now))
+    assert np.array_equal(one.q, two.q)
 
 
 @pytest.mark.parametrize("chain", ["sections", "lumped"])

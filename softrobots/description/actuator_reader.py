@@ -13,7 +13,7 @@ from softrobots.description.tag_numbers import described, number, numbers, posit
 from softrobots.description.urdf_tags import KINDS, NAMESPACE, ActuatorTag, AnySectionTag, RouteTag
 
 _TENDON = ("shortest", "longest", "weakest", "strongest", "friction")
-_OPTIONAL = {
+OPTIONAL = {
     "length": _TENDON,
     "tension": _TENDON,
     "elastic": (*_TENDON, "pretension"),
@@ -21,7 +21,8 @@ _OPTIONAL = {
     "mckibben": ("max_pressure",),
 }
 """Numbers that an actuator of each kind may state, beside its rest length."""
-_REQUIRED = {"elastic": ("stiffness",), "pressure": ("area",), "mckibben": ("diameter", "braid_angle")}
+REQUIRED = {"elastic": ("stiffness",), "pressure": ("area",), "mckibben": ("diameter", "braid_angle")}
+"""Numbers that an actuator of some kinds must state."""
 _NOT_NEGATIVE = ("shortest", "pretension", "friction")
 _TOUCHING = 1e-9  # between two pieces of a route [m]
 
@@ -77,7 +78,7 @@ def _actuator(
     kind = element.get("kind", "")
     if kind not in KINDS:
         raise DescriptionError(f"{where} has kind = {kind[:100]!r}; required: one of {', '.join(KINDS)}")
-    required, optional = _REQUIRED.get(kind, ()), _OPTIONAL[kind]
+    required, optional = REQUIRED.get(kind, ()), OPTIONAL[kind]
     missing = [key for key in required if key not in element.attrib]
     allowed = ("name", "kind", "rest_length", *required, *optional)
     superfluous = [key for key in element.attrib if key not in allowed]

@@ -11,8 +11,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
-from softrobots.robots import HelixTube, InflatableArm, PccArm, XacroRobot
+from softrobots.robots import HelixTube, InflatableArm, TendonArm, XacroRobot
+from softrobots.robots.continuum_arm import ContinuumArm
+from softrobots.robots.routes import owner
 
 Rules = dict[tuple[str, str], str]
 """Expression by the name of a part (joint, section, muscle, link) and of one of its numbers."""
@@ -25,8 +29,8 @@ def number_rules(robot: XacroRobot) -> Rules:
     """Return the expression of every number in the description of a robot."""
     if isinstance(robot, InflatableArm):
         return _inflatable_arm(robot)
-    if isinstance(robot, PccArm):
-        return _pcc_arm(robot)
+    if isinstance(robot, ContinuumArm):
+        return _continuum_arm(robot)
     return _helix_tube(robot) if isinstance(robot, HelixTube) else {}
 
 
@@ -35,10 +39,11 @@ def derived_numbers(robot: XacroRobot) -> dict[str, dict[str, Any]]:
     rows: list[_Row] = []
     if isinstance(robot, InflatableArm):
         rows = _link_stiffness(robot)
-    elif isinstance(robot, PccArm):
+    elif isinstance(robot, ContinuumArm):
         name = "elastic_sections" if robot.chain == "sections" else "hinges"
         lengths = [length / getattr(robot, name) for length in robot.segment_lengths]
         rows = [("section_lengths", lengths, "m", "Rest length of a section, by segment", f"segment_lengths[0] / {name}")]
+        rows += _backbone(robot) if isinstance(robot, TendonArm) else []
     elif isinstance(robot, HelixTube):
         rows = [*_tube_stiffness(robot), *_tube_shape(robot)]
     keys = ("value", "unit", "meaning", "source")
@@ -74,6 +79,26 @@ def _link_stiffness(robot: InflatableArm) -> list[_Row]:
         torsion, twist = f"(shear_of_wall[0] + {stress}) * 2 * {second}", robot.hinges.twist_stiffness.tolist()
         rows.append(("twisting", twisting, "N m2", "Torsional stiffness of a link", torsion))
         rows.append(("twist_stiffness", twist, "N m/rad", "Stiffness of its spring", "twisting[0] / link_lengths[0]"))
+    return rows
+
+
+def _backbone(robot: TendonArm) -> list[_Row]:
+    radius, modulus, ratio = (np.array(getattr(robot, name)) for name in ("backbone_radius", "young_modulus", "poisson_ratio"))
+    rods: dict[str, tuple[str, Any, str, str]] = {
+        "EI": ("bending", modulus * math.pi * radius**4 / 4.0, "N m2", "young_modulus[0] * pi * backbone_radius[0]**4 / 4"),
+        "GJ": (
+            "torsional",
+            modulus / (2.0 * (1.0 + ratio)) * math.pi * radius**4 / 2.0,
+            "N m2",
+            "young_modulus[0] / (2 * (1 + poisson_ratio[0])) * pi * backbone_radius[0]**4 / 2",
+        ),
+        "EA": ("axial", modulus * math.pi * radius**2, "N", "young_modulus[0] * pi * backbone_radius[0]**2"),
+    }
+    rows: list[_Row] = []
+    for name, (kind, of_rod, unit, rule) in rods.items():
+        measured = getattr(robot, f"{kind}_stiffness")
+        values, source = (of_rod.tolist(), rule) if measured is None else (list(measured), f"{kind}_stiffness[0]")
+        rows.append((name, values, unit, f"{kind.capitalize()} stiffness of a segment", source))
     return rows
 
 
@@ -142,19 +167,49 @@ def _inflatable_arm(robot: InflatableArm) -> Rules:
     return rules
 
 
-def _pcc_arm(robot: PccArm) -> Rules:
+def _continuum_arm(robot: ContinuumArm) -> Rules:
     rules: Rules = {}
+    kinds = ("EI", "GJ", "EA")
+    stiffness = kinds if isinstance(robot, TendonArm) else ("bending_stiffness", "torsional_stiffness", "axial_stiffness")
     for s in range(robot.n_segments):
-        names = {"EI": f"bending_stiffness[{s}]", "GJ": f"torsional_stiffness[{s}]", "EA": f"axial_stiffness[{s}]"}
+        names = {name: f"{rule}[{s}]" for name, rule in zip(kinds, stiffness, strict=True)}
         names |= {"length": f"section_lengths[{s}]", "radius": f"radius[{s}]", "chord": f"section_lengths[{s}]"}
         rules |= _chain(robot, s + 1, names | {"rest": "[0.0, 0.0, 0.0, 1.0]"})
-        for m in range(len(robot.muscle_azimuths)):
-            muscle, rest = f"muscle_{s + 1}_{m + 1}", f"segment_lengths[{s}]"
-            rules[muscle, "azimuth"], rules[muscle, "distance"] = f"muscle_azimuths[{m}]", f"muscle_distance[{s}]"
-            rules[muscle, "rest_length"] = rest
-            rules[muscle, "shortest"] = f"{rest} * (1 - muscle_contraction[{s}])"
-            rules[muscle, "longest"] = f"{rest} * (1 + muscle_extension[{s}])"
-            rules[muscle, "strongest"] = f"muscle_force[{s}]"
+    counts = [0] * robot.n_segments
+    for route in robot.routes:  # its table, and what follows from that, is in the URDF
+        s = owner(route, robot.segment_lengths) - 1
+        counts[s] += 1
+        rules |= _actuator(robot, f"{robot.ACTUATOR}_{s + 1}_{counts[s]}", s)
+    if not robot.routes:
+        for s in range(robot.n_segments):
+            for m in range(len(getattr(robot, f"{robot.ACTUATOR}_azimuths"))):
+                rules |= _actuator(robot, f"{robot.ACTUATOR}_{s + 1}_{m + 1}", s) | _straight_route(robot, s, m)
+    return rules
+
+
+def _actuator(robot: ContinuumArm, name: str, s: int) -> Rules:
+    """Rules of an actuator of segment `s`, from 0, without those of its route."""
+    word, facts = robot.ACTUATOR, ("stiffness", "pretension", "area", "diameter", "braid_angle", "max_pressure")
+    rules = {(name, fact): f"{word}_{fact}[{s}]" for fact in facts}
+    rules[name, "strongest"] = f"{word}_force[{s}]"
+    pushing = "0.0" if robot.kind[s] == "elastic" else f"-{word}_force[{s}]"
+    rules[name, "weakest"] = pushing if getattr(robot, f"{word}_least_tension") is None else f"{word}_least_tension[{s}]"
+    return rules
+
+
+def _straight_route(robot: ContinuumArm, s: int, m: int) -> Rules:
+    """Rules of the route and of the lengths of actuator `m` of segment `s`, from 0."""
+    word, start = robot.ACTUATOR, robot.starts[s]
+    name = f"{word}_{s + 1}_{m + 1}"
+    rest = " + ".join(f"segment_lengths[{k}]" for k in range(start, s + 1))
+    rules = {(name, "rest_length"): rest}
+    rules[name, "shortest"] = f"({rest}) * (1 - {word}_contraction[{s}])"
+    rules[name, "longest"] = f"({rest}) * (1 + {word}_extension[{s}])"
+    for k in range(start, s + 1):
+        piece = f"{name} {k + 1}"
+        azimuth = " + ".join([f"{word}_azimuths[{m}]", *(f"offset[{turn}]" for turn in range(k + 1, s + 1))])
+        rules[piece, "at"] = f"[0.0, segment_lengths[{k}]]"
+        rules[piece, "distance"], rules[piece, "azimuth"] = f"[{word}_distance[{s}]] * 2", f"[{azimuth}] * 2"
     return rules
 
 
@@ -168,7 +223,7 @@ def _helix_tube(robot: HelixTube) -> Rules:
     return rules | {("actuator", "azimuth"): "0.0", ("actuator", "distance"): "radius"}
 
 
-def _chain(robot: PccArm | HelixTube, segment: int, names: Mapping[str, str]) -> Rules:
+def _chain(robot: ContinuumArm | HelixTube, segment: int, names: Mapping[str, str]) -> Rules:
     """Rules of the sections of a segment and of their joints; `names` are the expressions of the properties of a section."""
     rules: Rules = {}
     lumped, length, chord = robot.chain == "lumped", names["length"], names["chord"]

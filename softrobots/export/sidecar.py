@@ -12,12 +12,14 @@ from typing import Any
 
 from softrobots.core.checks import instance_of
 from softrobots.core.errors import ParameterError, SoftRobotsError
+from softrobots.description.actuator_reader import OPTIONAL, REQUIRED
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag, SpringTag
 from softrobots.export.number_sources import Rules, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.robots import Route
 from softrobots.robots.fields import XacroRobot, default_text
 from softrobots.version import __version__
 
@@ -29,6 +31,12 @@ VERSION = 1
 
 _WIDTH = 128
 _CALLER = "given by the caller"
+_ROUTE_UNITS = {"at": "m", "distance": "m", "azimuth": "rad"}
+_ACTUATOR_UNITS = {
+    **dict.fromkeys(("rest_length", "shortest", "longest", "diameter"), "m"),
+    **dict.fromkeys(("weakest", "strongest", "pretension"), "N"),
+    **{"stiffness": "N/m", "area": "m2", "braid_angle": "rad", "max_pressure": "Pa"},
+}
 _TURNING, _SLIDING = ("rad", "N m/rad", "N m s/rad"), ("m", "N/m", "N s/m")
 
 _CONVENTIONS = {
@@ -50,10 +58,14 @@ _CONVENTIONS = {
     "elongation) with the stiffness EI / length, EI / length, GJ / length, EA / length; rest: strains kx, ky, twist, stretch "
     "where all joints are at zero",
     "lumped_sections": "spring joints that stand for a section, by coordinate; hinge: length of rod from its start to them",
-    "muscles": "length without twist = rest_length + sum of arms times coordinates; the arms are distance sin(azimuth) of "
-    "bend_x, -distance cos(azimuth) of bend_y and 1 of stretch; with a twist t a section has hypot(length without twist, "
-    "distance t), a lumped one distance^2 t^2 / (2 length) more; a tension adds the energy tension times length, so that it "
-    "moves the rest of a joint spring by -arm tension / stiffness; muscle_input tells whether lengths or forces are given",
+    "muscles": "actuators; route: offsets from the backbone, distance (cos(azimuth), sin(azimuth)), at places along the rest"
+    " length of segments, linear between; kind: what is given of it, length, tension, elastic (length of its motor: tension "
+    "= max(0, pretension + stiffness (length - motor))), pressure (tension = -pressure area) or mckibben (tension = max(0, "
+    "pressure pi diameter**2 / 4 (3 / tan(braid_angle)**2 (length / rest_length)**2 - 1 / sin(braid_angle)**2))); arms: "
+    "change of the length by each coordinate at rest; along a straight route a section has hypot(length without twist, "
+    "distance t) with a twist t, a lumped one distance^2 t^2 / (2 length) more; a tension adds the energy tension times "
+    "length, so that it moves the rest of a joint spring by -arm tension / stiffness; muscle_input tells whether lengths or "
+    "forces are given",
     "lines": "lines along a segment that are drawn and do nothing",
 }
 
@@ -83,7 +95,7 @@ def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
         "robot": checked.pinocchio.name,
     }
     if robot is not None:
-        instance_of("robot", robot, XacroRobot, "an InflatableArm, a PccArm or a HelixTube, or left out")
+        instance_of("robot", robot, XacroRobot, "a robot of this package, or left out")
         if robot.urdf() != checked.urdf:
             raise ParameterError("robot", robot, "the robot that the model was loaded from; it has another description")
         rules = number_rules(robot)
@@ -175,12 +187,21 @@ class _Parts:
         return entry | {"rest": self._number(tag.name, "rest", list(tag.rest), "rad/m, rad/m, rad/m, -", kind)}
 
     def _muscles(self) -> list[dict[str, Any]]:
-        units = {"azimuth": "rad", **dict.fromkeys(("distance", "rest_length", "shortest", "longest"), "m"), "strongest": "N"}
-        arms = self._model.structure.moment_arms
-        return [
-            {"name": tag.name, "segment": tag.segments[0], **self._numbers(tag, "muscle", **units), "arms": arms[tag.name]}
-            for tag in self._model.structure.muscles
-        ]
+        arms, entries = self._model.structure.moment_arms, []
+        for tag in self._model.structure.muscles:
+            pieces = [
+                {"segment": piece.segment}
+                | {
+                    key: self._number(f"{tag.name} {piece.segment}", key, list(getattr(piece, key)), unit, "softrobots:route")
+                    for key, unit in _ROUTE_UNITS.items()
+                }
+                for piece in tag.route
+            ]
+            stated = ("rest_length", *REQUIRED.get(tag.kind, ()), *OPTIONAL[tag.kind])
+            units = {key: unit for key, unit in _ACTUATOR_UNITS.items() if key in stated and math.isfinite(getattr(tag, key))}
+            numbers = self._numbers(tag, "actuator", **units)
+            entries.append({"name": tag.name, "kind": tag.kind, "route": pieces, **numbers, "arms": arms[tag.name]})
+        return entries
 
 
 def _parameters(robot: XacroRobot) -> dict[str, Any]:
@@ -192,7 +213,10 @@ def _parameters(robot: XacroRobot) -> dict[str, Any]:
             if not _is_default(robot, field.name):
                 source = f"{_CALLER} (default {default_text(field) or 'none'}: {source})"
             unit = facts.unit.replace("^", "") or "-"
-            entries[field.name] = {"value": getattr(robot, field.name), "unit": unit, "meaning": facts.what, "source": source}
+            value = getattr(robot, field.name)
+            if isinstance(value, tuple):
+                value = [vars(item) if isinstance(item, Route) else item for item in value]
+            entries[field.name] = {"value": value, "unit": unit, "meaning": facts.what, "source": source}
     return entries
 
 

@@ -11,12 +11,16 @@ from softrobots.robots.helix_tube import HelixTube
 from softrobots.robots.inflatable_arm import InflatableArm
 from softrobots.robots.inflated_links import AssumedStiffnessWarning
 from softrobots.robots.pcc_arm import PccArm
+from softrobots.robots.routes import Route
+from softrobots.robots.tendon_arm import TendonArm
 
 ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
     "inflatable_arm": InflatableArm,
     "inflatable_arm_two_hinges": partial(InflatableArm, link_model="two_hinges"),
     "pcc_arm": PccArm,
     "pcc_arm_lumped": partial(PccArm, chain="lumped"),
+    "tendon_arm": TendonArm,
+    "tendon_arm_lumped": partial(TendonArm, chain="lumped"),
     "helix_tube": HelixTube,
     "helix_tube_lumped": partial(HelixTube, chain="lumped"),
 }
@@ -31,4 +35,15 @@ def robot_class(name: str) -> tuple[Any, Mapping[str, Any]]:
     return (constructor.func, constructor.keywords) if isinstance(constructor, partial) else (constructor, {})
 
 
-__all__ = ["ROBOTS", "AssumedStiffnessWarning", "HelixTube", "InflatableArm", "PccArm", "Robot", "XacroRobot", "robot_class"]
+__all__ = [
+    "ROBOTS",
+    "AssumedStiffnessWarning",
+    "HelixTube",
+    "InflatableArm",
+    "PccArm",
+    "Robot",
+    "Route",
+    "TendonArm",
+    "XacroRobot",
+    "robot_class",
+]

@@ -126,9 +126,10 @@ def check_parameters(robot: Any, parts: str = "parts", lengths: str | None = Non
 def refuse_given(robot: Any, names: Sequence[str], requirement: str) -> None:
     """Refuse parameters that have no effect in a robot whose fields are checked: those that differ from their default."""
     for field in dataclasses.fields(robot):
-        value = getattr(robot, field.name)
-        if field.name in names and np.any(np.asarray(value) != np.asarray(field.default)):
-            raise ParameterError(field.name, value, f"left out {requirement}; it has no effect there")
+        value, default = np.asarray(getattr(robot, field.name)), np.asarray(field.default)
+        same = default.ndim == 0 or value.shape == default.shape
+        if field.name in names and not (same and np.all(value == default)):
+            raise ParameterError(field.name, getattr(robot, field.name), f"left out {requirement}; it has no effect there")
 
 
 def numbers(name: str, value: Any, count: int | None, unit: str, parts: str = "parts") -> tuple[float, ...]:
@@ -228,4 +229,7 @@ def argument_text(value: Any) -> str:
         return ""
     if isinstance(value, bool):
         return str(value).lower()
-    return "[" + ",".join(map(repr, value)) + "]" if isinstance(value, tuple) else repr(value)
+    if not isinstance(value, tuple):
+        return repr(value)
+    texts = [item if isinstance(item, str) else repr(item) for item in value]
+    return "[" + ",".join(texts) + "]"

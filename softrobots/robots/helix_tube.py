@@ -14,8 +14,8 @@ from softrobots import helix
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING, in_range
 from softrobots.core.checks import FloatArray, instance_of, positive_number
 from softrobots.core.errors import ParameterError, StraightTube
+from softrobots.robots.continuum_arm import CHAINS, HINGE_RULES, MOST_SECTIONS
 from softrobots.robots.fields import XacroRobot, check_parameters, parameter
-from softrobots.robots.pcc_arm import CHAINS, HINGE_RULES, MOST_SECTIONS
 
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""

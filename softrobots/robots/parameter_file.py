@@ -1,11 +1,13 @@
 """Files of robot parameters: YAML, or JSON if the name ends with `.json`.
 
 One mapping from the names of parameters to numbers, words, truth values, `null`, or lists of those; `robot:` may name the robot
-that they are for:
+that they are for. A route of an actuator is a mapping in a list:
 
-    robot: inflatable_arm
-    link_lengths: [0.5, 0.4]  # m
-    stiffness: 1.5e2          # N m/rad
+    robot: pcc_arm
+    segment_lengths: [0.5, 0.4]  # m
+    bending_stiffness: 1.5e0     # N m^2
+    kind: tension
+    routing: [{at: [0.0, 0.9], azimuth: [0.0, 3.14], distance: 0.04}]
 
 Unquoted words have their meaning in YAML 1.2: `1e3` is a number, `010` is ten and `no` is a word (in YAML 1.1: a word, eight,
 a truth value). Tags, anchors and aliases are refused, so that a file can neither construct objects nor grow when read.
@@ -29,7 +31,7 @@ from softrobots.core.bounded_reading import read_text
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
 from softrobots.core.files import as_path, write_text
 from softrobots.core.json_text import parse_json
-from softrobots.robots import ROBOTS, XacroRobot, robot_class
+from softrobots.robots import ROBOTS, Route, XacroRobot, robot_class
 
 LARGEST_FILE = 100_000
 """Largest size of a file [bytes]."""
@@ -37,7 +39,7 @@ LARGEST_FILE = 100_000
 MOST_VALUES = 5000
 """Most names and values in a file."""
 
-_DEEPEST = 3  # the mapping, a list with a value for each part, a list that is the value of a part
+_DEEPEST = 4  # the mapping, a list with a value for each part, a list or mapping that is the value of a part, a list in that
 _LARGEST_NUMBER = 1e300
 _NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")
@@ -65,13 +67,13 @@ def read_parameters(path: str | os.PathLike[str]) -> ParameterFile:
     Raises:
         ParameterError: If `path` is no path.
         FileFormatError: If the file cannot be read, is too large, or (with the line, for YAML) is no mapping of names to
-            numbers, words, truth values, null and lists of those; has a name twice, a tag, an anchor, or a number that is
-            not finite.
+            numbers, words, truth values, null, and lists of those or of mappings; has a name twice, a tag, an anchor, or a
+            number that is not finite.
     """
     file = as_path("path", path)
     text = read_text(file, LARGEST_FILE)
     try:
-        content = parse_json(text) if file.suffix.lower() == ".json" else _parse_yaml(text)
+        content = parse_json(text) if file.suffix.lower() == ".json" else parse_yaml(text)
         if not isinstance(content, dict) or not content:
             raise FileFormatError("a mapping with a line NAME: VALUE for each parameter is required")
         values = {name: _checked(name, value) for name, value in content.items()}
@@ -122,7 +124,7 @@ def write_parameters(
     Args:
         path: File to write; JSON if its name ends with `.json`, else YAML.
         robot: The robot that they are for.
-        values: Parameters by name: finite numbers, texts, truth values, None, and lists or tuples of those.
+        values: Parameters by name: finite numbers, texts, truth values, None, and lists or tuples of those or of routes.
         units: Units for comments behind the values (YAML only).
         overwrite: Replace an existing file.
 
@@ -140,7 +142,7 @@ def write_parameters(
         try:
             if not _PLAIN.fullmatch(name):
                 raise FileFormatError("a name of letters, digits and underscores is required")
-            _checked(name, value)
+            content[name] = _checked(name, value)
         except FileFormatError as error:
             raise ParameterError(name, value, f"what a file of parameters can hold: {error}") from error
     if file.suffix.lower() == ".json":
@@ -152,8 +154,11 @@ def write_parameters(
 
 def _checked(name: str, value: Any, depth: int = 1) -> Any:
     """The value with tuples for lists, if a parameter may have it."""
-    if isinstance(value, list | tuple) and depth < _DEEPEST:
+    if isinstance(value, list | tuple) and depth < 3:
         return tuple(_checked(name, item, depth + 1) for item in value)
+    mapping = vars(value) if isinstance(value, Route) else value
+    if isinstance(mapping, dict) and depth == 2 and all(map(_PLAIN.fullmatch, mapping)):
+        return {key: _checked(name, item, 2 if isinstance(item, list | tuple) else 3) for key, item in mapping.items()}
     if isinstance(value, int | float) and not abs(value) < _LARGEST_NUMBER:
         raise FileFormatError(f"{name}: finite numbers below {_LARGEST_NUMBER:g} in size are required")
     if value is not None and not isinstance(value, bool | int | float | str):
@@ -163,6 +168,8 @@ def _checked(name: str, value: Any, depth: int = 1) -> Any:
 
 def _yaml(value: Any) -> str:
     """The value as text that YAML 1.1 and 1.2 read alike."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{name}: {_yaml(item)}" for name, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_yaml, value)) + "]"
     if isinstance(value, float):
@@ -175,8 +182,12 @@ def _yaml(value: Any) -> str:
     return '"' + "".join(c if " " <= c <= "~" and c not in '"\\' else f"\\U{ord(c):08x}" for c in value) + '"'
 
 
-def _parse_yaml(text: str) -> Any:
-    """Value of a YAML text, from the events of PyYAML's parser; reading ends at the first event that is refused."""
+def parse_yaml(text: str) -> Any:
+    """Return the value of a YAML text, from the events of PyYAML's parser; reading ends at the first event that is refused.
+
+    Raises:
+        FileFormatError: If the text is no YAML, or holds more than a file of parameters can; with the line.
+    """
     try:
         events = yaml.parse(text, Loader=yaml.SafeLoader)
         document = (event for event in events if not isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent))

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import dataclasses
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
 from softrobots.description.argument_notes import argument_notes
 from softrobots.description.expansion import declared_arguments
 from softrobots.robots import ROBOTS, XacroRobot, robot_class
 from softrobots.robots.fields import facts_of
+from softrobots.robots.parameter_file import parse_yaml
 
 _WORDS = {"true": True, "false": False, "none": None, "": None}  # as xacro arguments spell them
 
@@ -103,7 +105,8 @@ def make_robot(name: str, words: Sequence[str], values: Mapping[str, Any] | None
 
     Args:
         name: Name of the robot.
-        words: Parameters, each `name=value`. A value is a number, a list `[0.5,0.4]`, true, false, none, or a word.
+        words: Parameters, each `name=value`. A value is a number, a list `[0.5,0.4]`, true, false, none, or a word;
+            a list may hold words `[base,2]` or routes `[{at: [0, 0.5], azimuth: 0.3, distance: 0.04}]`.
         values: Further parameters, e.g. of a file; those in `words` win.
 
     Raises:
@@ -125,13 +128,14 @@ def first_sentence(name: str) -> str:
 
 
 def _value(text: str) -> Any:
-    """Value of a text: a Python literal, true, false, none, or the text itself."""
+    """Value of a text: a Python literal, true, false, none, a list as in a file of parameters, or the text itself."""
     if text.strip().lower() in _WORDS:
         return _WORDS[text.strip().lower()]
-    try:
+    with contextlib.suppress(ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
         return ast.literal_eval(text.strip())
-    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
-        return text
+    with contextlib.suppress(FileFormatError):
+        return parse_yaml(text) if text.strip().startswith("[") else text
+    return text
 
 
 def _typed(value: Any) -> str:

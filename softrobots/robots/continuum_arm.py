@@ -1,0 +1,226 @@
+"""Arms of bending segments in a row: their rigid chain, and the actuators along them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from softrobots.constant_curvature import muscle_residual
+from softrobots.core.checks import finite_array, finite_number
+from softrobots.core.errors import ParameterError
+from softrobots.robots.fields import (
+    PerPart,
+    XacroRobot,
+    check_parameters,
+    facts_of,
+    numbers,
+    parameter,
+    per_part,
+    refuse_given,
+)
+from softrobots.robots.routes import Route, Routing, checked_routing, routing_text
+
+CHAINS = ("sections", "lumped")
+"""Forms of the equivalent rigid chain."""
+
+HINGE_RULES = ("corrected", "midpoint")
+"""Where the hinges of the lumped chain stand."""
+
+MOST_SECTIONS = 1000
+"""Sections or hinges that a segment may have; an arm has at most twice as many."""
+
+ROUTING = (
+    "Where the actuators of a segment start: segment (where it does), base (at the base, through the segments before it) "
+    "or the number of a segment, for all or one for each; or a list of routes, at (positions along the backbone from the "
+    "base), azimuth (from the x axis of the base) and distance there, the actuator then counts to the segment where it ends"
+)
+"""What `routing` is."""
+
+FACTS_OF_KINDS = {
+    "contraction": ("length", "tension", "elastic"),
+    "extension": ("length", "tension", "elastic"),
+    "force": ("length", "tension", "elastic"),
+    "least_tension": ("length", "tension", "elastic"),
+    "stiffness": ("elastic",),
+    "pretension": ("elastic",),
+    "area": ("pressure",),
+    "diameter": ("mckibben",),
+    "braid_angle": ("mckibben",),
+    "max_pressure": ("pressure", "mckibben"),
+}
+"""The kinds of actuators for which each of their parameters has an effect."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContinuumArm(XacroRobot):
+    """Base of an arm of bending segments; the defaults are those of the arm of [PCC paper].
+
+    Its actuators are fields of its class that begin with the same word, `ACTUATOR`: the azimuths and distances of those of a
+    segment, and what `FACTS_OF_KINDS` lists.
+
+    Raises:
+        ParameterError: If a value is out of range or a list has the wrong length; the message names the field.
+    """
+
+    segment_lengths: Sequence[float] = per_part(
+        (0.524, 0.524),
+        "m",
+        "Rest lengths of the segments, base to tip; their number is the number of segments",
+        "PCC paper, section 3 (52.4 cm)",
+        above=0.0,
+    )
+    offset: PerPart = parameter(
+        math.pi / 3,
+        "rad",
+        "Turn about the backbone before each segment but the first, or a list with one for each and the first",
+        "PCC paper, section 3 (60 degrees)",
+        form="special",
+    )
+    linear_density: PerPart = per_part(0.6, "kg/m", "Mass per rest length", "assumed", above=0.0)
+    radius: PerPart = per_part(0.05, "m", "Radius of the body; for inertia and pictures", "assumed", above=0.0)
+    chain: str = parameter("sections", "", "Form of the equivalent rigid chain: sections or lumped", options=CHAINS)
+    elastic_sections: int = parameter(
+        4,
+        "",
+        "Sections of constant strain a segment, for chain = sections; 1 is pure constant curvature",
+        at_least=1,
+        at_most=MOST_SECTIONS,
+    )
+    hinges: int = parameter(
+        12, "", "Pairs of orthogonal springs a segment, for chain = lumped", at_least=1, at_most=MOST_SECTIONS
+    )
+    hinge_rule: str = parameter(
+        "corrected",
+        "",
+        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the outer ones "
+        "of a segment moved so that it bends exactly under an end load and its own weight)",
+        options=HINGE_RULES,
+    )
+    torsion: bool = parameter(True, "", "Whether a lumped segment can twist: a torsional spring a hinge")
+    extension: bool = parameter(True, "", "Whether a lumped segment can stretch: a sliding spring a hinge")
+    rgba: Sequence[float] | Sequence[Sequence[float]] = parameter(
+        (0.55, 0.60, 0.65, 1.0), "", "Colour of a segment: red, green, blue, opacity in 0 to 1", form="colour"
+    )
+    damping_time: float = parameter(
+        0.05, "s", "Damping of each joint over its stiffness; has no effect on the statics", "assumed", at_least=0.0
+    )
+    base_mass: float = parameter(
+        2.0, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
+    )
+    routing: str | int | Sequence[str | int] | Sequence[Route] = parameter(
+        "segment",
+        "",
+        ROUTING,
+        form="special",
+    )
+    kind: str | Sequence[str] = parameter(
+        "length",
+        "",
+        "What the actuators of a segment are given, for all or one for each: their length, their tension, elastic (the length "
+        "at the motor), or the pressure of chambers (pressure) or McKibben muscles (mckibben); length for all or for none",
+        form="special",
+    )
+
+    ACTUATOR: ClassVar[str]
+    """What an actuator is called: the first word of its name and of its fields."""
+    KINDS: ClassVar[tuple[str, ...]]
+    """What actuators can be given."""
+
+    def __post_init__(self) -> None:
+        """Check every field and repeat single numbers for all segments."""
+        count = check_parameters(self, "segments", "segment_lengths")
+        azimuths = f"{self.ACTUATOR}_azimuths"
+        object.__setattr__(self, "offset", self._checked_offset(count))
+        object.__setattr__(self, "routing", checked_routing(self.routing, self.segment_lengths))
+        object.__setattr__(self, "kind", self._checked_kinds(count))
+        object.__setattr__(self, azimuths, self._checked_azimuths(azimuths))
+        most = max(1, 2 * MOST_SECTIONS // count)
+        for name in ("elastic_sections", "hinges"):
+            if getattr(self, name) > most:
+                raise ParameterError(name, getattr(self, name), f"a positive integer, at most {most} for {count} segments")
+        self._check_actuators()
+
+    def xacro_arguments(self) -> dict[str, str]:
+        """Return the parameters as arguments of the xacro file: text by name, full precision."""
+        return super().xacro_arguments() | {"routing": routing_text(self._each("routing"))}
+
+    @property
+    def n_segments(self) -> int:
+        """Number of segments."""
+        return len(self.segment_lengths)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of movable joints of the chain."""
+        each = 6 * self.elastic_sections if self.chain == "sections" else self.hinges * (2 + self.torsion + self.extension)
+        return self.n_segments * each
+
+    @property
+    def n_actuators(self) -> int:
+        """Number of actuators of the whole arm."""
+        return len(self.routes) or self.n_segments * len(getattr(self, f"{self.ACTUATOR}_azimuths"))
+
+    @property
+    def routes(self) -> tuple[Route, ...]:
+        """The routes that `routing` lists; none if it says where the actuators of the segments start."""
+        routing: Routing = self._each("routing")
+        return tuple(item for item in routing if isinstance(item, Route))
+
+    @property
+    def starts(self) -> tuple[int, ...]:
+        """Number, from 0, of the segment in which the actuators of each segment start; none if `routing` lists routes."""
+        starts: dict[str | int, int] = {"base": 0} | {number: number - 1 for number in range(1, self.n_segments + 1)}
+        words = [item for item in self._each("routing") if not isinstance(item, Route)]
+        return tuple(starts.get(word, segment) for segment, word in enumerate(words))
+
+    def _checked_offset(self, count: int) -> tuple[float, ...]:
+        if isinstance(self.offset, Sequence | np.ndarray) and np.ndim(self.offset) == 1:
+            return numbers("offset", self.offset, count, "rad", "segments")
+        turn = finite_number("offset", self.offset, "rad")
+        return (0.0, *(turn,) * (count - 1))
+
+    def _checked_kinds(self, count: int) -> tuple[str, ...]:
+        kinds = (self.kind,) * count if isinstance(self.kind, str) else self.kind
+        if (
+            not isinstance(kinds, Sequence)
+            or len(kinds) != count
+            or any(kind not in self.KINDS for kind in kinds)
+            or ("length" in kinds and set(kinds) != {"length"})
+        ):
+            words = ", ".join(self.KINDS)
+            raise ParameterError(
+                "kind", self.kind, f"one of {words}, or one for each of the {count} segments; length for all or none"
+            )
+        return tuple(kinds)
+
+    def _checked_azimuths(self, name: str) -> tuple[float, ...]:
+        given = getattr(self, name)
+        if len(np.atleast_1d(given)) == 0:
+            return ()
+        azimuths = finite_array(name, given, (None,), "rad")
+        around = np.sort(azimuths % math.tau)
+        if len(azimuths) > 1 and np.min(np.diff(around, append=around[0] + math.tau)) < 1e-6:
+            raise ParameterError(name, given, "azimuths that differ (modulo a turn) [rad]")
+        if "length" in self.kind:
+            try:
+                muscle_residual(np.ones(len(azimuths)), 1.0, azimuths)  # knows what azimuths fix an arc
+            except ParameterError as error:
+                requirement = "none, or three or more that differ (modulo a turn) and do not all lie close together [rad]"
+                raise ParameterError(name, given, f"{requirement}, for kind = length") from error
+        return tuple(azimuths.tolist())
+
+    def _check_actuators(self) -> None:
+        """Refuse parameters of actuators that have no effect, and a least tension above the largest."""
+        prefix, facts = f"{self.ACTUATOR}_", facts_of(self)
+        for name, kinds in FACTS_OF_KINDS.items():
+            if prefix + name in facts and not set(kinds) & set(self.kind):
+                refuse_given(self, (prefix + name,), f"for kind = {', '.join(dict.fromkeys(self.kind))}")
+        if self.routes:
+            refuse_given(self, (f"{prefix}azimuths", f"{prefix}distance"), "where routing lists the routes")
+        least: Any = getattr(self, f"{prefix}least_tension")
+        if least is not None and any(low >= high for low, high in zip(least, self._each(f"{prefix}force"), strict=True)):
+            raise ParameterError(f"{prefix}least_tension", least, f"below {prefix}force, {self._each(f'{prefix}force')} N")
