@@ -163,8 +163,8 @@ def test_legends_of_states_and_scales() -> None:
     assert [entry.dashed for entry in still] == [True, False, False, True]
     moving = tension_entries([drawn(0.0, 3.0, slack=True), drawn(7.0, -4.0)])
     assert [entry.meaning for entry in moving] == [
-        "pulls 10 N", "pulls 5 N", "0 N", "pushes 5 N", "pushes 10 N",
-        "straight: pulls 0 to 7 N, dashed where slack", "helix: -4 N (pushes) to 3 N (pulls)",
+        "pulls 10 N", "pulls 5 N", "0 N", "pushes 5 N", "pushes 10 N", "slack",
+        "straight: pulls 0 to 7 N", "helix: -4 N (pushes) to 3 N (pulls)",
     ]  # fmt: skip
     assert [entry.meaning for entry in tension_entries([drawn(None, None)])] == ["actuator"]
     assert tension_entries([[]]) == []

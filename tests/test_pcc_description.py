@@ -823,7 +823,6 @@ def test_a_section_with_a_rest_shape_is_accepted_where_it_says(rest: tuple) -> N
     ("options", "error", "message"),
     [
         ({"muscles": "tensions"}, sr.ParameterError, "muscles.*'lengths', 'forces'"),
-        ({"muscles": None}, sr.ParameterError, "muscles.*'lengths', 'forces'"),
         ({"springs": {"section_1_1_u1": 10.0}}, sr.NameNotFound, "no movable joint is called 'section_1_1_u1'"),
         ({"motors": ["section_1_1_c"]}, sr.NameNotFound, "no movable joint is called 'section_1_1_c'"),
         ({"tip": "segment_2"}, sr.NameNotFound, "no frame is called 'segment_2'.*did you mean 'segment_1'"),

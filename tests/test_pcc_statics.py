@@ -889,7 +889,7 @@ def test_a_chain_without_stretch_refuses_lengths_that_need_it() -> None:
         sr.solve_equilibrium(arm, bent + [0, 0, 0, 0.002, 0.002, 0.002])
 
 
-@each_row("choice", ["pressure", "", None, 1])
+@each_row("choice", ["pressure", "", True, 1])
 def test_an_unknown_choice_of_muscles_is_refused(choice: object) -> None:
     with pytest.raises(sr.ParameterError, match=r"muscles.*'lengths', 'forces'"):
         sr.load_model(sr.PccArm(), muscles=choice)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,9 +10,18 @@ import numpy as np
 from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.model.actuator_laws import (
+    UNITS,
+    ActuatorLaws,
+    input_limits,
+    input_scale,
+    length_limits,
+    relaxed_input,
+    tension_limits,
+)
 from softrobots.model.muscle_lengths import MuscleLengths
 
-_LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N"}  # by the unit of the coordinate
+_LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N", "Pa": "N"}  # by the unit of the coordinate
 
 
 class Drives(NamedTuple):
@@ -29,7 +38,7 @@ class Drives(NamedTuple):
 
 
 class Actuators:
-    """Motor joints, then muscles of which lengths or tensions are given."""
+    """Motor joints, then muscles of any kind."""
 
     def __init__(
         self,
@@ -37,8 +46,9 @@ class Actuators:
         joint_limits: FloatArray,
         turning: Sequence[bool],
         muscles: Sequence[ActuatorTag],
-        softness: FloatArray,
+        worth: FloatArray,
         lengths: MuscleLengths | None,
+        laws: ActuatorLaws | None,
         drives: FloatArray,
     ) -> None:
         """Collect names, limits and scales.
@@ -48,16 +58,16 @@ class Actuators:
             joint_limits: Their limits, shape (m, 2) [rad or m].
             turning: Which of them turn.
             muscles: The muscles.
-            softness: Bending of the segment of each muscle per moment at its end, shape (n,) [rad/(N m)].
-            lengths: The constraint of given muscle lengths; None if tensions are given or there are no muscles.
+            worth: Change of length of each per angle of bending [m/rad], and bending per tension [rad/N], shape (n, 2).
+            lengths: The constraint of given muscle lengths; None if there is none.
+            laws: The laws of muscles of other kinds; None if there are none.
             drives: The rows of `Drives` for the joints, shape (4, m).
         """
-        self._lengths = lengths
-        distance = np.array([muscle.distance for muscle in muscles])
-        self.muscle_lengths = read_only(np.array([(m.shortest, m.longest) for m in muscles]).reshape(-1, 2))
-        """Limits of the muscle lengths, shape (n_muscles, 2) [m]."""
-        self.muscle_forces = read_only(np.array([(-m.strongest, m.strongest) for m in muscles]).reshape(-1, 2))
-        """Limits of the muscle tensions, shape (n_muscles, 2) [N]."""
+        self._lengths, self._laws = lengths, laws
+        self.muscle_lengths = _pairs(map(length_limits, muscles))
+        """Limits of the muscle lengths, infinite where only the input has some, shape (n_muscles, 2) [m]."""
+        self.muscle_forces = _pairs(map(tension_limits, muscles))
+        """Limits of the muscle tensions, infinite for pressures, shape (n_muscles, 2) [N]."""
         strongest = np.array([muscle.strongest for muscle in muscles])
         of_muscles = np.concatenate([np.zeros((3, len(muscles))), strongest[None]])
         self.drives = Drives(*map(read_only, np.concatenate([drives, of_muscles], axis=1)))
@@ -66,43 +76,52 @@ class Actuators:
         """Name of each."""
         self.n_placed = len(joints) if lengths is None else len(self.names)
         """Number of those that have a place, which come first: all but muscles of given tension."""
-        self.limits = read_only(np.concatenate([joint_limits, self.muscle_forces if lengths is None else self.muscle_lengths]))
-        """Lower and upper limits, shape (n_motors, 2) [rad, m or N]."""
-        muscle_scale = 1.0 / (softness * distance) if lengths is None else distance
+        self.limits = read_only(np.concatenate([joint_limits, _pairs(map(input_limits, muscles))]))
+        """Lower and upper limits, shape (n_motors, 2) [rad, m, N or Pa]."""
+        muscle_scale = [input_scale(tag, *pair) for tag, pair in zip(muscles, worth.tolist(), strict=True)]
         self.scale = read_only(np.concatenate([np.ones(len(joints)), muscle_scale]))
-        """Change of each equivalent to about a radian of motion, shape (n_motors,) [rad, m or N]."""
+        """Change of each equivalent to about a radian of motion, shape (n_motors,) [rad, m, N or Pa]."""
         self.turning = np.array([*turning, *(False for _ in muscles)], dtype=bool)
         """Which of them turn rather than slide or pull, shape (n_motors,), truth values."""
-        self.units = (*("rad" if turns else "m" for turns in turning), *("N" if lengths is None else "m" for _ in muscles))
+        self.units = (*("rad" if turns else "m" for turns in turning), *(UNITS[muscle.kind] for muscle in muscles))
         """Unit of each."""
         self.basis = read_only(np.diag(self.scale) if lengths is None else lengths.basis(self.scale))
         """Independent changes, shape (n_motors, n), each equivalent to about a radian of motion."""
         self.independent = self.basis.shape[0] == self.basis.shape[1]
         """Whether each can be set by itself; the lengths of more than three muscles along a segment depend on each other."""
-        relaxed = np.concatenate([np.zeros(len(joints)), [0.0 if lengths is None else m.rest_length for m in muscles]])
+        relaxed = np.concatenate([np.zeros(len(joints)), [relaxed_input(muscle) for muscle in muscles]])
         self.relaxed = read_only(np.clip(relaxed, *self.limits.T))
-        """Joints at zero, muscles at rest or without tension, as near as the limits allow, shape (n_motors,) [rad, m or N]."""
-        self._unit = "rad" if not muscles else "N" if lengths is None else "m"
+        """Joints at zero, muscles at rest or without tension or pressure, as near as the limits allow, shape (n_motors,)."""
+        self._unit = ", ".join(dict.fromkeys(self.units[len(joints) :])) or "rad"
 
     def checked(self, value: Any, field: str) -> FloatArray:
         """Return positions that the robot can have, as a new array; see `SoftModel.checked_motors`."""
         motors = finite_array(field, value, (len(self.names),), self._unit)
-        requirement = None if self._lengths is None else self._lengths.refusal(motors)
+        requirement = self._refusal(motors)
         if requirement is not None:
             raise ParameterError(field, motors, requirement)
         return motors
 
+    def _refusal(self, motors: FloatArray) -> str | None:
+        if self._lengths is not None:
+            return self._lengths.refusal(motors)
+        return None if self._laws is None else self._laws.refusal(motors[len(motors) - len(self._laws.kinds) :])
+
     def admit(self, motors: FloatArray) -> bool:
         """Return whether the robot can have these positions, shape (n_motors,)."""
-        return self._lengths is None or self._lengths.refusal(motors) is None
+        return self._refusal(motors) is None
 
     def draw(self, random: np.random.Generator) -> FloatArray | None:
-        """Draw positions uniformly within the limits (continuous joints: one turn), shape (n_motors,).
+        """Draw positions uniformly within the limits, shape (n_motors,).
 
-        Muscle lengths are projected to consistent ones. None if the robot cannot have the result.
+        Without a limit it is half a turn, or what is worth that, from the relaxed position. Muscle lengths are projected to
+        consistent ones. None if the robot cannot have the result.
         """
         low, high = self.limits.T
-        sample = random.uniform(np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi))
+        far = np.pi * self.scale
+        sample = random.uniform(
+            np.where(np.isfinite(low), low, self.relaxed - far), np.where(np.isfinite(high), high, self.relaxed + far)
+        )
         if self._lengths is not None:
             sample = self._lengths.consistent(sample)
         return sample if self.admit(sample) and np.all((sample >= low) & (sample <= high)) else None
@@ -138,6 +157,11 @@ class Actuators:
             rows.append(normals)
             curvatures.append(bends)
         return np.concatenate(rows), np.concatenate(curvatures)
+
+
+def _pairs(limits: Iterable[tuple[float, float]]) -> FloatArray:
+    """Lower and upper limits as rows, shape (n, 2)."""
+    return read_only(np.array(list(limits), dtype=np.float64).reshape(-1, 2))
 
 
 def load_units(units: Sequence[str]) -> tuple[str, ...]:

@@ -10,7 +10,9 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import STRAINS, joint_positions
 from softrobots.core.checks import LARGEST, FloatArray, read_only
-from softrobots.description.urdf_tags import LumpedSectionTag, RobotTags, SectionTag, SpringTag
+from softrobots.core.errors import DescriptionError
+from softrobots.description.urdf_tags import ActuatorTag, LumpedSectionTag, RobotTags, SectionTag, SpringTag
+from softrobots.model.actuator_laws import ActuatorLaws
 from softrobots.model.actuators import Actuators
 from softrobots.model.chain_reader import chain_length
 from softrobots.model.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, rest_coordinates
@@ -18,7 +20,7 @@ from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.muscles import MuscleForces
 from softrobots.model.pinocchio_data import PinocchioData
-from softrobots.model.sections import SectionRow, places_by_segment
+from softrobots.model.sections import SectionRow
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import Springs, spring_groups
 from softrobots.model.structure import Structure
@@ -32,7 +34,7 @@ def assemble(
     springs: Mapping[str, SpringTag],
     motors: Sequence[str],
     tip: str,
-    muscle_input: str = "lengths",
+    muscle_input: str | None = None,
     locked: Sequence[str] = (),
     like: SoftModel | None = None,
 ) -> SoftModel:
@@ -45,7 +47,7 @@ def assemble(
         springs: Springs by joint name.
         motors: Names of the motor joints.
         tip: Name of the tip frame.
-        muscle_input: What `q_motors` holds of the muscles, "lengths" or "forces".
+        muscle_input: Whether actuators of given length or tension become "lengths" or "forces"; None: as their tags say.
         locked: Names of the movable joints of the text that are fixed in `rigid`.
         like: A model that differs in its springs alone, for what it can share.
 
@@ -53,8 +55,8 @@ def assemble(
         The model.
 
     Raises:
-        DescriptionError: If the muscles of a segment do not fix its shape, or the springs of an inflated link cannot have a
-            largest moment.
+        DescriptionError: If the muscles of a segment do not fix its shape, some have given lengths and others not, or the
+            springs of an inflated link cannot have a largest moment.
     """
     motor_joints, spring_joints = (tuple(sorted(names, key=rigid.getJointId)) for names in (motors, springs))
     motor_indices, spring_indices = velocity_indices(rigid, motor_joints), velocity_indices(rigid, spring_joints)
@@ -63,7 +65,8 @@ def assemble(
     sections = _section_rows(section_tags, first=len(spring_joints))
     rows = sections or [_lumped_row(tag, spring_joints) for tag in lumped_tags]
     strain_springs = _strain_springs(rigid, [springs[name] for name in spring_joints], spring_joints, section_tags)
-    segments, paths = places_by_segment(rows), MusclePaths(tags.muscles, rows, len(strain_springs.names))
+    muscles = actuators_of(tags.muscles, muscle_input)
+    paths = MusclePaths(muscles, rows, len(strain_springs.names))
 
     coordinates: Coordinates = DirectCoordinates(motor_indices, spring_indices, rigid.nv)
     elastic_limits: FloatArray = np.tile([-np.inf, np.inf], (rigid.nv, 1))
@@ -73,12 +76,13 @@ def assemble(
         elastic_limits[indices] = [_joint_limits(rigid, row.joint_names) for row in sections]
         lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("length", "rest_joints"))
         coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
-    given_lengths, elastic = None, strain_springs
-    if tags.muscles and muscle_input == "forces":
-        coordinates = MuscleForces(coordinates, paths)
-    elif tags.muscles:
-        given_lengths = MuscleLengths(coordinates, tags.muscles, rows, strain_springs, paths)
+    given_lengths, laws, elastic = None, None, strain_springs
+    if any(tag.kind == "length" for tag in muscles):
+        given_lengths = MuscleLengths(coordinates, muscles, rows, strain_springs, paths)
         coordinates, elastic = given_lengths, given_lengths.springs
+    elif muscles:
+        laws = ActuatorLaws(muscles)
+        coordinates = MuscleForces(coordinates, paths, laws)
 
     structure = Structure(
         tags=tags,
@@ -90,10 +94,10 @@ def assemble(
         constant_strain=bool(sections),
         section_table=tuple(rows),
         strain_springs=strain_springs,
-        muscles=tags.muscles,
-        muscle_input=muscle_input,
+        muscles=muscles,
         muscle_paths=paths,
         muscle_lengths=given_lengths,
+        actuator_laws=laws,
         lines=tags.lines,
         elastic_limits=read_only(elastic_limits),
     )
@@ -101,11 +105,10 @@ def assemble(
         motor_joints,
         _joint_limits(rigid, motor_joints),
         [_kind(rigid, name).startswith("JointModelR") for name in motor_joints],
-        tags.muscles,
-        np.array(
-            [float((1.0 / strain_springs.stiffness[list(segments[m.segments[0]]["bend_x"])]).sum()) for m in tags.muscles]
-        ),
+        muscles,
+        _worth(muscles, rows, paths, strain_springs),
         given_lengths,
+        laws,
         _drives(rigid, motor_joints, tags.rotors),
     )
     data = PinocchioData(rigid) if like is None else like.data
@@ -121,6 +124,40 @@ def assemble(
         data=data,
         reach=chain_length(rigid, data.frame_ids[tip], inside) if like is None else like.reach,
     )
+
+
+def actuators_of(tags: Sequence[ActuatorTag], muscle_input: str | None) -> tuple[ActuatorTag, ...]:
+    """Return the actuators of a description with given lengths made given tensions, or the reverse.
+
+    Raises:
+        DescriptionError: If some then have given lengths and others not.
+    """
+    swapped = {"lengths": {"tension": "length"}, "forces": {"length": "tension"}}.get(muscle_input or "", {})
+    made = tuple(replace(tag, kind=swapped.get(tag.kind, tag.kind)) for tag in tags)
+    held, others = ([tag.name for tag in made if (tag.kind == "length") is given] for given in (True, False))
+    if held and others:
+        raise DescriptionError(
+            f"the lengths of {', '.join(held)} are given, and not those of {', '.join(others)}; required: given lengths for "
+            "all or none (kind elastic with a high stiffness is nearly a given length)"
+        )
+    return made
+
+
+def _worth(tags: Sequence[ActuatorTag], rows: Sequence[SectionRow], paths: MusclePaths, springs: Springs) -> FloatArray:
+    """Change of length of each actuator per angle of bending [m/rad], and bending per tension [rad/N], shape (n, 2).
+
+    Of one that bends nothing, as along the backbone, elongation by its length is worth a radian.
+    """
+    worth = []
+    for tag, arms in zip(tags, paths.matrix, strict=True):
+        bends = [[row.places[key] for key in ("bend_x", "bend_y") if key in row.places] for row in rows]
+        bend = sum(float(np.linalg.norm(arms[pair] / springs.stiffness[pair])) for pair in bends)
+        reeled = sum(float(arms[pair] @ (arms[pair] / springs.stiffness[pair])) for pair in bends)
+        if reeled <= 1e-9 * tag.rest_length * bend:
+            reeled = float(arms @ (arms / springs.stiffness)) or 1.0
+            bend = reeled / tag.rest_length
+        worth.append((reeled / bend, bend))
+    return np.array(worth).reshape(-1, 2)
 
 
 def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:

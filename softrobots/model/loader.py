@@ -30,7 +30,7 @@ def load_model(
     springs: Mapping[str, float | tuple[float, float] | None] | None = None,
     motors: Sequence[str] | None = None,
     tip: str | None = None,
-    muscles: str = "lengths",
+    muscles: str | None = None,
 ) -> SoftModel:
     """Load a robot of this package, or a URDF, MJCF or SDF file.
 
@@ -49,7 +49,8 @@ def load_model(
         motors: Names of the motor joints; movable joints that are neither motor, spring nor part of a section are then locked
             at zero. By default every movable joint without a spring is a motor.
         tip: Name of the tip frame; by default the one in the file, else `tip`, else the only leaf of the tree.
-        muscles: What `q_motors` holds of the muscles: their "lengths" [m] or tensions, "forces" [N].
+        muscles: What `q_motors` holds of muscles of given length or tension: their "lengths" [m] or tensions, "forces" [N]; by
+            default, and for muscles of other kinds, what the file says.
 
     Returns:
         The model.
@@ -64,7 +65,8 @@ def load_model(
         ParameterError: If a stiffness is not positive, a rest coordinate is not finite, a joint is named twice or belongs to a
             section, or `muscles` is not one of the choices.
     """
-    choice("muscles", muscles, MUSCLE_INPUTS)
+    if muscles is not None:
+        choice("muscles", muscles, MUSCLE_INPUTS)
     urdf, label = read_source(source)
     tags = read_tags(urdf, label)
     try:

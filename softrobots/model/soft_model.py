@@ -92,7 +92,7 @@ class SoftModel:
 
     @property
     def muscle_input(self) -> str:
-        """What `q_motors` holds of the muscles: "lengths" or "forces"."""
+        """Whether `q_motors` holds the "lengths" that muscles are given, or what they pull with, "forces": see their kinds."""
         return self.structure.muscle_input
 
     @property
@@ -117,8 +117,10 @@ class SoftModel:
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding of the spring torques [N m]: `k (y - rest)` of a stiff spring with a rest coordinate is no more exact."""
-        return 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(self.stiffness * self.rest))
+        """Rounding of the torques [N m]: `k (y - rest)` of a stiff spring with a rest, or a stiff tendon, is no more exact."""
+        laws = self.structure.actuator_laws
+        of_muscles = 0.0 if laws is None else laws.rounding
+        return of_muscles + 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(self.stiffness * self.rest))
 
     @property
     def rest(self) -> FloatArray:
@@ -273,6 +275,13 @@ class SoftModel:
             raise DescriptionError(
                 f"an inflated link of {self.pinocchio.name} has max_moment; compiled solvers need springs that are linear, or "
                 "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
+            )
+        routed = [tag.name for tag in self.muscles if tag.kind not in ("length", "tension") or len(tag.segments) > 1]
+        routed += [tag.name for tag in self.muscles if not tag.straight and tag.name not in routed]
+        if routed:
+            raise DescriptionError(
+                f"{self.pinocchio.name} has actuators that compiled solvers do not take ({', '.join(routed)}); required: given "
+                "lengths or tensions, straight along one segment each (solve_equilibrium accepts the others, too)"
             )
         tip = self.frame_id(self.tip)
         return read_chain(

@@ -10,6 +10,7 @@ import numpy as np
 from softrobots.constant_curvature.strain_chain import STRAINS, in_range
 from softrobots.core.checks import FloatArray
 from softrobots.description.urdf_tags import ActuatorTag, LineTag, RobotTags, SpringTag
+from softrobots.model.actuator_laws import ActuatorLaws
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.sections import SectionRow
@@ -44,16 +45,21 @@ class Structure:
     """Springs of the strains, without the plateaus of inflated links."""
     muscles: tuple[ActuatorTag, ...]
     """Muscles."""
-    muscle_input: str
-    """What `q_motors` holds of the muscles, "lengths" or "forces"."""
     muscle_paths: MusclePaths
     """The muscle lengths as functions of the strains."""
     muscle_lengths: MuscleLengths | None
-    """The constraint of given muscle lengths; None if forces are given or there are no muscles."""
+    """The constraint of given muscle lengths; None if there is none."""
+    actuator_laws: ActuatorLaws | None
+    """The laws of muscles of other kinds; None if there are none."""
     lines: tuple[LineTag, ...]
     """Lines along the segments, for pictures only."""
     elastic_limits: FloatArray
     """Limits of the joints that springs and sections move, in the order of Pinocchio's velocities, shape (nv, 2)."""
+
+    @property
+    def muscle_input(self) -> str:
+        """See `SoftModel.muscle_input`."""
+        return "lengths" if self.actuator_laws is None else "forces"
 
     @property
     def section_joints(self) -> tuple[str, ...]:

@@ -12,7 +12,9 @@ from softrobots.description.urdf_tags import ActuatorTag, RouteTag
 from softrobots.view.body import BentSections, beside, tube
 
 THREAD = 0.09
-"""Radius of the curve of an actuator that has no thickness of its own, relative to the radius of the body."""
+"""Radius of a line along the body that has no thickness of its own, relative to the radius of the body."""
+
+_THINNEST, _THICKEST = 0.005, 0.18  # radius of a tendon: at least relative to the length of the body, at most to its radius
 
 _COARSEST = 0.3  # turn about the backbone from point to point [rad]
 _DASHES = 24  # along the whole robot, gaps between them as long
@@ -109,4 +111,5 @@ def _radius(tag: ActuatorTag, sections: BentSections) -> float:
         return 0.5 * tag.diameter
     if tag.kind == "pressure":
         return math.sqrt(tag.area / math.pi)
-    return THREAD * sections.radius(tag.route[0].segment)
+    radius = sections.radius(tag.route[0].segment)
+    return min(max(THREAD * radius, _THINNEST * sections.length), _THICKEST * radius)

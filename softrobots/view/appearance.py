@@ -27,6 +27,8 @@ LINE_COLOUR = (0.00, 0.45, 0.70, 1.0)
 TAIL_COLOUR = (0.25, 0.25, 0.28, 0.8)
 """Dark grey of the wall inside a growing tube."""
 
+DOT_SIZE = 0.011
+"""Size of the dots of a path, relative to the size of the robot."""
 ARROW_LENGTH = 0.2
 """Length of the arrow of the unit force, relative to the size of the robot; other arrows are in proportion."""
 ARROW_WIDTH = 0.009

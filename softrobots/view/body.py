@@ -148,6 +148,8 @@ class BentSections:
         self._table = structure.section_table
         self.segment_numbers = tuple(dict.fromkeys(section.segment for section in self._table))
         """Numbers of the segments, base to tip."""
+        self.length = sum(section.length for section in self._table)
+        """Rest length of all sections [m]."""
         if not self._table:
             return
         pin_model, data = model.workspace(None)

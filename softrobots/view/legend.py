@@ -78,17 +78,18 @@ def tension_entries(states: Sequence[Sequence[DrawnActuator]]) -> list[LegendEnt
     if len(states) > 1 or len(names) > _MOST_NAMED:
         shares = [1.0, 0.5] * (max(known) > 0.0) + [0.0] + [-0.5, -1.0] * (min(known) < 0.0)
         entries += [LegendEntry(tension_colour(share * end, end), _words(share * end, share * end)) for share in shares]
+        entries += [LegendEntry(ZERO_COLOUR, "slack", dashed=True)] * any(actuator.slack for actuator in drawn)
     if len(names) <= _MOST_NAMED:
-        return entries + [_entry(name, [one for one in drawn if one.curve.name == name], end) for name in names]
-    return entries + [LegendEntry(ZERO_COLOUR, "slack", dashed=True)] * any(actuator.slack for actuator in drawn)
+        entries += [_entry(name, [one for one in drawn if one.curve.name == name], end) for name in names]
+    return entries
 
 
 def _entry(name: str, states: Sequence[DrawnActuator], end: float) -> LegendEntry:
     """The entry of one actuator in some states, on a scale with an end [N]."""
     tensions = [0.0 if abs(one.tension) < _ZERO * end else one.tension for one in states if one.tension is not None]
-    slack = [one.slack for one in states]
-    words = "slack" if all(slack) else _words(min(tensions), max(tensions)) + ", dashed where slack" * any(slack)
-    return LegendEntry(tension_colour(max(tensions, key=abs), end), f"{name}: {words}", all(slack))
+    slack = all(one.slack for one in states)
+    words = "slack" if slack else _words(min(tensions), max(tensions))
+    return LegendEntry(tension_colour(max(tensions, key=abs), end), f"{name}: {words}", slack)
 
 
 def _words(least: float, most: float) -> str:

@@ -11,9 +11,9 @@ from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.actuators import slack_tendons
 from softrobots.view.actuator_curves import ActuatorCurve
 
-PULL_COLOURS = ((0.44, 0.70, 0.91), (0.00, 0.20, 0.48))
+PULL_COLOURS = ((0.46, 0.73, 0.95), (0.00, 0.24, 0.66))
 """Red, green, blue of the weakest and of the strongest pull: blue, from light to dark."""
-PUSH_COLOURS = ((0.97, 0.62, 0.25), (0.62, 0.20, 0.00))
+PUSH_COLOURS = ((0.98, 0.65, 0.28), (0.66, 0.22, 0.00))
 """Those of the weakest and of the strongest push: orange, from light to dark."""
 ZERO_COLOUR = (0.45, 0.45, 0.45)
 """Grey of an actuator without tension."""

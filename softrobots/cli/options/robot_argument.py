@@ -50,8 +50,8 @@ def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
     help_text += "for each joint; JOINT=none takes a spring away; other joints keep the springs of the file"
     parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=help_text)
     parser.add_argument("--tip", metavar="LINK", help="link that is the tip (the one that the file names, or its only end)")
-    help_text = "input of muscles: lengths [m] or tensions [N] (%(default)s)"
-    parser.add_argument("--muscles", choices=MUSCLE_INPUTS, default="lengths", help=help_text)
+    help_text = "input of muscles of given length or tension: lengths [m] or tensions [N] (as the description says)"
+    parser.add_argument("--muscles", choices=MUSCLE_INPUTS, default=None, help=help_text)
 
 
 def add_motors(

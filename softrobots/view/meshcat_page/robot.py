@@ -52,7 +52,9 @@ class RobotDrawing:
         import meshcat.geometry as geometry
 
         colours = np.tile(np.array(appearance.rgb(appearance.PATH_COLOUR))[:, None] / 255.0, (1, len(positions)))
-        cloud = geometry.PointCloud(positions.T.astype(np.float32), colours.astype(np.float32), size=0.012)
+        cloud = geometry.PointCloud(
+            positions.T.astype(np.float32), colours.astype(np.float32), size=appearance.DOT_SIZE * self._size
+        )
         self._root["path"].set_object(cloud)
         self._traced = True
 

@@ -19,7 +19,6 @@ from softrobots.view.robot_shapes import Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Extent, Scene
 
 _SIDES = 32  # corners of the cross-section of what is round
-_DOT = 0.012  # size of the dots of a path [m]
 _AMBIENT, _SUN = 2.2, 2.0  # strength of the light from everywhere and from above
 
 
@@ -87,9 +86,8 @@ class ViserDrawing:
             if path is not None and "path" in self.handles:
                 self.handles["path"].points = path
             elif path is not None:
-                self.handles["path"] = self._server.scene.add_point_cloud(
-                    "/path", path, rgb(appearance.PATH_COLOUR), point_size=_DOT, point_shape="circle", precision="float32"
-                )
+                style = {"point_size": appearance.DOT_SIZE * self._extent.size, "point_shape": "circle", "precision": "float32"}
+                self.handles["path"] = self._server.scene.add_point_cloud("/path", path, rgb(appearance.PATH_COLOUR), **style)
 
     def _meshes(self, scene: Scene, rigid: bool) -> Iterator[tuple[str, Mesh]]:
         """Name and triangles of everything that is shown."""
