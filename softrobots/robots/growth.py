@@ -36,6 +36,8 @@ def grown_coordinates(tube: HelixTube, length: float, front: float = 0.0) -> Flo
     instance_of("tube", tube, HelixTube, "a HelixTube")
     if tube.chain != "sections":
         raise ParameterError("tube", tube.chain, 'a HelixTube with chain="sections"; lumped chains cannot grow')
+    if tube.real:
+        raise ParameterError("tube", tube.actuator, 'a HelixTube with actuator="drawn"')
     grown = positive_number("length", length, "m")
     if not SHORTEST * tube.length <= grown <= tube.length:
         raise ParameterError("length", length, f"from {SHORTEST * tube.length} m to the length of the tube, {tube.length} m")

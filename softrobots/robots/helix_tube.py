@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 
 from softrobots import helix
-from softrobots.constant_curvature.strain_chain import LARGEST_BENDING, in_range
 from softrobots.core.checks import FloatArray, instance_of, positive_number
 from softrobots.core.errors import ParameterError, StraightTube
 from softrobots.robots.continuum_arm import CHAINS, HINGE_RULES, MOST_SECTIONS
 from softrobots.robots.fields import XacroRobot, check_parameters, parameter
+from softrobots.robots.helix_sections import actuator_strains, fewest_sections
 
 UPRIGHT = ("tube", "axis")
 """What can stand along world z: the tube where it leaves the base, or the axis of the helix."""
+
+ACTUATORS = ("drawn", "length", "elastic")
+"""What the actuator of a tube can be: drawn only, or real, of given length, or elastic in a tube under pressure."""
 
 MAX_JOINTS = 300
 """Most joints of a tube from a design; Pinocchio's workspace is refused above."""
@@ -42,6 +45,10 @@ class HelixTube(XacroRobot):
     the actuator is slack before any load. Give `bending_stiffness` as measured where that matters.
 
     The frames follow the actuator around the tube (`helix.material_twist` is the turn of the wall against them).
+
+    With `actuator="length"` or `"elastic"` the tube is straight at rest and its actuator, the backbone of the chain, bends it
+    against EI, GJ and EA (2 EI / r^2 if not given). The line of the wall opposite keeps its length. As EI goes to 0 against GJ
+    the shape tends to (12) of [Blumenschein 2018]; pressure untwists it, as `P r^4 / GJ` (the page of the helical tube).
 
     Raises:
         ParameterError: If a value is out of range, or there are too few sections; the message names the field. Sections are too
@@ -73,6 +80,14 @@ class HelixTube(XacroRobot):
         "",
         "What stands along world z: tube (where it leaves the base) or axis (of the helix, through the world origin)",
         options=UPRIGHT,
+    )
+    actuator: str = parameter(
+        "drawn",
+        "",
+        "What its actuator is: drawn (the tube is a helix at rest), or real, along a tube that is straight at rest: length "
+        "(q_motors are the lengths of the actuator and of the wall opposite) or elastic (those lengths without tension, and the "
+        "pressure)",
+        options=ACTUATORS,
     )
     pressure: float = parameter(
         10e3,
@@ -145,9 +160,13 @@ class HelixTube(XacroRobot):
         check_parameters(self)
         if self.wall_thickness > 0.05 * self.diameter:
             raise ParameterError("wall_thickness", self.wall_thickness, f"thin: at most a tenth of the radius, {self.radius} m")
+        for name, required in (("chain", "sections"), ("upright", "tube")):
+            if self.real and getattr(self, name) != required:
+                raise ParameterError(name, getattr(self, name), f'"{required}" for actuator="{self.actuator}"')
         if self.upright == "axis" and self.shape is not None and self.shape.centre_radius > _LARGEST_RADIUS * self.length:
             raise ParameterError("upright", self.upright, '"tube" for a helix so wide that the tube hardly bends')
-        self._check_sections()
+        if self.chain == "sections":
+            self._check_sections(max(fewest_sections(strains, length) for strains, length in self._chains()))
         if not self.allow_self_contact and self.shape is not None:
             helix.check_self_contact(self.shape, self.turns)
 
@@ -174,6 +193,18 @@ class HelixTube(XacroRobot):
         count = max(4, math.ceil(turning / _SECTION_TURN))
         counts = {"elastic_sections": min(count, MAX_JOINTS // 6), "hinges": min(count, MAX_JOINTS // 4)}
         return cls(**(counts | designed | fields))
+
+    @property
+    def real(self) -> bool:
+        """Whether its actuator is real, and bends it."""
+        return self.actuator != "drawn"
+
+    @property
+    def q_motors(self) -> FloatArray:
+        """What its actuators have: lengths of actuator and wall [m], and pressure [Pa] if elastic; nothing if drawn."""
+        wall = self.length / math.cos(self.angle)
+        given = [self.contraction * wall, wall, self.pressure]
+        return np.array(given[: {"drawn": 0, "length": 2, "elastic": 3}[self.actuator]])
 
     @property
     def radius(self) -> float:
@@ -247,16 +278,17 @@ class HelixTube(XacroRobot):
         each = {name: min(count, MOST_SECTIONS) for name, count in each.items()}
         return dataclasses.replace(self, length=length, **each)
 
-    def _check_sections(self) -> None:
-        """Refuse too few sections of constant strain for the range of their coordinates."""
-        if self.chain != "sections":
-            return
-        total = (self.strains - [0.0, 0.0, 0.0, 1.0]) * self.centre_length
-        turning = max(total[1] / LARGEST_BENDING, abs(total[2]) / math.pi)
-        count, fewest = self.elastic_sections, max(1, math.ceil(turning))
-        while fewest <= MOST_SECTIONS and not in_range(total / fewest, self.centre_length / fewest):
-            fewest += 1
+    def _chains(self) -> list[tuple[FloatArray, float]]:
+        """Strains and rest length of the chain at rest and where its actuator bends it."""
+        if not self.real:
+            return [(self.strains, self.centre_length)]
+        sign, wall = (1.0 if self.handedness == "right" else -1.0), self.length / math.cos(self.angle)
+        return [(actuator_strains(n, self.angle, self.diameter, sign), wall) for n in (1.0, self.contraction)]
+
+    def _check_sections(self, fewest: int) -> None:
         if fewest > MOST_SECTIONS:
             raise ParameterError("length", self.length, f"so short that {MOST_SECTIONS} sections are enough for its turns")
-        if count < fewest:
-            raise ParameterError("elastic_sections", count, f"at least {fewest} for this helix; more are advisable")
+        if self.elastic_sections < fewest:
+            raise ParameterError(
+                "elastic_sections", self.elastic_sections, f"at least {fewest} for this helix; more are advisable"
+            )
