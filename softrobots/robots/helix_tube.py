@@ -85,8 +85,8 @@ class HelixTube(XacroRobot):
         "drawn",
         "",
         "What its actuator is: drawn (the tube is a helix at rest), or real, along a tube that is straight at rest: length "
-        "(q_motors are the lengths of the actuator and of the wall opposite) or elastic (those lengths without tension, and the "
-        "pressure)",
+        "(q_motors are the lengths of the actuator and of the wall opposite) or elastic (those lengths without tension, and "
+        "the pressure)",
         options=ACTUATORS,
     )
     pressure: float = parameter(
