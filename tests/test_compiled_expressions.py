@@ -27,7 +27,6 @@ from softrobots.compiled.trace.expressions import (
     in_order,
     inverse_cube_root,
     larger,
-    operands,
     sine,
     smaller,
     square_root,
@@ -366,7 +365,7 @@ def test_what_is_hoisted_is_computed_before_and_nothing_changes(
 
 
 def depends(expression: Expression, loads: Sequence[Expression]) -> bool:
-    return expression in loads or any(depends(one, loads) for one in operands(expression))
+    return expression in loads or any(depends(one, loads) for one in expression.operands)
 
 
 @pytest.mark.parametrize("lanes", [False, True])

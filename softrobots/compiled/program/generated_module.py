@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -154,6 +155,7 @@ def functions_of(module: ModuleType) -> list[Callable[..., Any]]:
     return [one for one in vars(module).values() if inspect.isfunction(one) and one.__module__ == module.__name__]
 
 
+@cache
 def _text(function: Callable[..., Any]) -> str:
-    """Return the text of a function."""
+    """Return the text of a function of the drivers."""
     return inspect.getsource(function).rstrip()

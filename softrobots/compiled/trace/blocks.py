@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from softrobots.compiled.trace.expressions import Expression, Scalar, Trace, in_order, operands
+from softrobots.compiled.trace.expressions import Expression, Scalar, Trace, in_order
 
 WORKSPACE = "w"
 """Name of the workspace in generated code."""
@@ -93,7 +93,7 @@ def hoist(
     expressions = in_order([value for block in blocks for _, _, value in block.stores])
     moving = {one.number for one in varying}
     for one in expressions:
-        if any(argument.number in moving for argument in operands(one)):
+        if any(argument.number in moving for argument in one.operands):
             moving.add(one.number)
     kept: dict[int, Expression] = {}
     overwritten_numbers = {one.number for one in overwritten}
@@ -126,7 +126,7 @@ def hoist(
 
 def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool) -> Iterator[str]:
     expressions = in_order([value for _, _, value in stores])
-    uses = Counter(one.number for expression in expressions for one in operands(expression))
+    uses = Counter(one.number for expression in expressions for one in expression.operands)
     uses.update(value.number for _, _, value in stores if isinstance(value, Expression))
     texts: dict[int, tuple[str, int]] = {}  # by number: text and how strongly it binds
     written = {(base, offset) for base, offset, _ in stores}

@@ -33,7 +33,7 @@ class Trace:
         """Return the expression of an operation, a new one only if there is no equal one."""
         if operation in COMMUTATIVE and _order(arguments[1]) < _order(arguments[0]):
             arguments = arguments[::-1]
-        key = (operation, *((id(one) if isinstance(one, Expression) else one) for one in arguments))
+        key = (operation, *[id(one) if isinstance(one, Expression) else one for one in arguments])
         expression = self._expressions.get(key)
         if expression is None:
             expression = self._expressions[key] = Expression(self, operation, arguments, len(self._expressions))
@@ -43,13 +43,14 @@ class Trace:
 class Expression:
     """A number that is known only when the generated code runs."""
 
-    __slots__ = ("arguments", "number", "operation", "trace")
+    __slots__ = ("arguments", "number", "operands", "operation", "trace")
 
     def __init__(self, trace: Trace, operation: str, arguments: tuple[Any, ...], number: int) -> None:
         """Store operation and arguments; called by `Trace.make`."""
         self.trace = trace
         self.operation = operation
         self.arguments = arguments
+        self.operands = [one for one in arguments if isinstance(one, Expression)]
         self.number = number
 
     def __repr__(self) -> str:
@@ -182,11 +183,6 @@ def larger(one: Scalar, other: Scalar) -> Scalar:
     return if_less(other, one, one, other)
 
 
-def operands(expression: Expression) -> list[Expression]:
-    """Return the arguments of an expression that are expressions."""
-    return [one for one in expression.arguments if isinstance(one, Expression)]
-
-
 def in_order(roots: Sequence[Scalar]) -> list[Expression]:
     """Return `roots` and all expressions below them, each after its arguments."""
     seen: set[int] = set()
@@ -199,7 +195,7 @@ def in_order(roots: Sequence[Scalar]) -> list[Expression]:
         elif expression.number not in seen:
             seen.add(expression.number)
             pending.append((expression, True))
-            pending += ((one, False) for one in reversed(operands(expression)))
+            pending += [(one, False) for one in reversed(expression.operands)]
     return ordered
 
 
