@@ -25,6 +25,8 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 CHECKOUT = Path(__file__).resolve().parent.parent
+PATIENCE = 120.0
+"""How long a test waits for what other processes and threads do in a moment on free cores [s]: a guard against hanging."""
 
 
 JOBS = {

@@ -26,7 +26,7 @@ from softrobots.view.figures.loaded_robot import loaded_shape
 from softrobots.view.local_requests import is_local
 from softrobots.view.meshcat_page.page_text import legend_rows
 from softrobots.view.viewer import Viewer, view
-from tests.conftest import CHECKOUT, load_script
+from tests.conftest import CHECKOUT, PATIENCE, load_script
 from tests.support.pictures import listening
 
 SCRIPT = "</script><script>window.pwned = 1</script><img src=x onerror='window.pwned = 1'>"
@@ -210,7 +210,7 @@ def ask(port: int, path: str = "/", *, upgrade: bool = False, **headers: str) ->
     if upgrade:
         key = "AAAAAAAAAAAAAAAAAAAAAA=="
         asked |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": key}
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
     try:
         connection.request("GET", path, headers=asked)
         answer = connection.getresponse()

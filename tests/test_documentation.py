@@ -21,7 +21,7 @@ import pytest
 import softrobots as sr
 from softrobots.cli.main import parser
 from softrobots.robots.fields import facts_of
-from tests.conftest import CHECKOUT, missing
+from tests.conftest import CHECKOUT, PATIENCE, missing
 from tests.support.documentation import PageError, PageRunner, blocks, differences, missing_package
 from tests.support.tables import each_row
 
@@ -393,7 +393,7 @@ def test_the_site_is_served_on_loopback_only(tmp_path: Path) -> None:
     thread = threading.Thread(target=server.serve_forever)
     thread.start()
     try:
-        with urllib.request.urlopen(f"{served.url}index.html", timeout=10) as answer:
+        with urllib.request.urlopen(f"{served.url}index.html", timeout=PATIENCE) as answer:
             assert answer.read() == b"<title>here</title>"
     finally:
         server.shutdown()

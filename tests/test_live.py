@@ -24,6 +24,7 @@ from softrobots.view.live.input import Lines, Terminal, WatchedFile, commands_fr
 from softrobots.view.live.keys import KeyMoves
 from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
 from softrobots.view.warm_start import next_equilibrium, next_solution
+from tests.conftest import PATIENCE
 from tests.support.tables import each_row
 
 START = Wanted(np.array([0.0, 0.5, -0.5]), None, np.array([0.0, 0.0, -1.0]), None)
@@ -469,7 +470,7 @@ def test_the_terminal_is_as_before_on_every_way_out(way: str, terminal: SimpleNa
             if way == "error":
                 raise ZeroDivisionError
             signal.raise_signal(getattr(signal, way))
-            time.sleep(5.0)
+            time.sleep(PATIENCE)
 
     with pytest.raises((SystemExit, KeyboardInterrupt, ZeroDivisionError)) as ended:
         leave()

@@ -25,6 +25,7 @@ from softrobots.view.slider_page import SliderPage
 from softrobots.view.tension_scale import round_down, round_up, scale_end, tension_colour
 from softrobots.view.viser_page.drawing import triangles
 from softrobots.view.viser_page.slider_panel import slider_grid
+from tests.conftest import PATIENCE
 from tests.support.pictures import listening, pixels
 
 HELD = (0.47, 0.53, 0.55, 0.50, 0.55, 0.53)
@@ -41,8 +42,8 @@ def page(arm: sr.SoftModel) -> Iterator[SliderPage]:
         yield opened
 
 
-def wait_for(true: Callable[[], bool], seconds: float = 20.0) -> None:
-    deadline = time.monotonic() + seconds
+def wait_for(true: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
     while not true():
         assert time.monotonic() < deadline, "it did not happen"
         time.sleep(0.02)
@@ -323,10 +324,10 @@ def test_the_server_listens_on_loopback_only_says_nothing_and_ends_with_ctrl_c()
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         port = int(process.stdout.readline())
         assert listening(process.pid) == {"127.0.0.1"}
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=10) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=PATIENCE) as answer:
             assert b"<!doctype html>" in answer.read(100).lower()
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out, err) == (0, "end\n", "")
 
 
@@ -339,7 +340,7 @@ def test_pages_take_ports_of_their_own_and_close(page: SliderPage, arm: sr.SoftM
         other.set(force=(0, 0, -5))
     with pytest.raises(sr.ViewerError, match=f"port {page.port} of 127.0.0.1 cannot be had"):
         SliderPage(arm, port=page.port)
-    with urllib.request.urlopen(page.url, timeout=10) as answer:
+    with urllib.request.urlopen(page.url, timeout=PATIENCE) as answer:
         assert answer.status == 200
     assert page.set(force=(0, 0, -5)).stable
     other.close()  # once more does nothing
@@ -413,7 +414,7 @@ def test_sliders_in_the_browser_move_the_arm(browser: object, arm: sr.SoftModel)
 
         def picture(wanted: Callable[[np.ndarray], bool]) -> np.ndarray:
             """The picture of the robot, once it is as wanted and stays so: software draws a few frames a second."""
-            last, deadline = np.zeros(0), time.monotonic() + 60.0
+            last, deadline = np.zeros(0), time.monotonic() + PATIENCE
             while time.monotonic() < deadline:
                 shot = pixels(tab.screenshot(clip={"x": 0, "y": 150, "width": 460, "height": 450}))
                 if np.array_equal(shot, last) and wanted(shot):

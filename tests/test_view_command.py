@@ -25,6 +25,7 @@ from softrobots.cli.main import main
 from softrobots.view import animation_frames, slider_page
 from softrobots.view.browser import show_share
 from softrobots.view.live.loop import state_line
+from tests.conftest import PATIENCE
 from tests.support.pictures import coloured, listening, pixels
 from tests.support.tables import each_row
 
@@ -70,7 +71,7 @@ class Process:
 
     def until(self, word: str) -> str:
         """The next printed line that holds a word."""
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + PATIENCE
         seen = []
         while time.monotonic() < deadline:
             with contextlib.suppress(queue.Empty):
@@ -94,13 +95,13 @@ class Process:
 
     def ended(self) -> tuple[int, str]:
         """Exit status and what was said on stderr."""
-        status = self.popen.wait(20.0)
+        status = self.popen.wait(PATIENCE)
         return status, self.popen.stderr.read()
 
 
 def gone(pid: int) -> bool:
-    """Whether a process is no more, within ten seconds."""
-    deadline = time.monotonic() + 10.0
+    """Whether a process is no more, soon."""
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         try:
             if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":

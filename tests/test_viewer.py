@@ -20,6 +20,7 @@ from softrobots.view.browser import find_chromium, show_share, take_picture
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 from softrobots.view.viewer import Viewer, view
+from tests.conftest import PATIENCE
 from tests.support.packed_pages import scene_of
 from tests.support.pictures import coloured, listening, pictures_of, pixels
 
@@ -76,13 +77,13 @@ def test_a_server_that_does_not_answer_is_an_error_of_ours(arm: sr.SoftModel) ->
 def test_server_ends_when_its_parent_is_killed(how: int) -> None:
     code = (
         "import softrobots as sr, time; from softrobots.view.viewer import Viewer\n"
-        "v = Viewer(sr.load_model(sr.InflatableArm())); print(v._server.process.pid, flush=True); time.sleep(60)"
+        "v = Viewer(sr.load_model(sr.InflatableArm())); print(v._server.process.pid, flush=True); time.sleep(600)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:
         child = int(parent.stdout.readline())
         parent.send_signal(how)
-        parent.wait(10)
-    deadline = time.monotonic() + 10
+        parent.wait(PATIENCE)
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         try:
             os.kill(child, 0)
