@@ -131,23 +131,24 @@ class _Law(NamedTuple):
         folded = np.where(theta < 0.0, -tau, tau)
         knee = _knee(theta, tau, free)
         before = np.arange(len(theta)) < knee
-        line = _rising(theta[before], tau[before], free, moment, limit)
+        line = _rising(FittedLine.of(theta[before], tau[before], free), moment, limit)
         saturated = folded[knee:]
         plateau = float(saturated.mean() - saturated.std(ddof=1)) if len(saturated) else math.inf
         chosen = np.abs(line.at(theta)) < plateau
-        if FittedLine.of(theta[chosen], tau[chosen], free) is None:  # too few: a knee close to the zero
-            chosen = before
+        through = FittedLine.of(theta[chosen], tau[chosen], free)
+        if through is None:  # too few: a knee close to the zero
+            chosen, through = before, line
         while True:  # line and set of points below wrinkling depend on each other; a point left out stays out
-            line = _rising(theta[chosen], tau[chosen], free, moment, limit)
+            line = _rising(through, moment, limit)
             below = chosen & (np.abs(line.at(theta)) < limit)
             if np.array_equal(below, chosen):
                 return cls(folded, knee, line, int(np.count_nonzero(chosen)))
             chosen = below
+            through = FittedLine.of(theta[chosen], tau[chosen], free)
 
 
-def _rising(theta: FloatArray, tau: FloatArray, free: bool, moment: Any, limit: float) -> FittedLine:
-    """Line of points, or ParameterError if they do not determine one that rises."""
-    line = FittedLine.of(theta, tau, free)
+def _rising(line: FittedLine | None, moment: Any, limit: float) -> FittedLine:
+    """The line, or ParameterError if the points do not determine one that rises."""
     if line is None:
         enough = f"data with at least three loaded points below wrinkling at {limit:.4g} N m, none of them far from all others"
         raise ParameterError("moment", moment, enough)
@@ -165,16 +166,14 @@ def _knee(theta: FloatArray, tau: FloatArray, free: bool) -> int:
     n = len(theta)
     folded = np.where(theta < 0.0, -tau, tau)
     split = np.arange(3, n + 1)  # candidates: this many points before the knee
-
-    def before(values: FloatArray) -> FloatArray:
-        return np.asarray(np.cumsum(values)[split - 1])
-
+    sums = np.cumsum([theta * tau, theta, tau, theta * theta, tau * tau, folded], axis=1)[:, 2:]  # before it
+    theta_tau, thetas, taus, theta_squares, tau_squares, moments = sums
     share = free / split  # of the squares that the level of a free line takes off
-    products = before(theta * tau) - share * before(theta) * before(tau)
-    squares = before(theta**2) - share * before(theta) ** 2
-    line = before(tau**2) - share * before(tau) ** 2 - products**2 / np.maximum(squares, np.finfo(np.float64).tiny)
+    products = theta_tau - share * thetas * taus
+    squares = theta_squares - share * thetas**2
+    line = tau_squares - share * taus**2 - products**2 / np.maximum(squares, np.finfo(np.float64).tiny)
     after = n - split
-    constant = np.sum(tau**2) - before(tau**2) - (np.sum(folded) - before(folded)) ** 2 / np.maximum(after, 1)
+    constant = tau_squares[-1] - tau_squares - (moments[-1] - moments) ** 2 / np.maximum(after, 1)
     left = np.where((after >= 3) | (after == 0), line + np.where(after > 0, constant, 0.0), np.inf)
     best = int(np.argmin(left))
     knee, rounding = int(split[best]), 1e-12 * float(tau @ tau)
