@@ -24,27 +24,37 @@ from tests.support.round_rods import RoundRod
 @njit(cache=True)
 def _out_of_balance(y, v, force, grid, constants):  # type: ignore[no-untyped-def]
     """Mass matrix, and generalized forces less those of the acceleration that coordinates with constant rates have; the tip."""
-    w, running, bend, stretch, stiffness = grid
+    w, running, bend, stretch, turning, stiffness = grid
     density, inertia, retardation, gravity_x, gravity_z = constants
     bends, count = bend.shape[1], y.size
     angle, rate = bend @ y[:bends], bend @ v[:bends]
     length, lengthening = 1.0 + stretch @ y[bends:], stretch @ v[bends:]
     sine, cosine = np.sin(angle), np.cos(angle)
-    slopes_x, slopes_z = np.zeros((w.size, count)), np.zeros((w.size, count))
-    for k in range(bends):
-        slopes_x[:, k], slopes_z[:, k] = length * cosine * bend[:, k], -length * sine * bend[:, k]
-    for k in range(bends, count):
-        slopes_x[:, k], slopes_z[:, k] = sine * stretch[:, k - bends], cosine * stretch[:, k - bends]
-    forces = force[0] * (w @ slopes_x) + force[1] * (w @ slopes_z) - stiffness @ (y + retardation * v)
-    slopes_x, slopes_z = running @ slopes_x, running @ slopes_z
-    turning_x = running @ (2.0 * lengthening * rate * cosine - length * rate**2 * sine)
-    turning_z = running @ (-2.0 * lengthening * rate * sine - length * rate**2 * cosine)
-    mass = density * w
-    forces += (mass * (gravity_x - turning_x)) @ slopes_x + (mass * (gravity_z - turning_z)) @ slopes_z
-    weight = np.sqrt(mass).reshape(-1, 1)
-    slopes_x, slopes_z = weight * slopes_x, weight * slopes_z
-    matrix = slopes_x.T @ slopes_x + slopes_z.T @ slopes_z
-    matrix[:bends, :bends] += inertia * bend.T @ (w.reshape(-1, 1) * bend)
+    columns = np.zeros((w.size, 2 * count + 2))  # slopes of x and of z by the coordinates, accelerations at constant rates
+    for i in range(w.size):
+        for k in range(bends):
+            columns[i, k], columns[i, count + k] = length[i] * cosine[i] * bend[i, k], -length[i] * sine[i] * bend[i, k]
+        for k in range(bends, count):
+            columns[i, k], columns[i, count + k] = sine[i] * stretch[i, k - bends], cosine[i] * stretch[i, k - bends]
+        centripetal = length[i] * rate[i] ** 2
+        columns[i, -2] = 2.0 * lengthening[i] * rate[i] * cosine[i] - centripetal * sine[i]
+        columns[i, -1] = -2.0 * lengthening[i] * rate[i] * sine[i] - centripetal * cosine[i]
+    forces = -(stiffness @ (y + retardation * v))
+    if force[0] != 0.0 or force[1] != 0.0:
+        ends = w @ columns
+        forces += force[0] * ends[:count] + force[1] * ends[count : 2 * count]
+    columns = running @ columns
+    both = np.zeros((2 * w.size, count))  # the slopes of x above those of z, times the root of the mass
+    acceleration = np.zeros(2 * w.size)
+    for i in range(w.size):
+        weight = np.sqrt(density * w[i])
+        acceleration[i] = weight * (gravity_x - columns[i, -2])
+        acceleration[w.size + i] = weight * (gravity_z - columns[i, -1])
+        for k in range(count):
+            both[i, k], both[w.size + i, k] = weight * columns[i, k], weight * columns[i, count + k]
+    forces += acceleration @ both
+    matrix = both.T @ both
+    matrix[:bends, :bends] += inertia * turning
     return matrix, forces, np.array([np.sum(w * length * sine), np.sum(w * length * cosine)])
 
 
@@ -103,7 +113,8 @@ class PlanarRod(RoundRod):
         axial = self.young * self.area
         stiffness[: self.bends, : self.bends] = self.bending * curvature.T @ (w[:, None] * curvature)
         stiffness[self.bends :, self.bends :] = axial * stretch.T @ (w[:, None] * stretch)
-        return w, half * integrals @ fit, np.ascontiguousarray(bend), np.ascontiguousarray(stretch), stiffness
+        turning = bend.T @ (w[:, None] * bend)  # squares of the rate of the angle
+        return w, half * integrals @ fit, np.ascontiguousarray(bend), np.ascontiguousarray(stretch), turning, stiffness
 
     def _at(self, y: np.ndarray, v: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return _out_of_balance(y, v, np.asarray(force, dtype=float), self._grid, self._constants)
