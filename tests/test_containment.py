@@ -23,6 +23,7 @@ import softrobots as sr
 from softrobots.export import FORMATS, export_model
 from softrobots.view.figures import canvas, trajectories
 from softrobots.view.figures.loaded_robot import loaded_shape
+from softrobots.view.legend import LegendEntry
 from softrobots.view.local_requests import is_local
 from softrobots.view.meshcat_page.page_text import legend_rows
 from softrobots.view.viewer import Viewer, view
@@ -198,7 +199,8 @@ def test_names_add_nothing_to_a_page(hostile: Viewer) -> None:
     assert Elements(hostile.html(SCRIPT)).found == Elements(ours).found
     assert Elements(inline[1]).found == Elements(inline[0]).found
     assert "<title>" in theirs
-    assert Elements(legend_rows([(0xFF0000, SCRIPT)])).found == Elements(legend_rows([(0xFF0000, "a")])).found
+    rows = [legend_rows([LegendEntry(0xFF0000, meaning)]) for meaning in (SCRIPT, "a")]
+    assert Elements(rows[0]).found == Elements(rows[1]).found
 
 
 # --- Servers
