@@ -13,8 +13,10 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import softrobots as sr
+from softrobots import constant_curvature
 from softrobots.cli.options.robot_parameters import make_robot
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
@@ -22,6 +24,7 @@ from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.robots.continuum_arm import ContinuumArm
 from softrobots.robots.parameter_file import read_robot, write_parameters
+from softrobots.statics.kinematics import frame_placement
 from tests.support.laws import law
 from tests.support.tables import each_row
 from tests.support.urdf_reading import check_portable, link_poses
@@ -221,6 +224,46 @@ def test_the_backbone_of_a_tendon_arm_is_a_round_rod() -> None:
         for body in sr.load_model(sr.TendonArm(kind="length", routing="segment", elastic_sections=1)).pinocchio.inertias[1:]
     )
     assert masses == pytest.approx(0.05, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["pressure", "mckibben"])
+def test_the_default_muscles_bend_a_segment_by_about_a_radian(kind: str) -> None:
+    """One at its largest pressure, in closed form: a tension T bends by T d L / EI and shortens by T L / EA.
+
+    The tension of a McKibben muscle is that of Chou and Hannaford (1996) with the length that it then has, by SciPy's root.
+    1e-8: the solver stops at 1e-10 of the load.
+
+    """
+    length, distance, stiffness, axial, pressure = 0.524, 0.04, 1.92, 2400.0, 3e5
+
+    def excess(tension: float) -> float:
+        share = 1.0 - tension / axial - tension * distance**2 / stiffness
+        braid = math.radians(25.0)
+        pull = 3.0 / math.tan(braid) ** 2 * share**2 - 1.0 / math.sin(braid) ** 2
+        return pressure * math.pi * 0.01**2 / 4.0 * pull - tension
+
+    tension = -pressure * 3e-4 if kind == "pressure" else brentq(excess, 0.0, 1e3, xtol=1e-12)
+    model = sr.load_model(sr.PccArm(segment_lengths=(length,), kind=kind, muscle_azimuths=(0.7,), elastic_sections=2))
+    found = sr.solve_equilibrium(model, (pressure,))
+    assert found.muscle_forces[0] == pytest.approx(tension, rel=1e-8)
+    bend = tension * distance * length / stiffness
+    assert 0.8 < abs(bend) < 1.25
+    arc = constant_curvature.Arc(length * (1.0 - tension / axial), abs(bend), 0.7 if bend > 0.0 else 0.7 + math.pi)
+    assert np.allclose(found.transform_tip_to_world.homogeneous, constant_curvature.transform(arc), atol=1e-8)
+    assert found.stable
+    assert found.within_limits
+
+
+def test_an_arm_with_tendons_on_another_robot_bends_as_alone() -> None:
+    """Names get the prefix and segments other numbers; without weight its shape is that of the arm alone, from its base."""
+    arm = sr.TendonArm(offset=0.3, elastic_sections=1)
+    alone, whole = sr.load_model(arm), sr.load_model(sr.mount(sr.InflatableArm(), "tip", arm, prefix="wrist_"))
+    assert whole.motor_joints[-9:] == tuple(f"wrist_{name}" for name in alone.motor_joints)
+    pulled = alone.relaxed_motors + 1e-3 * np.array([-2.0, 0.0, 1.0, -1.0, 2.0, 0.0, -3.0, 0.0, 3.0])
+    one, other = sr.solve_equilibrium(alone, pulled), sr.solve_equilibrium(whole, (0.3, -0.4, 0.8, *pulled))
+    base = frame_placement(whole, other.q, "wrist_base_link")
+    assert np.allclose((base * one.transform_tip_to_world).homogeneous, other.transform_tip_to_world.homogeneous, atol=1e-9)
+    assert np.allclose(one.muscle_forces, other.muscle_forces[-9:], atol=1e-6)  # N; 8 N/mm and 1e-10 of the load
 
 
 @each_row(
