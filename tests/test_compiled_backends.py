@@ -64,7 +64,7 @@ def test_the_places_of_the_workspace_do_not_overlap(kind: str) -> None:
         MOTORS=motors,
         FORCE=3,
         GRAVITY=3,
-        TENSIONS=layout.muscles,
+        ACTUATORS=layout.muscles,
         HELD=layout.constraints,
         START=unknowns,
         UNKNOWN=unknowns,

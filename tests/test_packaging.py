@@ -100,7 +100,7 @@ ROOMS = {
     "cli": "core inflated_beam constant_curvature helix description robots model statics dynamics compiled export view",
 }
 """Every folder of the package, and the rooms that it may import."""
-TO_CODE = ("trace", "chain", "drivers", "program", "c", "run", "sweeps")
+TO_CODE = ("trace", "chain", "routes", "drivers", "program", "c", "run", "sweeps")
 """Folders of `compiled/` in the order in which a robot becomes code; each imports only those before it."""
 SOLVERS = "trajectory load_estimation imposed_displacement critical_load stability workspace post_buckling sensitivity"
 LOADING = "softrobots.model.loader softrobots.description.tag_reader softrobots.description.sources"

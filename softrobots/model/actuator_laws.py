@@ -30,7 +30,8 @@ UNITS = {"length": "m", "tension": "N", "elastic": "m", "pressure": "Pa", "mckib
 
 IntArray = NDArray[np.intp]
 
-_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)  # of lengths
+ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+"""Rounding of lengths, relative to them."""
 
 
 class Tensions(NamedTuple):
@@ -62,7 +63,7 @@ class ActuatorLaws:
         )
         braided = [tag.kind == "mckibben" for tag in tags]
         self._pull = np.array([pull_factors(tag) if has else (0.0, 0.0) for tag, has in zip(tags, braided, strict=True)])
-        self.rounding = _ROUNDING * float(np.linalg.norm(self._stiffness * self._rest))
+        self.rounding = ROUNDING * float(np.linalg.norm(self._stiffness * self._rest))
         """Rounding of the tensions of stiff tendons [N]: that of a length times the stiffness."""
 
     def at(self, elongations: FloatArray, inputs: FloatArray) -> Tensions:
@@ -89,7 +90,7 @@ class ActuatorLaws:
         stiffness = self._stiffness[places]
         pull = self._pretension[places] + stiffness * (beyond - (inputs - self._rest[places]))
         tension = np.maximum(pull, 0.0)
-        slope = np.where(pull > _ROUNDING * stiffness * self._rest[places], stiffness, 0.0)
+        slope = np.where(pull > ROUNDING * stiffness * self._rest[places], stiffness, 0.0)
         return tension, slope, -slope, tension * tension / (2.0 * stiffness)
 
     def _pressure(self, places: IntArray, beyond: FloatArray, inputs: FloatArray) -> tuple[FloatArray | float, ...]:
@@ -99,7 +100,7 @@ class ActuatorLaws:
     def _mckibben(self, places: IntArray, beyond: FloatArray, inputs: FloatArray) -> tuple[FloatArray | float, ...]:
         (square, least), rest = self._pull[places].T, self._rest[places]
         share, slack = 1.0 + beyond / rest, np.sqrt(least / square)
-        taut = share > slack * (1.0 + _ROUNDING)
+        taut = share > slack * (1.0 + ROUNDING)
         force = np.where(taut, square * share**2 - least, 0.0)
         slope = np.where(taut, 2.0 * square * share / rest, 0.0)
         work = (square * (share**2 + share * slack + slack**2) / 3.0 - least) * (share - slack) * rest

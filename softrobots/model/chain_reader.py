@@ -58,6 +58,7 @@ def read_chain(
         n_motors=len(structure.motor_joints),
         limits=limits,
         muscle_input=structure.muscle_input,
+        actuators=structure.muscles,
         muscle_paths=structure.muscle_paths,
         constrained=() if given is None else given.groups,
         constrained_slope=read_only(np.zeros((0, muscles))) if given is None else given.slopes,

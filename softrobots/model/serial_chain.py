@@ -7,9 +7,13 @@ welded bodies of the description are part of the constant placements between the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 from softrobots.core.checks import FloatArray
+from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.muscle_paths import MusclePaths
 
 
@@ -96,6 +100,8 @@ class SerialChain:
     """Lower and upper limit of the actuators, motor joints and then muscles, shape (n_actuators, 2) [rad, m or N]."""
     muscle_input: str
     """What `q_motors` holds of the muscles, "lengths" or "forces"."""
+    actuators: tuple[ActuatorTag, ...]
+    """The muscles."""
     muscle_paths: MusclePaths
     """The muscle lengths as functions of the strains."""
     constrained: tuple[tuple[int, ...], ...]
@@ -113,3 +119,48 @@ class SerialChain:
     """Part of the strains by elastic coordinates, shape (n_strains, n_springs)."""
     slack_hinges: tuple[tuple[int, int, float], ...] = ()
     """The two strains, base to tip, of each hinge of an inflated link whose wall goes slack, and the moment of that [N m]."""
+
+    @cached_property
+    def overlapping(self) -> list[list[int]]:
+        """Muscles of each segment, tip to base, those that end nearest to the tip first."""
+        merged: list[list[int]] = []
+        for muscle in sorted(range(len(self.spans)), key=lambda one: (-self.spans[one][1], one)):
+            if merged and self.spans[muscle][1] >= min(self.spans[one][0] for one in merged[-1]):
+                merged[-1].append(muscle)
+            else:
+                merged.append([muscle])
+        return merged
+
+    @cached_property
+    def routed(self) -> bool:
+        """Whether an actuator is not of given length or tension, winds, or passes other sections than those it overlaps."""
+        if any(one.kind not in ("length", "tension") or not one.straight for one in self.actuators):
+            return True
+        paths, shared = self.muscle_paths, False
+        for muscles in self.overlapping:
+            own = np.isin(paths.muscle, muscles)
+            shared |= int(own.sum()) != len(muscles) * len(np.unique(paths.places[own], axis=0))
+        return shared
+
+    @cached_property
+    def spans(self) -> list[tuple[int, int]]:
+        """First and last element beside each muscle."""
+        paths = self.muscle_paths
+        spans = []
+        for muscle in range(len(paths.rest)):
+            places = paths.places[paths.muscle == muscle].ravel().tolist()
+            rows = [self.element_of[place] for place in places if place < paths.count]
+            spans.append((min(rows), max(rows)))
+        return spans
+
+    @cached_property
+    def element_of(self) -> dict[int, int]:
+        """Element of each strain."""
+        return {strain: row for row, element in enumerate(self.elements) for strain in strains_of(element)}
+
+
+def strains_of(element: Element) -> tuple[int, ...]:
+    """Return the indices of the strains of an element; none for a motor."""
+    if isinstance(element, ChainSection):
+        return tuple(element.strain + place for place in range(4))
+    return () if element.strain is None else (element.strain,)

@@ -264,8 +264,9 @@ class SoftModel:
         """The robot as a serial chain from base to tip, for compiled solvers; read on first use, without Pinocchio's workspace.
 
         Raises:
-            DescriptionError: If a joint is not between base and tip, or neither turns nor slides, or if an inflated link has a
-                plateau, or a slack wall with other springs than two that turn, one behind the other.
+            DescriptionError: If a joint is not between base and tip, or neither turns nor slides, if an inflated link has a
+                plateau, or a slack wall with other springs than two that turn, one behind the other, or if an actuator winds
+                along lumped sections, or a given length runs otherwise than straight along one segment.
         """
         return self._chain
 
@@ -276,12 +277,15 @@ class SoftModel:
                 f"an inflated link of {self.pinocchio.name} has max_moment; compiled solvers need springs that are linear, or "
                 "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
             )
-        routed = [tag.name for tag in self.muscles if tag.kind not in ("length", "tension") or len(tag.segments) > 1]
-        routed += [tag.name for tag in self.muscles if not tag.straight and tag.name not in routed]
-        if routed:
+        paths = self.structure.muscle_paths
+        winding = {tag.name for tag in self.muscles if tag.kind == "length" and (len(tag.segments) > 1 or not tag.straight)}
+        if paths.lumped:
+            winding |= {self.muscles[muscle].name for muscle in paths.muscle[~paths.separable].tolist()}
+        if winding:
             raise DescriptionError(
-                f"{self.pinocchio.name} has actuators that compiled solvers do not take ({', '.join(routed)}); required: given "
-                "lengths or tensions, straight along one segment each (solve_equilibrium accepts the others, too)"
+                f"{self.pinocchio.name} has actuators that compiled solvers do not take ({', '.join(sorted(winding))}); "
+                "required: straight ones along lumped sections, and for given lengths along one segment each "
+                "(solve_equilibrium accepts the others, too)"
             )
         tip = self.frame_id(self.tip)
         return read_chain(

@@ -83,7 +83,7 @@ def _set_tensions(plan: Plan, block: Block, segment: Segment) -> None:
     """Write the tensions of a segment: as given, or as of the multipliers of the last point and the preload of the start."""
     chain, layout, recursion = plan.unknowns.chain, plan.layout, plan.recursion
     if not segment.groups:
-        block.store_all(recursion.tensions, [block.load(layout.tensions + muscle) for muscle in segment.muscles])
+        block.store_all(recursion.tensions, [block.load(layout.actuators + muscle) for muscle in segment.muscles])
         return
     held = [block.load(layout.held + group) for group in segment.groups]
     block.store_all(recursion.multipliers, held)

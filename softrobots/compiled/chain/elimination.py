@@ -54,6 +54,22 @@ class Outboard:
 
 
 @dataclass
+class RouteSums:
+    """What actuators on routes add to an element of `k` coordinates; see `softrobots.compiled.routes.terms`."""
+
+    load: Any
+    """Derivative of their energy by the coordinates, shape (k,)."""
+    curvature: Any
+    """Tensions times second derivatives of the lengths, shape (k, k)."""
+    push: Any
+    """`P` between the turn and the lengths times the slopes of these, shape (3, k)."""
+    own: Any
+    """Slopes times `P` between the lengths times slopes, shape (k, k)."""
+    sides: list[Any]
+    """Slopes times `s` of the lengths for each right-hand side, shape (k,)."""
+
+
+@dataclass
 class Eliminated:
     """Factors of an element after elimination, for its own step."""
 
@@ -66,11 +82,15 @@ class Eliminated:
     columns: list[list[Scalar]]
     """`L^-1 g'` of each right-hand side (k)."""
 
-    def steps(self, column: int, turn: Any) -> Any:
-        """Return the steps for one right-hand side, shape (k,), from the turn of all elements nearer to the base."""
+    def steps(self, column: int, turn: Any, before: Any = None) -> Any:
+        """Return the steps for one right-hand side, shape (k,), from the turn of all elements nearer to the base.
+
+        `before`, shape (k,), is what the coupling by lengths adds to that by the turn.
+        """
         k = len(self.inverse_pivots)
         steps = [
-            ((self.coupling[j] @ turn) - self.columns[column][j]) * self.inverse_pivots[j]  # backwards through L^T
+            ((self.coupling[j] @ turn) + (0.0 if before is None else before[j]) - self.columns[column][j])
+            * self.inverse_pivots[j]  # backwards through L^T
             for j in range(k)
         ]
         for j in reversed(range(k)):
@@ -97,6 +117,7 @@ def eliminate(
     *,
     pivot_shift: Scalar = 0.0,
     multipliers: bool = False,
+    routes: RouteSums | None = None,
 ) -> tuple[Eliminated, Outboard]:
     """Eliminate the coordinates of one element.
 
@@ -109,18 +130,23 @@ def eliminate(
         scales: The coordinates' own stiffness (k), to compare pivots with.
         pivot_shift: If positive, pivots are replaced by their size, and at least by this times the spring's own stiffness.
         multipliers: Whether the coordinates are multipliers, whose pivots are negative and never shifted.
+        routes: What lengths of actuators, as further components of the turn, add; their own sums are left to the caller.
 
     Returns:
         The factors of the element, and the sums including it.
     """
     k = len(scales)
     pushed = beyond.matrix @ twists
+    if routes is not None:
+        stiffness, pushed = stiffness - routes.push.T @ twists - routes.own, pushed + routes.push
     coupling = (bends + pushed).T.copy()
     block = stiffness - twists.T @ pushed
     columns = [
         [value + twists[:, j] @ column for j, value in enumerate(values)]
         for values, column in zip(right_hand_sides, beyond.columns, strict=True)
     ]
+    if routes is not None:
+        columns = [[*(vector(values) + more)] for values, more in zip(columns, routes.sides, strict=True)]
     lower = constants(np.eye(k))
     inverse: list[Scalar] = []
     min_pivot, n_negative_pivots = beyond.min_pivot, beyond.n_negative_pivots

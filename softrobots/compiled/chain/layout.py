@@ -56,15 +56,15 @@ class Layout:
     conditions: int = 3
     """Number of conditions of a target: 3 for a position, 6 for a pose."""
     muscles: int = 0
-    """Number of muscles with given tensions."""
+    """Number of muscles whose lengths are not given."""
     constraints: int = 0
     """Number of sums that muscle lengths constrain."""
     force: int = field(init=False)
     """Force on the tip, world axes [N] (3)."""
     gravity: int = field(init=False)
     """Gravity, world axes [m/s^2] (3)."""
-    tensions: int = field(init=False)
-    """Given tension of each muscle [N]."""
+    actuators: int = field(init=False)
+    """Input of each muscle whose length is not given: tension [N], length of the motor [m] or pressure [Pa]."""
     held: int = field(init=False)
     """Multiplier of each constrained sum at the last point, beyond those of the start [N m or N]."""
     start: int = field(init=False)
@@ -103,7 +103,7 @@ class Layout:
         motors, n = self.motors, self.unknowns
         point = self.varied + n
         before_tip = dict(
-            tensions=self.muscles, held=self.constraints, start=n, unknown=n, step=n, line_origin=n, line_direction=n
+            actuators=self.muscles, held=self.constraints, start=n, unknown=n, step=n, line_origin=n, line_direction=n
         )
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
         searches = dict(tip=3, torques=motors, target=self.target_size, next_target=self.target_size)

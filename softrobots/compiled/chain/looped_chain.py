@@ -15,51 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Load, constants, vector
-from softrobots.compiled.chain.elimination import Outboard
+from softrobots.compiled.chain.elements import Load, symmetric, vector
+from softrobots.compiled.chain.elimination import Eliminated, Outboard, RouteSums
 from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
+from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Expression, Scalar
-
-
-class TableColumns:
-    """Numbers of the elements of a kind: equal ones are constants, others go into a table."""
-
-    def __init__(self, block: Block, name: str, count: int) -> None:
-        """Begin a table for `count` elements."""
-        self._block, self._name, self._count = block, name, count
-        self._columns: list[tuple[float, ...]] = []
-
-    def entry(self, values: Sequence[Any]) -> Scalar:
-        """Return a number of an element: a constant, or a table entry for the row of the element."""
-        if len(set(values)) == 1:
-            return float(values[0])
-        column = tuple(float(value) for value in values)
-        if column not in self._columns:
-            self._columns.append(column)
-        return self._block.table(self._name, self._columns.index(column), "row")
-
-    def entries(self, values: Any) -> Any:
-        """Return the same for arrays, shape (count, ...)."""
-        array = np.asarray(values, dtype=np.float64)
-        entries = constants(np.zeros(array.shape[1:]))
-        for index in np.ndindex(*array.shape[1:]):
-            entries[index] = self.entry(array[(slice(None), *index)].tolist())
-        return entries
-
-    @property
-    def width(self) -> int:
-        """Count of numbers for one element."""
-        return len(self._columns)
-
-    @property
-    def numbers(self) -> list[float]:
-        """The table, element by element."""
-        return [column[row] for row in range(self._count) for column in self._columns]
+from softrobots.compiled.trace.tables import TableColumns
 
 
 @dataclass
@@ -91,7 +57,8 @@ def element_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     """Return the properties that elements with the same code share."""
     one = unknowns.traced(row)
     zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
-    constraint = unknowns.multipliers_at(row)
+    routed = unknowns.chain.routed and unknowns.segment_at(row) is not None
+    constraint = -1 if routed else unknowns.multipliers_at(row)
     muscles = [(muscle.number, muscle.twists, [arm == 0.0 for arm in muscle.arms]) for muscle in one.muscles]
     return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0)), str(muscles)
 
@@ -114,8 +81,9 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
     held = back.loads(recursion.multipliers, multipliers)
     muscles = len(element.muscles)
     tensions, preload = back.loads(recursion.tensions, muscles), back.loads(recursion.preload, muscles)
-    element = replace(element, tensions=tensions, preload=preload)
-    state = [*state, *held, *tensions, *preload]
+    routes, added = _arriving_routes(back, plan, rows[0])
+    element = replace(element, tensions=tensions, preload=preload, routes=routes)
+    state = [*state, *held, *tensions, *preload, *added]
     pivot_shift = back.load(layout.single("pivot_shift"))
     result = inward(
         element,
@@ -128,6 +96,8 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
     )
     back.store_all(recursion.lever, [one for load in result.loads for one in load.lever])
     plan.store_outboard(back, result.beyond)
+    if routes is not None and result.eliminated is not None:
+        _store_factors(back, plan.routes, result.twists, result.eliminated)
     if tip is None:
         state = [*state, *_store_constraints(back, element, result, recursion, multipliers)]
         back.store_all(
@@ -140,9 +110,9 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
                 result.beyond.n_negative_pivots,
             ],
         )
-        second = _store_step(step_pass, result, plan, held)
+        second = _store_step(step_pass, result, plan, held, routes is not None)
     else:
-        second = _store_tip_step(step_pass, back, result, plan, tip, multipliers)
+        second = _store_tip_step(step_pass, back, result, plan, tip, multipliers, routes is not None)
     size = hoist([back, step_pass], out, [*state, pivot_shift, *second], 0, "at", overwritten=axes_loads)
     size += hoist([step_pass], back, second, size, "at", overwritten=state)
     return Kind(number, rows, [out, back, step_pass], columns, size)
@@ -167,7 +137,48 @@ def _store_constraints(
     return [*gaps, *torques]
 
 
-def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence[Scalar]) -> list[Expression]:
+def _arriving_routes(block: Block, plan: Plan, row: int) -> tuple[RouteSums | None, list[Expression]]:
+    """Return what routes add to an element, and the workspace elements of that; None if there is none."""
+    routes, k = plan.routes, len(plan.unknowns.moving(row))
+    if row not in routes.beside:
+        return None, []
+    load, curvature, push, own = (
+        block.loads(place, size)
+        for place, size in (
+            (routes.load, k),
+            (routes.curvature, k * (k + 1) // 2),
+            (routes.push, 3 * k),
+            (routes.own, k * (k + 1) // 2),
+        )
+    )
+    sides = [block.loads(routes.sides + routes.stride * side, k) for side in range(len(plan.columns))]
+    sums = RouteSums(
+        vector(load),
+        symmetric(curvature, k),
+        vector(push).reshape(3, k),
+        symmetric(own, k),
+        [vector(side) for side in sides],
+    )
+    return sums, [*load, *curvature, *push, *own, *(one for side in sides for one in side)]
+
+
+def _store_factors(block: Block, routes: Routes, twists: Any, eliminated: Eliminated) -> None:
+    """Write what the elimination of the components of an element needs."""
+    block.store_all(routes.twists, twists.ravel().tolist())
+    block.store_all(routes.lower, eliminated.lower.ravel().tolist())
+    block.store_all(routes.inverse, eliminated.inverse_pivots)
+    block.store_all(routes.coupling, eliminated.coupling.ravel().tolist())
+    for side, column in enumerate(eliminated.columns):
+        block.store_all(routes.columns + routes.stride * side, column)
+
+
+def _before(block: Block, plan: Plan, k: int, routed: bool) -> list[list[Expression] | None]:
+    """Return what the lengths add to the turn of all elements nearer to the base, for each right-hand side."""
+    places = [plan.routes.before + plan.routes.stride * side for side in range(len(plan.turns))] if routed else []
+    return [block.loads(place, k) for place in places] or [None] * len(plan.turns)
+
+
+def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence[Scalar], routed: bool) -> list[Expression]:
     """Trace the Newton step of an element; return the sums of the elements before it.
 
     The residual is that with the multipliers of the last point, which those of this one must agree with.
@@ -176,7 +187,8 @@ def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence
     turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + len(held)), step_pass.loads(recursion.steps, 3)
     if result.eliminated is not None:
         turn = vector(turn_loads)
-        steps = result.eliminated.steps(0, turn)
+        (before,) = _before(step_pass, plan, len(result.gradient), routed)
+        steps = result.eliminated.steps(0, turn, before)
         sums: list[Scalar] = list(sum_loads)
         residuals = vector(result.gradient) + result.constrained[: len(held)].T @ vector(held)
         for place, (step, residual) in enumerate(zip(steps, residuals, strict=True)):
@@ -184,17 +196,18 @@ def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence
             step_pass.store(layout.step - layout.unknown + place, step, "q")
         step_pass.store_all(recursion.turn, (turn + result.twists @ steps)[:3].tolist())
         step_pass.store_all(recursion.steps, sums)
-        return [*turn_loads, *sum_loads]
+        return [*turn_loads, *sum_loads, *(before or ())]
     return [*turn_loads, *sum_loads]
 
 
 def _store_tip_step(
-    step_pass: Block, back: Block, result: InwardPass, plan: Plan, tip: TipLayout, multipliers: int
+    step_pass: Block, back: Block, result: InwardPass, plan: Plan, tip: TipLayout, multipliers: int, routed: bool
 ) -> list[Expression]:
     """Trace the response of an element to a force on the tip; for a motor, its column of the Jacobian so far."""
     layout = plan.layout
     turn_loads = [step_pass.loads(place, 3 + multipliers) for place in plan.turns]
     bend_loads = [step_pass.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
+    before = _before(step_pass, plan, len(result.gradient), routed)
     if result.eliminated is None:
         twist, bend = result.motion.twists[:, 0], result.motion.bends[:, 0]
         back.store(tip.motor_torques, result.motion.torque[0], "q")
@@ -203,13 +216,13 @@ def _store_tip_step(
             step_pass.store(tip.jacobian + axis * tip.motors, follow, "q")
             back.store(tip.twists + axis * tip.motors, twist[axis], "q")
     else:
-        steps = [result.eliminated.steps(side, vector(turn)) for side, turn in enumerate(turn_loads)]
+        steps = [result.eliminated.steps(side, vector(turn), before[side]) for side, turn in enumerate(turn_loads)]
         for place, turn, step in zip(plan.turns, turn_loads, steps, strict=True):
             step_pass.store_all(place, (vector(turn) + result.twists @ step)[:3].tolist())
         for axis, (nearer, step) in enumerate(zip(bend_loads, steps[1:], strict=True)):
             step_pass.store_all(tip.tip_columns + axis * tip.unknowns - layout.unknown, step.tolist(), "q")
             step_pass.store_all(tip.bends + 3 * axis, (vector(nearer) + result.motion.bends @ step).tolist())
-    return [one for part in (*turn_loads, *bend_loads) for one in part]
+    return [one for part in (*turn_loads, *bend_loads, *before) for one in part or ()]
 
 
 def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) -> TracedElement:

@@ -25,12 +25,13 @@ from softrobots.compiled.chain.articulated import (
 from softrobots.compiled.chain.elements import Screw, Vector, constants, symmetric, turned, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Eliminated
 from softrobots.compiled.chain.layout import assign_places
-from softrobots.compiled.chain.looped_chain import Kind, TableColumns
+from softrobots.compiled.chain.looped_chain import Kind
 from softrobots.compiled.chain.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Expression, Scalar
+from softrobots.compiled.trace.tables import TableColumns
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from softrobots.compiled.chain.composite_body import CompositeBody
 from softrobots.compiled.chain.elements import constants
-from softrobots.compiled.chain.looped_chain import TableColumns, element_signature, table_element
+from softrobots.compiled.chain.looped_chain import element_signature, table_element
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import JointState, RigidBody, SectionState, joint_state, round_part
 from softrobots.compiled.chain.muscle_terms import pulls_on
@@ -19,6 +19,7 @@ from softrobots.compiled.chain.recursion import TracedElement, range_margin
 from softrobots.compiled.chain.unknowns import Unknowns, bodies_of
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, if_less
+from softrobots.compiled.trace.tables import TableColumns
 from softrobots.core.checks import FloatArray
 from softrobots.model.serial_chain import ChainBody, ChainJoint
 

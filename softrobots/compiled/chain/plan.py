@@ -8,6 +8,7 @@ from functools import cached_property
 from softrobots.compiled.chain.elements import symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
+from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Expression
@@ -37,6 +38,11 @@ class Plan:
     def recursion(self) -> RecursionLayout:
         """Places of the sums that elements of a looped chain hand on."""
         return RecursionLayout(self.layout.prepared, self.unknowns.most_muscles)
+
+    @cached_property
+    def routes(self) -> Routes:
+        """Routes of actuators that are looped over; before their places stand the share of the step and the bounds of loops."""
+        return Routes(self.unknowns, self.recursion.end + 3)
 
     @property
     def infix(self) -> str:

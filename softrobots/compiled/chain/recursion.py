@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint
-from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate, resized
+from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint, vector
+from softrobots.compiled.chain.elimination import Eliminated, Outboard, RouteSums, eliminate, resized
 from softrobots.compiled.chain.muscle_terms import ElementMuscle, pulls_on
 from softrobots.compiled.trace.expressions import Scalar, if_less, smaller
 from softrobots.compiled.trace.stumpff_series import LARGEST
@@ -67,6 +67,8 @@ class TracedElement:
     """Tension of each muscle of its segment [N]."""
     preload: Sequence[Scalar] = ()
     """Part of it that the start of the springs accounts for; with given lengths [N]."""
+    routes: RouteSums | None = None
+    """What actuators on routes add."""
 
 
 @dataclass
@@ -200,6 +202,8 @@ def inward(
     elif law is not None:
         twists[-1, 0] = 1.0
     stiffness = pulls.curvature[np.ix_(moving, moving)] - motion.curvature
+    if element.routes is not None:
+        stiffness, gradient = stiffness + element.routes.curvature, [*(vector(gradient) + element.routes.load)]
     for place, own in enumerate(element.stiffness):
         stiffness[place, place] = stiffness[place, place] + (own if law is None else law.stiffness)
     sides = [gradient, *(-np.concatenate([motion.moves, motion.twists])[:tip_columns]).tolist()]
@@ -211,6 +215,7 @@ def inward(
         sides,
         element.stiffness,
         pivot_shift=pivot_shift,
+        routes=element.routes,
     )
     if law is not None and law.coupling is None:
         n = len(handed_on.matrix) - 1

@@ -13,12 +13,16 @@ import numpy as np
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.recursion import TracedElement
-from softrobots.compiled.settings import LARGEST_POSITION, MAX_UNROLLED_JOINTS
+from softrobots.compiled.settings import LARGEST_NUMBER, LARGEST_POSITION, MAX_UNROLLED_JOINTS
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.errors import NameNotFound, ParameterError
-from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain
+from softrobots.model.actuator_laws import ActuatorLaws
+from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain, strains_of
+
+STRETCHED = ("elastic", "mckibben")
+"""Kinds of actuators whose tension depends on the length."""
 
 
 class Segment(NamedTuple):
@@ -31,7 +35,9 @@ class Segment(NamedTuple):
     groups: tuple[int, ...]
     """Its groups of `SerialChain.constrained`, one multiplier each; empty if tensions are given."""
     muscles: tuple[int, ...]
-    """Its muscles."""
+    """Its muscles; with `Unknowns.routed` those first whose tension depends on the length, from the tip on."""
+    stretched: tuple[int, ...] = ()
+    """Those whose tension depends on the length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,24 +92,18 @@ class Unknowns:
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
         """The segments with muscles."""
-        segments: list[Segment] = []
-        paths = self.chain.muscle_paths
-        row_of = {strain: row for row, element in enumerate(self.chain.elements) for strain in strains_of(element)}
-        for muscle in range(len(paths.rest)):
-            rows = [row_of[place] for place in paths.places[paths.muscle == muscle].ravel().tolist() if place < paths.count]
-            new = Segment(min(rows), max(rows), (), (muscle,))
-            for place, one in enumerate(segments):
-                if one.first <= new.last and new.first <= one.last:
-                    first, last = min(one.first, new.first), max(one.last, new.last)
-                    segments[place] = Segment(first, last, (), (*one.muscles, muscle))
-                    break
-            else:
-                segments.append(new)
-        rows = [row_of[group[0]] for group in self.chain.constrained]
-        return tuple(
-            one._replace(groups=tuple(group for group, row in enumerate(rows) if one.first <= row <= one.last))
-            for one in segments
+        return tuple(self._segment(muscles) for muscles in reversed(self.chain.overlapping))
+
+    def _segment(self, muscles: Sequence[int]) -> Segment:
+        """Return the segment of muscles that overlap, sorted by their ends, tip to base."""
+        chain, spans = self.chain, self.chain.spans
+        first, last = min(spans[one][0] for one in muscles), max(spans[one][1] for one in muscles)
+        groups = tuple(
+            number for number, group in enumerate(chain.constrained) if first <= self.chain.element_of[group[0]] <= last
         )
+        stretched = tuple(one for one in muscles if chain.actuators[one].kind in STRETCHED)
+        ordered = [*stretched, *(one for one in muscles if one not in stretched)] if self.chain.routed else sorted(muscles)
+        return Segment(first, last, groups, tuple(ordered), stretched)
 
     @cached_property
     def multiplier(self) -> dict[int, int]:
@@ -179,7 +179,7 @@ class Unknowns:
         """Return the muscles beside an element."""
         paths, segment = self.chain.muscle_paths, self.segment_at(row)
         beside: list[ElementMuscle] = []
-        if segment is None:
+        if segment is None or self.chain.routed:
             return beside
         for number, muscle in enumerate(segment.muscles):
             for path in np.flatnonzero((paths.muscle == muscle) & np.isin(paths.places, strains).any(axis=1)).tolist():
@@ -203,6 +203,12 @@ class Unknowns:
         return len(self.chain.muscle_paths.rest) if self.chain.muscle_input == "forces" else 0
 
     @property
+    def least_inputs(self) -> tuple[float, ...]:
+        """Least input of each muscle whose length is not given; see `ActuatorLaws.refusal`."""
+        least = {"elastic": float(np.finfo(np.float64).tiny), "mckibben": 0.0}
+        return tuple(least.get(one.kind, -LARGEST_NUMBER) for one in self.chain.actuators[: self.n_tensions])
+
+    @property
     def most_muscles(self) -> int:
         """Largest number of muscles of a segment."""
         return max((len(segment.muscles) for segment in self.segments), default=0)
@@ -220,9 +226,11 @@ class Unknowns:
 
     @property
     def spring_rounding(self) -> float:
-        """Rounding of the spring torques [N m], see `SoftModel.rounding`."""
+        """Rounding of the torques of springs and stiff tendons [N m], see `SoftModel.rounding`."""
         chain, strains = self.chain, list(self.strains)
-        return 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(chain.stiffness[strains] * chain.rest[strains]))
+        return ActuatorLaws(chain.actuators).rounding + 8.0 * float(np.finfo(np.float64).eps) * float(
+            np.linalg.norm(chain.stiffness[strains] * chain.rest[strains])
+        )
 
     def multipliers_at(self, row: int) -> int:
         """Return the number of multipliers of the segment of an element; 0 outside of constrained segments."""
@@ -249,13 +257,6 @@ class Unknowns:
         return frozenset(
             element.strain + row for element in self.chain.elements if isinstance(element, ChainSection) for row in rows
         )
-
-
-def strains_of(element: Element) -> tuple[int, ...]:
-    """Return the indices of the strains of an element; none for a motor."""
-    if isinstance(element, ChainSection):
-        return tuple(element.strain + place for place in range(4))
-    return () if element.strain is None else (element.strain,)
 
 
 def bodies_of(element: Element) -> tuple[ChainBody, ...]:

@@ -12,9 +12,12 @@ from softrobots.compiled.settings import *
 
 
 def is_usable(w: Array) -> bool:
-    """Tell whether motors and load are finite and not too large to compute with."""
+    """Tell whether motors and load are finite and not too large to compute with, and actuators take their inputs."""
     for i in range(N_MOTORS):
         if not fabs(w[i]) <= LARGEST_POSITION:
+            return False
+    for i in range(N_INPUTS):
+        if not (w[ACTUATORS + i] >= LEAST_INPUT[i] and w[ACTUATORS + i] <= LARGEST_NUMBER):
             return False
     for i in range(3):
         if not fabs(w[FORCE + i]) <= LARGEST_NUMBER:

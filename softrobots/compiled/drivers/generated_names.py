@@ -21,6 +21,7 @@ NEUTRAL: int
 N: int
 N_MOTORS: int
 N_CONSTRAINTS: int
+N_INPUTS: int
 N_MUSCLES: int
 N_MUSCLE_ROWS: int
 N_VARIED: int
@@ -31,6 +32,7 @@ LANE_SIZE: int
 WORKSPACE_SIZE: int
 
 # Places in the workspace, see `softrobots.compiled.chain.layout`.
+ACTUATORS: int
 CORRECTION: int
 DAMPING: int
 ENERGY: int
@@ -90,6 +92,7 @@ WHOLE_STEP: int
 
 # Numbers of the robot: spring rounding [N m], reach [m], tables by unknown, motor or muscle.
 GROUP: tuple[int, ...]
+LEAST_INPUT: tuple[float, ...]
 LOWER: tuple[float, ...]
 MUSCLE_BASE: tuple[float, ...]
 MUSCLE_REST: tuple[float, ...]

@@ -118,6 +118,8 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "LANE_SIZE": lane_size,
         "LANES": lane_count(lane_size),
         "N_CONSTRAINTS": len(chain.constrained),
+        "N_INPUTS": unknowns.n_tensions,
+        "LEAST_INPUT": unknowns.least_inputs,
         **{status.name: status.value for status in Status},
         "REACH": float(chain.reach),
         "N_VARIED": layout.varied,
@@ -143,7 +145,7 @@ def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
     return {
         "N_MUSCLES": len(rest),
         "N_MUSCLE_ROWS": len(base),
-        "MUSCLE_PLACE": layout.tensions if layout.muscles else layout.start,
+        "MUSCLE_PLACE": layout.actuators if layout.muscles else layout.start,
         "MUSCLE_REST": tuple(rest.tolist()),
         "MUSCLE_BASE": tuple(base.tolist()),
         "MUSCLE_SLOPE": tuple((slope + 0.0).ravel().tolist()),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, constants, vector
-from softrobots.compiled.chain.layout import Layout, RecursionLayout
+from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance
 from softrobots.compiled.chain.unrolled_chain import place_base
@@ -18,7 +18,7 @@ def looped_frame(plan: Plan, count: int) -> list[Block]:
     """Trace the straight-line functions around loops of `count` steps."""
     return [
         _prepare(plan, count),
-        _start_outward(plan.recursion),
+        _start_outward(plan),
         _start_inward(plan),
         _finish(plan),
         _decide(plan),
@@ -40,9 +40,14 @@ def _prepare(plan: Plan, count: int) -> Block:
     return block
 
 
-def _start_outward(recursion: RecursionLayout) -> Block:
+def _start_outward(plan: Plan) -> Block:
     block = Block("start_outward", "Start the outward pass at the base.")
-    block.store_all(recursion.axes, constants(np.eye(3)).ravel().tolist())
+    routes = plan.routes
+    block.store_all(plan.recursion.axes, constants(np.eye(3)).ravel().tolist())
+    if routes.beside:
+        block.store(routes.margin, 1.0)
+        block.store_all(routes.lengths, [0.0] * max(len(one.muscles) for one in routes.segments))
+        block.store_all(routes.turns, [0.0] * (4 * routes.components))
     return block
 
 

@@ -13,6 +13,9 @@ from softrobots.compiled.chain.looped_tip import tip_frame
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import looped_frame
+from softrobots.compiled.routes.ends import keep_lengths, leave_segment, start_lengths
+from softrobots.compiled.routes.loops import COMPONENTS, LENGTHS, PULLS, around, loops_of
+from softrobots.compiled.routes.terms import component_blocks, form_of, length_blocks, route_forms
 from softrobots.compiled.trace.blocks import Block
 
 
@@ -34,11 +37,14 @@ class LoopedProgram:
     """Places of the response of the tip in it."""
     calls: dict[str, list[tuple[int, str]]]
     """By pass (`outward`, `inward`, `step`, and with `_tip` those of the response of the tip): kind of element and call."""
+    route_loops: tuple[list[tuple[str, str]], list[tuple[str, str]]]
+    """Loops over actuators, text and name of the form of elements, of equilibria and of the response of the tip."""
 
     def loops(self, suffix: str = "") -> str:
         """Return the functions that loop over the elements; those of batches end in "_lanes", without response of the tip."""
         passes = [name for name in self.calls if not suffix or name in _PASSES]
-        texts = [*(self._loop(name, suffix) for name in passes), _CONTROL.replace("_SUFFIX", suffix)]
+        routes = [loops_of(*loop, suffix) for loop in self.route_loops[0] + ([] if suffix else self.route_loops[1])]
+        texts = [*routes, *(self._loop(name, suffix) for name in passes), _CONTROL.replace("_SUFFIX", suffix)]
         return "\n\n\n".join(texts if suffix else [*texts, TIP_CONTROL])
 
     def _loop(self, name: str, suffix: str) -> str:
@@ -60,8 +66,9 @@ def loop_text(name: str, purpose: str, calls: Sequence[tuple[int, str]], *, back
         "        kind = KIND[i]",
     ]
     word = "if"
-    for kind, call in calls:
-        lines += [f"        {word} kind == {kind}:", f"            {call.replace('(', suffix + '(', 1)}"]
+    for kind in dict.fromkeys(kind for kind, _ in calls):
+        own = [call.replace("(", suffix + "(", 1) for number, call in calls if number == kind]
+        lines += [f"        {word} kind == {kind}:", *(f"            {call}" for call in own)]
         word = "elif"
     return "\n".join([*lines, f"        i {'-' if back else '+'}= 1"])
 
@@ -105,24 +112,35 @@ def looped_program(plan: Plan) -> LoopedProgram:
     unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
     calls: dict[str, list[tuple[int, str]]] = {}
     kinds = element_kinds(plan)
-    # Before the records stand the share of the step, and the bounds of the loops.
-    blocks, sequence, lane_size = _sequence(plan, kinds, recursion.end + 3, calls)
+    # Before the records stand the share of the step, the bounds of the loops, and the places of routes.
+    blocks, sequence, lane_size = _sequence(plan, kinds, plan.routes.end, calls)
     tip = TipLayout(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.constrained))
     tip_plan = replace(plan, tip=tip)
     tip_blocks, tip_sequence, size = _sequence(tip_plan, element_kinds(tip_plan), tip.end, calls)
     constants: dict[str, object] = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}
     constants |= tip.constants()
     constants |= {f"TABLE_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
-    constants |= dict(zip(("KIND", "AT", "ROW", "PLACE"), zip(*sequence, strict=True), strict=True))
-    constants["AT_TIP"] = tuple(at for _, at, _, _ in tip_sequence)
+    steps = dict(zip(("KIND", "AT", "ROW", "PLACE", "ELEMENT"), zip(*sequence, strict=True), strict=True))
+    constants |= {name: values for name, values in steps.items() if name != "ELEMENT" or unknowns.chain.routed}
+    constants["AT_TIP"] = tuple(at for _, at, *_ in tip_sequence)
+    loops: list[tuple[str, str]] = []
+    tip_loops: list[tuple[str, str]] = []
+    for name, form in route_forms(plan).items():
+        added, columns = length_blocks(plan, name, form)
+        blocks += added + component_blocks(plan, name, form)
+        tip_blocks += component_blocks(tip_plan, name, form)
+        loops += [(LENGTHS if columns else PULLS, name), (COMPONENTS, name)]
+        tip_loops.append((COMPONENTS, f"tip_{name}"))
+        if columns:
+            constants |= plan.routes.tables(columns.width) | {"POINT_TABLE": tuple(columns.numbers)}
     blocks = looped_frame(plan, len(sequence)) + blocks
     tip_blocks = tip_frame(plan, tip) + tip_blocks
-    return LoopedProgram(blocks, tip_blocks, constants, lane_size, size, tip, calls)
+    return LoopedProgram(blocks, tip_blocks, constants, lane_size, size, tip, calls, (loops, tip_loops))
 
 
 def _sequence(
     plan: Plan, kinds: list[Kind], record: int, calls: dict[str, list[tuple[int, str]]]
-) -> tuple[list[Block], list[tuple[int, int, int, int]], int]:
+) -> tuple[list[Block], list[tuple[int, int, int, int, int]], int]:
     """Put the elements in order, with the ends of segments with muscles between them.
 
     Args:
@@ -132,31 +150,43 @@ def _sequence(
         calls: Calls of each pass, extended here.
 
     Returns:
-        The straight-line functions; kind, place of the record, row of the table and coordinate of each step of a loop; and the
-        first place behind the records.
+        The straight-line functions; kind, place of the record, row of the table, coordinate and element of each step of a loop;
+        and the first place behind the records.
     """
     unknowns, layout, infix = plan.unknowns, plan.layout, plan.infix
     suffix, at = ("", "AT[i]") if plan.tip is None else ("_tip", "AT_TIP[i]")
     outward_calls, inward_calls, step_calls = (calls.setdefault(name + suffix, []) for name in _PASSES)
-    steps: dict[int, tuple[int, int, int, int]] = {}  # by element
+    steps: dict[int, tuple[int, int, int, int, int]] = {}  # by element
+    forms = {form: name for name, form in route_forms(plan).items()}
     for kind in kinds:
         for place, row in enumerate(kind.rows):
-            steps[row] = (kind.number, record, place * kind.columns.width, _coordinate(unknowns, layout, row))
+            steps[row] = (kind.number, record, place * kind.columns.width, _coordinate(unknowns, layout, row), row)
             record += kind.record
+        routed = kind.rows[0] in plan.routes.beside
+        form = forms[form_of(plan, kind.rows[0])] if routed else ""
         for name, pass_calls in (("outward", outward_calls), ("inward", inward_calls), ("step", step_calls)):
-            pass_calls.append((kind.number, f"{name}_{infix}{kind.number}(w, {at}, ROW[i], PLACE[i])"))
+            before, after = around(name, form, infix) if routed else ([], [])
+            own = f"{name}_{infix}{kind.number}(w, {at}, ROW[i], PLACE[i])"
+            pass_calls += [(kind.number, call) for call in (*before, own, *after)]
     blocks = [block for kind in kinds for block in kind.blocks]
     sequence = [steps[row] for row in sorted(steps)]
     leading = unknowns.leading_motors
     for number, segment in reversed(list(enumerate(unknowns.segments))):
-        ends_of_segment, size = segment_blocks(plan, number, segment)
-        blocks += ends_of_segment
         base = len(kinds) + 2 * number
         end = base + 1
-        sequence.insert(segment.last + 1 - leading, (end, 0, 0, 0))
+        sequence.insert(segment.last + 1 - leading, (end, 0, 0, 0, 0))
+        if unknowns.chain.routed:
+            blocks += [start_lengths(plan, number, segment), leave_segment(plan, number)]
+            blocks += [keep_lengths(plan, number, segment)] if plan.tip is None else []
+            outward_calls.append((end, f"keep_lengths_{number}(w)"))
+            inward_calls.append((end, f"start_lengths_{infix}{number}(w)"))
+            step_calls.append((end, f"leave_segment_{infix}{number}(w)"))
+            continue
+        ends_of_segment, size = segment_blocks(plan, number, segment)
+        blocks += ends_of_segment
         inward_calls.append((end, f"add_multipliers_{infix}{number}(w)"))
         if segment.groups:
-            sequence.insert(segment.first - leading, (base, record, 0, 0))
+            sequence.insert(segment.first - leading, (base, record, 0, 0, 0))
             record += size
             inward_calls.append((base, f"eliminate_multipliers_{infix}{number}(w, {at})"))
             step_calls.append((base, f"solve_multipliers_{infix}{number}(w, {at})"))

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from softrobots.compiled.chain.layout import TipLayout
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.unknowns import Unknowns, strains_of
+from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
-from softrobots.model.serial_chain import ChainJoint, ChainSection
+from softrobots.model.serial_chain import ChainJoint, ChainSection, strains_of
 
 _WIDTH = 112  # of a line, without the asterisk of a comment in C
 
@@ -63,7 +63,7 @@ def _inputs(plan: Plan) -> list[Place]:
     if plan.weight:
         places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
     if layout.muscles:
-        places.append(Place("TENSIONS", layout.muscles, "muscle tensions [N]; put_muscles writes them"))
+        places.append(Place("ACTUATORS", layout.muscles, f"{_inputs_of(unknowns)}; put_muscles writes them"))
     if unknowns.chain.constrained:
         places.append(Place("START", n, "unknowns with the muscle lengths [rad or m]; put_muscles writes them"))
     starts = "for settle_from, reach and follow" if searches else "for settle_from"
@@ -109,6 +109,17 @@ def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
                 Place("CONSTRAINT_COLUMNS", 3 * held, f"derivative of the tip by those sums, (3, {held}) {rows} [m/rad or -]")
             )
     return places
+
+
+def _inputs_of(unknowns: Unknowns) -> str:
+    """Return what the inputs of the actuators along the body are."""
+    kinds = {
+        "tension": "tensions [N]",
+        "elastic": "lengths of motors [m]",
+        "pressure": "pressures [Pa]",
+        "mckibben": "pressures [Pa]",
+    }
+    return " or ".join(dict.fromkeys(kinds[one.kind] for one in unknowns.chain.actuators))
 
 
 def motor_names(unknowns: Unknowns) -> str:

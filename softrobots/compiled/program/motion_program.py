@@ -27,8 +27,11 @@ def check_motion(unknowns: Unknowns, *, full_damping: bool = False) -> None:
     Raises:
         ParameterError: If muscle lengths are given, or the damping of a long chain is a matrix.
     """
-    if unknowns.chain.constrained or (full_damping and not unknowns.is_unrolled):
-        what = "given muscle lengths" if unknowns.chain.constrained else "a damping matrix (mass_damping)"
+    what = "a damping matrix (mass_damping)" if full_damping and not unknowns.is_unrolled else ""
+    if unknowns.chain.routed:
+        what = "actuators but those of given tension, each straight along one segment"
+    what = "given muscle lengths" if unknowns.chain.constrained else what
+    if what:
         raise ParameterError("model", unknowns.chain.name, f"a robot without {what}, to have its motion compiled")
 
 

@@ -39,7 +39,7 @@ def point_numbers(
     unknowns, layout = plan.unknowns, plan.layout
     force = block.loads(layout.force, 3)
     load = dot(force, force) * unknowns.chain.reach**2 + balance.weight
-    tensions = block.loads(layout.tensions, layout.muscles)
+    tensions = block.loads(plan.routes.pulled if plan.routes.beside else layout.actuators, layout.muscles)
     load = load + dot(tensions, tensions) * unknowns.chain.reach**2
     size = larger(load, LEAST_SIZE**2)
     return {

@@ -11,6 +11,7 @@ from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.settings import LARGEST_POSITION
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
+from softrobots.model.actuator_laws import ActuatorLaws, Tensions
 from softrobots.model.soft_model import SoftModel
 
 _CLOSING_STEPS = 8  # of the sums to the muscle lengths, where segments are twisted; each leaves a hundredth
@@ -25,7 +26,7 @@ class Actuation:
         chain = unknowns.chain
         self._count = chain.n_motors
         self._plain = len(chain.constrained) == 0 and len(self._strains) == len(chain.stiffness)
-        self._tensions = unknowns.n_tensions > 0
+        self._tensions, self._least = unknowns.n_tensions > 0, np.array(unknowns.least_inputs)
         self._lengths = len(chain.constrained) > 0
         self._relaxed = chain.free @ model.rest  # strains at rest of elastic coordinates and muscles
         self._shares = np.zeros((len(chain.constrained), len(chain.stiffness)))  # of each strain in the sums
@@ -37,7 +38,7 @@ class Actuation:
         layout, w = run.layout, run.workspace()
         run.put(w, 0, motors[: self._count])
         if self._tensions:
-            run.put(w, layout.tensions, motors[self._count :])
+            run.put(w, layout.actuators, motors[self._count :])
         if self._lengths:
             run.put(w, layout.start, self._starts(motors[None]))
         for name, values in numbers.items():
@@ -53,13 +54,29 @@ class Actuation:
                 [joints, _rows(w, tip.constraint_columns, tip.n_constraints) @ chain.constrained_slope], axis=1
             )
         if self._tensions:  # a tension loads the strains with its arms
-            by_force, strains = _rows(w, tip.tip_columns, tip.unknowns), np.array(chain.rest)
-            strains[self._strains] = _rows(w, run.layout.unknown, len(self._strains), 1)[0]
-            return np.concatenate([joints, -by_force @ chain.muscle_paths.at(strains).arms[:, self._strains].T], axis=1)
+            stretch, pull = self._pulled(run, w)
+            return np.concatenate([joints, -stretch.T * pull.by_input], axis=1)
         return joints
 
+    def feeling(self, run: Any, w: Any) -> FloatArray:
+        """Return the derivative of the actuators' loads by a force on the tip after `look_at_tip`, shape (n_motors, 3)."""
+        if not self._tensions:
+            return self.jacobian(run, w).T
+        stretch, pull = self._pulled(run, w)
+        joints = _rows(w, run.program.tip.jacobian, self._count)
+        return np.concatenate([joints.T, stretch * pull.by_length[:, None]])
+
+    def _pulled(self, run: Any, w: Any) -> tuple[FloatArray, Tensions]:
+        """Return the derivative of the lengths by a force on the tip, shape (n_muscles, 3), and the tensions."""
+        tip, strains = run.program.tip, np.array(self._chain.rest)
+        strains[self._strains] = _rows(w, run.layout.unknown, len(self._strains), 1)[0]
+        paths = self._chain.muscle_paths.at(strains)
+        inputs = _rows(w, run.layout.actuators, run.layout.muscles, 1)[0]
+        stretch = paths.arms[:, self._strains] @ _rows(w, tip.tip_columns, tip.unknowns).T
+        return stretch, ActuatorLaws(self._chain.actuators).at(paths.elongation, inputs)
+
     def loads(self, run: Any, w: Any) -> FloatArray:
-        """Return the load on motor joints and muscles of given length after `look_at_tip`, shape (n_motors,) [N m or N].
+        """Return the load on motor joints and muscles after `look_at_tip`, shape (n_motors,) [N m or N].
 
         The multipliers are the loads beyond those of the start, see `looped_chain`.
         """
@@ -70,13 +87,15 @@ class Actuation:
             spread = _rows(w, run.layout.start, len(self._strains), 1)[0] - chain.rest[self._strains]
             held = _rows(w, tip.constraint_loads, tip.n_constraints, 1)[0] - (chain.stiffness[self._strains] * spread)[first]
             return np.concatenate([joints, held @ chain.constrained_slope])
+        if self._tensions:
+            return np.concatenate([joints, self._pulled(run, w)[1].tension])
         return np.asarray(joints)
 
     def rows(self, motors: FloatArray, layout: Layout) -> list[tuple[int, FloatArray]]:
         """Return places in the workspace and values of many cases: motor joints, loads of tensions, starts at the lengths."""
         inputs = [(0, motors[:, : self._count])]
         if self._tensions:
-            inputs.append((layout.tensions, np.ascontiguousarray(motors[:, self._count :])))
+            inputs.append((layout.actuators, np.ascontiguousarray(motors[:, self._count :])))
         if self._lengths:
             starts = self._starts(motors)
             inputs += [(layout.start, starts), (layout.unknown, starts)]
@@ -88,6 +107,8 @@ class Actuation:
         joints = motors[:, : self._count]
         if joints.size and not (joints.min() >= -LARGEST_POSITION and joints.max() <= LARGEST_POSITION):
             bad |= ~np.all(np.abs(joints) <= LARGEST_POSITION, axis=1)
+        if self._tensions:
+            bad |= ~np.all(motors[:, self._count :] >= self._least, axis=1)
         if self._lengths:
             admitted = (np.all(np.isfinite(row)) and self._model.actuators.admit(row) for row in motors)
             bad |= ~np.fromiter(admitted, dtype=bool, count=len(motors))

@@ -46,7 +46,8 @@ class CompiledStatics:
         self._heavy: Any = None  # the same of the code with weight, once it is made
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
-        self._plain = len(self._chain.muscle_paths.rest) == 0 and backend == "numba"
+        self._plain = not self._chain.constrained and backend == "numba"
+        self._joints = self._chain.n_motors
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as the robot and its options; the other process compiles it again, or finds the code in its cache."""
@@ -132,19 +133,18 @@ class CompiledStatics:
             and q_motors.shape == self._shape
             and force.shape == _THREE
         ):
-            motors = self._motors
-            if gravity is None:
-                w = np.zeros(self._size)
-                w[:motors] = q_motors
-                w[motors : motors + 3] = force
-                if self._settle(w) == 0:
-                    return CompiledEquilibrium(w, self._layout, self._actuation)
-            elif (down := self._plain_gravity(gravity)) is not None:
-                settle, size, layout = self._heavy
+            joints, down = self._joints, None if gravity is None else self._plain_gravity(gravity)
+            if gravity is None or down is not None:
+                settle, size, layout = (self._settle, self._size, self._layout) if gravity is None else self._heavy
                 w = np.zeros(size)
-                w[:motors] = q_motors
-                w[motors : motors + 3] = force
-                w[motors + 3 : motors + 6] = down
+                if joints == self._motors:
+                    w[:joints] = q_motors
+                else:
+                    w[:joints] = q_motors[:joints]
+                    w[layout.actuators : layout.actuators + layout.muscles] = q_motors[joints:]
+                w[joints : joints + 3] = force
+                if down is not None:
+                    w[joints + 3 : joints + 6] = down
                 if settle(w) == 0:
                     return CompiledEquilibrium(w, layout, self._actuation)
         return self._checked_equilibrium(q_motors, force, gravity, q_springs0)

@@ -217,7 +217,7 @@ class _MeasuredTorques:
         return np.asarray(self.torques - self.chain.actuation.loads(self.chain.run, state.w))
 
     def directions(self, state: ChainState) -> Directions:
-        return Directions.of(self.chain.actuation.jacobian(self.chain.run, state.w).T, self.chain.model.reach)
+        return Directions.of(self.chain.actuation.feeling(self.chain.run, state.w), self.chain.model.reach)
 
 
 @dataclass(frozen=True, eq=False)

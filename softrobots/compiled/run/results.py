@@ -50,7 +50,10 @@ class CompiledEquilibrium:
     @property
     def q_motors(self) -> FloatArray:
         """Actuator coordinates, motor joints and then muscles, shape (n_motors,) [rad, m or N], read-only."""
-        return self._part(0, self._layout.motors) if self._motors is None else read_only(np.array(self._motors))
+        if self._motors is not None:
+            return read_only(np.array(self._motors))
+        layout = self._layout
+        return read_only(np.concatenate([self._part(0, layout.motors), self._part(layout.actuators, layout.muscles)]))
 
     @property
     def force(self) -> FloatArray:

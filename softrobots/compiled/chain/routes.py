@@ -1,0 +1,176 @@
+"""Routes of actuators along a chain, as tables: what passes which element, and where the sums over it stand.
+
+Straight-line code for each actuator beside each element would take minutes to compile; so code of routes is a loop over the
+actuators beside an element, and over the points of each (`softrobots.model.muscle_paths`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.compiled.chain.layout import assign_places
+from softrobots.compiled.chain.unknowns import Segment, Unknowns
+from softrobots.model.serial_chain import strains_of
+
+POINT_RECORD = 4
+"""Numbers kept of a point: components of its direction, and one over its length."""
+
+
+class Beside(NamedTuple):
+    """An actuator beside an element."""
+
+    number: int
+    """Its number in the segment."""
+    paths: tuple[int, ...]
+    """Its paths there, of `MusclePaths`."""
+
+
+@dataclass(frozen=True)
+class Routes:
+    """The routed segments of a chain, and places of their numbers behind `first`.
+
+    The actuators of a segment are numbered (M); the first c of them, whose tensions depend on their lengths, are components of
+    the turn of the elements that they pass. A side is a right-hand side of the elimination; `k` the largest number of unknowns
+    of an element; sums over its unknowns have so many places.
+    """
+
+    unknowns: Unknowns
+    """The chain."""
+    first: int
+    """First of the places."""
+    beside: dict[int, tuple[Beside, ...]] = field(init=False)
+    """By element of a routed segment: what is beside it."""
+    margin: int = field(init=False)
+    """Least distance of a route from the end of its range [m]."""
+    lengths: int = field(init=False)
+    """Change of length of each actuator of a segment, from zero strain, so far [m] (M)."""
+    changes: int = field(init=False)
+    """The same of each actuator of the robot, whole [m]."""
+    pulled: int = field(init=False)
+    """Tension of each actuator of the robot [N]."""
+    tensions: int = field(init=False)
+    """Tension of each actuator of the segment [N] (M)."""
+    load: int = field(init=False)
+    """Sum of tensions times slopes of the lengths, of an element."""
+    curvature: int = field(init=False)
+    """Sum of tensions times second derivatives of the lengths, upper triangle by columns."""
+    push: int = field(init=False)
+    """Sum over the components of `P` of turn and component times slopes (3, k)."""
+    own: int = field(init=False)
+    """Slopes times `P` of the components times slopes, upper triangle by columns."""
+    sides: int = field(init=False)
+    """Sum of slopes times `s` of the components, of each side."""
+    before: int = field(init=False)
+    """Sum of `L^-1 C^T` of the components times their turns, of each side."""
+    twists: int = field(init=False)
+    """Turn per unknown of the element (3, k)."""
+    lower: int = field(init=False)
+    """`L` of the element (k, k)."""
+    inverse: int = field(init=False)
+    """`1 / D'` of the element."""
+    coupling: int = field(init=False)
+    """`L^-1 C^T` of the turn (k, 3)."""
+    columns: int = field(init=False)
+    """`L^-1 g'` of each side."""
+    cross: int = field(init=False)
+    """`P` of turn and components, component by component (3 each)."""
+    square: int = field(init=False)
+    """`P` of the components (c, c)."""
+    sums: int = field(init=False)
+    """`s` of the components, of each side (4, c)."""
+    turns: int = field(init=False)
+    """How much the steps nearer to the base lengthen the actuators, of each side (4, c) [m]."""
+    slopes: int = field(init=False)
+    """Slope of the length of each numbered actuator beside each element, k each."""
+    meetings: int = field(init=False)
+    """`L^-1 C^T` of the components of each element, k each."""
+    points: int = field(init=False)
+    """`POINT_RECORD` of each point."""
+    end: int = field(init=False)
+    """The first place behind."""
+
+    def __post_init__(self) -> None:
+        """Find what is beside each element, and assign the places."""
+        rows = [row for one in self.segments for row in range(one.first, one.last + 1) if self.unknowns.moving(row)]
+        object.__setattr__(self, "beside", {row: self._beside(row) for row in rows})
+        muscles = max((len(one.muscles) for one in self.segments), default=0)
+        robot, c, k = len(self.unknowns.chain.actuators), self.components, self.stride
+        sums = dict(
+            load=k, curvature=k * (k + 1) // 2, push=3 * k, own=k * (k + 1) // 2, sides=4 * k, before=4 * k, twists=3 * k
+        )
+        sums |= dict(lower=k * k, inverse=k, coupling=3 * k, columns=4 * k, cross=3 * c, square=c * c, sums=4 * c, turns=4 * c)
+        sizes = dict(margin=1, lengths=muscles, changes=robot, pulled=robot, tensions=muscles) | sums
+        rest = dict(slopes=sum(map(self.rows, rows)) * k, meetings=sum(map(self.past, rows)) * k)
+        rest["points"] = POINT_RECORD * sum(len(one.paths) for row in rows for one in self.beside[row])
+        if rows:
+            assign_places(self, self.first, **sizes, **rest, end=0)
+        else:
+            object.__setattr__(self, "end", self.first)
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The routed segments, base to tip."""
+        return list(self.unknowns.segments) if self.unknowns.chain.routed else []
+
+    @property
+    def components(self) -> int:
+        """Largest number of components of a segment."""
+        return max((len(one.stretched) for one in self.segments), default=0)
+
+    @property
+    def stride(self) -> int:
+        """Largest number of unknowns of an element."""
+        return max((len(self.unknowns.moving(row)) for row in self.beside), default=0)
+
+    def past(self, row: int) -> int:
+        """Return the number of components at an element: up to the last actuator of them that goes past it."""
+        segment, spans = self.unknowns.segment_at(row), self.unknowns.chain.spans
+        past = [
+            number for number, one in enumerate(segment.stretched if segment else ()) if spans[one][0] <= row <= spans[one][1]
+        ]
+        return 1 + max(past, default=-1)
+
+    def rows(self, row: int) -> int:
+        """Return how many numbered actuators an element has slopes of."""
+        return max(self.past(row), 1 + max((one.number for one in self.beside[row]), default=-1))
+
+    def paths(self) -> list[tuple[int, int]]:
+        """Return element and path of every point, in the order of the tables."""
+        return [(row, path) for row in self.beside for one in self.beside[row] for path in one.paths]
+
+    def tables(self, width: int) -> dict[str, object]:
+        """Return the tables of the loops, with `width` numbers of each point in their table."""
+        count = len(self.unknowns.chain.elements)
+        beside = [self.beside.get(row, ()) for row in range(count)]
+        pairs, k = [one for row in beside for one in row], self.stride
+        rows, past = ([size(row) if row in self.beside else 0 for row in range(count)] for size in (self.rows, self.past))
+        return {
+            "FIRST_BESIDE": (0, *accumulate(len(one) for one in beside)),
+            "FIRST_POINT": (0, *accumulate(len(one.paths) for one in pairs)),
+            "NUMBER": tuple(one.number for one in pairs),
+            "N_ROWS": tuple(rows),
+            "N_PAST": tuple(past),
+            "SLOPES": tuple(accumulate((k * size for size in rows[:-1]), initial=self.slopes)),
+            "MEETINGS": tuple(accumulate((k * size for size in past[:-1]), initial=self.meetings)),
+            "STRIDE": k,
+            "POINTS": self.points,
+            "POINT_WIDTH": width,
+            "POINT_RECORD": POINT_RECORD,
+            "N_COMPONENTS": self.components,
+            "COMPONENT_PUSH": self.cross,
+            "COMPONENT_SQUARE": self.square,
+        }
+
+    def _beside(self, row: int) -> tuple[Beside, ...]:
+        paths, segment = self.unknowns.chain.muscle_paths, self.unknowns.segment_at(row)
+        touching = np.isin(paths.places, strains_of(self.unknowns.chain.elements[row])).any(axis=1)
+        found = []
+        for number, muscle in enumerate(segment.muscles if segment else ()):
+            own = np.flatnonzero(touching & (paths.muscle == muscle)).tolist()
+            if own:
+                found.append(Beside(number, tuple(own)))
+        return tuple(found)
