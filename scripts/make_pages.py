@@ -16,6 +16,7 @@ from studies.gallery.scenes import EXHIBITS
 PAGES = {
     "helix_growth": "helix_growth",
     "pcc_arm": "pcc_arm",
+    "tendon_arm": "moving_tendon_arm",
     "inflatable_arm": "wrinkling_arm",
     "wrist": "wrist",
     "ur5_bench": "ur5_bench",

@@ -13,7 +13,17 @@ from softrobots.view.browser import take_picture
 from studies.gallery.moving_picture import take_animation
 from studies.gallery.scenes import EXHIBITS
 
-PICTURES = ("inflatable_arm", "wrist", "pcc_arm", "helix_tube", "helix_growth", "ur5_bench", "ur5_with_soft_arm")
+PICTURES = (
+    "inflatable_arm",
+    "wrist",
+    "pcc_arm",
+    "tendon_arm",
+    "helical_tendons",
+    "helix_tube",
+    "helix_growth",
+    "ur5_bench",
+    "ur5_with_soft_arm",
+)
 """Exhibits of which there is a picture."""
 
 ANIMATION = "inflatable_arm.gif"

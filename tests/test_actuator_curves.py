@@ -13,7 +13,9 @@ from softrobots.statics.kinematics import frame_placement
 from softrobots.view.actuator_curves import actuator_curves, route_places
 from softrobots.view.appearance import body_parts
 from softrobots.view.body import BentSections
+from softrobots.view.figures import loaded_robot
 from softrobots.view.legend import tension_entries
+from softrobots.view.meshcat_page.page_text import legend_rows
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.tension_scale import DrawnActuator, drawn_actuators, scale_end, tension_colour
 
@@ -96,6 +98,23 @@ def test_a_helix_is_as_long_as_the_closed_form() -> None:
     assert exact * (1.0 - 0.3**2 / 24.0) < length < exact
 
 
+def test_actuators_through_the_same_holes_are_shown_side_by_side() -> None:
+    """Tendons from the base to the end of each segment: their curves coincide, what is drawn of them does not."""
+    z = np.random.default_rng(8).normal(0.0, 0.1, MODEL.n_springs) * np.tile([1.0, 1.0, 1.0, 0.05], MODEL.n_springs // 4)
+    whole = ROUTES["straight"]
+    pair = [ActuatorTag(name=f"tendon_{n}", route=whole[:n], kind="tension", rest_length=0.5) for n in (1, 2)]
+    short, long = actuator_curves(BentSections(MODEL, MODEL.relaxed_motors, z), tuple(pair))
+    count = len(short.points)
+    assert np.allclose(long.points[:count], short.points, atol=1e-14)
+    apart = np.linalg.norm(long.shown[:count] - short.shown, axis=1)
+    assert apart.min() > 2.0 * short.radius
+    assert np.allclose(0.5 * (long.shown[:count] + short.shown), short.points, atol=1e-14)
+    backbone = frame_placement(MODEL, MODEL.configuration(MODEL.relaxed_motors, z), "section_1_3")
+    assert abs(backbone.rotation[:, 2] @ (long.shown[count - 1] - short.shown[-1])) < 1e-14  # across the body
+    (alone,) = actuator_curves(BentSections(MODEL, MODEL.relaxed_motors, z), (pair[1],))
+    assert np.array_equal(alone.shown, alone.points)
+
+
 @pytest.mark.parametrize(("kind", "size", "radius"), [
     ("pressure", {"area": 3e-4}, math.sqrt(3e-4 / math.pi)),
     ("mckibben", {"diameter": 0.012, "braid_angle": 0.4}, 0.006),
@@ -145,6 +164,27 @@ def test_what_is_drawn_has_the_colours_and_the_words_of_the_legend() -> None:
         assert entry.meaning == f"{name}: {'pulls' if force > 0.0 else 'pushes'} {abs(force):.3g} N"
         red, _, blue, _ = entry.colour
         assert (blue > red) == (force > 0.0)
+
+
+def test_slack_tendons_are_dashed_on_pages_and_in_figures() -> None:
+    """Those without tension in the balance, and no others."""
+    arm = sr.load_model(sr.TendonArm(elastic_sections=2))
+    loose = sr.solve_equilibrium(arm, arm.relaxed_motors + 1e-3 * np.array((-3, 1, 0, -6, 4, 0, -8, 4, 4)))
+    slack = {name for name, force in zip(arm.motor_joints, loose.muscle_forces.tolist(), strict=True) if force == 0.0}
+    assert 0 < len(slack) < 9
+    assert {name for name, hangs in zip(arm.motor_joints, loose.muscle_slack, strict=True) if hangs} == slack
+    scene = SceneBuilder(arm).loaded(loose)
+    parts = [part for part in body_parts(scene) if part.path.startswith("actuators/")]
+    assert {part.path.split("/")[1] for part in parts if part.path.endswith("/slack")} == slack
+    assert all(len(part.surface()[0]) == 24 * (2 * 6 + 2) for part in parts if part.path.endswith("/slack"))
+    rows = legend_rows(tension_entries([scene.actuators]))
+    for row in rows.strip().splitlines():
+        assert ("repeating-linear-gradient" in row) == any(f"{name}: slack" in row for name in slack)
+    axes = loaded_robot.shape(loose).axes[0]
+    curves = {tuple(actuator.curve.shown[-1]): actuator.curve.name for actuator in scene.actuators}
+    lines = {curves.get(tuple(np.array(line.get_data_3d())[:, -1])): line.get_linestyle() for line in axes.lines}
+    assert {name for name, style in lines.items() if name is not None and style == "--"} == slack
+    assert set(arm.motor_joints) <= lines.keys()
 
 
 def drawn(*tensions: float | None, slack: bool = False) -> list[DrawnActuator]:

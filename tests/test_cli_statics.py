@@ -155,6 +155,22 @@ def test_solve_tells_of_muscles(answer, told: Told) -> None:
     assert "wrinkled" not in out
 
 
+def test_solve_tells_slack_tendons_and_pressures(answer, told: Told) -> None:
+    """A motor that lets 3 mm go leaves its tendon slack; a pressure has a unit of its own, and a tension below zero."""
+    motors = ("--motors", *["0.06", "0.06", "0.06", "0.1225", "0.1225", "0.1225", "0.1865", "0.1865", "0.1895"])
+    found, (_, out, _) = answer("solve", "tendon_arm", *motors), told("solve", "tendon_arm", *motors)
+    assert found["muscle_slack"] == [False] * 8 + [True]
+    assert (found["units"]["q_motors"], found["units"]["muscle_forces"]) == ("m", "N")
+    assert re.search(r"^tendon_3_3 +elastic +0.189500  m +0\.\d{6}  m +0.000000  N +slack$", out, re.M)
+    assert len(re.findall(r" slack$", out, re.M)) == 1
+    assert re.search(r"^slack tendons +tendon_3_3$", out, re.M)
+    pressed = ("pcc_arm", "--set", "kind=pressure", "--motors", "1e5", *"00000")
+    assert answer("solve", *pressed)["units"]["q_motors"] == "Pa"
+    out = told("solve", *pressed)[1]
+    assert re.search(r"^muscle_1_1 +pressure +100000.000000  Pa +\S+  m +-30.000000  N$", out, re.M)  # 3 cm^2
+    assert "slack tendons" not in out
+
+
 def test_solve_takes_somebodys_robot(told: Told, answer, tmp_path: Path) -> None:
     file = tmp_path / "branched.urdf"
     file.write_text(BRANCHED, encoding="utf-8")

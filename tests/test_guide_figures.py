@@ -172,7 +172,8 @@ def test_the_script_makes_what_is_asked_for(tmp_path: Path, capsys: pytest.Captu
     assert ended.value.code == 2
     names = {*script["FIGURES"], *script["SCENES"]}
     guides = "".join(
-        (CHECKOUT / "docs" / page).read_text(encoding="utf-8") for page in ("inflatable_arm.md", "own_robot.md", "motion.md")
+        (CHECKOUT / "docs" / page).read_text(encoding="utf-8")
+        for page in ("actuators.md", "inflatable_arm.md", "own_robot.md", "motion.md")
     )
     for name in names:
         assert f"images/{name}.png" in guides

@@ -18,6 +18,7 @@ _THINNEST, _THICKEST = 0.005, 0.18  # radius of a tendon: at least relative to t
 
 _COARSEST = 0.3  # turn about the backbone from point to point [rad]
 _DASHES = 24  # along the whole robot, gaps between them as long
+_GAP = 2.3  # between the middles of actuators through the same holes, relative to their radius
 _SAME = 1e-9  # of the length of a curve: points nearer to the last one are left out
 
 
@@ -33,16 +34,18 @@ class ActuatorCurve:
     """Axes of the cross-section of the body at each point, shape (n, 3, 3)."""
     radius: float
     """Half its thickness [m]: of a McKibben muscle at rest, of a round chamber of its area, else that of a thread."""
+    shown: FloatArray
+    """The points as they are drawn, shape (n, 3) [m]: actuators through the same holes are shown side by side."""
 
     def surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
         """Return corners and triangles of the tube around the curve, as `softrobots.view.body.tube`."""
-        return self._tube(self.points, self.frames, sides)
+        return self._tube(self.shown, self.frames, sides)
 
     def dashes(self) -> list[FloatArray]:
         """Return the ends of straight dashes along the curve, each shape (2, 3) [m]; gaps are as long as dashes."""
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.shown, axis=0), axis=1))])
         places = along[-1] * np.arange(2 * _DASHES) / (2 * _DASHES - 1)  # begins and ends with a dash
-        ends = np.column_stack([np.interp(places, along, axis) for axis in self.points.T])
+        ends = np.column_stack([np.interp(places, along, axis) for axis in self.shown.T])
         return list(ends.reshape(_DASHES, 2, 3))
 
     def dashed_surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
@@ -74,13 +77,21 @@ def actuator_curves(sections: BentSections, actuators: tuple[ActuatorTag, ...], 
         A curve for each actuator.
     """
     curves = []
-    for tag in actuators:
+    starts = [_start(tag) for tag in actuators]
+    for number, tag in enumerate(actuators):
         places = [route_places(sections, route, points) for route in tag.route]
         frames = np.concatenate([sections.frames(route.segment, at) for route, at in zip(tag.route, places, strict=True)])
         curve = np.concatenate([route_points(sections, route, at) for route, at in zip(tag.route, places, strict=True)])
+        centres = frames[:, :3, 3]
         steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
         kept = np.append(True, steps > _SAME * steps.sum())
-        curves.append(ActuatorCurve(tag.name, curve[kept], frames[kept, :3, :3], _radius(tag, sections)))
+        turns, radius = frames[kept, :3, :3], _radius(tag, sections)
+        together, before = starts.count(starts[number]), starts[:number].count(starts[number])
+        gap = min(_GAP * radius, tag.distance / max(together - 1, 1))
+        inwards = centres[kept] - curve[kept]
+        aside = np.cross(inwards, turns[:, :, 2]) / np.maximum(np.linalg.norm(inwards, axis=1), 1e-12)[:, None]
+        shown = curve[kept] + (0.5 * (together - 1) - before) * gap * aside
+        curves.append(ActuatorCurve(tag.name, curve[kept], turns, radius, shown))
     return tuple(curves)
 
 
@@ -103,6 +114,12 @@ def route_points(sections: BentSections, route: RouteTag, at: FloatArray) -> Flo
     """Return the points of a route at rest lengths from the start of its segment, shape (n,) [m], shape (n, 3) [m]."""
     distance, azimuth = np.interp(at, route.at, route.distance), np.interp(at, route.at, route.azimuth)
     return beside(sections.frames(route.segment, at), distance, azimuth)
+
+
+def _start(tag: ActuatorTag) -> tuple[float, ...]:
+    """Where an actuator begins: segment, place and offset, rounded."""
+    first = tag.route[0]
+    return first.segment, round(first.at[0], 9), round(tag.distance, 9), round(tag.azimuth % math.tau, 6) % round(math.tau, 6)
 
 
 def _radius(tag: ActuatorTag, sections: BentSections) -> float:

@@ -14,7 +14,7 @@ from softrobots.description.composition import fix_joints, mount
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.dynamics.motion import Motion
 from softrobots.model.loader import load_model
-from softrobots.robots import HelixTube, InflatableArm, PccArm
+from softrobots.robots import HelixTube, InflatableArm, PccArm, Route, TendonArm
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
 from softrobots.statics.trajectory import Trajectory, follow_trajectory
@@ -121,6 +121,53 @@ def moving_pcc_arm(duration: float = 6.0, frames: int = 90) -> Viewer:
     return viewer
 
 
+def bent_tendon_arm() -> Viewer:
+    """The arm driven by tendons under its weight and a force: motors pulled or let go by millimetres, one tendon slack."""
+    model = load_model(TendonArm())
+    pulled = 1e-3 * np.array((-3, 1, 0, -6, 4, 0, -8, 4, 4))
+    viewer = view(model, solve_equilibrium(model, model.relaxed_motors + pulled, (0.0, 0.0, -0.1), gravity=EARTH_GRAVITY))
+    viewer.look_from((0.09, -0.155, 0.11), (0.035, 0.0, 0.09))
+    return viewer
+
+
+def moving_tendon_arm(duration: float = 6.0, frames: int = 90) -> Viewer:
+    """The same arm under its weight, led around: its tendons are pulled and let go in turn, and some are slack at times.
+
+    Args:
+        duration: Time until the motors are where they were at first [s].
+        frames: How many equilibria, evenly spaced.
+
+    Returns:
+        The viewer.
+
+    Raises:
+        ViewerError: If its server does not start.
+    """
+    robot = TendonArm(elastic_sections=2)  # a smaller page
+    model, azimuths = load_model(robot), np.array(robot.tendon_azimuths)
+    states: list[Equilibrium] = []
+    for turn in 2.0 * np.pi * np.arange(frames + 1) / frames:
+        ways = [way * np.cos(azimuths - turn) for way in (0.002, 0.004, 0.009)]
+        start = states[-1].q_springs if states else None
+        motors = model.relaxed_motors - np.concatenate(ways)
+        states.append(solve_equilibrium(model, motors, gravity=EARTH_GRAVITY, q_springs0=start))
+    tips = np.array([state.tip_position for state in states])
+    times = np.linspace(0.0, duration, len(states))
+    viewer = view(model, Trajectory(read_only(times), read_only(tips), tuple(states), "newton"))
+    viewer.look_from((0.10, -0.21, 0.17), (0.0, 0.0, 0.075))
+    return viewer
+
+
+def helical_tendons() -> Viewer:
+    """An arm of one segment with three tendons that wind around it by three quarters of a turn, one pulled hard."""
+    azimuths = 2.0 * np.pi * np.arange(3) / 3.0
+    routes = [Route(at=(0.0, 0.2), azimuth=(a, a + 1.5 * np.pi), distance=0.0045) for a in azimuths.tolist()]
+    model = load_model(TendonArm(segment_lengths=(0.2,), elastic_sections=12, routing=routes, kind="tension"))
+    viewer = view(model, solve_equilibrium(model, (8.0, 2.0, 0.5)))
+    viewer.look_from((0.155, -0.07, 0.14), (0.0, 0.04, 0.102))
+    return viewer
+
+
 def sagging_helix_tube() -> Viewer:
     """A helical tube of three and a half turns that hangs out sideways under its own weight, near wrinkling at its base."""
     model = load_model(HelixTube(length=2.0, elastic_sections=32, pressure=6e3))
@@ -169,6 +216,9 @@ EXHIBITS = {
         pointing_wrist, "Inflatable arm with a wrist: poses of the hand under weight and 5 N, tilt compensated", 0.3
     ),
     "pcc_arm": Exhibit(moving_pcc_arm, "PCC arm led through muscle lengths, own weight and 4.7 N on the tip", 0.8),
+    "tendon_arm": Exhibit(bent_tendon_arm, "Arm driven by tendons, own weight and 0.1 N on the tip"),
+    "moving_tendon_arm": Exhibit(moving_tendon_arm, "Arm driven by tendons, led around under its weight"),
+    "helical_tendons": Exhibit(helical_tendons, "Tendons that wind around an arm"),
     "helix_tube": Exhibit(sagging_helix_tube, "Helical tube under its own weight"),
     "helix_growth": Exhibit(growing_helix_tube, "Growth of the helical tube", 0.45),
     "ur5_bench": Exhibit(characterisation_bench, "UR5 pushes an inflated link at 30 kPa", 0.8),

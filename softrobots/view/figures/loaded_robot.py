@@ -87,7 +87,7 @@ def shape(equilibrium: Equilibrium) -> Any:
         axes.plot(*_circle(segment.poses[-1], segment.radius).T, color="0.35", lw=1.6, label="end of a segment")
     end = scale_end(equilibrium.muscle_forces.tolist())
     for curve, tension, slack in actuators:
-        axes.plot(*curve.points.T, color=tension_colour(tension, end), lw=1.6, ls=_DASHED if slack else "-")
+        axes.plot(*curve.shown.T, color=tension_colour(tension, end), lw=1.6, ls=_DASHED if slack else "-")
     arrow = force_arrow(axes, equilibrium)
     equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
     handles, labels = axes.get_legend_handles_labels()
