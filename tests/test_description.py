@@ -325,7 +325,10 @@ def test_bad_arguments_of_the_xacro_file_are_refused(arguments: dict, message: s
 
 
 def test_texts_are_evaluated_as_by_xacro_itself(tmp_path: Path) -> None:
-    """Escapes, lone dollars, several expressions, lazy properties, arguments, calls with other values of the same text."""
+    """Escapes, lone dollars, several expressions, lazy properties, arguments, calls with other values of the same text.
+
+    Blocks, conditions, calls by name, and elements and attributes with computed names; comments, and namespaces of macros.
+    """
     texts = ("", " ", "a$b", "$", "$${x}", "$$$(arg size)", "${x}", "${x}${y}m", "$(arg size) m", "${'%.3f' % z} ${[x, y][1]}")
     links = "".join(f"<link name='${{tag}}_{number}' text=\"{text}\">{text}</link>" for number, text in enumerate(texts))
     file = tmp_path / "texts.xacro"
@@ -333,6 +336,14 @@ def test_texts_are_evaluated_as_by_xacro_itself(tmp_path: Path) -> None:
         f"<robot name='r' xmlns:xacro='{XACRO_NAMESPACE}'><xacro:arg name='size' default='2'/>"
         "<xacro:property name='z' value='${x / 7}'/><xacro:property name='x' value='$(arg size)'/>"
         f"<xacro:macro name='row' params='tag y:=${{z}}'><xacro:property name='x' value='${{y + 1}}'/>{links}</xacro:macro>"
+        "<xacro:macro name='box' params='*one **all' xmlns:more='urn:more'><more:tag xacro:note='b' z='1' a='&lt;&quot;&amp;'>"
+        "<xacro:insert_block name='one'/>\n\n<!-- kept -->\n<xacro:insert_block name='all'/>"
+        "<!-- gone -->\n<xacro:if value='${x > 1}'>"
+        "<xacro:element xacro:name='e${x}' c='${y}'><xacro:attribute name='d' value='s${x}'/></xacro:element></xacro:if>"
+        "<xacro:unless value='${x > 1}'><!-- a word -->none</xacro:unless></more:tag></xacro:macro>"
+        "<xacro:property name='y' value='${2 * x}'/>"
+        "<xacro:box><one n='${x}'/><all>\n <inner/> text <inner m='${y}'> </inner></all></xacro:box>"
+        '<xacro:call macro=\'${"bo" + "x"}\'><one/><all/></xacro:call>'
         "<xacro:row tag='a'/><xacro:row tag='b' y='3'/><!-- xacro:eval-comments --><!-- ${x} --></robot>",
         encoding="utf-8",
     )
