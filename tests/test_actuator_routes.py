@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
 from functools import cache
 
 import numpy as np
@@ -19,7 +20,7 @@ from scipy.optimize import brentq
 import softrobots as sr
 from softrobots.model.actuator_laws import ActuatorLaws
 from softrobots.statics.elastic_state import elastic_state
-from softrobots.statics.loads import Load
+from softrobots.statics.loads import AppliedLoad, Load
 from tests.support.oracles import central_difference
 from tests.support.routed_arms import actuator, curve_length, routed
 
@@ -284,3 +285,115 @@ def test_work_of_the_motors_is_the_change_of_energy() -> None:
     assert len(slack) > 2
     assert errors[1] < 1e-2 * abs(energy(before) - first)
     assert errors[1] < 0.2 * errors[0]  # second order: a sixteenth, were it not for the knees
+
+
+# --- Given lengths
+
+
+def held(names: list[str], chain: str = "sections", **fields: object) -> sr.SoftModel:
+    return routed(*(actuator(name, *ROUTES[name], kind="length") for name in names), chain=chain, **(FIELDS | fields))
+
+
+@pytest.mark.parametrize("names", [["from_base"], ["helix", "table", "part"], list(ROUTES)], ids=lambda names: str(len(names)))
+def test_given_lengths_are_held_on_any_routes(names: list[str]) -> None:
+    """The lengths are met, and tensions as multipliers balance the springs: `K z = -J^T T`, with lengths by another code."""
+    model, random = held(names), np.random.default_rng(3)
+    lengths = model.relaxed_motors + random.uniform(-0.004, 0.004, len(names))
+    found = sr.solve_equilibrium(model, lengths)
+    z = model.structure.strains(found.q_motors, found.q_springs)
+    assert found.muscle_lengths == pytest.approx(lengths, abs=1e-12)
+    assert [curve_length(ROUTES[n], SPANS, z.reshape(-1, 4)) for n in names] == pytest.approx(lengths, abs=1e-12)
+    jacobian = np.zeros((len(names), z.size))
+    for place in range(z.size):
+        shifted = z.astype(complex)
+        shifted[place] += 1e-30j
+        jacobian[:, place] = [curve_length(ROUTES[n], SPANS, shifted.reshape(-1, 4)).imag / 1e-30 for n in names]
+    carried = model.structure.strain_springs.stiffness * z
+    assert carried == pytest.approx(-found.muscle_forces @ jacobian, abs=1e-9 * np.abs(carried).max())
+    assert model.n_springs == z.size - len(names)
+
+
+@pytest.mark.parametrize("chain", ["sections", "lumped"])
+def test_derivatives_at_given_lengths_are_those_of_the_residual(chain: str) -> None:
+    names = ["helix", "table", "part", "cone"]
+    model, random = held(names, chain), np.random.default_rng(8)
+    lengths = model.relaxed_motors + random.uniform(-0.002, 0.002, 4)
+    y = 0.1 * random.uniform(-1.0, 1.0, model.n_springs) * np.where(model.springs.turning, 1.0, 0.02)
+    load = Load.of(model, (1.0, -2.0, 1.5), gravity=(0.0, 0.0, -9.81))
+    state = elastic_state(model, lengths, y, load)
+    tangent = central_difference(lambda y: elastic_state(model, lengths, y, load).residual, y)
+    coupling = -central_difference(lambda u: elastic_state(model, u, y, load).residual, lengths)
+    tensions = central_difference(lambda u: elastic_state(model, u, y, load).load.motors, lengths)
+    by_lengths, _ = state.point.motor_derivatives(AppliedLoad(model, load).at(state.q))
+    assert np.abs(state.tangent - tangent).max() < 1e-7 * np.abs(tangent).max()
+    assert np.abs(state.load.coupling - coupling).max() < 1e-6 * np.abs(coupling).max()
+    assert np.abs(by_lengths - tensions).max() < 1e-6 * np.abs(tensions).max()
+
+
+def test_tendons_from_the_base_hold_the_sums_over_each_segment() -> None:
+    """Straight through whole segments, three for each: the coordinates and names are those of muscles segment by segment."""
+    through = tendons(1.0, 0.0, "length", elastic_sections=2)
+    apart = sr.load_model(sr.PccArm(segment_lengths=LENGTHS, offset=TURN, elastic_sections=2))
+    assert through.spring_joints == apart.spring_joints
+    found = sr.solve_equilibrium(through, through.relaxed_motors + [-0.01, 0.0, 0.01, 0.002, -0.01, 0.004], (0.2, 0.1, 0.0))
+    short = [0, 1, 2], [3, 4, 5]
+    assert found.stable
+    for rows in short:
+        assert found.muscle_lengths[rows] == pytest.approx(found.q_motors[rows], abs=1e-13)
+
+
+def test_stiff_tendons_tend_to_given_lengths() -> None:
+    """Of first order in 1 / stiffness, also where tendons are fewer than the strains that they could hold."""
+    routes = {name: ROUTES[name] for name in ("from_base", "helix")}
+    exact = held(list(routes))
+    lengths, force = exact.relaxed_motors - (0.006, 0.004), (0.3, -0.2, 0.1)
+    tip = sr.solve_equilibrium(exact, lengths, force).tip_position
+    errors = []
+    for stiffness in (1e5, 1e6, 1e7):
+        soft = routed(*(actuator(n, *r, kind="elastic", stiffness=stiffness) for n, r in routes.items()), **FIELDS)
+        found = sr.solve_equilibrium(soft, lengths, force)
+        assert np.all(found.muscle_forces > 0.0)
+        errors.append(float(np.linalg.norm(found.tip_position - tip)))
+    assert errors[0] > 1e-6
+    assert np.divide(errors[:-1], errors[1:]) == pytest.approx(10.0, rel=0.05)
+
+
+def test_lengths_that_no_shape_has_are_refused() -> None:
+    """Two equal routes hold one direction: their lengths must agree; the nearest are their mean."""
+    two = routed(*(actuator(name, *ROUTES["helix"], kind="length") for name in ("a", "b")), **FIELDS)
+    rest = two.relaxed_motors
+    assert two.n_springs == 2 * SECTIONS * 4 - 1
+    with pytest.raises(
+        sr.ParameterError, match=r"one shape of the robot explains; that of [ab] misses the nearest shape by 0\.001 m"
+    ):
+        sr.solve_equilibrium(two, rest + (0.0, 0.002))
+    nearest = two.structure.muscle_lengths.consistent(rest + (0.0, 0.002))
+    assert nearest == pytest.approx(rest + 0.001, abs=1e-12)
+    found = sr.solve_equilibrium(two, nearest)
+    assert found.muscle_forces[0] == pytest.approx(found.muscle_forces[1], rel=1e-9)  # the least tensions
+    with pytest.raises(sr.ParameterError, match="a shape of the robot has"):
+        sr.solve_equilibrium(two, 0.005 * rest)
+    with pytest.raises(sr.ParameterError, match=r"segment 1 would bend by 3\.3"):
+        sr.solve_equilibrium(two, rest + 1.0)
+
+
+def test_given_lengths_beside_other_kinds_are_refused() -> None:
+    tags = actuator("a", *ROUTES["helix"], kind="length"), actuator("b", *ROUTES["cone"], kind="pressure", area=1e-4)
+    with pytest.raises(sr.DescriptionError, match="the lengths of a are given, and not those of b"):
+        routed(*tags, **FIELDS)
+    assert routed(*tags, muscles="forces", **FIELDS).actuators.units == ("N", "Pa")
+
+
+@pytest.mark.parametrize("kind", ["length", "tension", "elastic"])
+def test_kinds_are_kept_in_files_and_copies(kind: str, tmp_path: object) -> None:
+    model = tendons(4e3, 2.0, kind)
+    found = sr.solve_equilibrium(model, model.relaxed_motors + (3.0 if kind == "tension" else -1e-3), (0.1, 0.0, 0.0))
+    path = tmp_path / "found.npz"
+    sr.save_result(found, path)
+    again = sr.load_result(path)
+    assert again.model == model
+    assert [tag.kind for tag in again.model.muscles] == [kind] * 6
+    assert np.array_equal(again.motor_torques, found.motor_torques)
+    assert pickle.loads(pickle.dumps(model)) == model
+    other = sr.load_model(model.urdf, muscles="forces" if kind == "length" else "lengths")
+    assert {tag.kind for tag in other.muscles} == {{"length": "tension", "tension": "length"}.get(kind, kind)}

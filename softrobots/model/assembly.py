@@ -55,8 +55,8 @@ def assemble(
         The model.
 
     Raises:
-        DescriptionError: If the muscles of a segment do not fix its shape, some have given lengths and others not, or the
-            springs of an inflated link cannot have a largest moment.
+        DescriptionError: If some muscles have given lengths and others not, or the springs of an inflated link cannot have a
+            largest moment.
     """
     motor_joints, spring_joints = (tuple(sorted(names, key=rigid.getJointId)) for names in (motors, springs))
     motor_indices, spring_indices = velocity_indices(rigid, motor_joints), velocity_indices(rigid, spring_joints)

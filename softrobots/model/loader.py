@@ -59,7 +59,7 @@ def load_model(
         DescriptionError: If the file cannot be read, is of another kind or has unsupported elements, has no springs and none
             are given, has joints other than revolute, continuous and prismatic, has a spring on a fixed joint, would have a
             motor that mimics another joint, has a section whose joints are not the chain that its tag describes, has muscles
-            that do not fix the shape of their segment, or has several leaves and no tip.
+            of which some have given lengths and others not, or has several leaves and no tip.
         MissingDependency: If it is MJCF or SDF, and MuJoCo or Drake is not installed (extra `interop`).
         NameNotFound: If a named joint or frame does not exist.
         ParameterError: If a stiffness is not positive, a rest coordinate is not finite, a joint is named twice or belongs to a

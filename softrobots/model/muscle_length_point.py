@@ -47,7 +47,7 @@ class MuscleLengthPoint(MusclePoint):
     def reduce(self, joints: JointLoad) -> ReducedLoad:
         """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included.
 
-        The energy of the sums is that beyond the state without twist.
+        The energy of the sums is that beyond the state without twist. The tensions of winding muscles count in the scale.
         """
         load, held, paths = self.inner.reduce(joints), self.held, self.paths
         by_lengths, by_free = self._sum_slopes
@@ -62,7 +62,7 @@ class MuscleLengthPoint(MusclePoint):
             half @ to_free - by_free.T @ stiff,
             np.concatenate([to_free.T @ load.coupling, half @ to_lengths - stiff.T @ by_lengths], axis=1),
             load.potential + float(stiffness @ (change * middle)),
-            load.scale,
+            load.scale + (0.0 if held.groups else float(np.abs(tensions).sum())),
         )
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -36,11 +36,6 @@ _SHORTEST = 1e-3  # length of a muscle along its tangent at rest, relative to it
 _TWIST = STRAINS.index("twist")
 
 
-def muscle_arms(tags: Sequence[ActuatorTag]) -> FloatArray:
-    """Derivative of the lengths of straight routes by the sums of bending and elongation, shape (n, 3) [m/rad, m/rad, -]."""
-    return np.array([(tag.distance * np.sin(tag.azimuth), -tag.distance * np.cos(tag.azimuth), 1.0) for tag in tags])
-
-
 class MusclePaths:
     """The actuators of a robot along the sections that they pass; a *path* is a point of a route for part of a section."""
 
@@ -62,6 +57,8 @@ class MusclePaths:
         """Places of the four section coordinates of each path among the strains, `count` if locked, shape (n_paths, 4)."""
         self.places = self.places.reshape(-1, len(STRAINS))
         winding = np.array([point.widening != 0.0 or point.winding != 0.0 for _, point, _ in pairs], dtype=bool)
+        self.straight = not winding.any()
+        """Whether all run straight."""
         self.separable = ~winding & self.lumped
         """Whether the path is straight along a lumped section, shape (n_paths,)."""
         frames = [_tangent(point, row) for _, point, row in pairs]

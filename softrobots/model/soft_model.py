@@ -118,9 +118,10 @@ class SoftModel:
     @cached_property
     def rounding(self) -> float:
         """Rounding of the torques [N m]: `k (y - rest)` of a stiff spring with a rest, or a stiff tendon, is no more exact."""
-        laws = self.structure.actuator_laws
-        of_muscles = 0.0 if laws is None else laws.rounding
-        return of_muscles + 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(self.stiffness * self.rest))
+        of_muscles = self.structure.actuator_laws or self.structure.muscle_lengths
+        return (0.0 if of_muscles is None else of_muscles.rounding) + 8.0 * float(np.finfo(np.float64).eps) * float(
+            np.linalg.norm(self.stiffness * self.rest)
+        )
 
     @property
     def rest(self) -> FloatArray:
@@ -277,14 +278,16 @@ class SoftModel:
                 f"an inflated link of {self.pinocchio.name} has max_moment; compiled solvers need springs that are linear, or "
                 "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
             )
-        paths = self.structure.muscle_paths
+        paths, held = self.structure.muscle_paths, self.structure.muscle_lengths
         winding = {tag.name for tag in self.muscles if tag.kind == "length" and (len(tag.segments) > 1 or not tag.straight)}
         if paths.lumped:
             winding |= {self.muscles[muscle].name for muscle in paths.muscle[~paths.separable].tolist()}
+        if held is not None and not held.groups:
+            winding |= {tag.name for tag in self.muscles}
         if winding:
             raise DescriptionError(
                 f"{self.pinocchio.name} has actuators that compiled solvers do not take ({', '.join(sorted(winding))}); "
-                "required: straight ones along lumped sections, and for given lengths along one segment each "
+                "required: straight ones along lumped sections, and for given lengths three or more along one whole segment each "
                 "(solve_equilibrium accepts the others, too)"
             )
         tip = self.frame_id(self.tip)

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from softrobots.cli.tools.kinematics import KinematicsRow, as_file, compare_kinematics
 from softrobots.core.checks import positive_integer
-from softrobots.core.errors import DescriptionError, SoftRobotsError
+from softrobots.core.errors import SoftRobotsError
 from softrobots.description.sources import read_source
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_rules import Finding, check_rules
@@ -90,15 +90,8 @@ def _in_softrobots(urdf: str, label: str) -> str:
     tags = read_tags(urdf, label)
     if not tags.springs and not tags.sections:
         return "no springs; load_model needs springs={joint: stiffness}"
-    how = "loads"
-    try:
-        model = load_model(urdf)
-    except DescriptionError as error:
-        if not tags.muscles:
-            raise
-        model = load_model(urdf, muscles="forces")  # e.g. one chamber of a finger: its length alone fixes no shape
-        how = f"loads if tensions are given, muscles='forces', because {str(error).partition(';')[0]}"
-    return f"{how}: {model.n_motors} motors, {model.n_springs} elastic coordinates, tip {model.tip}"
+    model = load_model(urdf)
+    return f"loads: {model.n_motors} motors, {model.n_springs} elastic coordinates, tip {model.tip}"
 
 
 def _valid_in_yourdfpy(source: Robot | Path | str) -> Finding:
