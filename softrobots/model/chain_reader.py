@@ -39,9 +39,11 @@ def read_chain(
     shape (n_motors, 2) [rad, m or N], and reach [m] are copied; `groups` are the springs of the inflated links.
 
     Raises:
-        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, or the springs of a slack
-            wall are not two that turn, one behind the other.
+        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, the springs of a slack
+            wall are not two that turn, one behind the other, an actuator winds along lumped sections, or given lengths are
+            other than those of three or more that run straight along a whole segment.
     """
+    _check_actuators(str(pinocchio_model.name), structure)
     tip = pinocchio_model.frames[tip_frame]
     elements, axes = _elements(pinocchio_model, _path(pinocchio_model, tip.parentJoint, str(tip.name)), structure)
     tip_rotation, tip_translation = _placed(tip.placement, axes)
@@ -67,6 +69,22 @@ def read_chain(
         free=read_only(np.eye(count)) if given is None else given.free,
         slack_hinges=_slack_hinges(str(pinocchio_model.name), elements, groups),
     )
+
+
+def _check_actuators(name: str, structure: Structure) -> None:
+    """Refuse actuators that compiled solvers do not take."""
+    paths, held, muscles = structure.muscle_paths, structure.muscle_lengths, structure.muscles
+    unlike = {tag.name for tag in muscles if tag.kind == "length" and (len(tag.segments) > 1 or not tag.straight)}
+    if held is not None and not held.groups:
+        unlike |= {tag.name for tag in muscles}
+    if paths.lumped:
+        unlike |= {muscles[muscle].name for muscle in paths.muscle[~paths.separable].tolist()}
+    if unlike:
+        raise DescriptionError(
+            f"{name} has actuators that compiled solvers do not take ({', '.join(sorted(unlike))}); required: straight ones "
+            "along lumped sections, and for given lengths three or more along one whole segment each (solve_equilibrium "
+            "accepts the others, too)"
+        )
 
 
 def chain_length(pinocchio_model: Any, tip_frame: int, strained: Collection[str]) -> float:

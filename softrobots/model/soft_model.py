@@ -278,18 +278,6 @@ class SoftModel:
                 f"an inflated link of {self.pinocchio.name} has max_moment; compiled solvers need springs that are linear, or "
                 "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
             )
-        paths, held = self.structure.muscle_paths, self.structure.muscle_lengths
-        winding = {tag.name for tag in self.muscles if tag.kind == "length" and (len(tag.segments) > 1 or not tag.straight)}
-        if paths.lumped:
-            winding |= {self.muscles[muscle].name for muscle in paths.muscle[~paths.separable].tolist()}
-        if held is not None and not held.groups:
-            winding |= {tag.name for tag in self.muscles}
-        if winding:
-            raise DescriptionError(
-                f"{self.pinocchio.name} has actuators that compiled solvers do not take ({', '.join(sorted(winding))}); "
-                "required: straight ones along lumped sections, and for given lengths three or more along one whole segment each "
-                "(solve_equilibrium accepts the others, too)"
-            )
         tip = self.frame_id(self.tip)
         return read_chain(
             self.pinocchio, self.structure, tip, limits=self.motor_limits, reach=self.reach, groups=self.spring_groups
