@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import softrobots as sr
 from studies.measured_arm.errors import best_pose, offset_errors, repeatability, rms
+from studies.measured_arm.nominal import Nominal, predict
 from studies.measured_arm.plain_kinematics import constant_curvature_tips
 from studies.measured_arm.recordings import FOLDER, Recording, family_of, read_recording, servos_by_tendon
+from studies.measured_arm.tables import table
+from tests.conftest import CHECKOUT
+from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
 TURNS = (-3.0589, -2.5615, -2.0506)
@@ -190,3 +196,148 @@ def test_the_files_stand_beside_their_source_and_licence() -> None:
     assert "github.com/ContinuumRoboticsLab/opencr-mujoco" in (FOLDER / "README.md").read_text(encoding="utf-8")
     with (FOLDER / "val.csv").open(encoding="utf-8", newline="") as stream:
         assert next(csv.reader(stream)) == HEAD.split(",")
+
+
+# --- Predictions
+
+
+def arcs_with_elastic_tendons(pulls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tips, (n, 3) [m], and tensions, (n, 9) [N], by the least energy of three arcs, which a robot without weight bends to.
+
+    Straight tendons exert a constant moment along a segment, so that bending (towards x and y) and elongation `e` are constant
+    there. The energy `1/2 z K z + sum max(0, T)^2 / 2 k` is convex and quadratic where the same tendons are taut: Newton's
+    method with the tendons that are taut ends in finitely many steps.
+    """
+    bending, axial = 50e9 * math.pi * 0.0005**4 / 4.0, 50e9 * math.pi * 0.0005**2
+    around = np.array(TURNS)[:, None] + np.radians([0.0, 120.0, 240.0])
+    slopes, stiffness = np.zeros((9, 9)), np.zeros(9)
+    for segment in range(3):
+        stiffness[3 * segment : 3 * segment + 3] = np.array([bending, bending, axial]) / LENGTHS[segment]
+        for k in range(3):
+            angle = around[segment, k]
+            row = (-DISTANCE * math.cos(angle), -DISTANCE * math.sin(angle), 1.0)
+            slopes[3 * segment + k, : 3 * segment + 3] = np.tile(row, segment + 1)
+    tips, tensions = [], []
+    for pulled in pulls:
+
+        def energy(z: np.ndarray, pulled: np.ndarray = pulled) -> float:
+            return 0.5 * stiffness @ z**2 + np.sum(np.maximum(0.0, 1.0 + 7e3 * (slopes @ z + pulled)) ** 2) / 14e3
+
+        z = np.zeros(9)
+        for _ in range(100):
+            tension = 1.0 + 7e3 * (slopes @ z + pulled)
+            taut = slopes[tension > 0.0]
+            slope = stiffness * z + taut.T @ tension[tension > 0.0]
+            if np.abs(slope).max() < 1e-11:
+                break
+            step = -np.linalg.solve(np.diag(stiffness) + 7e3 * taut.T @ taut, slope)
+            while energy(z + step) > energy(z) + 1e-4 * float(slope @ step) and np.abs(step).max() > 1e-9:
+                step = 0.5 * step
+            z = z + step
+        place, frame = np.zeros(3), np.eye(3)
+        for (x, y, elongation), length in zip(z.reshape(3, 3), LENGTHS, strict=True):
+            angle, whole = math.hypot(x, y), length + elongation
+            half = np.array([x, y]) / angle * math.sin(angle / 2.0) if angle > 0.0 else np.zeros(2)
+            chord = whole * math.sin(angle / 2.0) / (angle / 2.0) if angle > 0.0 else whole
+            place = place + frame @ np.array([*(chord * half), chord * math.cos(angle / 2.0)])
+            cross = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
+            frame = frame @ expm(cross)
+        tips.append(place)
+        tensions.append(np.maximum(0.0, tension))
+    return np.array(tips), np.array(tensions)
+
+
+@pytest.mark.parametrize(("name", "every"), [("train", 160), ("val", 110)])
+def test_predictions_are_equilibria_of_three_arcs_with_elastic_tendons(name: str, every: int) -> None:
+    """Without weight four sections a segment are one arc; equilibria are settled to 1e-10 of the moments, over 0.04 N m/rad."""
+    recording = read_recording(name).thinned(every)
+    found, (tips, tensions) = predict(recording, Nominal()), arcs_with_elastic_tendons(recording.pulls)
+    assert found.stable.all()
+    assert np.allclose(found.tips, tips, atol=1e-7)
+    assert np.allclose(np.maximum(0.0, found.tensions), tensions, atol=1e-4)
+    assert found.counts()["slack_tendons"] == np.sum(tensions == 0.0) > 0
+
+
+def recorded() -> dict:
+    return json.loads((CHECKOUT / "docs" / "validation" / "measured_arm.json").read_text(encoding="utf-8"))
+
+
+def test_the_page_shows_the_record() -> None:
+    page = (CHECKOUT / "docs" / "measured.md").read_text(encoding="utf-8")
+    assert f"\n\n{table(recorded())}\n\n<!-- measured_arm:end -->\n" in page
+
+
+@pytest.mark.study
+def test_the_record_is_what_least_energy_says() -> None:
+    """All 2063 rows anew by least energy, in both metrics."""
+    record = recorded()
+    sets = {name: read_recording(name) for name in ("train", "val")}
+    tips = {name: arcs_with_elastic_tendons(one.pulls)[0] for name, one in sets.items()}
+    pose = best_pose(tips["train"], sets["train"].tips)
+    ours, _, published, floor = record["models"]
+    for name, one in sets.items():
+        apart = tips[name] - one.tips
+        assert ours[name]["offset_m"] == pytest.approx(math.sqrt(apart.var(axis=0).sum()), abs=1e-7)
+        assert ours[name]["raw_m"] == pytest.approx(rms(np.linalg.norm(apart, axis=1)), abs=1e-7)
+        assert ours[name]["posed_m"] == pytest.approx(rms(np.linalg.norm(pose.moved(tips[name]) - one.tips, axis=1)), abs=1e-7)
+        assert record["sets"][name]["stable"] == record["sets"][name]["rows"] == len(one.tips)
+        assert floor[name]["offset_m"] == pytest.approx(rms(repeatability([one], 2e-4).distances), rel=1e-12)
+        assert floor[name]["offset_m"] < ours[name]["posed_m"] < published[name]["offset_m"]
+
+
+# --- The script
+
+
+def test_the_script_writes_tables_rows_and_refuses_to_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder = tmp_path / "out"
+    arguments = ["--every", "150", "--no-others", "--no-plots", "--output", str(folder)]
+    assert run_script("measured_arm", arguments) == 0
+    out, err = capsys.readouterr()
+    assert "| elastic tendons, nominal | nothing here; turns by the source | " in out
+    assert "/11 [" in err  # a progress bar
+    assert {path.name for path in folder.iterdir()} == {"measured_arm.json", "measured_arm.md", "measured_arm.csv"}
+    record = json.loads((folder / "measured_arm.json").read_text(encoding="utf-8"))
+    rows = list(csv.DictReader((folder / "measured_arm.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == 11 + 3 == sum(one["rows"] for one in record["sets"].values())
+    errors = np.array([float(row["error_m"]) for row in rows if row["set"] == "train"])
+    assert rms(errors) == pytest.approx(record["models"][0]["train"]["posed_m"], rel=1e-12)
+    assert run_script("measured_arm", arguments) == 2
+    assert "not empty" in capsys.readouterr().err
+
+
+@each_row(
+    ("arguments", "told"),
+    [
+        (["--stiffness", "0"], "--stiffness"),
+        (["--stiffness", "nan"], "--stiffness"),
+        (["--mass", "-1"], "--mass"),
+        (["--pretension", "-1"], "--pretension"),
+        (["--every", "0"], "--every"),
+        (["--data", "nowhere"], "cannot read nowhere"),
+        (["--docs", "--every", "2"], "given without --every"),
+        (["--docs", "--no-others"], "given without --no-others"),
+    ],
+)
+def test_bad_input_is_refused_before_work(
+    arguments: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert run_script("measured_arm", [*arguments, "--output", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    assert told in err
+    assert (out, list(tmp_path.iterdir())) == ("", [])
+
+
+@pytest.mark.study
+def test_pictures_and_the_page_are_written(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert run_script("measured_arm", ["--every", "60", "--no-others", "--json", "--output", str(tmp_path / "out")]) == 0
+    assert json.loads(capsys.readouterr().out)["sets"]["train"]["rows"] == 27
+    for name in ("axes", "errors", "tips", "paths", "families"):
+        assert (tmp_path / "out" / f"measured_{name}.png").stat().st_size > 10_000
+        assert (CHECKOUT / "docs" / "images" / f"measured_{name}.png").stat().st_size > 10_000
+
+
+def test_help_tells_what_it_does(capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run_script("measured_arm", ["--help"])
+    assert ended.value.code == 0
+    assert "--pretension" in capsys.readouterr().out

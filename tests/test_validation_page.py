@@ -26,12 +26,26 @@ def environments() -> list[dict[str, Any]]:
 
 
 def pages() -> list[str]:
-    return [(CHECKOUT / "docs" / name).read_text(encoding="utf-8") for name in ("validation.md", "agreement.md", "motion.md")]
+    return [
+        (CHECKOUT / "docs" / name).read_text(encoding="utf-8")
+        for name in ("validation.md", "agreement.md", "motion.md", "measured.md")
+    ]
 
 
 @pytest.mark.parametrize(
     "name",
-    ["agreement", "beam_validity", "soak", "fuzzing", "environments", "coverage", "mutation", "input_shaping", "controllers"],
+    [
+        "agreement",
+        "beam_validity",
+        "soak",
+        "fuzzing",
+        "environments",
+        "coverage",
+        "mutation",
+        "input_shaping",
+        "controllers",
+        "measured_arm",
+    ],
 )
 def test_every_slow_proof_is_recorded(name: str) -> None:
     """With its date and its command, which is one of ours, on the page that it belongs to."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from softrobots.core.checks import FloatArray
 from studies.measured_arm.recordings import Recording
@@ -78,15 +79,13 @@ def repeatability(
     pulls = np.concatenate([recording.pulls for recording in recordings])
     tips = np.concatenate([recording.tips for recording in recordings])
     blocks = np.array([block for recording in recordings for block in recording.blocks])
-    near = np.abs(pulls[:, None] - pulls).max(axis=2) <= within
+    first, second = KDTree(pulls).query_pairs(within, p=np.inf, output_type="ndarray").T
+    large = np.abs(pulls).max(axis=1) >= moved
+    chosen = (blocks[first] != blocks[second]) & large[first] & large[second]
     if same_history:
         follows = np.concatenate([[False], blocks[1:] == blocks[:-1]])
-        before = np.zeros_like(near)
-        before[1:, 1:] = near[:-1, :-1]
-        near &= before & follows & follows[:, None]
-    large = np.abs(pulls).max(axis=1) >= moved
-    near &= (blocks[:, None] != blocks) & large & large[:, None]
-    squares = np.square(np.linalg.norm(tips[:, None] - tips, axis=2))
-    counts = near.sum(axis=1)
-    means = (near * squares).sum(axis=1)[counts > 0] / counts[counts > 0]
-    return Repeated(np.asarray(np.sqrt(means / 2.0)), int(near.sum()) // 2)
+        chosen &= follows[first] & follows[second] & (np.abs(pulls[first - 1] - pulls[second - 1]).max(axis=1) <= within)
+    ends = np.concatenate([[first[chosen], second[chosen]], [second[chosen], first[chosen]]], axis=1)
+    squares = np.square(np.linalg.norm(tips[ends[0]] - tips[ends[1]], axis=1))
+    sums, counts = (np.bincount(ends[0], weights, len(tips)) for weights in (squares, None))
+    return Repeated(np.asarray(np.sqrt(sums[counts > 0] / counts[counts > 0] / 2.0)), int(chosen.sum()))
