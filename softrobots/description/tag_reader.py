@@ -152,6 +152,9 @@ def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any
     if len(strains) != 4 or any(map(math.isnan, strains)) or strains[3] <= 0.0:
         raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
     sizes = {key: positive(element, key, where) for key in ("length", "radius")}
+    sizes["friction"] = number(element, "friction", where) if "friction" in element.attrib else 0.0
+    if sizes["friction"] < 0.0:
+        raise DescriptionError(f"{where} has friction {sizes['friction']}; a moment of at least 0 N m is required")
     return {"name": element.get("name", ""), "segment": segment_number(element, where), "rest": strains, **sizes}
 
 

@@ -67,6 +67,8 @@ class AnySectionTag:
     """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
     radius: float
     """Radius of the body, for pictures [m]."""
+    friction: float = 0.0
+    """Moment of dry friction that holds its bending [N m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

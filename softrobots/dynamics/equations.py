@@ -25,6 +25,7 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray
 from softrobots.model.actuators import Drives
 from softrobots.model.coordinates import Point
+from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import AppliedLoad, Load
@@ -48,7 +49,7 @@ class EquationsOfMotion:
             damping: `D` of the elastic coordinates, shape (n_springs, n_springs); None: none.
             drives: Rotors, `A`, and viscous friction of the actuators, where they move by their force; None: neither acts.
         """
-        self.model, self.gravity = model, gravity
+        self.model, self.gravity = check_frictionless(model, "motion"), gravity
         self.n_motors, self.n = model.n_motors, model.n_motors + model.n_springs
         weightless = 0.0, 0.0, 0.0  # for the workspace; Pinocchio's own model has gravity
         self._pinocchio, self._data = model.workspace(weightless if gravity is None else gravity)

@@ -24,7 +24,8 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.urdf_tags import SpringTag
-from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.soft_model import SoftModel
 
 ACTUATORS = ("driven", "welded")
 """Motor joints in the export: driven joints, or fixed at their positions."""
@@ -50,7 +51,7 @@ def check_linear(model: Any) -> SoftModel:
     Raises:
         ParameterError: If it is not a `SoftModel`, has sections of constant strain, or springs that are not linear.
     """
-    checked = check_model(model)
+    checked = check_frictionless(model, "exports")
     if checked.structure.constant_strain:
         requirement = (
             'a chain of joint springs, chain="lumped" (pcc_arm_lumped, helix_tube_lumped): the six joints of a section of '

@@ -16,6 +16,8 @@ from softrobots.model.actuator_laws import ActuatorLaws
 from softrobots.model.actuators import Actuators
 from softrobots.model.chain_reader import chain_length
 from softrobots.model.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, rest_coordinates
+from softrobots.model.dry_friction import DryFriction
+from softrobots.model.friction_coordinates import FrictionCoordinates
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.muscles import MuscleForces
@@ -76,6 +78,10 @@ def assemble(
         elastic_limits[indices] = [_joint_limits(rigid, row.joint_names) for row in sections]
         lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("length", "rest_joints"))
         coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
+    friction = None
+    if any(row.friction > 0.0 for row in rows) or any(tag.friction > 0.0 for tag in muscles):
+        friction = DryFriction(rows, muscles, paths, strain_springs.rest)
+        coordinates = FrictionCoordinates(coordinates, friction, friction.untouched, np.zeros(friction.n_guides))
     given_lengths, laws, elastic = None, None, strain_springs
     if any(tag.kind == "length" for tag in muscles):
         given_lengths = MuscleLengths(coordinates, muscles, rows, strain_springs, paths)
@@ -98,6 +104,7 @@ def assemble(
         muscle_paths=paths,
         muscle_lengths=given_lengths,
         actuator_laws=laws,
+        friction=friction,
         lines=tags.lines,
         elastic_limits=read_only(elastic_limits),
     )
@@ -240,7 +247,9 @@ def _section_rows(tags: Sequence[SectionTag], first: int) -> list[SectionRow]:
     joints = joint_positions(rest, np.array([tag.length for tag in tags]))
     places = first + np.arange(4 * len(tags)).reshape(-1, 4)
     return [
-        SectionRow(t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, dict(zip(STRAINS, row, strict=True)))
+        SectionRow(
+            t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, t.friction, dict(zip(STRAINS, row, strict=True))
+        )
         for t, at, z, row in zip(tags, joints, rest, places.tolist(), strict=True)
     ]
 
@@ -249,7 +258,7 @@ def _lumped_row(tag: LumpedSectionTag, spring_joints: tuple[str, ...]) -> Sectio
     places = {name: spring_joints.index(joint) for name, joint in tag.joints.items()}
     joints = tuple(tag.joints.values())
     rest = rest_coordinates([tag])[0]
-    return SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, joints, np.zeros(6), rest, places)
+    return SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, joints, np.zeros(6), rest, tag.friction, places)
 
 
 def _strain_springs(rigid: Any, tags: Sequence[SpringTag], joints: tuple[str, ...], sections: Sequence[SectionTag]) -> Springs:

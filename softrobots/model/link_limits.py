@@ -19,6 +19,8 @@ from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.model.soft_model import SoftModel
 
+_NEAR_PLATEAU, _NEAR_COLLAPSE = 0.99, 0.95  # shares of the largest moment at which a link explains why there is no equilibrium
+
 
 class LinkLimits(NamedTuple):
     """Inflated links and the limits of their walls, each at the hinge that is nearest to them; arrays of shape (n_links,).
@@ -173,3 +175,19 @@ def _largest_along(moments: FloatArray) -> FloatArray:
     between = 0.5 * (moments[1:] + moments[:-1])
     ends = np.concatenate([[1.5 * moments[0] - 0.5 * moments[1]], between, [1.5 * moments[-1] - 0.5 * moments[-2]]])
     return np.asarray(np.maximum(np.maximum(ends[1:], ends[:-1]), moments))
+
+
+def near_largest_moment(model: SoftModel, moments: FloatArray) -> str:
+    """Return what keeps a link from carrying more, in words; empty if none is near its largest moment.
+
+    Args:
+        model: The robot.
+        moments: Moment at each inflated link, shape (n_links,) [N m].
+    """
+    for moment, group in zip(moments, model.spring_groups, strict=True):
+        most = group.largest_moment
+        if most is not None and moment >= (_NEAR_COLLAPSE if group.slack_wall else _NEAR_PLATEAU) * most:
+            springs = ", ".join(model.spring_joints[place] for place in group.springs)
+            state = "near the collapse of its slack wall" if group.slack_wall else "on the plateau of its moment"
+            return f"the link of {springs} is {state}, {most:g} N m, and cannot carry a dead moment beyond it"
+    return ""

@@ -142,10 +142,19 @@ class MusclePathsAt:
     @cached_property
     def excess(self) -> FloatArray:
         """Lengths beyond their linear part `matrix @ strains`, shape (..., n_muscles) [m]."""
+        starts, each = self._paths.starts, self._excess_of_paths
+        return np.add.reduceat(each, starts, axis=-1) if len(starts) else np.zeros((*each.shape[:-1], 0))
+
+    @property
+    def _excess_of_paths(self) -> FloatArray:
         paths, size = self._paths, self._size
         each = self._across**2 / (size + np.where(paths.separable, size, np.maximum(self._along, 0.0)))
-        each = each - paths.turned**2 / (2.0 * paths.length)
-        return np.add.reduceat(each, paths.starts, axis=-1) if len(paths.starts) else np.zeros((*each.shape[:-1], 0))
+        return np.asarray(each - paths.turned**2 / (2.0 * paths.length))
+
+    @property
+    def pieces(self) -> FloatArray:
+        """Length of each path, shape (n_paths,) [m]."""
+        return np.asarray(self._along + self._excess_of_paths)
 
     @property
     def change(self) -> FloatArray:
@@ -165,22 +174,40 @@ class MusclePathsAt:
     @cached_property
     def slopes(self) -> FloatArray:
         """Derivative of the excess with respect to the strains, shape (n_muscles, count)."""
+        paths = self._paths
+        slopes = np.zeros((len(paths.rest), paths.count + 1))
+        np.add.at(slopes, (paths.muscle[:, None], paths.places), self._slopes_of_paths)
+        return slopes[:, : paths.count]
+
+    @property
+    def _slopes_of_paths(self) -> FloatArray:
+        """Derivative of the excess of each path with respect to the section coordinates, shape (n_paths, 4)."""
         paths, size = self._paths, self._size
         back = np.where(paths.separable, 0.0, -(self._across**2) / (size * (size + self._along)))
         each = paths.arms * back[:, None] + paths.across[:, 0] * (self._around / size)[:, None]
         if paths.conical:
             each += paths.across[:, 1] * (self._radial / size)[:, None]
-        slopes = np.zeros((len(paths.rest), paths.count + 1))
-        np.add.at(slopes, (paths.muscle[:, None], paths.places), each)
-        return slopes[:, : paths.count]
+        return np.asarray(each)
+
+    @property
+    def piece_arms(self) -> FloatArray:
+        """Derivative of `pieces` with respect to the strains, shape (n_paths, count)."""
+        paths = self._paths
+        arms = np.zeros((len(paths.muscle), paths.count + 1))
+        arms[np.arange(len(arms))[:, None], paths.places] = paths.arms + self._slopes_of_paths
+        return arms[:, : paths.count]
 
     def curvature(self, tensions: FloatArray) -> FloatArray:
-        r"""Return the weighted sum of the second derivatives of the lengths, `sum_m tensions_m d^2 l_m`, shape (count, count).
+        """Return the second derivatives of the lengths times tensions, `sum_m tensions_m d^2 l_m`, shape (count, count)."""
+        return self.stiffening(tensions[self._paths.muscle])
 
-        That of one path is the square of the change of its tangent across the path, over its length.
+    def stiffening(self, pulls: FloatArray) -> FloatArray:
+        """Return the same for the tension in each path, shape (n_paths,) [N].
+
+        The second derivative of one path is the square of the change of its tangent across the path, over its length.
         """
         paths, across = self._paths, self._turning
-        weighted = across * (tensions[paths.muscle] / self._size)[:, None, None]
+        weighted = across * (pulls / self._size)[:, None, None]
         blocks = np.swapaxes(across, -1, -2) @ weighted
         total = np.zeros((paths.count + 1, paths.count + 1))
         np.add.at(total, (paths.places[:, :, None], paths.places[:, None, :]), blocks)

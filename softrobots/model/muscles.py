@@ -30,12 +30,14 @@ class MuscleForces:
 
     def __init__(self, inner: Coordinates, paths: MusclePaths, laws: ActuatorLaws) -> None:
         """Add actuators on their paths to a robot without them."""
-        self._inner, self._paths, self._laws = inner, paths, laws
+        self.inner = inner
+        """The robot without them."""
+        self._paths, self._laws = paths, laws
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> MuscleForcePoint:
         """Return the robot at given coordinates."""
         count = len(motors) - len(self._paths.rest)
-        return MuscleForcePoint(self._inner.at(motors[:count], elastic), self._paths.at(elastic), self._laws, motors[count:])
+        return MuscleForcePoint(self.inner.at(motors[:count], elastic), self._paths.at(elastic), self._laws, motors[count:])
 
 
 @dataclass(frozen=True, eq=False)

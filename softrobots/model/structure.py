@@ -11,6 +11,7 @@ from softrobots.constant_curvature.strain_chain import STRAINS, in_range
 from softrobots.core.checks import FloatArray
 from softrobots.description.urdf_tags import ActuatorTag, LineTag, RobotTags, SpringTag
 from softrobots.model.actuator_laws import ActuatorLaws
+from softrobots.model.dry_friction import DryFriction
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.sections import SectionRow
@@ -51,10 +52,17 @@ class Structure:
     """The constraint of given muscle lengths; None if there is none."""
     actuator_laws: ActuatorLaws | None
     """The laws of muscles of other kinds; None if there are none."""
+    friction: DryFriction | None
+    """Dry friction of sections and guides; None if there is none."""
     lines: tuple[LineTag, ...]
     """Lines along the segments, for pictures only."""
     elastic_limits: FloatArray
     """Limits of the joints that springs and sections move, in the order of Pinocchio's velocities, shape (nv, 2)."""
+
+    @property
+    def guided(self) -> bool:
+        """Whether actuators rub in their guides."""
+        return self.friction is not None and self.friction.guided
 
     @property
     def muscle_input(self) -> str:

@@ -17,6 +17,7 @@ from eigenpy import ComputationInfo
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.model.coordinates import Point, ReducedLoad
+from softrobots.model.friction_coordinates import gripped
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.loads import AppliedLoad, Load
 
@@ -25,6 +26,9 @@ TOLERANCE = 1e-10
 
 MOMENT_FLOOR = 1e-3
 """Least scale of the residual, for vanishing loads [N m]."""
+
+SAME_FRICTION = 1e-13
+"""Change of the friction of guides that is none, relative to the largest tension."""
 
 ENERGY_ROUNDING = 1e-14
 """Energies this close, relative to their terms, cannot be told apart."""
@@ -100,7 +104,12 @@ class ElasticProblem:
 def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
     """Evaluate residual, tangent stiffness and energy at actuator and elastic coordinates; see `ElasticProblem.state`."""
     with one_blas_thread(model.n_springs):
-        return ElasticProblem(model, q_motors, load).state(q_springs)
+        state = ElasticProblem(model, q_motors, load).state(q_springs)
+        change = math.inf if model.structure.guided else 0.0
+        while change > SAME_FRICTION * float(np.abs(state.load.motors).max(initial=0.0)):
+            model, change = gripped(model, q_motors, q_springs, state.load.motors)
+            state = ElasticProblem(model, q_motors, load).state(q_springs)
+        return state
 
 
 def _out_of_range(model: SoftModel, q_springs: FloatArray, q: FloatArray, point: Point) -> ElasticState:

@@ -18,9 +18,19 @@ from eigenpy import LDLT
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
+from softrobots.model.friction_coordinates import gripped
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
-from softrobots.statics.elastic_state import TOLERANCE, ElasticProblem, ElasticState, largest_residual, norm, positive, scaled
+from softrobots.statics.elastic_state import (
+    SAME_FRICTION,
+    TOLERANCE,
+    ElasticProblem,
+    ElasticState,
+    largest_residual,
+    norm,
+    positive,
+    scaled,
+)
 from softrobots.statics.loads import Load
 from softrobots.statics.stability import is_positive, is_stable
 
@@ -58,10 +68,17 @@ def solve_springs(
         The last state, whether or not it meets the tolerance (see `largest_residual`); the evaluations spent; and whether that
         state is stable (see `softrobots.statics.stability`).
     """
-    problem = ElasticProblem(model, q_motors, load, tolerance)
+    most = MOST_ITERATIONS[method] if max_iterations is None else max_iterations
     solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
     with one_blas_thread(model.n_springs):
-        return solve(problem, start, MOST_ITERATIONS[method] if max_iterations is None else max_iterations)
+        state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)
+        while model.structure.guided and spent < most:  # the friction of guides follows the tensions
+            model, change = gripped(model, q_motors, state.q_springs, state.load.motors)
+            if change <= SAME_FRICTION * float(np.abs(state.load.motors).max()):
+                break
+            state, used, stable = solve(ElasticProblem(model, q_motors, load, tolerance), state.q_springs, most - spent)
+            spent += used
+    return state, spent, stable
 
 
 def balanced_state(

@@ -12,7 +12,8 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.actuators import slack_tendons
-from softrobots.model.link_limits import LinkLimits, link_limits, link_moments
+from softrobots.model.friction_coordinates import after_step, gripped
+from softrobots.model.link_limits import LinkLimits, link_limits, link_moments, near_largest_moment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual
 from softrobots.statics.elastostatics import METHODS, solve_springs
@@ -20,7 +21,6 @@ from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.stability import Stability, is_stable, stability
 
-_NEAR_PLATEAU, _NEAR_COLLAPSE = 0.99, 0.95  # shares of the largest moment at which a link explains why there is no equilibrium
 _LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are computed from the shape
 
 
@@ -173,6 +173,7 @@ def solve_equilibrium(
     gravity: Any = None,
     method: str = "newton",
     q_springs0: Any = None,
+    previous: Equilibrium | None = None,
     tolerance: float = TOLERANCE,
     max_iterations: int | None = None,
 ) -> Equilibrium:
@@ -192,6 +193,8 @@ def solve_equilibrium(
         gravity: Gravity, shape (3,) [m/s^2], world axes, e.g. `softrobots.EARTH_GRAVITY`; None: weightless.
         method: "newton", or "fixed_point" ([Troise 2021], converges for small loads only).
         q_springs0: Start of the solver, shape (n_springs,) [rad or m]; the relaxed springs by default.
+        previous: The equilibrium that the robot comes from: the start of the solver, unless `q_springs0` is given, and what dry
+            friction remembers; by default nothing has moved the robot yet.
         tolerance: Largest residual, relative to `max(|f| reach + |moment| + |g|, 1e-3 N m)`.
         max_iterations: Limit of evaluations; 200 for "newton", 1000 for "fixed_point" by default.
 
@@ -207,7 +210,12 @@ def solve_equilibrium(
     choice("method", method, METHODS)
     motors = model.checked_motors(q_motors)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
-    start = model.rest if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
+    relaxed = model.rest
+    if previous is not None:
+        check_same_model(model, previous, "previous")
+        relaxed = previous.q_springs
+        model = after_step(previous.model, previous.q_motors, relaxed)
+    start = relaxed if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
     if q_springs0 is not None and not model.coordinates.at(motors, start).valid:
         raise ParameterError("q_springs0", start, "within the range of every section (see strain_chain.in_range)")
     positive_number("tolerance", tolerance)
@@ -238,18 +246,11 @@ def _hint(best: Equilibrium) -> str:
         )
     if best.method == "fixed_point":
         return "; method='newton' converges for larger loads"
-    for moment, group in zip(best.link_moments, best.model.spring_groups, strict=True):
-        most = group.largest_moment
-        if most is not None and moment >= (_NEAR_COLLAPSE if group.slack_wall else _NEAR_PLATEAU) * most:
-            springs = ", ".join(best.model.spring_joints[place] for place in group.springs)
-            state = "near the collapse of its slack wall" if group.slack_wall else "on the plateau of its moment"
-            return (
-                f"; the link of {springs} is {state}, {most:g} N m, and cannot carry a dead moment beyond it; "
-                f"solve_imposed_displacement finds equilibria there for a given displacement"
-            )
-    if not best.conservative:
-        return "; under a world-fixed moment the load grows from zero, then the moments alone, until the path turns back"
-    return ""
+    overloaded = near_largest_moment(best.model, best.link_moments)
+    if overloaded:
+        return f"; {overloaded}; solve_imposed_displacement finds equilibria there for a given displacement"
+    moments = "; under a world-fixed moment the load grows from zero, then the moments alone, until the path turns back"
+    return "" if best.conservative else moments
 
 
 def equilibrium_from_state(
@@ -264,6 +265,8 @@ def equilibrium_from_state(
     stable: bool | None = None,
 ) -> Equilibrium:
     """Result of a state; `stable` if it is already known."""
+    if model.structure.guided:
+        model, _ = gripped(model, q_motors, state.q_springs, state.load.motors)
     return Equilibrium(
         model=model,
         load=load,

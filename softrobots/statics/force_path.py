@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray, unit_vector
-from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual, scaled
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import Load
@@ -95,7 +96,7 @@ class ForcePath:
     @classmethod
     def of(cls, model: SoftModel, q_motors: Any, direction: Any, *, frame: str | None, gravity: Any) -> ForcePath:
         """Check the arguments of `critical_load`; the reference point is the relaxed robot and 1 N."""
-        check_model(model)
+        check_frictionless(model, "branches and critical loads")
         motors, unit = model.checked_motors(q_motors), unit_vector("direction", direction)
         constant = Load.of(model, frame=frame, gravity=gravity)
         return cls(model, motors, constant, model.tip if frame is None else frame, unit, model.rest, 1.0)

@@ -13,7 +13,8 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, finite_number, positive_integer, read_only, unit_vector
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
-from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.displacement_control import (
     GAP,
     DisplacementControl,
@@ -121,7 +122,7 @@ def solve_imposed_displacement(
         NameNotFound: If the frame does not exist.
         EquilibriumNotFound: If the displacement cannot be reached; carries the farthest `ImposedDisplacement` on the way.
     """
-    check_model(model)
+    check_frictionless(model, "imposed displacements")
     motors = model.checked_motors(q_motors)
     wanted = finite_number("displacement", displacement, "m")
     if model.n_springs == 0:

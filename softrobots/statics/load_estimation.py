@@ -18,7 +18,8 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, read_only
 from softrobots.core.errors import LoadNotFound, ParameterError
 from softrobots.core.result_file import text
-from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.loads import Load
@@ -131,7 +132,7 @@ def estimate_load(
         LoadNotFound: If no force explains the torques; carries the best estimate.
         NeutralEquilibrium: If the search meets a load at which the tangent stiffness is singular.
     """
-    check_model(model)
+    check_frictionless(model, "an estimate of its load")
     choice("method", method, METHODS)
     instance_of("restart", restart, bool, "True or False")
     check_feels(model)

@@ -18,6 +18,8 @@ from softrobots.core.checks import FloatArray, choice, finite_array, finite_numb
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
+from softrobots.model.dry_friction import FrictionMemory
+from softrobots.model.friction_coordinates import memory_of, remembering
 from softrobots.model.loader import load_again, load_arguments
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.displacement_control import DisplacementControl, Probe
@@ -67,6 +69,9 @@ def _pack_rows(equilibria: tuple[Equilibrium, ...], *, one_load: bool = True) ->
     if one_load and any(not e.load.same_as(first.load) for e in equilibria):
         raise ParameterError("result", first.model, "equilibria under one load; these have several")
     columns = {name: [getattr(equilibrium, name) for equilibrium in equilibria] for name in _COLUMNS}
+    if first.model.structure.friction is not None:
+        memories = [memory_of(equilibrium.model)._asdict() for equilibrium in equilibria]
+        columns |= {f"friction_{name}": [memory[name] for memory in memories] for name in FrictionMemory._fields}
     return pack_model(first.model, first.load) | columns | {"solver": [equilibrium.method for equilibrium in equilibria]}
 
 
@@ -82,9 +87,12 @@ def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, fr
     iterations, solvers = counts(fields, "iterations"), fields["solver"].tolist()
     for solver in set(solvers):
         choice("solver", solver, _SOLVERS)
+    memories = None if model.structure.friction is None else _memories(fields, model, count)
     equilibria = []
     for row in range(count):
         model.checked_motors(motors[row])
+        if memories is not None:
+            model = remembering(model, memories[row])
         at = load if forces is None else load.plus(frame, np.append(forces[row], np.zeros(3)))
         state = elastic_state(model, motors[row], springs[row], at)
         found = equilibrium_from_state(model, motors[row], at, state, method=solvers[row], iterations=iterations[row])
@@ -95,6 +103,16 @@ def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, fr
             )
         equilibria.append(replace(found, tolerance=float(tolerance[row])))
     return tuple(equilibria)
+
+
+def _memories(fields: Mapping[str, Any], model: SoftModel, count: int) -> list[FrictionMemory]:
+    """What dry friction remembered before each row."""
+    shapes = [part.shape for part in memory_of(model)]
+    columns = [
+        finite_array(name, fields[name], (count, *shape))
+        for name, shape in zip((f"friction_{name}" for name in FrictionMemory._fields), shapes, strict=True)
+    ]
+    return [FrictionMemory(*parts) for parts in zip(*columns, strict=True)]
 
 
 def _pack_solution(solution: IkSolution) -> dict[str, Any]:

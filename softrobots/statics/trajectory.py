@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
+from softrobots.model.friction_coordinates import after_step
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
 from softrobots.statics.elastostatics import solve_springs
@@ -224,7 +225,8 @@ def _exact_steps(
     tip: LoadedTip, goals: list[Goal], first: Equilibrium, tolerance: float, allow_jumps: bool
 ) -> Iterable[Equilibrium]:
     model, load, method = tip.model, tip.load, tip.method
-    here = LocalSolution(first.q_motors, elastic_state(model, first.q_motors, first.q_springs, load), 0.0)
+    here = LocalSolution(first.q_motors, elastic_state(first.model, first.q_motors, first.q_springs, load), 0.0)
+    tip = replace(tip, model=after_step(first.model, first.q_motors, first.q_springs))
     for number, (last, target) in enumerate(pairwise(goals), start=2):
         reached = advance(tip, last, target, here, tolerance)
         if reached is None:
@@ -248,7 +250,9 @@ def _exact_steps(
                     iterations=reached.iterations,
                 )
         here = reached
-        yield equilibrium_from_state(model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
+        found = equilibrium_from_state(tip.model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
+        tip = replace(tip, model=after_step(found.model, found.q_motors, found.q_springs))
+        yield found
 
 
 def _jump(tip: LoadedTip, target: Goal, start: FloatArray, tolerance: float) -> LocalSolution[ElasticState]:

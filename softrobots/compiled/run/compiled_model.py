@@ -18,7 +18,8 @@ from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import choice, finite_array, positive_integer, positive_number
 from softrobots.core.errors import LoadNotFound, ParameterError, TargetUnreachable
-from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
 from softrobots.statics.load_estimation import check_feels
 from softrobots.statics.tip_search import POSITION_TOLERANCE
@@ -44,7 +45,7 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
         DescriptionError: If the robot is not a serial chain with linear springs.
         MissingDependency: If `backend` is "numba" and numba is not installed.
     """
-    check_model(model)
+    check_frictionless(model, "compiled solvers")
     chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
     if isinstance(locked_strains, str) or not isinstance(locked_strains, Iterable):
         raise ParameterError("locked_strains", locked_strains, f"a tuple of names, of {', '.join(STRAINS)}")

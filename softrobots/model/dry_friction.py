@@ -1,0 +1,153 @@
+r"""Dry friction of sections that bend and of actuators in their guides, as the minimum of an energy from the last state.
+
+Friction does not depend on the rate: a step from a remembered state to the next equilibrium minimises the potential energy plus
+what friction dissipates on the way. Both frictions are a spring in line with a slider, of stiffness `limit / stick`: the
+*stick* is small, and only makes the minimum smooth. With the displacement `x` from the slider the step adds
+
+.. math:: L\,H(|x|), \qquad H(x) = \begin{cases} x^2 / (2 s) & x \le s \\ x - s/2 & x > s \end{cases}
+
+- *Bending of a section*: `L` is the moment of its friction [N m], `x` the vector of its bending less that of the slider [rad].
+- *Guides*: where an actuator turns by the angle :math:`\theta` in its guides, the tension beyond changes by the capstan's
+  factor :math:`e^{-\mu\theta}` in the direction of slip. `x` is the slip of the actuator towards its motor, i.e. how much the
+  length beyond has shrunk, and :math:`L = T (1 - e^{-\mu\theta\sigma}) / \sigma`, with the tension `T` before the guide and the
+  direction of slip :math:`\sigma = H'(x)` in [-1, 1]; the minimum is found for given `L`, until `L` stays the same.
+
+A guide stands at each point of a route (`softrobots.description.route_points`), all along the body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.constant_curvature.strain_chain import STRAINS
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.description.route_points import RoutePoint, route_points
+from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.model.muscle_paths import MusclePaths
+from softrobots.model.sections import SectionRow
+
+_BENDING_STICK = 1e-4  # of a section [rad]
+_GUIDE_STICK = 1e-5  # of an actuator, relative to its length at rest
+
+
+class FrictionMemory(NamedTuple):
+    """What friction remembers of the last state."""
+
+    bending: FloatArray
+    """Bending of the sliders of the sections with friction, shape (n_sections, 2) [rad]."""
+    slip: FloatArray
+    """Displacement of the actuators from the sliders of their guides, towards the motors, shape (n_guides,) [m]."""
+    pieces: FloatArray
+    """Length of each piece of the actuators, shape (n_guides,) [m]."""
+
+
+class DryFriction:
+    """The dry friction of a robot, as a function of its strains."""
+
+    def __init__(
+        self, sections: Sequence[SectionRow], tags: Sequence[ActuatorTag], paths: MusclePaths, relaxed: FloatArray
+    ) -> None:
+        """Take the sections, the actuators with their paths, and the relaxed strains, shape (count,)."""
+        rubbing = [row for row in sections if row.friction > 0.0]
+        self._limit = np.array([row.friction for row in rubbing])
+        self._places = np.array([[row.places[name] for name in STRAINS[:2]] for row in rubbing], dtype=np.intp).reshape(-1, 2)
+        self._paths, self._count, self._relaxed = paths, len(relaxed), relaxed
+        coefficients = np.array([tag.friction for tag in tags])
+        self.guided = bool(coefficients.any())
+        """Whether an actuator rubs in its guides."""
+        self.n_guides = len(paths.muscle) if self.guided else 0
+        """Number of guides, one a path; 0 if there is no friction in guides."""
+        if self.guided:
+            self._coefficient = coefficients[paths.muscle]
+            self._stick = _GUIDE_STICK * np.array([tag.rest_length for tag in tags])[paths.muscle]
+            same = paths.muscle[:, None] == paths.muscle
+            self._beyond = np.triu(same, 1) + 0.5 * np.eye(self.n_guides)  # lengths beyond a guide by pieces
+            self._before = np.tril(same, -1).astype(np.float64)
+            spans = [(row.segment, row.length) for row in sections]
+            pairs = [(point, sections[point.section]) for tag in tags for point in route_points(tag.route, spans)]
+            turns = [_turn(point, row) for point, row in pairs]
+            self._rest, self._slope = (np.array(part) for part in zip(*turns, strict=True))
+            self._places_of_paths = paths.places
+
+    @property
+    def untouched(self) -> FrictionMemory:
+        """The memory of a robot at rest that nothing has moved yet."""
+        pieces = self._paths.at(self._relaxed).pieces if self.guided else np.zeros(0)
+        return FrictionMemory(self._relaxed[self._places], np.zeros(self.n_guides), pieces)
+
+    def after(self, strains: FloatArray, memory: FrictionMemory) -> FrictionMemory:
+        """Return the memory after a step to strains, shape (count,)."""
+        apart = strains[self._places] - memory.bending
+        share = np.minimum(1.0, _BENDING_STICK / np.maximum(np.linalg.norm(apart, axis=1), _BENDING_STICK))
+        bending = strains[self._places] - apart * share[:, None]
+        if not self.guided:
+            return FrictionMemory(bending, memory.slip, memory.pieces)
+        pieces = self._paths.at(strains).pieces
+        slip = np.clip(self._slipped(pieces, memory), -self._stick, self._stick)
+        return FrictionMemory(read_only(bending), read_only(slip), read_only(pieces))
+
+    def grip(self, strains: FloatArray, tensions: FloatArray, memory: FrictionMemory) -> FloatArray:
+        """Return the friction `L` of each guide that slips, shape (n_guides,) [N], at tensions of the motors, (n_muscles,)."""
+        if not self.guided:
+            return np.zeros(0)
+        z = np.append(strains, 0.0)[self._places_of_paths]
+        turning, tangent = np.swapaxes(self._rest + (self._slope @ z[:, None, :, None])[..., 0], 0, 1)
+        angles = np.linalg.norm(np.cross(turning, tangent), axis=1) / np.linalg.norm(tangent, axis=1)
+        slips = self._slipped(self._paths.at(strains).pieces, memory) / self._stick
+        exponent = self._coefficient * angles
+        along = exponent * np.clip(slips, -1.0, 1.0)
+        before = np.abs(tensions)[self._paths.muscle] * np.exp(-self._before @ along)
+        small = np.abs(along) < 1e-8
+        return np.asarray(before * exponent * np.where(small, 1.0, -np.expm1(-along) / np.where(small, 1.0, along)))
+
+    def at(self, strains: FloatArray, memory: FrictionMemory, grip: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return what a step adds to the energy [J], the torque on the strains, shape (count,), and their stiffness."""
+        apart = strains[self._places] - memory.bending
+        size = np.linalg.norm(apart, axis=1)
+        reach = np.maximum(size, _BENDING_STICK)
+        energy = float(self._limit @ _dissipated(size, _BENDING_STICK))
+        torque, stiffness = np.zeros(self._count), np.zeros((self._count, self._count))
+        torque[self._places] = apart * (self._limit / reach)[:, None]
+        along = apart / reach[:, None] * (size > _BENDING_STICK)[:, None]
+        blocks = (np.eye(2) - along[:, :, None] * along[:, None, :]) * (self._limit / reach)[:, None, None]
+        stiffness[self._places[:, :, None], self._places[:, None, :]] = blocks
+        if self.guided:
+            paths = self._paths.at(strains)
+            slip = self._slipped(paths.pieces, memory)
+            pull = -(grip * np.clip(slip / self._stick, -1.0, 1.0)) @ self._beyond  # what friction adds to the tension
+            arms = paths.piece_arms
+            slips = self._beyond @ arms
+            sticking = np.where(np.abs(slip) <= self._stick, grip / self._stick, 0.0)
+            energy += float(grip @ _dissipated(np.abs(slip), self._stick))
+            torque += pull @ arms
+            stiffness += paths.stiffening(pull) + slips.T @ (sticking[:, None] * slips)
+        return energy, torque, stiffness
+
+    def _slipped(self, pieces: FloatArray, memory: FrictionMemory) -> FloatArray:
+        """Displacement of the actuators from the sliders of their guides, shape (n_guides,) [m]."""
+        return np.asarray(memory.slip + self._beyond @ (memory.pieces - pieces))
+
+
+def _dissipated(size: FloatArray, stick: FloatArray | float) -> FloatArray:
+    """`H`, see the module."""
+    return np.where(size <= stick, size**2 / (2.0 * stick), size - 0.5 * stick)
+
+
+def _turn(point: RoutePoint, row: SectionRow) -> tuple[FloatArray, FloatArray]:
+    """Turn of the body along a piece of a route, and its tangent, in radial, circumferential and axial components.
+
+    Returns:
+        Both where all strains are zero, shape (2, 3), and their derivatives by the section coordinates, shape (2, 3, 4).
+    """
+    share, sine, cosine = point.weight / row.length, np.sin(point.azimuth), np.cos(point.azimuth)
+    slope = np.zeros((2, 3, len(STRAINS)))
+    slope[0] = share * np.array([[cosine, sine, 0.0, 0.0], [-sine, cosine, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+    slope[1, 1, 2] = share * point.distance
+    slope[1, 2] = share * np.array([point.distance * sine, -point.distance * cosine, 0.0, 1.0])
+    rest = point.weight * np.array(
+        [[0.0, 0.0, point.winding], [point.widening, point.distance * point.winding, 1.0]]
+    ) + slope @ np.asarray(row.origin)
+    return rest, slope

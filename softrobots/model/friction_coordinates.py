@@ -1,0 +1,145 @@
+"""A robot with dry friction, at its coordinates: the load of friction, and what it remembers from step to step.
+
+The law is in `softrobots.model.dry_friction`. A model carries the memory of the last state; a step is solved from there.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
+from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
+from softrobots.model.dry_friction import DryFriction, FrictionMemory
+from softrobots.model.joint_loads import JointLoad
+from softrobots.model.soft_model import SoftModel, check_model
+
+
+class FrictionCoordinates:
+    """Coordinates of a robot with dry friction: those of the robot without it, and the memory of the last state."""
+
+    def __init__(self, inner: Coordinates, friction: DryFriction, memory: FrictionMemory, grip: FloatArray) -> None:
+        """Add friction to a robot without muscles."""
+        self._inner, self.friction = inner, friction
+        self.memory = memory
+        """What friction remembers."""
+        self.grip = grip
+        """Friction of each guide that slips, shape (n_guides,) [N]."""
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> FrictionPoint:
+        """Return the robot at given coordinates."""
+        return FrictionPoint(self._inner.at(motors, elastic), *self.friction.at(elastic, self.memory, self.grip))
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionPoint:
+    """A robot with dry friction, at given coordinates."""
+
+    inner: Point
+    """The robot without it."""
+    energy: float
+    """What friction adds to the energy of the step [J]."""
+    torque: FloatArray
+    """Torque of friction on the strains, shape (count,) [N m or N]."""
+    stiffness: FloatArray
+    """Derivative of that, shape (count, count)."""
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions."""
+        return self.inner.joints
+
+    @property
+    def valid(self) -> bool:
+        """Whether every section is within its range."""
+        return self.inner.valid
+
+    def reduce(self, load: JointLoad) -> ReducedLoad:
+        """Add friction to the load."""
+        bare = self.inner.reduce(load)
+        return bare._replace(
+            elastic=bare.elastic - self.torque,
+            derivative=bare.derivative - self.stiffness,
+            potential=bare.potential + self.energy,
+        )
+
+    def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Those of the robot without friction."""
+        return self.inner.columns(jacobian)
+
+    def motor_derivatives(self, load: JointLoad) -> tuple[FloatArray, FloatArray]:
+        """Those of the robot without friction."""
+        return self.inner.motor_derivatives(load)
+
+    def loads(self, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Add friction to the load on the strains."""
+        motors, elastic = self.inner.loads(torque)
+        return motors, elastic - self.torque
+
+    def velocity(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Those of the robot without friction."""
+        return self.inner.velocity(motors, elastic)
+
+    def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """Those of the robot without friction."""
+        return self.inner.velocity_product(motors, elastic)
+
+
+def check_frictionless(model: Any, what: str) -> SoftModel:
+    """Return `model` if it is a `SoftModel` without dry friction, or raise ParameterError; `what` needs that, in words."""
+    if check_model(model).structure.friction is not None:
+        requirement = f"a robot without dry friction, for {what}; solve_equilibrium and follow_trajectory have it"
+        raise ParameterError("model", model.pinocchio.name, requirement)
+    return model  # type: ignore[no-any-return]
+
+
+def memory_of(model: SoftModel) -> FrictionMemory:
+    """Return what the friction of a robot remembers; only for a robot with friction."""
+    return _rubbing(model.coordinates).memory
+
+
+def after_step(model: SoftModel, motors: FloatArray, elastic: FloatArray) -> SoftModel:
+    """Return a robot with what friction remembers of a step to given coordinates; the robot itself without friction."""
+    friction = model.structure.friction
+    if friction is None:
+        return model
+    return remembering(model, friction.after(model.structure.strains(motors, elastic), memory_of(model)))
+
+
+def remembering(model: SoftModel, memory: FrictionMemory) -> SoftModel:
+    """Return the robot with another memory."""
+    friction = _rubbing(model.coordinates).friction
+    return replace(model, coordinates=_rubbed(model.coordinates, memory, np.zeros(friction.n_guides)))
+
+
+def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: FloatArray) -> tuple[SoftModel, float]:
+    """Return the robot with the friction of its guides at given coordinates and loads, and how much that changed [N].
+
+    Args:
+        model: The robot, with friction of guides.
+        motors: Actuators, shape (n_motors,).
+        elastic: Elastic coordinates, shape (n_springs,).
+        loads: Load on each actuator; of muscles the tension at the motor, shape (n_motors,) [N m or N].
+    """
+    last, tensions = _rubbing(model.coordinates), loads[len(model.structure.motor_joints) :]
+    grip = last.friction.grip(model.structure.strains(motors, elastic), tensions, last.memory)
+    change = float(np.abs(grip - last.grip).max(initial=0.0))
+    return replace(model, coordinates=_rubbed(model.coordinates, last.memory, grip)), change
+
+
+def _rubbing(coordinates: Any) -> FrictionCoordinates:
+    """The coordinates with friction among those that muscles wrap around each other."""
+    return coordinates if isinstance(coordinates, FrictionCoordinates) else _rubbing(coordinates.inner)
+
+
+def _rubbed(coordinates: Any, memory: FrictionMemory, grip: FloatArray) -> Any:
+    changed = copy.copy(coordinates)
+    if isinstance(changed, FrictionCoordinates):
+        changed.memory, changed.grip = memory, grip
+    else:
+        changed.inner = _rubbed(changed.inner, memory, grip)
+    return changed

@@ -1,0 +1,196 @@
+"""Dry friction of bending and of guides: closed forms, hysteresis, and the energy that a cycle takes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from tests.support.result_files import saved_and_loaded
+
+EI, LENGTH, DISTANCE = 2e-3, 0.06, 0.0045
+MOMENT = 2e-3  # of friction [N m]
+STICK = 1e-4  # [rad] that a section bends before its friction is whole, and relative slip of a tendon: see `dry_friction`
+
+
+def one_segment(sections: int = 4, azimuths: Sequence[float] = (0.0,), **fields: object) -> sr.TendonArm:
+    return sr.TendonArm(
+        segment_lengths=(LENGTH,),
+        tendon_azimuths=azimuths,
+        tendon_distance=DISTANCE,
+        kind="tension",
+        bending_stiffness=EI,
+        elastic_sections=sections,
+        **fields,
+    )
+
+
+def path(model: sr.SoftModel, rows: Sequence[Sequence[float]], **load: object) -> list[sr.Equilibrium]:
+    """Equilibria one after the other."""
+    steps: list[sr.Equilibrium] = []
+    for row in rows:
+        steps.append(sr.solve_equilibrium(model, row, previous=steps[-1] if steps else None, **load))
+    return steps
+
+
+def bending(equilibrium: sr.Equilibrium) -> np.ndarray:
+    """Curvature of each section towards the first tendon [rad/m]."""
+    return equilibrium.strains[:, 1]
+
+
+def test_the_bending_of_a_segment_plays_between_two_lines() -> None:
+    """A tendon bends a segment by the constant moment `T d`; friction takes or gives up to its moment: a play operator."""
+    model = sr.load_model(one_segment(bending_friction=MOMENT))
+    tensions = [0.2, 0.4, 1.0, 2.0, 1.9, 1.5, 0.5, 0.0, 0.1, 2.0, 3.0]
+    held, expected = 0.0, []
+    for tension in tensions:
+        free = tension * DISTANCE / EI
+        held = min(max(held, free - MOMENT / EI), free + MOMENT / EI)
+        expected.append(held)
+    for equilibrium, curvature in zip(path(model, [[t] for t in tensions]), expected, strict=True):
+        assert equilibrium.stable
+        # A section of LENGTH / 4 gives way by the stick before it holds.
+        assert bending(equilibrium) == pytest.approx(np.full(4, curvature), abs=1.01 * STICK / (LENGTH / 4))
+
+
+def test_friction_does_not_depend_on_the_rate_nor_on_the_number_of_steps() -> None:
+    model = sr.load_model(one_segment(bending_friction=MOMENT, guide_friction=0.2, azimuths=(0.0, 2.0, 4.0)))
+    ends = [np.array(row) for row in ([3.0, 0.5, 0.5], [0.5, 0.5, 0.5], [0.5, 3.0, 1.0])]
+    coarse = path(model, ends)
+    fine = [
+        last + share * (end - last)
+        for last, end in zip([np.full(3, 0.0), *ends], ends, strict=False)
+        for share in (0.25, 0.5, 0.75, 1.0)
+    ]
+    for one, other in zip(coarse, path(model, fine)[3::4], strict=True):
+        # The capstan's factor is that of the angle at the end of a step: steps of a slipping tendon differ by rounding and by
+        # the stick, 1e-5 of its length.
+        assert one.tip_position == pytest.approx(other.tip_position, abs=2e-5)
+
+
+def test_the_moment_of_friction_acts_against_the_bending_whatever_its_direction() -> None:
+    """Twelve directions of one load, weightless: the bow is in the plane of the force, less the friction."""
+    model = sr.load_model(one_segment(bending_friction=MOMENT, azimuths=()))
+    bows = []
+    for angle in np.arange(12) * np.pi / 6.0:
+        moment = 0.01 * np.array([-np.sin(angle), np.cos(angle), 0.0])
+        found = sr.solve_equilibrium(model, [], wrench=(0.0, 0.0, 0.0, *moment))
+        rates = found.strains[:, :2]
+        assert rates @ moment[:2] / 0.01 == pytest.approx(np.full(4, (0.01 - MOMENT) / EI), rel=1e-3)
+        bows.append(np.linalg.norm(found.tip_position[:2]))
+    assert np.ptp(bows) < 1e-9
+
+
+def capstan(tension: float, coefficient: float, s: np.ndarray) -> np.ndarray:
+    r"""Angle of the backbone at `s` under a tendon that slips towards its motor [rad].
+
+    `EI theta' = T d exp(-mu theta)` gives `theta = log(1 + mu T d s / EI) / mu`.
+    """
+    return np.log1p(coefficient * tension * DISTANCE * s / EI) / coefficient
+
+
+@pytest.mark.parametrize("tension", [2.0, 8.0])
+def test_a_tendon_in_its_guides_follows_the_capstan(tension: float) -> None:
+    coefficient, errors = 0.4, []
+    for sections in (4, 8, 16):
+        model = sr.load_model(one_segment(sections, guide_friction=coefficient))
+        (found,) = path(model, [[tension]])
+        ends = LENGTH * np.arange(1, sections + 1) / sections
+        angles = np.cumsum(bending(found)) * LENGTH / sections
+        errors.append(np.abs(angles - capstan(tension, coefficient, ends)).max())
+    assert errors[0] / errors[1] == pytest.approx(4.0, abs=0.8)  # second order in the sections
+    assert errors[2] < 2e-3 * capstan(tension, coefficient, np.array(LENGTH))
+    frictionless = tension * DISTANCE * LENGTH / EI
+    assert capstan(tension, coefficient, np.array(LENGTH)) < 0.97 * frictionless
+
+
+def test_a_tendon_that_is_let_go_first_sticks_and_then_slips_back() -> None:
+    """Let go, the segment keeps its bow until the tension at the base is that at the tip beyond the capstan, twice over."""
+    model = sr.load_model(one_segment(8, guide_friction=0.4))
+    tensions = [6.0, 5.8, 5.6, 2.0]
+    pulled, stuck, still, slipped = (bending(e).sum() * LENGTH / 8 for e in path(model, [[t] for t in tensions]))
+    assert pulled == pytest.approx(float(capstan(6.0, 0.4, np.array(LENGTH))), rel=3e-3)
+    assert pulled > stuck >= still
+    assert stuck == pytest.approx(pulled, rel=0.02)  # without friction it would lose 3.3 %
+    # Slipping back everywhere: the sign of the coefficient changes.
+    assert slipped == pytest.approx(float(capstan(2.0, -0.4, np.array(LENGTH))), rel=3e-3)
+
+
+@pytest.mark.parametrize("fields", [{"bending_friction": MOMENT}, {"guide_friction": 0.3}])
+def test_a_cycle_takes_energy_and_gives_none(fields: dict[str, object]) -> None:
+    """Work of a tendon over closed cycles, `sum T dl`: positive, and the same each time; nothing is lost without friction."""
+    model = sr.load_model(one_segment(**fields))
+    up = np.linspace(0.0, 4.0, 21)
+    cycle = np.concatenate([up, up[-2::-1]])
+    steps = path(model, [[t] for t in np.concatenate([cycle, cycle[1:]])])
+    lengths = np.array([float(e.muscle_lengths[0]) for e in steps])
+    tensions = np.array([float(e.q_motors[0]) for e in steps])
+    work = -0.5 * (tensions[1:] + tensions[:-1]) * np.diff(lengths)
+    first, second = work[: len(cycle) - 1].sum(), work[len(cycle) - 1 :].sum()
+    assert first > 0.0
+    assert second > 0.0
+    if "bending_friction" in fields:  # twice the moment times the angle that it slides, there and back
+        angle = (4.0 * DISTANCE - 2.0 * MOMENT) / EI * LENGTH
+        assert second == pytest.approx(2.0 * MOMENT * angle, rel=0.02)  # of the trapezoidal rule
+
+
+def test_muscles_of_given_length_have_hysteresis_too() -> None:
+    """The same lengths on the way out and back: bent alike where one section follows them, with other tensions."""
+    arm = sr.PccArm(segment_lengths=(0.524,), elastic_sections=1, bending_friction=0.5)
+    model, rest = sr.load_model(arm), np.full(3, 0.524)
+    bend = 0.04 * np.cos([0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0])
+    out, further, back = path(model, [rest - 0.5 * bend, rest - bend, rest - 0.5 * bend])
+    assert out.tip_position == pytest.approx(back.tip_position, abs=1e-12)
+    # The moment of the muscles about the axis of bending differs by twice the friction.
+    arms = np.array([sr.constant_curvature.muscles_from_arc] and np.cos([0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0])) * 0.04
+    assert (out.muscle_forces - back.muscle_forces) @ arms == pytest.approx(2.0 * 0.5, rel=1e-6)
+    assert further.stable
+
+
+def test_a_trajectory_remembers_its_way(tmp_path: object) -> None:
+    """Out and back along a line: other tensions at the same tip, as those of single steps from point to point."""
+    model = sr.load_model(sr.TendonArm(kind="tension", bending_friction=MOMENT))
+    start = sr.solve_equilibrium(model, np.full(9, 1.0))
+    line = start.tip_position + np.linspace(0.0, 1.0, 5)[:, None] * (0.02, 0.01, -0.003)
+    there = sr.follow_trajectory(model, np.concatenate([line, line[-2::-1]]), q_motors0=np.full(9, 1.0))
+    assert there.tip_error.max() < 1e-6
+    tensions = there.q_motors
+    assert np.abs(tensions[1] - tensions[-2]).max() > 0.05
+    for before, after in zip(there.equilibria, there.equilibria[1:], strict=False):
+        again = sr.solve_equilibrium(model, after.q_motors, previous=before)
+        assert again.tip_position == pytest.approx(after.tip_position, abs=1e-9)
+    loaded = saved_and_loaded(there, tmp_path)
+    again = sr.solve_equilibrium(model, tensions[0], previous=loaded.equilibria[-1])
+    direct = sr.solve_equilibrium(model, tensions[0], previous=there.equilibria[-1])
+    assert again.q_springs == pytest.approx(direct.q_springs, abs=1e-14)
+
+
+def test_what_has_no_friction_refuses_it() -> None:
+    model = sr.load_model(sr.TendonArm(bending_friction=MOMENT))
+    rest = model.relaxed_motors
+    found = sr.solve_equilibrium(model, rest)
+    for call in (
+        lambda: sr.compile(model),
+        lambda: sr.simulate(model, 0.1, rest),
+        lambda: sr.vibration_modes(model, found),
+        lambda: sr.estimate_load(model, rest, found.motor_torques),
+        lambda: sr.critical_load(model, rest, (0.0, 0.0, -1.0)),
+        lambda: sr.solve_imposed_displacement(model, rest, 0.001, (1.0, 0.0, 0.0)),
+    ):
+        with pytest.raises(sr.ParameterError, match="without dry friction, for"):
+            call()
+
+
+@pytest.mark.parametrize(("field", "value"), [("bending_friction", -1.0), ("guide_friction", -0.1), ("guide_friction", "much")])
+def test_bad_friction_is_refused(field: str, value: object) -> None:
+    with pytest.raises(sr.ParameterError, match=field):
+        sr.TendonArm(**{field: value})
+
+
+def test_a_file_with_negative_friction_is_refused() -> None:
+    text = sr.TendonArm(bending_friction=MOMENT).urdf()
+    with pytest.raises(sr.DescriptionError, match="friction -1"):
+        sr.load_model(re.sub(r'moment="[^"]*"', 'moment="-1"', text, count=1))
