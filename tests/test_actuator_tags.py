@@ -35,8 +35,8 @@ def one(*routes: str, **attributes: object) -> ActuatorTag:
 
 def test_an_actuator_through_two_segments_is_read() -> None:
     numbers = {"shortest": 0.5, "longest": 0.8, "weakest": -1.0, "strongest": 60.0, "stiffness": 8e3, "pretension": 2.0}
-    tag = one(ALONG_1, ALONG_2, kind="elastic", rest_length=0.69, friction=0.1, **numbers)
-    assert (tag.name, tag.kind, tag.rest_length, tag.friction) == ("a", "elastic", 0.69, 0.1)
+    tag = one(ALONG_1, ALONG_2, kind="elastic", rest_length=0.69, **numbers)
+    assert (tag.name, tag.kind, tag.rest_length) == ("a", "elastic", 0.69)
     assert {name: getattr(tag, name) for name in numbers} == numbers
     assert (tag.segments, tag.straight, tag.distance, tag.azimuth) == ((1, 2), True, 0.03, 0.3)
     assert (tag.route[1].at, tag.route[1].distance, tag.route[1].azimuth) == ((0.0, 0.3), (0.03, 0.03), (0.0, 0.0))

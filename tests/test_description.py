@@ -69,6 +69,8 @@ ODD_MUSCLES = {
     ],
     "muscle_braid_angle": 0.5,
     "muscle_pretension": (0.0, 3.0),
+    "bending_friction": (0.1, 0.0),
+    "guide_friction": 0.2,
     "muscle_least_tension": (0.0, -2.0),
 }
 ODD_TENDONS = {

@@ -12,7 +12,7 @@ from softrobots.description.route_points import route_length, route_points
 from softrobots.description.tag_numbers import described, number, numbers, positive, segment_number
 from softrobots.description.urdf_tags import KINDS, NAMESPACE, ActuatorTag, AnySectionTag, RouteTag
 
-_TENDON = ("shortest", "longest", "weakest", "strongest", "friction")
+_TENDON = ("shortest", "longest", "weakest", "strongest")
 OPTIONAL = {
     "length": _TENDON,
     "tension": _TENDON,
@@ -23,7 +23,7 @@ OPTIONAL = {
 """Numbers that an actuator of each kind may state, beside its rest length."""
 REQUIRED = {"elastic": ("stiffness",), "pressure": ("area",), "mckibben": ("diameter", "braid_angle")}
 """Numbers that an actuator of some kinds must state."""
-_NOT_NEGATIVE = ("shortest", "pretension", "friction")
+_NOT_NEGATIVE = ("shortest", "pretension")
 _TOUCHING = 1e-9  # between two pieces of a route [m]
 
 

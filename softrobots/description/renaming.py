@@ -71,7 +71,7 @@ def prefix_names(robot: minidom.Element, prefix: str) -> None:
 
 def shift_segments(robot: minidom.Element, shift: int) -> None:
     """Add `shift` to the number of every segment of a description, in place."""
-    for tag in _NAMED_BY_US:
+    for tag in (*_NAMED_BY_US, "friction"):
         for element in package_tags(robot, tag):
             for placed in package_tags(element, "route") if tag == "actuator" else [element]:
                 placed.setAttribute("segment", str(int(placed.getAttribute("segment")) + shift))

@@ -20,6 +20,7 @@ from softrobots.description.urdf_tags import (
     NAMESPACE,
     ROLES,
     AnySectionTag,
+    FrictionTag,
     InflatedLinkTag,
     LineTag,
     LumpedSectionTag,
@@ -58,6 +59,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         lines=tuple(_line(element, source) for element in _ours(root, "line")),
         mimics=tuple(joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None),
         tip=_tip(root, source),
+        friction=tuple(_friction(element, source) for element in _ours(root, "friction")),
         rotors=rotors,
     )
     _check_together(tags, source)
@@ -152,9 +154,6 @@ def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any
     if len(strains) != 4 or any(map(math.isnan, strains)) or strains[3] <= 0.0:
         raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
     sizes = {key: positive(element, key, where) for key in ("length", "radius")}
-    sizes["friction"] = number(element, "friction", where) if "friction" in element.attrib else 0.0
-    if sizes["friction"] < 0.0:
-        raise DescriptionError(f"{where} has friction {sizes['friction']}; a moment of at least 0 N m is required")
     return {"name": element.get("name", ""), "segment": segment_number(element, where), "rest": strains, **sizes}
 
 
@@ -162,6 +161,15 @@ def _line(element: ElementTree.Element, source: str) -> LineTag:
     where = described(element, "line", source)
     azimuth, distance = number(element, "azimuth", where), positive(element, "distance", where)
     return LineTag(name=element.get("name", ""), segment=segment_number(element, where), azimuth=azimuth, distance=distance)
+
+
+def _friction(element: ElementTree.Element, source: str) -> FrictionTag:
+    segment = segment_number(element, f"a friction of {source}")
+    where = f"the friction of segment {segment} of {source}"
+    tag = FrictionTag(segment, number(element, "bending", where), number(element, "guides", where))
+    if tag.bending < 0.0 or tag.guides < 0.0:
+        raise DescriptionError(f"{where} has bending {tag.bending} and guides {tag.guides}; required >= 0")
+    return tag
 
 
 def _tip(root: ElementTree.Element, source: str) -> str | None:
@@ -187,12 +195,12 @@ def _check_together(tags: RobotTags, source: str) -> None:
     if orphans:
         raise DescriptionError(f"{source} has joints with the role 'section' that no section names: {', '.join(orphans)}")
     segments = {tag.segment for tag in sections}
-    for tag in tags.lines:
-        if tag.segment not in segments:
-            raise DescriptionError(
-                f"the line {tag.name!r} of {source} runs along segment {tag.segment}; "
-                f"available: {', '.join(map(str, sorted(segments))) or 'none'}"
-            )
+    placed = [(f"line {tag.name!r} of {source} runs along", tag.segment) for tag in tags.lines]
+    for what, segment in (*placed, *((f"friction of {source} is that of", tag.segment) for tag in tags.friction)):
+        if segment not in segments:
+            available = ", ".join(map(str, sorted(segments))) or "none"
+            raise DescriptionError(f"the {what} segment {segment}; available: {available}")
+    _unique("friction of segment", [str(tag.segment) for tag in tags.friction], source)
 
 
 def _base_to_tip(root: ElementTree.Element, tags: RobotTags) -> list[AnySectionTag]:

@@ -67,8 +67,6 @@ class AnySectionTag:
     """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
     radius: float
     """Radius of the body, for pictures [m]."""
-    friction: float = 0.0
-    """Moment of dry friction that holds its bending [N m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,8 +158,6 @@ class ActuatorTag:
     """Diameter of a braided muscle at rest [m]."""
     braid_angle: float = 0.0
     """Angle between its braid and its axis at rest [rad]."""
-    friction: float = 0.0
-    """Coefficient of friction in its guides [-]."""
 
     @property
     def straight(self) -> bool:
@@ -182,6 +178,18 @@ class ActuatorTag:
     def azimuth(self) -> float:
         """Azimuth where it begins, as for `distance` [rad]."""
         return self.route[0].azimuth[0]
+
+
+@dataclass(frozen=True)
+class FrictionTag:
+    """Dry friction of a segment, which does not depend on the rate; `softrobots.model.dry_friction` has its law."""
+
+    segment: int
+    """Number of the segment, from 1."""
+    bending: float
+    """Moment that holds its bending [N m]."""
+    guides: float
+    """Coefficient of friction of actuators in its guides [-]."""
 
 
 @dataclass(frozen=True)
@@ -206,5 +214,7 @@ class RobotTags:
     """Names of the joints that mimic another joint."""
     tip: str | None = None
     """Name of the link that is the tip by default; None if the file names none."""
+    friction: tuple[FrictionTag, ...] = ()
+    """Dry friction of segments."""
     rotors: Mapping[str, float] = field(default_factory=dict)
     """Inertia of the rotor of a motor at its joint [kg m^2, or kg at a prismatic joint] by joint name."""

@@ -167,6 +167,9 @@ def _inflatable_arm(robot: InflatableArm) -> Rules:
     return rules
 
 
+_FRICTION = {"bending": "bending_friction", "guides": "guide_friction"}
+
+
 def _continuum_arm(robot: ContinuumArm) -> Rules:
     rules: Rules = {}
     kinds = ("EI", "GJ", "EA")
@@ -175,6 +178,7 @@ def _continuum_arm(robot: ContinuumArm) -> Rules:
         names = {name: f"{rule}[{s}]" for name, rule in zip(kinds, stiffness, strict=True)}
         names |= {"length": f"section_lengths[{s}]", "radius": f"radius[{s}]", "chord": f"section_lengths[{s}]"}
         rules |= _chain(robot, s + 1, names | {"rest": "[0.0, 0.0, 0.0, 1.0]"})
+        rules |= {(f"friction {s + 1}", name): f"{fact}[{s}]" for name, fact in _FRICTION.items()}
     counts = [0] * robot.n_segments
     for route in robot.routes:  # its table, and what follows from that, is in the URDF
         s = owner(route, robot.segment_lengths) - 1

@@ -15,7 +15,7 @@ from softrobots.core.errors import ParameterError, SoftRobotsError
 from softrobots.description.actuator_reader import OPTIONAL, REQUIRED
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
-from softrobots.description.urdf_tags import LumpedSectionTag, SectionTag, SpringTag
+from softrobots.description.urdf_tags import FrictionTag, LumpedSectionTag, SectionTag, SpringTag
 from softrobots.export.number_sources import Rules, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
@@ -66,6 +66,7 @@ _CONVENTIONS = {
     "distance t) with a twist t, a lumped one distance^2 t^2 / (2 length) more; a tension adds the energy tension times "
     "length, so that it moves the rest of a joint spring by -arm tension / stiffness; muscle_input tells whether lengths or "
     "forces are given",
+    "friction": "dry friction of segments: moment that holds their bending, coefficient of actuators in their guides",
     "lines": "lines along a segment that are drawn and do nothing",
 }
 
@@ -124,6 +125,7 @@ class _Parts:
             "inflated_links": [self._inflated_link(tag) for tag in tags.inflated_links],
             "sections": [self._section(tag) for tag in tags.sections],
             "lumped_sections": [self._section(tag) for tag in tags.lumped_sections],
+            "friction": [self._friction(tag) for tag in tags.friction],
             "muscles": self._muscles(),
             "lines": [
                 {"name": tag.name, "segment": tag.segment, **self._numbers(tag, "line", azimuth="rad", distance="m")}
@@ -185,6 +187,11 @@ class _Parts:
         values |= {"length": (tag.length, "m"), "radius": (tag.radius, "m")}
         entry |= {key: self._number(tag.name, key, *value, kind) for key, value in values.items()}
         return entry | {"rest": self._number(tag.name, "rest", list(tag.rest), "rad/m, rad/m, rad/m, -", kind)}
+
+    def _friction(self, tag: FrictionTag) -> dict[str, Any]:
+        part, kind = f"friction {tag.segment}", "softrobots:friction"
+        bending = self._number(part, "bending", tag.bending, "N m", kind)
+        return {"segment": tag.segment, "bending": bending, "guides": self._number(part, "guides", tag.guides, "-", kind)}
 
     def _muscles(self) -> list[dict[str, Any]]:
         arms, entries = self._model.structure.moment_arms, []

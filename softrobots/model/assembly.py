@@ -79,8 +79,8 @@ def assemble(
         lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("length", "rest_joints"))
         coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
     friction = None
-    if any(row.friction > 0.0 for row in rows) or any(tag.friction > 0.0 for tag in muscles):
-        friction = DryFriction(rows, muscles, paths, strain_springs.rest)
+    if any(tag.bending > 0.0 or (tag.guides > 0.0 and muscles) for tag in tags.friction):
+        friction = DryFriction(tags.friction, rows, muscles, paths, strain_springs.rest)
         coordinates = FrictionCoordinates(coordinates, friction, friction.untouched, np.zeros(friction.n_guides))
     given_lengths, laws, elastic = None, None, strain_springs
     if any(tag.kind == "length" for tag in muscles):
@@ -247,9 +247,7 @@ def _section_rows(tags: Sequence[SectionTag], first: int) -> list[SectionRow]:
     joints = joint_positions(rest, np.array([tag.length for tag in tags]))
     places = first + np.arange(4 * len(tags)).reshape(-1, 4)
     return [
-        SectionRow(
-            t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, t.friction, dict(zip(STRAINS, row, strict=True))
-        )
+        SectionRow(t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, dict(zip(STRAINS, row, strict=True)))
         for t, at, z, row in zip(tags, joints, rest, places.tolist(), strict=True)
     ]
 
@@ -258,7 +256,7 @@ def _lumped_row(tag: LumpedSectionTag, spring_joints: tuple[str, ...]) -> Sectio
     places = {name: spring_joints.index(joint) for name, joint in tag.joints.items()}
     joints = tuple(tag.joints.values())
     rest = rest_coordinates([tag])[0]
-    return SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, joints, np.zeros(6), rest, tag.friction, places)
+    return SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, joints, np.zeros(6), rest, places)
 
 
 def _strain_springs(rigid: Any, tags: Sequence[SpringTag], joints: tuple[str, ...], sections: Sequence[SectionTag]) -> Springs:

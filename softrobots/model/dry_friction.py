@@ -25,7 +25,7 @@ import numpy as np
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.description.route_points import RoutePoint, route_points
-from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.description.urdf_tags import ActuatorTag, FrictionTag
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.sections import SectionRow
 
@@ -48,26 +48,32 @@ class DryFriction:
     """The dry friction of a robot, as a function of its strains."""
 
     def __init__(
-        self, sections: Sequence[SectionRow], tags: Sequence[ActuatorTag], paths: MusclePaths, relaxed: FloatArray
+        self,
+        friction: Sequence[FrictionTag],
+        sections: Sequence[SectionRow],
+        tags: Sequence[ActuatorTag],
+        paths: MusclePaths,
+        relaxed: FloatArray,
     ) -> None:
-        """Take the sections, the actuators with their paths, and the relaxed strains, shape (count,)."""
-        rubbing = [row for row in sections if row.friction > 0.0]
-        self._limit = np.array([row.friction for row in rubbing])
+        """Take the friction of segments, all sections, the actuators with their paths, and the relaxed strains, (count,)."""
+        bending = {tag.segment: tag.bending for tag in friction if tag.bending > 0.0}
+        guides = {tag.segment: tag.guides for tag in friction if tag.guides > 0.0}
+        rubbing = [row for row in sections if row.segment in bending]
+        self._limit = np.array([bending[row.segment] for row in rubbing])
         self._places = np.array([[row.places[name] for name in STRAINS[:2]] for row in rubbing], dtype=np.intp).reshape(-1, 2)
         self._paths, self._count, self._relaxed = paths, len(relaxed), relaxed
-        coefficients = np.array([tag.friction for tag in tags])
-        self.guided = bool(coefficients.any())
+        self.guided = bool(tags) and bool(guides)
         """Whether an actuator rubs in its guides."""
         self.n_guides = len(paths.muscle) if self.guided else 0
         """Number of guides, one a path; 0 if there is no friction in guides."""
         if self.guided:
-            self._coefficient = coefficients[paths.muscle]
             self._stick = _GUIDE_STICK * np.array([tag.rest_length for tag in tags])[paths.muscle]
             same = paths.muscle[:, None] == paths.muscle
             self._beyond = np.triu(same, 1) + 0.5 * np.eye(self.n_guides)  # lengths beyond a guide by pieces
             self._before = np.tril(same, -1).astype(np.float64)
             spans = [(row.segment, row.length) for row in sections]
             pairs = [(point, sections[point.section]) for tag in tags for point in route_points(tag.route, spans)]
+            self._coefficient = np.array([guides.get(row.segment, 0.0) for _, row in pairs])
             turns = [_turn(point, row) for point, row in pairs]
             self._rest, self._slope = (np.array(part) for part in zip(*turns, strict=True))
             self._places_of_paths = paths.places

@@ -29,8 +29,6 @@ class SectionRow(NamedTuple):
     """Joint positions that the joint origins carry, shape (6,); zeros if lumped."""
     rest: FloatArray
     """Section coordinates where every joint is at zero, shape (4,) [rad, rad, rad, m]."""
-    friction: float
-    """Moment of dry friction of its bending [N m]."""
     places: Mapping[str, int]
     """Place among the strains of each section coordinate that can change."""
 
