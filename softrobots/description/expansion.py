@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
-from xml.dom import minidom
+from typing import Any
 
 from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import parse_xml, read_xml
@@ -95,12 +94,14 @@ def _checked_files() -> Iterator[None]:
     """Let xacro read every file, also included ones, by `read_xml`, stop at `MOST_STEPS`, and take linear time.
 
     xacro itself reads in the encoding of the system, expands entities and waits for pipes; a macro that doubles itself takes
-    minutes; and a text is taken apart, and its expressions compiled, each time that a macro comes to it.
+    minutes; and it looks for expressions in texts without any.
     """
     import xacro
 
-    own = {name: getattr(xacro, name) for name in ("parse", "eval_all", "resolve_macro", "replace_node", "eval_text")}
-    own |= {name: getattr(xacro, name) for name in ("is_valid_name", "safe_eval", "QuickLexer")}
+    own = {
+        name: getattr(xacro, name)
+        for name in ("parse", "eval_all", "resolve_macro", "replace_node", "eval_text", "is_valid_name")
+    }
     steps = 0
 
     def count(more: int) -> None:
@@ -114,10 +115,7 @@ def _checked_files() -> Iterator[None]:
         if content is None and file.exists():  # xacro reports missing files, which may be optional
             content = read_xml(file)
             parse_xml(content, str(file))
-        document = own["parse"](content, filename)
-        for element in document.getElementsByTagName("*"):
-            element.__class__, element.texts = _Element, dict(element.attributes.items())
-        return document
+        return own["parse"](content, filename)
 
     def evaluated(*arguments: Any) -> Any:
         count(1)
@@ -132,113 +130,12 @@ def _checked_files() -> Iterator[None]:
         return text if isinstance(text, str) and "$" not in text else own["eval_text"](text, symbols)
 
     ours = {"parse": checked, "eval_all": evaluated, "resolve_macro": resolved, "replace_node": _replace_node}
-    ours |= {"eval_text": text_of, "is_valid_name": lru_cache(own["is_valid_name"]), "safe_eval": _value, "QuickLexer": _Lexer}
+    ours |= {"eval_text": text_of, "is_valid_name": lru_cache(own["is_valid_name"])}
     vars(xacro).update(ours)
     try:
         yield
     finally:
         vars(xacro).update(own)
-
-
-@lru_cache(maxsize=2048)
-def _code(expression: str) -> Any:
-    return compile(expression.strip(), "<expression>", "eval")
-
-
-def _value(expression: str, symbols: Any) -> Any:
-    """`safe_eval` of xacro with compiled expressions that are kept."""
-    code = _code(expression)
-    forbidden = [name for name in code.co_names if name.startswith("__")]
-    if forbidden:
-        raise DescriptionError(f"use of invalid names: {', '.join(forbidden)}")
-    symbols.update(__builtins__={})  # no functions but those of xacro
-    return eval(code, symbols)
-
-
-@lru_cache(maxsize=2048)
-def _tokens(text: str) -> tuple[tuple[int, str], ...]:
-    """Parts of a text between and in `${...}` and `$(...)`, each with its kind, by xacro's own lexer."""
-    import xacro
-
-    found = []
-    xacro.LEXER.lex(text)
-    while xacro.LEXER.peek():
-        found.append(xacro.LEXER.next())
-    return tuple(found)
-
-
-class _Lexer:
-    """`QuickLexer` of xacro with parts that are kept."""
-
-    def __init__(self, own: Any) -> None:
-        vars(self).update(vars(own))
-
-    def lex(self, text: str) -> None:
-        self._left = list(reversed(_tokens(text)))
-
-    def peek(self) -> tuple[int, str] | None:
-        return self._left[-1] if self._left else None
-
-    def next(self) -> tuple[int, str] | None:
-        return self._left.pop() if self._left else None
-
-
-class _Attribute(NamedTuple):
-    value: str
-
-
-class _Attributes:
-    """What xacro asks of the attributes of an element."""
-
-    def __init__(self, texts: dict[str, str]) -> None:
-        self._texts = texts
-        self.keys = texts.keys
-
-    def items(self) -> list[tuple[str, str]]:
-        return list(self._texts.items())
-
-    def __getitem__(self, name: str) -> _Attribute:
-        return _Attribute(self._texts[name])
-
-
-class _Element(minidom.Element):
-    """Element whose attributes are texts; minidom makes two nodes of each, which takes half of the time of an expansion."""
-
-    texts: dict[str, str]
-    """Attributes by name."""
-
-    def _get_attributes(self) -> _Attributes:
-        return _Attributes(self.texts)
-
-    attributes = property(_get_attributes)
-
-    def getAttribute(self, attname: str) -> str:
-        return self.texts.get(attname, "")
-
-    def getAttributeNode(self, attrname: str) -> _Attribute | None:  # type: ignore[override]
-        return _Attribute(self.texts[attrname]) if attrname in self.texts else None
-
-    def hasAttribute(self, name: str) -> bool:
-        return name in self.texts
-
-    def setAttribute(self, attname: str, value: str) -> None:
-        self.texts[attname] = value
-
-    def removeAttribute(self, name: str) -> None:
-        self.texts.pop(name, None)
-
-    def cloneNode(self, deep: bool) -> _Element:
-        copy = _Element(self.tagName)
-        copy.ownerDocument, copy.texts = self.ownerDocument, dict(self.texts)
-        last: Any = None
-        for child in self.childNodes if deep else ():
-            new: Any = child.cloneNode(deep)
-            new.parentNode, new.previousSibling = copy, last
-            if last is not None:
-                last.nextSibling = new
-            copy.childNodes.append(new)
-            last = new
-        return copy
 
 
 def _replace_node(node: Any, by: Any, content_only: bool = False) -> None:
