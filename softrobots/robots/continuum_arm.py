@@ -111,11 +111,9 @@ class ContinuumArm(XacroRobot):
     base_mass: float = parameter(
         2.0, "kg", "Mass of the base, fixed to the world", "assumed; has no effect on the statics", above=1e-6
     )
-    bending_friction: PerPart = per_part(
-        0.0, "N m", "Moment of dry friction that holds the bending of a segment", "chosen: none", at_least=0.0
-    )
+    bending_friction: PerPart = per_part(0.0, "N m", "Moment of dry friction that holds the bending of a segment", at_least=0.0)
     guide_friction: PerPart = per_part(
-        0.0, "-", "Coefficient of dry friction of actuators in the guides of a segment", "chosen: none", at_least=0.0
+        0.0, "-", "Coefficient of dry friction of actuators in the guides of a segment", at_least=0.0
     )
     routing: str | int | Sequence[str | int] | Sequence[Route] = parameter(
         "segment",

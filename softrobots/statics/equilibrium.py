@@ -193,8 +193,7 @@ def solve_equilibrium(
         gravity: Gravity, shape (3,) [m/s^2], world axes, e.g. `softrobots.EARTH_GRAVITY`; None: weightless.
         method: "newton", or "fixed_point" ([Troise 2021], converges for small loads only).
         q_springs0: Start of the solver, shape (n_springs,) [rad or m]; the relaxed springs by default.
-        previous: The equilibrium that the robot comes from: the start of the solver, unless `q_springs0` is given, and what dry
-            friction remembers; by default nothing has moved the robot yet.
+        previous: Where the robot comes from: what dry friction remembers, and the start unless `q_springs0` is given.
         tolerance: Largest residual, relative to `max(|f| reach + |moment| + |g|, 1e-3 N m)`.
         max_iterations: Limit of evaluations; 200 for "newton", 1000 for "fixed_point" by default.
 
@@ -213,8 +212,7 @@ def solve_equilibrium(
     relaxed = model.rest
     if previous is not None:
         check_same_model(model, previous, "previous")
-        relaxed = previous.q_springs
-        model = after_step(previous.model, previous.q_motors, relaxed)
+        model, relaxed = after_step(previous.model, previous.q_motors, previous.q_springs), previous.q_springs
     start = relaxed if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
     if q_springs0 is not None and not model.coordinates.at(motors, start).valid:
         raise ParameterError("q_springs0", start, "within the range of every section (see strain_chain.in_range)")
@@ -249,8 +247,9 @@ def _hint(best: Equilibrium) -> str:
     overloaded = near_largest_moment(best.model, best.link_moments)
     if overloaded:
         return f"; {overloaded}; solve_imposed_displacement finds equilibria there for a given displacement"
-    moments = "; under a world-fixed moment the load grows from zero, then the moments alone, until the path turns back"
-    return "" if best.conservative else moments
+    return (
+        "" if best.conservative else "; under a world-fixed moment the load grows, then the moments alone, to a turning point"
+    )
 
 
 def equilibrium_from_state(
