@@ -245,6 +245,10 @@ def test_the_line_tells_where_the_tip_is_and_what_is_wrong(arm: sr.SoftModel) ->
     tube = sr.load_model(sr.PccArm(segment_lengths=(0.3,), muscle_azimuths=()))
     assert "motors" not in state_line(sr.solve_equilibrium(tube, ()))
     assert "wrinkled" not in state_line(sr.solve_equilibrium(tube, ()))
+    tendons = sr.load_model(sr.TendonArm(elastic_sections=1))
+    loose = sr.solve_equilibrium(tendons, tendons.relaxed_motors + [0, 0, 0, 0, 0, 0, 0, 0, 0.003])
+    newtons = " ".join(f"{force:.4f}" for force in loose.muscle_forces)
+    assert f", tensions {newtons} N, slack tendon_3_3, stable, residual" in state_line(loose)
     assert "motors 3.5000 0.0000 0.0000 (beyond limits)" in state_line(sr.solve_equilibrium(arm, (3.5, 0, 0)))
 
 

@@ -256,6 +256,18 @@ def test_a_body_bends_without_becoming_another_object() -> None:
             assert f"{name}: {'pulls' if force > 0.0 else 'pushes'} {abs(force):.3g} N" in panel_html(page)
 
 
+def test_tendons_become_dashed_and_whole_again() -> None:
+    arm = sr.load_model(sr.TendonArm(elastic_sections=2))
+    loose = arm.relaxed_motors.copy()
+    loose[8] += 0.003
+    with SliderPage(arm) as page:
+        for motors, slack in ((arm.relaxed_motors, False), (loose, True), (arm.relaxed_motors, False)):
+            assert page.set(q_motors=motors).muscle_slack[8] == slack
+            assert ("body/actuators/tendon_3_3/slack" in page._drawing.handles) == slack
+            assert ("body/actuators/tendon_3_3" in page._drawing.handles) != slack
+            assert ("tendon_3_3: slack" in panel_html(page)) == slack
+
+
 def test_the_rigid_arm_and_the_path_can_be_switched(page: SliderPage) -> None:
     assert drawn_boxes(page, "rigid")
     page._panel._rigid.value = False

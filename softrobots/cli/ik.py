@@ -59,7 +59,7 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(how, "--orientation", "X Y Z", help_text)
     add_numbers(how, "--rpy", "R P Y", "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)")
     add_loads(parser)
-    help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+    help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m, N or Pa] (relaxed)"
     add_numbers(parser, "--start", "Q", help_text, nargs="+")
     help_text = (
         "side of the last motor joint, without a wrist, above or below the line from the first one to the tip; of a path at "

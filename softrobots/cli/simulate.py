@@ -66,10 +66,10 @@ def add_parser(subparsers: Any) -> None:
     add_model(parser)
     add_numbers(parser, "--duration", "T", "time to simulate [s] (that of --trajectory; required without it)")
     moved = parser.add_mutually_exclusive_group()
-    add_motors(moved, "motors that stay where they are: motor joints, then muscles, base to tip [rad, m or N] (relaxed)")
+    add_motors(moved, "motors that stay where they are: motor joints, then muscles, base to tip [rad, m, N or Pa] (relaxed)")
     help_text = (
         "motors over time: a trajectory of `softrobots ik -o`, as .npz or .csv, or a .csv table with a column t [s] and one "
-        "with the name of each motor [rad, m or N], joined by a cubic spline from rest to rest"
+        "with the name of each motor [rad, m, N or Pa], joined by a cubic spline from rest to rest"
     )
     moved.add_argument("--trajectory", type=Path, metavar="FILE", help=help_text)
     add_loads(parser)

@@ -75,7 +75,7 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EXAMPLES,
     )
     add_model(parser, optional=True)
-    help_text = "motor joints, then muscles, base to tip [rad, m or N]; with --target, where the search starts (relaxed)"
+    help_text = "motor joints, then muscles, base to tip [rad, m, N or Pa]; with --target, where the search starts (relaxed)"
     add_motors(parser, help_text)
     add_loads(parser)
     add_numbers(parser, "--target", "X Y Z", "move the loaded tip to this position by inverse kinematics [m] (no target)")

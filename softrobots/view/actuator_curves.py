@@ -18,6 +18,7 @@ _THINNEST, _THICKEST = 0.005, 0.18  # radius of a tendon: at least relative to t
 
 _COARSEST = 0.3  # turn about the backbone from point to point [rad]
 _DASHES = 24  # along the whole robot, gaps between them as long
+_WIDEST = 0.4  # radius of a muscle or chamber, relative to that of the body, which it would hide
 _GAP = 2.3  # between the middles of actuators through the same holes, relative to their radius
 _SAME = 1e-9  # of the length of a curve: points nearer to the last one are left out
 
@@ -33,7 +34,7 @@ class ActuatorCurve:
     frames: FloatArray
     """Axes of the cross-section of the body at each point, shape (n, 3, 3)."""
     radius: float
-    """Half its thickness [m]: of a McKibben muscle at rest, of a round chamber of its area, else that of a thread."""
+    """Half its thickness [m]: that of a McKibben muscle or round chamber, if it is thin, else of a thread."""
     shown: FloatArray
     """The points as they are drawn, shape (n, 3) [m]: actuators through the same holes are shown side by side."""
 
@@ -124,9 +125,9 @@ def _start(tag: ActuatorTag) -> tuple[float, ...]:
 
 def _radius(tag: ActuatorTag, sections: BentSections) -> float:
     """Half the thickness of an actuator [m]."""
-    if tag.kind == "mckibben":
-        return 0.5 * tag.diameter
-    if tag.kind == "pressure":
-        return math.sqrt(tag.area / math.pi)
     radius = sections.radius(tag.route[0].segment)
+    if tag.kind == "mckibben":
+        return min(0.5 * tag.diameter, _WIDEST * radius)
+    if tag.kind == "pressure":
+        return min(math.sqrt(tag.area / math.pi), _WIDEST * radius)
     return min(max(THREAD * radius, _THINNEST * sections.length), _THICKEST * radius)

@@ -55,7 +55,7 @@ def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
 
 
 def add_motors(
-    parser: argparse.ArgumentParser, help_text: str = "motor joints, then muscles, base to tip [rad, m or N] (relaxed)"
+    parser: argparse.ArgumentParser, help_text: str = "motor joints, then muscles, base to tip [rad, m, N or Pa] (relaxed)"
 ) -> None:
     """Add `--motors`; see `motors_of`."""
     add_numbers(parser, "--motors", "Q", help_text, nargs="+")
@@ -148,7 +148,7 @@ def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
 
 
 def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--motors") -> FloatArray:
-    """Return the actuator coordinates given by an option, or the relaxed ones without it, shape (n_motors,) [rad, m or N].
+    """Return the actuator coordinates given by an option, or the relaxed ones without it, shape (n_motors,) [rad, m, N or Pa].
 
     Raises:
         ParameterError: If there are more or fewer numbers than actuators (which are named), or they are out of range.

@@ -192,5 +192,6 @@ def _links(equilibrium: Equilibrium) -> list[str]:
 
 
 def _fixed(value: float) -> str:
-    """A number with six decimals, or with an exponent if that would hide it."""
+    """A number with six decimals, or with an exponent if that would hide it; without a negative zero."""
+    value = value + 0.0
     return f"{value:.6f}" if value == 0.0 or 1e-4 <= abs(value) < 1e6 else f"{value:.2e}" if abs(value) >= 1e-15 else "0.000000"
