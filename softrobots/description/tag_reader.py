@@ -12,7 +12,7 @@ from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import number_in
 from softrobots.description.actuator_reader import read_actuators
 from softrobots.description.expansion import XACRO_NAMESPACE
-from softrobots.description.tag_numbers import described, number, positive, segment_number
+from softrobots.description.tag_numbers import described, number, numbers, positive, segment_number
 from softrobots.description.urdf_structure import check_structure, urdf_root
 from softrobots.description.urdf_tags import (
     COORDINATES,
@@ -153,8 +153,12 @@ def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any
     strains = tuple(number_in(text) for text in rest)
     if len(strains) != 4 or any(map(math.isnan, strains)) or strains[3] <= 0.0:
         raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
-    sizes = {key: positive(element, key, where) for key in ("length", "radius")}
-    return {"name": element.get("name", ""), "segment": segment_number(element, where), "rest": strains, **sizes}
+    facts: dict[str, Any] = {key: positive(element, key, where) for key in ("length", "radius")}
+    if "middle" in element.attrib:
+        facts["middle"] = numbers(element, "middle", where)
+        if len(facts["middle"]) != 2:
+            raise DescriptionError(f"{where} has {len(facts['middle'])} numbers as its middle; x and y are required")
+    return {"name": element.get("name", ""), "segment": segment_number(element, where), "rest": strains, **facts}
 
 
 def _line(element: ElementTree.Element, source: str) -> LineTag:

@@ -67,6 +67,8 @@ class AnySectionTag:
     """Strains at rest, where every joint is at zero: kx, ky, twist [rad/m], stretch [-]."""
     radius: float
     """Radius of the body, for pictures [m]."""
+    middle: tuple[float, float] = (0.0, 0.0)
+    """Middle of the body beside the backbone, x and y in the section, for pictures [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -247,7 +247,7 @@ def _section_rows(tags: Sequence[SectionTag], first: int) -> list[SectionRow]:
     joints = joint_positions(rest, np.array([tag.length for tag in tags]))
     places = first + np.arange(4 * len(tags)).reshape(-1, 4)
     return [
-        SectionRow(t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, dict(zip(STRAINS, row, strict=True)))
+        SectionRow(t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, dict(zip(STRAINS, row, strict=True)), t.middle)
         for t, at, z, row in zip(tags, joints, rest, places.tolist(), strict=True)
     ]
 

@@ -31,6 +31,8 @@ class SectionRow(NamedTuple):
     """Section coordinates where every joint is at zero, shape (4,) [rad, rad, rad, m]."""
     places: Mapping[str, int]
     """Place among the strains of each section coordinate that can change."""
+    middle: tuple[float, float] = (0.0, 0.0)
+    """Middle of the body beside the backbone, x and y in the section, for pictures [m]."""
 
     @property
     def lumped(self) -> bool:

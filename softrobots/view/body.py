@@ -202,6 +202,7 @@ class BentSections:
                 for tag in self._structure.lines
                 if tag.segment == number
             }
+            frames[:, :3, 3] += frames[:, :3, :2] @ self._table[self.rows(number)[0]].middle
             bodies.append(SegmentBody(number, frames, self.radius(number), lines))
         return tuple(bodies)
 
