@@ -1,7 +1,6 @@
-"""The exact length of muscles: twist under co-contraction, torsional buckling, and rods with guided tendons by `solve_bvp`.
+"""The exact length of muscles: twist under co-contraction, torsional buckling, and rods with guided tendons.
 
-The oracles here are closed forms of a twisted straight rod, and a Cosserat rod with tendons (Rucker and Webster 2011) whose
-strains follow at every point from the internal force and moment; nothing of the package is in them.
+The oracles here are closed forms of a twisted straight rod, and the rod with strings of Rucker and Webster (2011).
 """
 
 from __future__ import annotations
@@ -10,15 +9,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_bvp
 from scipy.optimize import brentq, minimize_scalar
 
 import softrobots as sr
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.loads import Load
-from tests.support.muscle_rods import MuscleSegment
 from tests.support.oracles import central_difference
-from tests.support.rods import quaternion_rotation
+from tests.support.tendon_rod import Piece, String, solve_tendon_rod
 
 EI, GJ, EA, DISTANCE, LENGTH = 1.92, 1.28, 2400.0, 0.04, 0.524
 
@@ -158,34 +155,8 @@ def test_more_than_three_lengths_are_met_in_the_least_squares() -> None:
 # --- A rod with guided tendons
 
 
-ROD = MuscleSegment(
-    length=LENGTH, turn=0.0, bend=(0.0, 0.0), elongation=0.0,
-    bending_stiffness=EI, torsional_stiffness=GJ, axial_stiffness=EA, distance=DISTANCE,
-)  # fmt: skip
-
-
-def tendon_rod(tensions: np.ndarray, force: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position and rotation of the tip, and the lengths of the tendons, under a dead force and a world-fixed moment."""
-
-    def rates(_: np.ndarray, y: np.ndarray) -> np.ndarray:
-        q, m = y[3:7], y[7:10]
-        turns = quaternion_rotation(q.T)
-        axis = turns[:, :, 2].T
-        x = ROD.pulled(np.einsum("nji,jn->in", turns, m), force @ axis, tensions)
-        u, way = x[:3], axis * (1.0 + x[3])
-        dq = 0.5 * np.vstack([-np.sum(q[1:] * u, axis=0), q[0] * u + np.cross(q[1:], u, axis=0)])
-        return LENGTH * np.vstack([way, dq, np.cross(force[:, None], way, axis=0), np.hypot(*ROD.rates(x))])
-
-    def ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.r_[a[:7] - np.r_[np.zeros(3), 1.0, np.zeros(3)], a[10:], b[7:10] - moment]
-
-    s = np.linspace(0.0, 1.0, 21)
-    y = np.zeros((13, 21))
-    y[2], y[3], y[10:] = LENGTH * s, 1.0, LENGTH * s
-    found = solve_bvp(rates, ends, s, y, tol=1e-9, bc_tol=1e-11)
-    assert found.success
-    last = found.y[:, -1]
-    return last[:3], quaternion_rotation(last[None, 3:7])[0], last[10:]
+PIECE = Piece(LENGTH, EI, GJ, EA)
+STRINGS = [String.straight(LENGTH, DISTANCE, azimuth) for azimuth in (0.0, -2.0 * np.pi / 3.0, 2.0 * np.pi / 3.0)]
 
 
 @pytest.mark.parametrize("moment", [0.0, 0.3])
@@ -195,7 +166,8 @@ def test_sections_converge_to_a_rod_with_guided_tendons(moment: float) -> None:
     So do the lengths; and the arm held at the lengths of the rod finds its tensions.
     """
     tensions, force, about = np.array([140.0, 60.0, 100.0]), np.array([4.0, -6.0, 2.0]), np.array([0.0, 0.0, moment])
-    tip, rotation, lengths = tendon_rod(tensions, force, about)
+    exact = solve_tendon_rod([PIECE], STRINGS, tensions, force=force, moment=about)
+    tip, rotation, lengths = exact.position, exact.rotation, exact.lengths
     wrench, errors = np.r_[force, about], []
     for sections in (2, 4, 8):
         pulled = sr.solve_equilibrium(one(elastic_sections=sections), tensions, wrench=wrench)

@@ -202,7 +202,9 @@ def right(case: str) -> TendonRod:
     return CASES[case].solution()
 
 
-@pytest.mark.parametrize("case", [pytest.param("straight", marks=pytest.mark.study), *list(CASES)[1:]])
+@pytest.mark.parametrize(
+    "case", [*(pytest.param(name, marks=pytest.mark.study) for name in ("straight", "corners")), "helical", "three segments"]
+)
 def test_sections_converge_to_rucker_and_webster(case: str) -> None:
     """Tip, lengths of the tendons and direction: second order in the number of sections of a rod that bends by 1 to 2.5 rad."""
     counts = {"helical": (8, 16), "three segments": (2, 4)}.get(case, (4, 8))
@@ -241,6 +243,38 @@ def test_elastic_tendons_converge_to_the_strings_and_go_slack_with_them() -> Non
     ratios = np.array(errors[0]) / errors[1]
     assert np.log2(ratios).min() > 1.8
     assert max(errors[1]) < 5e-3
+
+
+def test_the_arm_with_tendons_is_the_rod_that_its_parameters_say() -> None:
+    """The default robot, motors moved by up to 5 mm, weight, a tip force: 1.4e-3 of the length at its four sections."""
+    lengths, radius = (0.060, 0.0625, 0.064), 0.0005
+    bend, axial = 50e9 * np.pi * radius**4 / 4.0, 50e9 * np.pi * radius**2
+    pieces = [Piece(length, bend, bend / 1.3, axial, 0.05 / 0.1865) for length in lengths]
+    azimuths = np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
+    strings = [String.straight(end, DISTANCE, azimuth) for end in np.cumsum(lengths) for azimuth in azimuths]
+    motors = np.repeat(np.cumsum(lengths), 3) + 1e-3 * np.array([-1.0, 0.5, 0.5, 1.0, -2.0, 1.0, -3.0, 5.0, -2.0])
+    force, gravity = (0.1, 0.05, 0.0), (0.0, 0.0, -9.81)
+    exact = solve_tendon_rod(pieces, strings, [Springy(motor, 8e3, 2.0) for motor in motors], force=force, gravity=gravity)
+    errors = []
+    for count in (4, 8):
+        found = sr.solve_equilibrium(sr.load_model(sr.TendonArm(elastic_sections=count)), motors, force, gravity=gravity)
+        tensions = np.abs(found.motor_torques - exact.tensions).max() / exact.tensions.max()
+        errors.append([np.linalg.norm(found.tip_position - exact.position) / sum(lengths), tensions])
+    assert np.log2(np.array(errors[0]) / errors[1]).min() > 1.9
+    assert max(errors[0]) < 2e-3
+
+
+@pytest.mark.study
+def test_given_lengths_of_strings_find_their_tensions() -> None:
+    """Along routes with corners, from the middle of the rod: second order in tip and tensions."""
+    case, exact, errors = CASES["corners"], right("corners"), []
+    for count in (8, 16):
+        model = case.model(count, kind="length")
+        found = sr.solve_equilibrium(model, exact.lengths, wrench=case.wrench, gravity=case.gravity)
+        tensions = np.abs(found.motor_torques - exact.tensions).max() / exact.tensions.max()
+        errors.append([np.linalg.norm(found.tip_position - exact.position) / case.length, tensions])
+    assert np.log2(np.array(errors[0]) / errors[1]).min() > 1.8
+    assert max(errors[1]) < 1e-2
 
 
 # --- Closed forms
