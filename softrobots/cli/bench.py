@@ -158,12 +158,20 @@ def measure(name: str, job: Job, rounds: int) -> Row:
     with threadpool_limits(limits=1, user_api="blas"):
         for solve in solvers:
             solve()
-        repeats = [math.ceil(_LEAST_TIME / max(_cpu_seconds(solve, 1), 1e-7)) for solve in solvers]
+        repeats = [_repeats(solve) for solve in solvers]
         for row in seconds:
             row[:] = [_cpu_seconds(*pair) for pair in zip(solvers, repeats, strict=True)]
     ratios = seconds[:, 1] / seconds[:, 0]
     costs = np.median(seconds, axis=0) / job.cases
     return Row(name, *costs.tolist(), *(float(statistic(ratios)) for statistic in (np.median, np.min, np.max)))
+
+
+def _repeats(solve: Callable[[], object]) -> int:
+    """How often a job runs to take `_LEAST_TIME`: doubled until it does, because the clock may be too coarse for one run."""
+    count = 1
+    while _cpu_seconds(solve, count) * count < _LEAST_TIME:
+        count *= 2
+    return count
 
 
 def _cpu_seconds(solve: Callable[[], object], repeats: int) -> float:
