@@ -128,11 +128,11 @@ def vibration_modes() -> Any:
 def finger_grip() -> Any:
     """Closing angle and grip force of the pneumatic finger of docs/own_robot.md over its pressure."""
     finger, way_to_close = _example("soft_finger.py")["SoftFinger"](), _example("three_fingers.py")["way_to_close"]
-    model = sr.load_model(finger, muscles="forces")
+    model = sr.load_model(finger)
     pressures = np.linspace(0.0, finger.max_pressure, 17)
     figure = canvas.new_figure((10.0, 4.4))
     left, right = figure.subplots(1, 2)
-    free = [sr.solve_equilibrium(model, (finger.tension(p),)) for p in pressures]
+    free = [sr.solve_equilibrium(model, (p,)) for p in pressures]
     turned = [one.transform_tip_to_world.rotation for one in free]
     angles = np.degrees([np.arctan2(turn[0, 2], turn[2, 2]) for turn in turned])
     style = {"ls": "", "marker": canvas.MARKERS[0], "color": canvas.COLOURS[0]}
@@ -145,7 +145,7 @@ def finger_grip() -> Any:
         for pressure, open_finger in zip(pressures, free, strict=True):
             way = way_to_close(finger, open_finger.tip_position[0], radius)
             if way >= 0.0:
-                held = sr.solve_imposed_displacement(model, (finger.tension(pressure),), way, direction=PUSH)
+                held = sr.solve_imposed_displacement(model, (pressure,), way, direction=PUSH)
                 points.append((1e-3 * pressure, held.reaction))
         right.plot(*np.transpose(points), label=f"cylinder of {2e3 * radius:g} mm", **canvas.line_style(number))
     right.set(ylabel="force of a finger on the cylinder [N]", title="Grip of a hand of three fingers")
@@ -221,13 +221,13 @@ def three_fingers() -> sr.Viewer:
     """The hand of docs/examples/three_fingers.py around its cylinder."""
     example = _example("three_fingers.py")
     finger = _example("soft_finger.py")["SoftFinger"]()
-    one, tension = sr.load_model(finger, muscles="forces"), finger.tension(60e3)
-    way = example["way_to_close"](finger, sr.solve_equilibrium(one, (tension,)).tip_position[0])
-    grip = sr.solve_imposed_displacement(one, (tension,), way, direction=PUSH).reaction
-    hand = sr.load_model(example["three_fingers"](finger), muscles="forces", tip="a_tip")
+    one, pressure = sr.load_model(finger), 60e3
+    way = example["way_to_close"](finger, sr.solve_equilibrium(one, (pressure,)).tip_position[0])
+    grip = sr.solve_imposed_displacement(one, (pressure,), way, direction=PUSH).reaction
+    hand = sr.load_model(example["three_fingers"](finger), tip="a_tip")
     places = example["FINGERS"].items()
     pushed = {f"{name}tip": (grip * np.cos(angle), grip * np.sin(angle), 0, 0, 0, 0) for name, angle in places}
-    viewer = sr.view(hand, sr.solve_equilibrium(hand, (tension,) * 3, wrench=pushed))
+    viewer = sr.view(hand, sr.solve_equilibrium(hand, (pressure,) * 3, wrench=pushed))
     viewer.look_from((0.03, -0.17, 0.2), (0.0, 0.0, 0.06))
     return viewer
 

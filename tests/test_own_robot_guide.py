@@ -36,7 +36,7 @@ def finger() -> Any:
 
 @pytest.fixture(scope="module")
 def model(finger: Any) -> sr.SoftModel:
-    return sr.load_model(finger, muscles="forces")
+    return sr.load_model(finger)
 
 
 def closing_angle(equilibrium: sr.Equilibrium) -> float:
@@ -109,7 +109,7 @@ def test_the_arm_refuses_bad_arguments(arguments: dict[str, str]) -> None:
 @pytest.mark.parametrize("pressure", [0.0, 5e3, 40e3, 80e3])
 def test_the_free_finger_closes_and_stretches_as_a_rod_does(pressure: float, finger: Any, model: sr.SoftModel) -> None:
     """Moment and thrust are the same in every section, so hinges and rod agree exactly, up to the tolerance of the solver."""
-    free = sr.solve_equilibrium(model, (finger.tension(pressure),))
+    free = sr.solve_equilibrium(model, (pressure,))
     thrust = pressure * finger.chamber_area
     angle = thrust * finger.chamber_distance * finger.length / finger.bending_stiffness
     stretched = finger.length * (1.0 + thrust / finger.axial_stiffness)
@@ -121,16 +121,15 @@ def test_the_free_finger_closes_and_stretches_as_a_rod_does(pressure: float, fin
 
 def test_the_grip_is_that_of_a_cantilever_when_small(finger: Any, model: sr.SoftModel) -> None:
     """3 M / 2 L; eight hinges in the middle of their sections are off by about 1 / (4 n^2)."""
-    tension = finger.tension(100.0)
-    way = sr.solve_equilibrium(model, (tension,)).tip_position[0]
-    held = sr.solve_imposed_displacement(model, (tension,), way, direction=(-1, 0, 0))
+    way = sr.solve_equilibrium(model, (100.0,)).tip_position[0]
+    held = sr.solve_imposed_displacement(model, (100.0,), way, direction=(-1, 0, 0))
     assert held.reaction == pytest.approx(1.5 * 100.0 * 1.5e-4 * 0.008 / 0.1, rel=5e-3)
     assert held.stable
 
 
 def test_mujoco_closes_the_finger_as_far(finger: Any, model: sr.SoftModel, tool: Callable[[str], ModuleType]) -> None:
     mujoco = tool("mujoco")
-    free = sr.solve_equilibrium(model, (finger.tension(30e3),))
+    free = sr.solve_equilibrium(model, (30e3,))
     theirs = mujoco.MjModel.from_xml_string(sr.export.to_mjcf(model, free.q_motors, actuators="welded"))
     data = mujoco.MjData(theirs)
     names = [mujoco.mj_id2name(theirs, mujoco.mjtObj.mjOBJ_JOINT, number) for number in range(theirs.njnt)]
@@ -150,15 +149,15 @@ def test_three_fingers_reach_the_cylinder(finger: Any, model: sr.SoftModel, monk
     monkeypatch.syspath_prepend(str(EXAMPLES))
     example = runpy.run_path(str(EXAMPLES / "three_fingers.py"))
     sys.modules.pop("soft_finger")
-    tension = finger.tension(50e3)
-    way = example["way_to_close"](finger, sr.solve_equilibrium(model, (tension,)).tip_position[0])
-    force = sr.solve_imposed_displacement(model, (tension,), way, direction=(-1, 0, 0)).reaction
+    pressure = 50e3
+    way = example["way_to_close"](finger, sr.solve_equilibrium(model, (pressure,)).tip_position[0])
+    force = sr.solve_imposed_displacement(model, (pressure,), way, direction=(-1, 0, 0)).reaction
     assert force > 0.0
     text = example["three_fingers"](finger)
     for name, angle in example["FINGERS"].items():
-        hand = sr.load_model(text, muscles="forces", tip=f"{name}tip")
+        hand = sr.load_model(text, tip=f"{name}tip")
         pushed = (force * math.cos(angle), force * math.sin(angle), 0.0)
-        tip = sr.solve_equilibrium(hand, (tension,) * 3, pushed).tip_position
+        tip = sr.solve_equilibrium(hand, (pressure,) * 3, pushed).tip_position
         expected = 0.015 + finger.radius
         assert tip[:2] == pytest.approx([expected * math.cos(angle), expected * math.sin(angle)], abs=1e-9)  # reach is 0.1 m
 
@@ -166,13 +165,15 @@ def test_three_fingers_reach_the_cylinder(finger: Any, model: sr.SoftModel, monk
 # --- Muscles whose lengths do not fix a shape
 
 
-def test_a_single_chamber_loads_with_its_length_too(finger: Any) -> None:
-    """One length holds one combination of strains; the rest is free, and without load the chamber carries nothing."""
-    model = sr.load_model(finger)
+def test_a_single_muscle_loads_with_its_length_too(finger: Any) -> None:
+    """One length holds one combination of strains; the rest is free, and without load the muscle carries nothing."""
+    text = re.sub(r' kind="pressure"| area="[^"]*"| max_pressure="[^"]*"', "", finger.urdf())
+    text = text.replace("<softrobots:actuator ", '<softrobots:actuator kind="length" ')
+    model = sr.load_model(text)
     found = sr.solve_equilibrium(model, model.relaxed_motors)
-    assert model.n_springs == sr.load_model(finger, muscles="forces").n_springs - 1
+    assert model.n_springs == sr.load_model(finger).n_springs - 1
     assert found.muscle_forces == pytest.approx(0.0, abs=1e-12)
-    told = {finding.what: finding for finding in check_description(finger)}["softrobots"]
+    told = {finding.what: finding for finding in check_description(text)}["softrobots"]
     assert told.ok
     assert told.remarks[0].startswith("loads: 1 motors")
 

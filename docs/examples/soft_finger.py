@@ -29,10 +29,6 @@ class SoftFinger(XacroRobot):
     def __post_init__(self) -> None:
         check_parameters(self)
 
-    def tension(self, pressure: float) -> float:
-        """Tension of the muscle `chamber` at a gauge pressure [Pa]: minus pressure times section [N]."""
-        return -pressure * self.chamber_area
-
     def closing_angle(self, pressure: float) -> float:
         """Angle of the tip without load [rad], in closed form: the moment p A d is the same in every section."""
         return pressure * self.chamber_area * self.chamber_distance * self.length / self.bending_stiffness
