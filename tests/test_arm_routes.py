@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,11 @@ from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import ActuatorTag
-from softrobots.robots.continuum_arm import ContinuumArm
+from softrobots.robots.continuum_arm import FACTS_OF_KINDS, ContinuumArm
+from softrobots.robots.fields import facts_of
 from softrobots.robots.parameter_file import read_robot, write_parameters
 from softrobots.statics.kinematics import frame_placement
+from tests.conftest import CHECKOUT
 from tests.support.laws import law
 from tests.support.tables import each_row
 from tests.support.urdf_reading import check_portable, link_poses
@@ -305,6 +308,13 @@ FAR = sr.Route(at=(0.0, 1.1), azimuth=0.0, distance=0.004)
         ),
         (sr.PccArm, {"routing": [{"at": (0, 1), "azimuth": 0, "distance": 0}]}, "routing"),
         (sr.PccArm, {"routing": [FITS] * 1001}, "routing"),
+        (sr.PccArm, {"routing": np.array([0.5, 0.6])}, "routing"),
+        (sr.PccArm, {"routing": np.timedelta64(1, "s")}, "routing"),
+        (sr.PccArm, {"kind": np.zeros(2)}, "kind"),
+        (sr.PccArm, {"kind": [np.zeros(2), np.zeros(2)]}, "kind"),
+        (sr.PccArm, {"offset": [0.5, [0.6]]}, "offset"),
+        (sr.PccArm, {"muscle_azimuths": [0.5, [0.6]]}, "muscle_azimuths"),
+        (sr.PccArm, {"muscle_azimuths": np.array(0.5), "kind": "tension"}, "muscle_azimuths"),
         *(
             (sr.PccArm, {"kind": value}, "kind")
             for value in ("rubber", None, 1, (), ("tension",), ("length", "tension"), ("tension", 1))
@@ -380,3 +390,23 @@ def test_bad_parameters_of_actuators_are_refused(kind: type, parameters: dict[st
 def test_bad_arguments_of_the_xacro_files_are_refused(file: str, arguments: dict[str, str], message: str) -> None:
     with pytest.raises(sr.DescriptionError, match=message):
         expand(xacro_folder() / f"{file}.urdf.xacro", arguments)
+
+
+def test_the_table_of_the_guide_has_the_defaults_and_kinds() -> None:
+    page = (CHECKOUT / "docs" / "actuators.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([a-z_]+)` \| (.*?) \| *(?:`(\w+)`)? *\| *(.*?) *\| *(.*?) *\| .* \|$", page, flags=re.MULTILINE)
+    shown = {sr.PccArm: [row[0] for row in rows], sr.TendonArm: [row[2] for row in rows if row[2]]}
+    for first, one, second, other, kinds in rows:
+        for kind, name, cell in ((sr.PccArm, first, one), (sr.TendonArm, second, other)):
+            if name:
+                default, unit = (
+                    {field.name: field.default for field in dataclasses.fields(kind)}[name],
+                    facts_of(kind)[name].unit,
+                )
+                number = cell.removesuffix(f" {unit}") if unit else cell
+                same = number == ("none" if default is None else default)
+                assert same or float(number) == pytest.approx(default, rel=1e-4), (name, cell)
+                assert set(filter(None, kinds.split(", "))) == set(FACTS_OF_KINDS.get(name.partition("_")[2], ())), name
+    for kind, word in ((sr.PccArm, "muscle"), (sr.TendonArm, "tendon")):
+        named = {f"{word}_{name}" for name in (*FACTS_OF_KINDS, "distance")} & facts_of(kind).keys()
+        assert set(shown[kind]) == {"kind", "routing", *named}

@@ -35,8 +35,8 @@ MOST_SECTIONS = 1000
 
 ROUTING = (
     "Where the actuators of a segment start: segment (where it does), base (at the base, through the segments before it) "
-    "or the number of a segment, for all or one for each; or a list of routes, at (positions along the backbone from the "
-    "base), azimuth (from the x axis of the base) and distance there, the actuator then counts to the segment where it ends"
+    "or the number of a segment, for all or one for each; or a list of routes, each with at (positions along the backbone "
+    "from the base), azimuth (from the x axis of the base) and distance there; it is of the segment in which it ends"
 )
 """What `routing` is."""
 
@@ -182,17 +182,17 @@ class ContinuumArm(XacroRobot):
         return tuple(starts.get(word, segment) for segment, word in enumerate(words))
 
     def _checked_offset(self, count: int) -> tuple[float, ...]:
-        if isinstance(self.offset, Sequence | np.ndarray) and np.ndim(self.offset) == 1:
+        if isinstance(self.offset, list | tuple) or (isinstance(self.offset, np.ndarray) and self.offset.ndim):
             return numbers("offset", self.offset, count, "rad", "segments")
         turn = finite_number("offset", self.offset, "rad")
         return (0.0, *(turn,) * (count - 1))
 
     def _checked_kinds(self, count: int) -> tuple[str, ...]:
-        kinds = (self.kind,) * count if isinstance(self.kind, str) else self.kind
+        kinds: Any = (self.kind,) * count if isinstance(self.kind, str) else self.kind
         if (
-            not isinstance(kinds, Sequence)
+            not isinstance(kinds, list | tuple)
             or len(kinds) != count
-            or any(kind not in self.KINDS for kind in kinds)
+            or any(not isinstance(kind, str) or kind not in self.KINDS for kind in kinds)
             or ("length" in kinds and set(kinds) != {"length"})
         ):
             words = ", ".join(self.KINDS)
@@ -203,9 +203,9 @@ class ContinuumArm(XacroRobot):
 
     def _checked_azimuths(self, name: str) -> tuple[float, ...]:
         given = getattr(self, name)
-        if len(np.atleast_1d(given)) == 0:
-            return ()
         azimuths = finite_array(name, given, (None,), "rad")
+        if len(azimuths) == 0:
+            return ()
         around = np.sort(azimuths % math.tau)
         if len(azimuths) > 1 and np.min(np.diff(around, append=around[0] + math.tau)) < 1e-6:
             raise ParameterError(name, given, "azimuths that differ (modulo a turn) [rad]")

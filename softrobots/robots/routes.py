@@ -71,10 +71,13 @@ def checked_routing(value: Any, lengths: Sequence[float]) -> Routing:
     Raises:
         ParameterError: If it is neither, a segment is behind its actuators, or a route ends behind the tip.
     """
-    items = (value,) * len(lengths) if isinstance(value, str | int | np.integer) else value
-    if isinstance(items, Sequence) and items and all(isinstance(item, Route | Mapping) for item in items):
+    plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    items = (plain,) * len(lengths) if isinstance(plain, str | int) else plain
+    if not isinstance(items, list | tuple) or not items:
+        raise ParameterError("routing", value, _requirement(len(lengths)))
+    if all(isinstance(item, Route | Mapping) for item in items):
         return tuple(_route(item, value, float(np.sum(lengths)), len(items)) for item in items)
-    if not isinstance(items, Sequence | np.ndarray) or len(items) != len(lengths):
+    if len(items) != len(lengths):
         raise ParameterError("routing", value, _requirement(len(lengths)))
     return tuple(_start(item, value, segment, len(lengths)) for segment, item in enumerate(items, start=1))
 
@@ -115,8 +118,8 @@ def _of_mapping(item: Mapping[str, Any], value: Any) -> Route:
 def _start(item: Any, value: Any, segment: int, count: int) -> str | int:
     if isinstance(item, str) and item in ROUTINGS:
         return item
-    if isinstance(item, int | np.integer) and not isinstance(item, bool) and 1 <= item <= segment:
-        return int(item)
+    if isinstance(item, int) and not isinstance(item, bool) and 1 <= item <= segment:
+        return item
     raise ParameterError("routing", value, _requirement(count))
 
 
