@@ -325,32 +325,6 @@ def test_driven_motors_settle_where_our_statics_says(tool: Tool) -> None:
     assert 1e-5 < np.abs(reached - robot.data.ctrl).max() < 1e-2 * np.abs(found.motor_torques).max() / 50.0 * 1.001
 
 
-@pytest.mark.parametrize("given", ["lengths", "forces"])
-def test_driven_muscles_settle_where_our_statics_says(tool: Tool, given: str) -> None:
-    """The lengths that MuJoCo's tendons reach, or the tensions, are an equilibrium of ours.
-
-    Its tendons are linear: with given lengths, twist of up to 4e-3 rad a hinge does not lengthen them, and torsion has the
-    stiffness of the tensions at home.
-    """
-    model = _pcc(muscles=given)
-    motors = (0.5, 0.55, 0.52, 0.53, 0.5, 0.5) if given == "lengths" else (20.0, 5.0, -10.0, 30.0, 3.0, 0.0)
-    robot = InMujoco(tool("mujoco"), to_mjcf(model, motors, damping="critical", gravity=sr.EARTH_GRAVITY))
-    robot.mujoco.mj_resetDataKeyframe(robot.model, robot.data, 0)
-    robot.mujoco.mj_forward(robot.model, robot.data)
-    rest = np.array([tag.rest_length for tag in model.muscles])
-    if given == "lengths":
-        assert np.allclose(robot.data.ten_length + rest, motors, rtol=0, atol=1e-15)  # home is the shape of these lengths
-    robot.settle(8.0)
-    reached = robot.data.ten_length + rest if given == "lengths" else motors
-    found = sr.solve_equilibrium(model, reached, gravity=sr.EARTH_GRAVITY)
-    strains = model.structure.strains(found.q_motors, found.q_springs)
-    assert np.abs(robot.data.qpos[robot.dofs(list(model.structure.spring_joints))] - strains).max() < (
-        1e-8 if given == "forces" else 3e-5
-    )
-    tensions = robot.data.actuator_force if given == "forces" else -robot.data.actuator_force  # it lengthens the tendon
-    assert np.abs(tensions - found.motor_torques).max() < (1e-6 if given == "forces" else 1e-2)
-
-
 # --- Numbers
 
 
@@ -431,7 +405,7 @@ def test_a_file_says_what_it_is() -> None:
     frequency = re.search(r"w1 = (\S+) rad/s", head)
     assert frequency is not None
     assert "pcc_arm, for MuJoCo" in head
-    assert "their tensions are in the springs" in head
+    assert "Muscles and tendons are welded: they are springs" in head
     assert "muscle_1_3 -10.0" in head
     arm = re.sub(r"\s+", " ", to_sdf(case_of("arm").model).split("-->")[0])
     assert "Motors are driven" in arm

@@ -1,19 +1,20 @@
-r"""A robot with held actuators: motor positions, and joint springs that include the muscle tensions.
+r"""A robot with held actuators: motor positions, and joint springs that include the tensions of actuators.
 
-A tension `t` of the muscles adds the energy `t l`. Along lumped sections (`softrobots.model.muscle_paths`) that is linear in
-bending and elongation, with the arms `A`, and quadratic in twist, with the stiffness :math:`\kappa = \sum t d^2 / h`, so that
-it changes the reference and the stiffness of each spring:
+A given tension `t`, or that of a given pressure, adds the energy `t l`. On a straight route along lumped sections
+(`softrobots.model.muscle_paths`) that is linear in bending and elongation, with the arms `A`, and quadratic in twist, with the
+stiffness :math:`\kappa = \sum t d^2 / h`, so that it changes the reference and the stiffness of each spring:
 
 .. math:: \tfrac12 k (z - r)^2 + t^T A z + \tfrac12 \kappa z^2
           = \tfrac12 (k + \kappa) \Bigl(z - \frac{k r - A^T t}{k + \kappa}\Bigr)^2 + \text{constant}
 
-so a lumped chain under tensions is exactly a chain of springs. Muscles of given length couple the joints of a segment, and the
-six joints of a section of constant strain follow four coordinates; neither is a joint spring, and both are refused.
+so a lumped chain under tensions is exactly a chain of springs. All else is refused: actuators of given length, tensions that
+follow the length, and winding routes couple the joints of a segment, and the six joints of a section of constant strain follow
+four coordinates; none is a joint spring.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -23,7 +24,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import RigidTree
-from softrobots.description.urdf_tags import SpringTag
+from softrobots.description.urdf_tags import ActuatorTag, SpringTag
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 
@@ -42,7 +43,7 @@ class HeldRobot:
     locked: tuple[str, ...]
     """Joints locked at zero."""
     tensions: Mapping[str, float]
-    """Tension by muscle [N]."""
+    """Tension by actuator that is held, negative where it pushes [N]."""
 
 
 def check_linear(model: Any) -> SoftModel:
@@ -67,39 +68,53 @@ def check_linear(model: Any) -> SoftModel:
     return checked
 
 
-def hold(model: Any, q_motors: Any = None) -> HeldRobot:
-    """Hold the actuators of a robot: motors at positions, muscles at tensions; by default `relaxed_motors`.
-
-    Raises:
-        ParameterError: If `check_linear` refuses the model, it has muscles of given length, `q_motors` does not fit it, or the
-            muscles push so hard that a spring has no stiffness left.
-    """
-    checked = check_linear(model)
-    if checked.muscles and checked.muscle_input != "forces":
-        requirement = (
-            'a robot with given muscle tensions, load_model(..., muscles="forces") with the muscle_forces of an equilibrium: '
-            "muscles of given length couple the joints of a segment"
-        )
-        raise ParameterError("model", checked.pinocchio.name, requirement)
-    structure = checked.structure
-    values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
-    count = len(structure.motor_joints)
-    springs = pulled_springs(checked, values[count:], by_tendons=False)
-    motors = dict(zip(structure.motor_joints, values[:count].tolist(), strict=True))
-    tensions = dict(zip((muscle.name for muscle in checked.muscles), values[count:].tolist(), strict=True))
-    return HeldRobot(MappingProxyType(motors), MappingProxyType(springs), structure.locked_joints, MappingProxyType(tensions))
-
-
-def pulled_springs(model: SoftModel, tensions: FloatArray, *, by_tendons: bool) -> dict[str, SpringTag]:
-    """Return the joint springs of a lumped chain with muscle tensions in them.
+def hold(model: Any, q_motors: Any = None, *, apart: Sequence[str] = ()) -> HeldRobot:
+    """Hold the actuators of a robot: motors at positions, tensions and pressures in the springs; by default `relaxed_motors`.
 
     Args:
         model: The robot.
-        tensions: Tension of each muscle, shape (n_muscles,) [N].
-        by_tendons: Whether linear tendons pull with the arms, so that only the stiffness of the tensions goes into the springs.
+        q_motors: Motor joints, then inputs of actuators, shape (n_motors,) [rad, m, N or Pa].
+        apart: Kinds of actuators that are left out, because the file has them by themselves.
 
     Raises:
-        ParameterError: If the muscles push so hard that a spring has no stiffness left: it buckles in torsion.
+        ParameterError: If `check_linear` refuses the model, it has actuators that are no joint springs, `q_motors` does not fit
+            it, or the actuators push so hard that a spring has no stiffness left.
+    """
+    checked = check_linear(model)
+    _refuse_coupled([tag for tag in checked.muscles if tag.kind not in apart], checked.pinocchio.name)
+    structure = checked.structure
+    values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
+    count = len(structure.motor_joints)
+    factors = [{"tension": 1.0, "pressure": -tag.area}.get(tag.kind, 0.0) for tag in checked.muscles]
+    pulls = np.array(factors) * values[count:]
+    motors = dict(zip(structure.motor_joints, values[:count].tolist(), strict=True))
+    pairs = zip(checked.muscles, pulls.tolist(), strict=True)
+    tensions = {tag.name: tension for tag, tension in pairs if tag.kind not in apart}
+    springs = _pulled_springs(checked, pulls)
+    return HeldRobot(MappingProxyType(motors), MappingProxyType(springs), structure.locked_joints, MappingProxyType(tensions))
+
+
+def _refuse_coupled(tags: Sequence[ActuatorTag], robot: str) -> None:
+    """Refuse actuators that are no joint springs when they are held."""
+    reasons = {
+        'a robot with given tensions, load_model(..., muscles="forces") with the muscle_forces of an equilibrium: actuators of '
+        "given length couple the joints of a segment": [tag.name for tag in tags if tag.kind == "length"],
+        'kind="tension" with the muscle_forces of an equilibrium, or MuJoCo, which has such actuators (to_mjcf): a tension '
+        "that follows the length couples joints": [tag.name for tag in tags if tag.kind in ("elastic", "mckibben")],
+        "straight routes, or MuJoCo with driven actuators (to_mjcf): tension along a winding route couples joints": [
+            tag.name for tag in tags if not tag.straight
+        ],
+    }
+    for requirement, names in reasons.items():
+        if names:
+            raise ParameterError("model", f"{robot} with {', '.join(names)}", requirement)
+
+
+def _pulled_springs(model: SoftModel, tensions: FloatArray) -> dict[str, SpringTag]:
+    """Return the joint springs of a lumped chain with tensions of its actuators, shape (n_muscles,) [N], in them.
+
+    Raises:
+        ParameterError: If the actuators push so hard that a spring has no stiffness left: it buckles in torsion.
     """
     springs, paths = model.structure.strain_springs, model.structure.muscle_paths
     straight = paths.at(np.zeros(paths.count))
@@ -107,7 +122,7 @@ def pulled_springs(model: SoftModel, tensions: FloatArray, *, by_tendons: bool) 
     soft = [name for name, value in zip(springs.names, stiffness, strict=True) if value <= 0.0]
     if soft:
         raise ParameterError("q_motors", tensions, f"tensions that leave {', '.join(soft)} a stiffness: such a push buckles it")
-    pull = tensions @ straight.arms * (not by_tendons)
+    pull = tensions @ straight.arms
     rest = (springs.stiffness * springs.rest - pull) / stiffness
     rest = np.where(stiffness == springs.stiffness, springs.rest - pull / stiffness, rest)  # no rounding without tension
     tags = map(SpringTag, stiffness.tolist(), rest.tolist())

@@ -11,9 +11,12 @@ import numpy as np
 
 from softrobots.core.errors import DescriptionError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
+from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.export.meshes import MeshFiles, mujoco_reads
+from softrobots.export.mjcf_tendons import Sites, place_sites, write_drives, write_tendons
 from softrobots.export.prepared import PreparedRobot, checked_gravity, neighbours, prepare, weld_groups
-from softrobots.export.servos import ANGLE_ERROR, Muscle, Servo
+from softrobots.export.servos import ANGLE_ERROR, LENGTH_ERROR, Motor
+from softrobots.export.tendons import SPRINGY, tendons_of
 from softrobots.export.xml_text import document
 from softrobots.model.soft_model import SoftModel
 
@@ -39,14 +42,16 @@ def to_mjcf(
     and OBJ are named by their whole path, others are left out.
 
     Driven motors are position actuators (`softrobots.export.servos`), whose joints have the damping at which the motor just
-    reaches its largest speed under its largest torque, if `damping` is "critical". Muscles are fixed tendons, whose `length` is
-    the muscle's less its rest length, linear in the joints; with a motor each if tensions are given, or a position actuator if
-    lengths are. The keyframe `home` holds the relaxed springs and these actuators.
+    reaches its largest speed under its largest torque, if `damping` is "critical". Actuators along the body are spatial tendons
+    (`softrobots.export.tendons`) with an actuator each, whose `ctrl` is the input and whose force is the tension, whatever the
+    kind; that of a given length is a servo. Welded, tensions and pressures are part of the springs, elastic actuators and
+    McKibben muscles are springs of tendons (the latter in MuJoCo 4 only, whose springs have polynomials). The keyframe `home`
+    holds the relaxed springs and `q_motors` as `ctrl`.
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscles, shape (n_motors,) [rad, m or N]; relaxed by default.
-        actuators: "driven", or "welded": motor joints become fixed, tensions become part of the springs.
+        q_motors: Motor joints, then inputs of actuators, shape (n_motors,) [rad, m, N or Pa]; relaxed by default.
+        actuators: "driven", or "welded": motor joints become fixed, actuators become springs.
         damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
             without swinging (`softrobots.export.damping`).
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
@@ -57,21 +62,24 @@ def to_mjcf(
 
     Raises:
         ParameterError: If an argument does not fit, or the robot has sections of constant strain, springs that are not linear,
-            or muscles of given length with "welded".
+            or actuators that MuJoCo does not have: driven McKibben muscles; welded, given lengths and tensions along winding
+            routes.
         DescriptionError: If the robot has moving links without mass or moments of inertia, a link with impossible
             moments, a link `world` that is not its root, or more joints than Pinocchio supports.
     """
     field = checked_gravity(gravity)
-    robot = prepare(model, q_motors, actuators=actuators, damping=damping)
+    robot = prepare(model, q_motors, actuators=actuators, damping=damping, apart=SPRINGY)
     _refuse(robot.tree)
+    tendons = tendons_of(model, robot, welded=actuators == "welded")
     root = ElementTree.Element("mujoco", {"model": robot.tree.name or "robot"})
     compiler = {"angle": "radian", "autolimits": "true", "fusestatic": "false", "inertiafromgeom": "false"}
     ElementTree.SubElement(root, "compiler", compiler)
     option = ElementTree.SubElement(root, "option", {"gravity": number_text(field)})
-    if robot.motors or robot.muscles:
-        option.set("integrator", "implicitfast")  # which treats the damping of actuators implicitly, too
+    if robot.motors or tendons:
+        option.set("integrator", "implicitfast")  # which treats the damping of actuators and tendons implicitly, too
     assets = ElementTree.SubElement(root, "asset")
-    bodies = _Bodies(robot, limits, damping == "critical", assets)
+    sites = place_sites(tendons)
+    bodies = _Bodies(robot, limits, damping == "critical", assets, sites)
     bodies.write(ElementTree.SubElement(root, "worldbody"))
     if not len(assets):
         root.remove(assets)
@@ -80,22 +88,26 @@ def to_mjcf(
         contact = ElementTree.SubElement(root, "contact")
         for first, second in pairs:
             ElementTree.SubElement(contact, "exclude", {"body1": first, "body2": second})
-    if robot.muscles:
-        _write_tendons(ElementTree.SubElement(root, "tendon"), robot.muscles)
+    if tendons:
+        write_tendons(ElementTree.SubElement(root, "tendon"), tendons)
     key = {"name": "home", "qpos": number_text(robot.home[name] for name in bodies.order)}
-    if robot.motors or robot.muscles:
-        _write_actuators(ElementTree.SubElement(root, "actuator"), robot)
-        key["ctrl"] = number_text([*(motor.position for motor in robot.motors), *map(_command, robot.muscles)])
+    if actuators == "driven" and model.n_motors:
+        driven = ElementTree.SubElement(root, "actuator")
+        _write_motors(driven, robot.motors)
+        write_drives(driven, tendons)
+        key["ctrl"] = number_text(robot.q_motors)
     if bodies.order:
         ElementTree.SubElement(ElementTree.SubElement(root, "keyframe"), "key", key)
-    return document(root, _head(robot, bodies.meshes, limits))
+    return document(root, _head(robot, model.muscles if actuators == "driven" else (), bodies.meshes, limits))
 
 
 class _Bodies:
     """Writes the nested bodies; records the order of the joints and the meshes left out."""
 
-    def __init__(self, robot: PreparedRobot, limits: bool, limit_speed: bool, assets: ElementTree.Element) -> None:
-        self._robot, self._limits, self._assets = robot, limits, assets
+    def __init__(
+        self, robot: PreparedRobot, limits: bool, limit_speed: bool, assets: ElementTree.Element, sites: Sites
+    ) -> None:
+        self._robot, self._limits, self._assets, self._sites = robot, limits, assets, sites
         self._damping = {motor.joint.name: motor.speed_damping for motor in robot.motors} if limit_speed else {}
         self._mesh_names: dict[tuple[Path, tuple[float, ...]], str] = {}
         self.order: list[str] = []
@@ -127,6 +139,8 @@ class _Bodies:
             self._geom(element, shape, file, {"group": _HIDDEN if drawn or not body.visuals else _DRAWN})
         if body.name == self._robot.tip:
             ElementTree.SubElement(element, "site", {"name": body.name})
+        for name, place in self._sites.get(body.name, ()):
+            ElementTree.SubElement(element, "site", {"name": name, "pos": number_text(place), "size": "0.001"})
         for joint in self._robot.tree.joints_of(body.name):
             self._body(element, self._robot.tree.body(joint.child), joint.placement, joint)
 
@@ -211,48 +225,28 @@ def _where(placement: Placement) -> dict[str, str]:
     return attributes
 
 
-def _write_tendons(tendons: ElementTree.Element, muscles: Sequence[Muscle]) -> None:
-    for muscle in muscles:
-        fixed = ElementTree.SubElement(tendons, "fixed", {"name": muscle.tag.name})
-        for name, arm in muscle.arms.items():
-            ElementTree.SubElement(fixed, "joint", {"joint": name, "coef": repr(arm)})
-
-
-def _write_actuators(element: ElementTree.Element, robot: PreparedRobot) -> None:
-    for motor in robot.motors:
-        attributes = {"name": motor.joint.name, "joint": motor.joint.name, **_servo(motor.servo)}
+def _write_motors(element: ElementTree.Element, motors: Sequence[Motor]) -> None:
+    for motor in motors:
+        gain, damping, force = motor.servo
+        attributes = {"name": motor.joint.name, "joint": motor.joint.name, "kp": repr(gain), "kv": repr(damping)}
+        if np.isfinite(force):
+            attributes["forcerange"] = number_text((-force, force))
         if np.all(np.isfinite(motor.joint.limits)):
             attributes["ctrlrange"] = number_text(motor.joint.limits)
         ElementTree.SubElement(element, "position", attributes)
-    for muscle in robot.muscles:
-        tag = muscle.tag
-        attributes = {"name": tag.name, "tendon": tag.name}
-        if muscle.servo is None:  # a positive force in MuJoCo lengthens the tendon, a tension shortens it
-            attributes |= {"gear": "-1.0", "ctrlrange": number_text((-tag.strongest, tag.strongest))}
-            ElementTree.SubElement(element, "motor", attributes)
-        else:
-            reach = number_text((tag.shortest - tag.rest_length, tag.longest - tag.rest_length))
-            ElementTree.SubElement(element, "position", attributes | _servo(muscle.servo) | {"ctrlrange": reach})
 
 
-def _servo(servo: Servo) -> dict[str, str]:
-    gains = {"kp": repr(servo.gain), "kv": repr(servo.damping)}
-    return gains | ({"forcerange": number_text((-servo.force, servo.force))} if np.isfinite(servo.force) else {})
-
-
-def _command(muscle: Muscle) -> float:
-    return muscle.value if muscle.servo is None else muscle.value - muscle.tag.rest_length
-
-
-def _head(robot: PreparedRobot, meshes: MeshFiles, limits: bool) -> list[str]:
+def _head(robot: PreparedRobot, driven: Sequence[ActuatorTag], meshes: MeshFiles, limits: bool) -> list[str]:
     lines = [f"{robot.tree.name}, for MuJoCo; written by softrobots from its URDF. SI units and radians."]
     lines += [*robot.remarks, robot.damping_rule]
     if robot.motors:
         lines.append(
             f"Position actuators of motors give all their torque at an error of {ANGLE_ERROR} rad; statics holds exactly."
         )
-    if any(muscle.servo for muscle in robot.muscles):
-        lines.append("The ctrl of a muscle is its length less its rest length [m].")
+    if any(tag.kind == "length" for tag in driven):
+        lines.append(f"Actuators of given length give all their force at an error of {LENGTH_ERROR} of their length at rest.")
+    if driven:
+        lines.append("The ctrl of an actuator is its length, that of its motor [m], its tension [N] or pressure [Pa].")
     if not limits:
         lines.append("The springs have no limits here.")
     return [*lines, *meshes.remark("neither OBJ nor binary STL")]

@@ -1,12 +1,12 @@
 """A robot prepared for a simulator: fixed and driven joints, springs, damping and servos.
 
 Statics holds motors exactly. In a simulator a motor is a joint with an actuator ("driven"), or a fixed joint at the given
-coordinate ("welded"); then muscle tensions are part of the springs (`softrobots.export.held`).
+coordinate ("welded"); then the tensions of actuators are part of the springs (`softrobots.export.held`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,9 +16,10 @@ from softrobots.core.checks import FloatArray, choice, finite_array
 from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.urdf_tags import SpringTag
 from softrobots.export.damping import checked_damping, damped, lowest_frequency, mass_matrix, rule_text
-from softrobots.export.held import ACTUATORS, check_linear, hold, pulled_springs, weld
-from softrobots.export.servos import Motor, Muscle, motors_of, muscles_of
+from softrobots.export.held import ACTUATORS, check_linear, hold, weld
+from softrobots.export.servos import Motor, motors_of
 from softrobots.model.soft_model import SoftModel
 
 _LIGHTEST = 1e-15  # [kg]; MuJoCo refuses lighter moving bodies
@@ -34,30 +35,40 @@ class PreparedRobot:
     """Body at the tip."""
     motors: tuple[Motor, ...]
     """Driven motors, base to tip; none if welded."""
-    muscles: tuple[Muscle, ...]
-    """Driven muscles; none if welded."""
+    q_motors: FloatArray
+    """Positions of motors, then inputs of actuators, shape (n_motors,) [rad, m, N or Pa]."""
     home: Mapping[str, float]
     """Position of every movable joint with the springs relaxed [rad or m]."""
+    damping_time: float | None
+    """Damping of the springs over their stiffness [s]; None for that of the description."""
     frequency: float | None
     """Lowest frequency at rest [rad/s], if it sets the damping; else None."""
     remarks: tuple[str, ...]
-    """Remarks on motors and muscles for the head of the file."""
+    """Remarks on motors and actuators for the head of the file."""
     damping_rule: str
     """Where the damping of the springs comes from, in words, for the head of the file."""
 
 
-def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damping: str | float = "file") -> PreparedRobot:
-    """Fix or drive the actuators, put muscle tensions into the springs, choose damping and servos.
+def prepare(
+    model: Any,
+    q_motors: Any = None,
+    *,
+    actuators: str = "driven",
+    damping: str | float = "file",
+    apart: Sequence[str] = (),
+) -> PreparedRobot:
+    """Fix or drive the motors, put held tensions into the springs, choose damping and servos.
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscles, shape (n_motors,) [rad, m or N]; relaxed by default.
+        q_motors: Motor joints, then inputs of actuators, shape (n_motors,) [rad, m, N or Pa]; relaxed by default.
         actuators: "driven" or "welded".
         damping: "file", "critical" or a damping time [s], see `softrobots.export.damping`.
+        apart: Kinds of actuators that are no part of the springs if they are welded.
 
     Raises:
         ParameterError: If `check_linear` refuses the model; a choice is unknown; `q_motors` does not fit the robot or, driven,
-            is beyond the limits of the actuators; or muscles of given length are to be welded.
+            is beyond the limits of the actuators; or actuators are to be welded that are no joint springs (`hold`).
         DescriptionError: If the robot has moving bodies without mass, or more joints than Pinocchio supports.
     """
     checked = check_linear(model)
@@ -69,21 +80,23 @@ def prepare(model: Any, q_motors: Any = None, *, actuators: str = "driven", damp
     fixed = dict.fromkeys(structure.locked_joints, 0.0)
     welded = actuators == "welded"
     if welded:
-        springs, fixed = hold(checked, values).springs, fixed | positions
+        springs, fixed = hold(checked, values, apart=apart).springs, fixed | positions
     else:
         _check_limits(checked, values)
-        springs = pulled_springs(checked, _tensions(checked, values), by_tendons=True)
+        springs = {name: SpringTag(*pair) for name, pair in checked.spring_table.items()}
     tree = weld(tree, fixed)
     _refuse_massless(tree)
-    mass = mass_matrix(checked, values)
-    frequency = lowest_frequency(checked, mass) if rule == "critical" and springs else None
+    swings = rule == "critical" and bool(springs)
+    mass = mass_matrix(checked, values) if swings or (positions and not welded) else np.zeros((0, 0))
+    frequency = lowest_frequency(checked, mass) if swings else None
     time = rule if isinstance(rule, float) else None if frequency is None else 2.0 / frequency
     return PreparedRobot(
         tree=replace(damped(tree, springs, time), springs=springs),
         tip=tip_body(tree, checked.tip),
         motors=() if welded else motors_of(checked, tree.joints, positions, mass),
-        muscles=() if welded else muscles_of(checked, values[len(positions) :], mass),
+        q_motors=values,
         home=_home(checked, tree, values),
+        damping_time=time,
         frequency=frequency,
         remarks=_remarks(checked, values, welded),
         damping_rule=rule_text(rule, frequency),
@@ -132,16 +145,6 @@ def _check_limits(model: SoftModel, motors: FloatArray) -> None:
         raise ParameterError("q_motors", motors, f'within the limits of {", ".join(names)}, or actuators="welded"')
 
 
-def _tensions(model: SoftModel, values: FloatArray) -> FloatArray:
-    """Tension of each muscle at home, without load, shape (n_muscles,) [N]."""
-    structure = model.structure
-    if structure.muscle_lengths is None:
-        return values[len(structure.motor_joints) :]
-    springs = structure.strain_springs
-    carried = springs.stiffness * (structure.strains(values, model.rest) - springs.rest)
-    return np.asarray(-carried @ structure.muscle_lengths.spread)
-
-
 def _refuse_massless(tree: RigidTree) -> None:
     group = weld_groups(tree)
     mass = dict.fromkeys(group, 0.0)
@@ -171,13 +174,10 @@ def _remarks(model: SoftModel, motors: FloatArray, welded: bool) -> tuple[str, .
     if model.structure.motor_joints:
         remarks.append("Motors are welded: their joints are fixed." if welded else "Motors are driven: their joints move.")
     if model.muscles and welded:
-        remarks.append("Muscles are welded: their tensions are in the springs, which is exact.")
-    elif model.muscles:
-        remarks.append(f"Muscles are driven; given are their {'tensions' if model.muscle_input == 'forces' else 'lengths'}.")
-        remarks.append("Twist does not lengthen them here; the springs of twist have the stiffness of their tensions at home.")
+        remarks.append("Muscles and tendons are welded: they are springs, which is exact.")
     if model.n_motors:
         at = ", ".join(f"{name} {value!r}" for name, value in zip(model.motor_joints, motors.tolist(), strict=True))
-        remarks.append(f"{'Held' if welded else 'Home'} at [rad, m or N]: {at}.")
+        remarks.append(f"{'Held' if welded else 'Home'} at [rad, m, N or Pa]: {at}.")
     if model.spring_groups:
         remarks.append("Inflated links wrinkle beyond a moment; the springs here do not.")
     return tuple(remarks)

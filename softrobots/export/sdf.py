@@ -67,8 +67,8 @@ def to_sdf(
             reserves, or more joints than Pinocchio supports.
     """
     robot = prepare(model, q_motors, actuators=actuators, damping=damping)
-    if robot.muscles:
-        raise ParameterError("actuators", actuators, '"welded" for a robot with muscles, which SDF does not have')
+    if model.muscles and actuators == "driven":
+        raise ParameterError("actuators", actuators, '"welded" for a robot with muscles or tendons, which SDF does not have')
     tree = robot.tree
     names = [body.name for body in tree.bodies] + [joint.name for joint in tree.joints]
     reserved = [body.name for body in tree.bodies[1:] if body.name == _WORLD]

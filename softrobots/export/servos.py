@@ -1,13 +1,13 @@
-r"""Position servos in place of motors and muscles in a simulator.
+r"""Position servos in place of motors and of actuators of given length in a simulator.
 
 Statics holds an actuator exactly; a servo is compliant. Its gain is its largest force over a small error,
 
 .. math:: k_p = F / \varepsilon, \qquad k_v = 2 \sqrt{k_p I}
 
 and `k_v` damps it critically with the inertia `I` of the softest motion that moves this actuator by one unit at the home
-position: for a motor, all that it carries turns about its axis; for a muscle, the springs of its segment share its elongation
-as `K^{-1} A^T`. (A simulator that takes `I` from the inverse of the mass matrix, as MuJoCo's `dampratio` does, finds the body
-next to the motor, behind which the rest hangs on springs: a two-thousandth of it in the inflatable arm.)
+position: for a motor, all that it carries turns about its axis; for an actuator of given length, the springs along its route
+share its elongation as `K^{-1} A^T`. (A simulator that takes `I` from the inverse of the mass matrix, as MuJoCo's `dampratio`
+does, finds the body next to the motor, behind which the rest hangs on springs: a two-thousandth of it in the inflatable arm.)
 """
 
 from __future__ import annotations
@@ -21,16 +21,15 @@ import numpy as np
 
 from softrobots.core.checks import LARGEST, FloatArray
 from softrobots.description.rigid_tree import Joint
-from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.soft_model import SoftModel
 
 ANGLE_ERROR = 1e-2
 """Error at which the servo of a revolute motor reaches its full torque [rad]."""
 
 LENGTH_ERROR = 1e-3
-"""The same for a muscle, as a fraction of its rest length, and for a prismatic motor, as a fraction of its travel."""
+"""The same for an actuator of given length, relative to its rest length, and for a prismatic motor, relative to its travel."""
 
-_UNLIMITED = 1e3  # gain of a motor without torque limit, over the stiffness of the stiffest spring
+_UNLIMITED = 1e3  # gain without a limit, over the stiffness of the stiffest spring, or of those along the route
 
 
 class Servo(NamedTuple):
@@ -62,20 +61,6 @@ class Motor:
         return max(self.joint.damping, force / fastest if 0.0 < fastest < LARGEST and force < LARGEST else 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Muscle:
-    """A driven muscle, whose length is linear in joint coordinates."""
-
-    tag: ActuatorTag
-    """Its course and limits."""
-    arms: Mapping[str, float]
-    """Derivative of its length by joint [m/rad, or 1 at a prismatic joint]; only joints that change it."""
-    value: float
-    """Its length [m] or tension [N] at home."""
-    servo: Servo | None
-    """Its servo if its length is given; None if its tension is given."""
-
-
 def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str, float], mass: FloatArray) -> tuple[Motor, ...]:
     """Return the driven motors at given positions [rad or m], with servos for the mass matrix at home, shape (nv, nv)."""
     by_name = {joint.name: joint for joint in joints}
@@ -86,18 +71,17 @@ def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str,
     )
 
 
-def muscles_of(model: SoftModel, values: FloatArray, mass: FloatArray) -> tuple[Muscle, ...]:
-    """Return the muscles of given lengths [m] or tensions [N], shape (n_muscles,); those of given length have servos."""
-    structure, muscles = model.structure, []
-    arms, springs = structure.moment_arms, structure.spring_indices
-    elastic = mass[np.ix_(springs, springs)]
-    for tag, row, value in zip(model.muscles, structure.muscle_paths.matrix, values.tolist(), strict=True):
-        motion = row / structure.strain_springs.stiffness
-        motion /= row @ motion
-        gain = tag.strongest / (LENGTH_ERROR * tag.rest_length)
-        servo = Servo(gain, 2.0 * math.sqrt(gain * float(motion @ elastic @ motion)), tag.strongest)
-        muscles.append(Muscle(tag, arms[tag.name], value, servo if model.muscle_input == "lengths" else None))
-    return tuple(muscles)
+def length_servo(model: SoftModel, place: int, mass: FloatArray) -> Servo:
+    """Return the servo of an actuator of given length, the one at `place` among them, for the mass matrix at home, (nv, nv)."""
+    structure, tag = model.structure, model.muscles[place]
+    springs, row = structure.spring_indices, structure.muscle_paths.matrix[place]
+    motion = row / structure.strain_springs.stiffness
+    softness = row @ motion
+    motion /= softness
+    inertia = float(motion @ mass[np.ix_(springs, springs)] @ motion)
+    force = max(abs(tag.weakest), tag.strongest)
+    gain = force / (LENGTH_ERROR * tag.rest_length) if force < LARGEST else _UNLIMITED / float(softness)
+    return Servo(gain, 2.0 * math.sqrt(gain * inertia), force)
 
 
 def _motor_servo(joint: Joint, stiffest: float, inertia: float) -> Servo:

@@ -1,10 +1,12 @@
-"""Balance of our answers in MuJoCo."""
+"""Balance of our answers in MuJoCo, and MuJoCo's own equilibria."""
 
 from __future__ import annotations
 
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import softrobots as sr
 from softrobots.robots import Robot
@@ -33,3 +35,34 @@ def assert_mujoco_balances(mujoco: ModuleType, robot: Robot, force: np.ndarray, 
     assert np.allclose(data.body("tip").xpos, found.tip_position, atol=1e-12)
     assert data.ncon == 0
     return found
+
+
+def mujoco_equilibrium(mujoco: ModuleType, text: str, ctrl: ArrayLike, force: ArrayLike, start: ArrayLike = 0.0) -> Any:
+    """Where MuJoCo's generalised forces balance under a dead force at the tip, by Newton's method from `start`: its data there.
+
+    Contacts are off. The derivative is that of central differences, taken again where steps do not become ten times smaller.
+    """
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    data.ctrl[:], tip = ctrl, model.body("tip").id
+
+    def balance(q: np.ndarray) -> np.ndarray:
+        data.qpos[:] = q
+        mujoco.mj_forward(model, data)
+        jacobian = np.zeros((3, model.nv))
+        mujoco.mj_jacBody(model, data, jacobian, None, tip)
+        return np.asarray(jacobian.T @ force + data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
+
+    q, changes, last, inverse = np.zeros(model.nv) + start, 1e-6 * np.eye(model.nv), 0.0, np.zeros((model.nv, model.nv))
+    for _ in range(40):
+        step = -inverse @ balance(q)
+        if not np.abs(step).max() < 0.1 * last:
+            inverse = np.linalg.inv(np.array([balance(q + change) - balance(q - change) for change in changes]).T / 2e-6)
+            step = -inverse @ balance(q)
+        last = float(np.abs(step).max())
+        q = q + step * min(1.0, 0.2 / last)
+        if last < 1e-8:
+            balance(q)
+            return data
+    raise AssertionError(f"MuJoCo does not balance: the last step is {last}")

@@ -1,0 +1,190 @@
+r"""Actuators as spatial tendons of MuJoCo: straight legs between sites on the links of a lumped chain.
+
+A route is a sum over points (`softrobots.description.route_points`): at the offset `o` from the backbone, with the tangent `t`
+per rest length at rest, for the share `f` of a section of rest length `h`. Where the hinge of the section turns by a small `w`
+and stretches by `e`, its length is :math:`f |c + w \times o + e|` with :math:`c = h t`, as along a section of constant strain.
+
+A leg from `o - c/2` on the link below the hinge to `o + c/2` on that above is a chord, too short by
+:math:`|w \times c|^2 / 8|c|`, and the tip of an arm with 30 hinges a segment is then off by a thousandth of its length. (A leg
+from `o` to `o + c` has an error of first order in `h`.) A leg along the backbone, from `c` on the link below to `2c` on that
+above, is too long by :math:`|w \times c|^2 / |c|`. So there are both, the first enlarged so that they share the stretch: with
+the motion `H` of the hinge
+
+.. math:: l = \tfrac{7 f}{8} \bigl|H\bigl(\tfrac87 (o + \tfrac c2)\bigr) - \tfrac87 (o - \tfrac c2)\bigr|
+          + \tfrac{f}{8} |H(2c) - c|
+
+(MuJoCo divides the lengths of branches by the divisors of pulleys). That is an eighth of the length at rest too long, which the
+laws of the actuators take away. The second leg is mirrored, from `-2c` to `-c`, where the hinge stretches before it bends, so
+that the stretch hardly changes its excess. What remains is a tenth of the error of the chord, and falls like `1/n^2` with `n`
+hinges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
+from softrobots.description.rigid_tree import Joint
+from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from softrobots.description.route_points import RoutePoint, route_points
+from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.export.damping import mass_matrix
+from softrobots.export.prepared import PreparedRobot
+from softrobots.export.servos import Servo, length_servo
+from softrobots.model.actuator_laws import input_limits, pull_factors
+from softrobots.model.sections import SectionRow
+from softrobots.model.soft_model import SoftModel
+
+SPRINGY = ("elastic", "mckibben")
+"""Kinds whose tension follows the length: welded, they are springs."""
+
+_CENTRAL = 0.125  # share of the legs along the backbone
+
+
+class Leg(NamedTuple):
+    """A straight piece of a tendon, from a site on the link below a hinge to a site on the link above it."""
+
+    divisor: float
+    """Its length is divided by this."""
+    below: FloatArray
+    """Place of the first site in the body below the hinge, shape (3,) [m]."""
+    above: FloatArray
+    """Place of the second site in the body above it, shape (3,) [m]."""
+    bodies: tuple[str, str]
+    """Names of both bodies."""
+    rest_length: float
+    """Its part of the length of the tendon at rest [m]."""
+
+
+class Drive(NamedTuple):
+    """An actuator of a tendon of length `l`: `tension = gain u + constant + stiffness l + damping l'`, within limits."""
+
+    gain: float
+    """Tension per input [1, N/m or m^2]."""
+    constant: float
+    """Constant part of the tension [N]."""
+    stiffness: float
+    """Tension per length [N/m]."""
+    damping: float
+    """Tension per speed [N s/m]."""
+    limits: tuple[float, float]
+    """Least and largest tension [N]."""
+    inputs: tuple[float, float]
+    """Least and largest input [m, N or Pa]."""
+
+
+class Spring(NamedTuple):
+    """A spring that is slack up to a length: `tension = linear x + square x^2` at `x` beyond it, plus `damping x'`."""
+
+    slack: float
+    """Length up to which it is slack [m]."""
+    linear: float
+    """[N/m]."""
+    square: float
+    """[N/m^2]."""
+    damping: float
+    """[N s/m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tendon:
+    """An actuator as a tendon, either driven or a spring."""
+
+    name: str
+    """Name of the actuator."""
+    legs: tuple[Leg, ...]
+    """Its course, base to tip."""
+    law: Drive | Spring
+    """Its tension."""
+    home: float
+    """Its input at home [m, N or Pa]."""
+
+
+def tendons_of(model: SoftModel, robot: PreparedRobot, *, welded: bool) -> tuple[Tendon, ...]:
+    """Return the tendons of a robot: driven actuators, or springs in place of those whose tension follows their length.
+
+    Raises:
+        ParameterError: If MuJoCo has no such law: that of a driven McKibben muscle, or of an elastic actuator that is taut at
+            any length.
+    """
+    structure, joints = model.structure, read_rigid_tree(model.urdf).joints
+    inputs = robot.q_motors[len(structure.motor_joints) :].tolist()
+    held = not welded and any(tag.kind == "length" for tag in model.muscles)
+    mass = mass_matrix(model, robot.q_motors) if held else np.zeros((0, 0))
+    time, made = robot.damping_time or 0.0, []
+    for place, (tag, value) in enumerate(zip(model.muscles, inputs, strict=True)):
+        if welded and tag.kind not in SPRINGY:
+            continue
+        legs = legs_of(tag, structure.section_table, joints)
+        beyond = float(structure.muscle_paths.rest[place]) - math.fsum(leg.rest_length for leg in legs)
+        if welded:
+            law: Drive | Spring = _spring(tag, value, beyond, time)
+        else:
+            law = _drive(tag, beyond, time, length_servo(model, place, mass) if tag.kind == "length" else None)
+        made.append(Tendon(tag.name, legs, law, value))
+    return tuple(made)
+
+
+def legs_of(tag: ActuatorTag, sections: Sequence[SectionRow], joints: Sequence[Joint]) -> tuple[Leg, ...]:
+    """Return the legs of the tendon of an actuator along the lumped sections of a robot with given joints, base to tip."""
+    hinges = [[joint for joint in joints if joint.name in row.joint_names] for row in sections]
+    legs = []
+    for point in route_points(tag.route, [(row.segment, row.length) for row in sections]):
+        hinge, share = hinges[point.section], point.weight / sections[point.section].length
+        bodies, place = (hinge[0].parent, hinge[-1].child), hinge[0].placement
+        offset, tangent = _offset_and_tangent(point, sections[point.section])
+        beside = (offset - 0.5 * tangent) / (1.0 - _CENTRAL), (offset + 0.5 * tangent) / (1.0 - _CENTRAL)
+        along = (-2.0 * tangent, -tangent) if hinge[0].kind == "prismatic" else (tangent, 2.0 * tangent)
+        for (below, above), part in ((beside, (1.0 - _CENTRAL) * share), (along, _CENTRAL * share)):
+            rest_length = part * float(np.linalg.norm(above - below))
+            legs.append(Leg(1.0 / part, place.position + place.rotation @ below, above, bodies, rest_length))
+    return tuple(legs)
+
+
+def _offset_and_tangent(point: RoutePoint, row: SectionRow) -> tuple[FloatArray, FloatArray]:
+    """Offset of a point from the backbone, and the tangent there times the length of the section, shape (3,) each [m]."""
+    kx, ky, twist, along = (row.rest / row.length).tolist()
+    radial = np.array([math.cos(point.azimuth), math.sin(point.azimuth), 0.0])
+    around = np.array([-radial[1], radial[0], 0.0])
+    offset = point.distance * radial
+    tangent = point.widening * radial + point.distance * (point.winding + twist) * around
+    tangent[2] = 1.0 + along + kx * offset[1] - ky * offset[0]
+    return offset, row.length * tangent
+
+
+def _drive(tag: ActuatorTag, beyond: float, time: float, servo: Servo | None) -> Drive:
+    """The law of a driven actuator, which is by `beyond` [m] longer than its tendon, with a damping time [s]."""
+    inputs = input_limits(tag)
+    if tag.kind == "tension":
+        return Drive(1.0, 0.0, 0.0, 0.0, (-math.inf, math.inf), inputs)
+    if tag.kind == "pressure":
+        return Drive(-tag.area, 0.0, 0.0, 0.0, (-math.inf, math.inf), inputs)
+    if tag.kind == "elastic":
+        stiffness, least, damping = tag.stiffness, 0.0, time * tag.stiffness
+    elif servo is not None:
+        stiffness, least, damping = servo.gain, tag.weakest, servo.damping
+    else:
+        requirement = 'actuators="welded": no actuator of MuJoCo pulls by pressure times (a l^2 - b), as McKibben muscles do'
+        raise ParameterError("actuators", f"driven, with {tag.name}", requirement)
+    constant = tag.pretension + stiffness * beyond
+    return Drive(-stiffness, constant, stiffness, damping, (least, tag.strongest), inputs)
+
+
+def _spring(tag: ActuatorTag, value: float, beyond: float, time: float) -> Spring:
+    """The law of an actuator at a fixed input [m or Pa]; see `_drive`."""
+    if tag.kind == "elastic":
+        slack, linear, square = value - tag.pretension / tag.stiffness, tag.stiffness, 0.0
+    else:
+        factor, least = pull_factors(tag)
+        slack = tag.rest_length * math.sqrt(least / factor)
+        square = value * factor / tag.rest_length**2
+        linear = 2.0 * square * slack
+    if slack <= beyond:
+        raise ParameterError("q_motors", value, f"a longer {tag.name}: it is taut at any length, which no spring of MuJoCo is")
+    return Spring(slack - beyond, linear, square, time * linear)
