@@ -37,7 +37,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--format", choices=FORMATS, help=f"{help_text} (by the suffix of FILE)")
     add_motors(parser)
     parser.add_argument(
-        "--welded", action="store_true", help="fix the motors where they are, put tensions of muscles into the springs"
+        "--welded", action="store_true", help="fix the motors where they are, make springs of muscles and tendons"
     )
     help_text = (
         "damping of the springs: that of the file; a time [s], by which their stiffness is multiplied; or critical, for the "
