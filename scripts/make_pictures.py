@@ -21,6 +21,7 @@ PICTURES = (
     "helical_tendons",
     "helix_tube",
     "helix_growth",
+    "helix_actuator",
     "ur5_bench",
     "ur5_with_soft_arm",
 )

@@ -182,6 +182,15 @@ def growing_helix_tube() -> Viewer:
     return viewer
 
 
+def actuated_helix_tube() -> Viewer:
+    """A tube that is straight at rest, under 10 kPa, which its actuator bends into a helix."""
+    tube = HelixTube(actuator="elastic", length=1.1, elastic_sections=18, bending_stiffness=1e-3)
+    model = load_model(tube)
+    viewer = view(model, solve_equilibrium(model, tube.q_motors))
+    viewer.look_from((0.44, 0.11, 0.19), (0.07, 0.16, 0.07))
+    return viewer
+
+
 def characterisation_bench() -> Viewer:
     """A UR5 pushes an inflated link through wrinkling (needs example-robot-data)."""
     row = inflated_beam.TABLE_3[2]
@@ -221,6 +230,7 @@ EXHIBITS = {
     "helical_tendons": Exhibit(helical_tendons, "Tendons that wind around an arm"),
     "helix_tube": Exhibit(sagging_helix_tube, "Helical tube under its own weight"),
     "helix_growth": Exhibit(growing_helix_tube, "Growth of the helical tube", 0.45),
+    "helix_actuator": Exhibit(actuated_helix_tube, "A tube under 10 kPa, bent by its actuator"),
     "ur5_bench": Exhibit(characterisation_bench, "UR5 pushes an inflated link at 30 kPa", 0.8),
     "released_arm": Exhibit(lambda: in_slow_motion(release(), 0.5), "The sagging arm is let go, at half speed", 0.06),
     "helix_in_a_gust": Exhibit(lambda: in_slow_motion(gust(), 0.5), "A helical tube in a gust, at half speed", 0.1),
