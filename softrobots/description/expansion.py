@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from xml.dom import minidom
 
 from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import parse_xml, read_xml
@@ -115,7 +116,10 @@ def _checked_files() -> Iterator[None]:
         if content is None and file.exists():  # xacro reports missing files, which may be optional
             content = read_xml(file)
             parse_xml(content, str(file))
-        return own["parse"](content, filename)
+        document = own["parse"](content, filename)
+        for element in document.getElementsByTagName("*"):
+            element.__class__, element.texts = _Element, dict(element.attributes.items())
+        return document
 
     def evaluated(*arguments: Any) -> Any:
         count(1)
@@ -136,6 +140,64 @@ def _checked_files() -> Iterator[None]:
         yield
     finally:
         vars(xacro).update(own)
+
+
+class _Attribute(NamedTuple):
+    value: str
+
+
+class _Attributes:
+    """What xacro asks of the attributes of an element."""
+
+    def __init__(self, texts: dict[str, str]) -> None:
+        self._texts = texts
+        self.keys = texts.keys
+
+    def items(self) -> list[tuple[str, str]]:
+        return list(self._texts.items())
+
+    def __getitem__(self, name: str) -> _Attribute:
+        return _Attribute(self._texts[name])
+
+
+class _Element(minidom.Element):
+    """Element whose attributes are texts; minidom makes two nodes of each, which takes half of the time of an expansion."""
+
+    texts: dict[str, str]
+    """Attributes by name."""
+
+    def _get_attributes(self) -> _Attributes:
+        return _Attributes(self.texts)
+
+    attributes = property(_get_attributes)
+
+    def getAttribute(self, attname: str) -> str:
+        return self.texts.get(attname, "")
+
+    def getAttributeNode(self, attrname: str) -> _Attribute | None:  # type: ignore[override]
+        return _Attribute(self.texts[attrname]) if attrname in self.texts else None
+
+    def hasAttribute(self, name: str) -> bool:
+        return name in self.texts
+
+    def setAttribute(self, attname: str, value: str) -> None:
+        self.texts[attname] = value
+
+    def removeAttribute(self, name: str) -> None:
+        self.texts.pop(name, None)
+
+    def cloneNode(self, deep: bool) -> _Element:
+        copy = _Element(self.tagName)
+        copy.ownerDocument, copy.texts = self.ownerDocument, dict(self.texts)
+        last: Any = None
+        for child in self.childNodes if deep else ():
+            new: Any = child.cloneNode(deep)
+            new.parentNode, new.previousSibling = copy, last
+            if last is not None:
+                last.nextSibling = new
+            copy.childNodes.append(new)
+            last = new
+        return copy
 
 
 def _replace_node(node: Any, by: Any, content_only: bool = False) -> None:
