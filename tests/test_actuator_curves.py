@@ -98,6 +98,20 @@ def test_a_helix_is_as_long_as_the_closed_form() -> None:
     assert exact * (1.0 - 0.3**2 / 24.0) < length < exact
 
 
+def test_the_tube_of_a_steep_helix_is_not_pinched() -> None:
+    """Its volume is the hexagon across it times its length (Pappus), for twenty turns on half a metre, too."""
+    steep = (route(1, (0.0, 0.5), (0.04, 0.04), (0.0, 40.0 * math.pi)),)
+    tag = ActuatorTag(name="steep", route=steep, rest_length=5.0)
+    (curve,) = actuator_curves(BentSections(MODEL, MODEL.relaxed_motors, np.zeros(MODEL.n_springs)), (tag,))
+    corners, triangles = curve.surface()
+    a, b, c = (corners[triangles[:, place]] for place in range(3))
+    volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+    hexagon = 1.5 * math.sqrt(3.0) * curve.radius**2
+    assert volume == pytest.approx(
+        hexagon * math.hypot(0.5, 0.04 * 40.0 * math.pi), rel=0.03
+    )  # corners of 0.3 rad: 0.3^2 (1/24 + 1/8), more where they are uneven
+
+
 def test_actuators_through_the_same_holes_are_shown_side_by_side() -> None:
     """Tendons from the base to the end of each segment: their curves coincide, what is drawn of them does not."""
     z = np.random.default_rng(8).normal(0.0, 0.1, MODEL.n_springs) * np.tile([1.0, 1.0, 1.0, 0.05], MODEL.n_springs // 4)

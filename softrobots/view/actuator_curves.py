@@ -9,7 +9,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.description.urdf_tags import ActuatorTag, RouteTag
-from softrobots.view.body import BentSections, beside, tube
+from softrobots.view.body import BentSections, outwards, tube
 
 THREAD = 0.09
 """Radius of a line along the body that has no thickness of its own, relative to the radius of the body."""
@@ -31,8 +31,8 @@ class ActuatorCurve:
     """Name of the actuator."""
     points: FloatArray
     """Points along it, shape (n, 3) [m]."""
-    frames: FloatArray
-    """Axes of the cross-section of the body at each point, shape (n, 3, 3)."""
+    outwards: FloatArray
+    """Unit vectors away from the backbone there, shape (n, 3)."""
     radius: float
     """Half its thickness [m]: that of a McKibben muscle or round chamber, if it is thin, else of a thread."""
     shown: FloatArray
@@ -40,7 +40,7 @@ class ActuatorCurve:
 
     def surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
         """Return corners and triangles of the tube around the curve, as `softrobots.view.body.tube`."""
-        return self._tube(self.shown, self.frames, sides)
+        return self._tube(self.shown, self.outwards, sides)
 
     def dashes(self) -> list[FloatArray]:
         """Return the ends of straight dashes along the curve, each shape (2, 3) [m]; gaps are as long as dashes."""
@@ -51,17 +51,17 @@ class ActuatorCurve:
 
     def dashed_surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
         """Return corners and triangles of the dashes; as many whatever the shape of the robot."""
-        nearest = np.rint(np.linspace(0, len(self.frames) - 1, _DASHES)).astype(int)
-        pieces = [self._tube(ends, self.frames[[at, at]], sides) for ends, at in zip(self.dashes(), nearest, strict=True)]
+        nearest = np.rint(np.linspace(0, len(self.outwards) - 1, _DASHES)).astype(int)
+        pieces = [self._tube(ends, self.outwards[[at, at]], sides) for ends, at in zip(self.dashes(), nearest, strict=True)]
         count = len(pieces[0][0])
         triangles = [faces + number * count for number, (_, faces) in enumerate(pieces)]
         return np.concatenate([corners for corners, _ in pieces]), np.concatenate(triangles)
 
-    def _tube(self, points: FloatArray, frames: FloatArray, sides: int) -> tuple[FloatArray, FloatArray]:
+    def _tube(self, points: FloatArray, across: FloatArray, sides: int) -> tuple[FloatArray, FloatArray]:
         """A tube whose cross-sections stand across the curve rather than across the body."""
         z = np.gradient(points, axis=0)
         z /= np.linalg.norm(z, axis=1)[:, None]
-        y = np.cross(z, frames[:, :, 0])
+        y = np.cross(z, across)
         y /= np.linalg.norm(y, axis=1)[:, None]
         return tube(np.stack([np.cross(y, z), y, z], axis=-1), points, self.radius, sides)
 
@@ -82,17 +82,15 @@ def actuator_curves(sections: BentSections, actuators: tuple[ActuatorTag, ...], 
     for number, tag in enumerate(actuators):
         places = [route_places(sections, route, points) for route in tag.route]
         frames = np.concatenate([sections.frames(route.segment, at) for route, at in zip(tag.route, places, strict=True)])
-        curve = np.concatenate([route_points(sections, route, at) for route, at in zip(tag.route, places, strict=True)])
-        centres = frames[:, :3, 3]
+        distance, azimuth = np.concatenate([offsets(route, at) for route, at in zip(tag.route, places, strict=True)], axis=1)
+        away, radius = outwards(frames, azimuth), _radius(tag, sections)
+        curve = frames[:, :3, 3] + distance[:, None] * away
         steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
         kept = np.append(True, steps > _SAME * steps.sum())
-        turns, radius = frames[kept, :3, :3], _radius(tag, sections)
         together, before = starts.count(starts[number]), starts[:number].count(starts[number])
         gap = min(_GAP * radius, tag.distance / max(together - 1, 1))
-        inwards = centres[kept] - curve[kept]
-        aside = np.cross(inwards, turns[:, :, 2]) / np.maximum(np.linalg.norm(inwards, axis=1), 1e-12)[:, None]
-        shown = curve[kept] + (0.5 * (together - 1) - before) * gap * aside
-        curves.append(ActuatorCurve(tag.name, curve[kept], turns, radius, shown))
+        shown = curve + (before - 0.5 * (together - 1)) * gap * np.cross(away, frames[:, :3, 2])
+        curves.append(ActuatorCurve(tag.name, curve[kept], away[kept], radius, shown[kept]))
     return tuple(curves)
 
 
@@ -111,10 +109,9 @@ def route_places(sections: BentSections, route: RouteTag, points: int) -> FloatA
     return np.concatenate([*pieces, [last]])
 
 
-def route_points(sections: BentSections, route: RouteTag, at: FloatArray) -> FloatArray:
-    """Return the points of a route at rest lengths from the start of its segment, shape (n,) [m], shape (n, 3) [m]."""
-    distance, azimuth = np.interp(at, route.at, route.distance), np.interp(at, route.at, route.azimuth)
-    return beside(sections.frames(route.segment, at), distance, azimuth)
+def offsets(route: RouteTag, at: FloatArray) -> FloatArray:
+    """Return distance [m] and azimuth [rad] of a route at rest lengths from the start of its segment, shape (2, n)."""
+    return np.array([np.interp(at, route.at, route.distance), np.interp(at, route.at, route.azimuth)])
 
 
 def _start(tag: ActuatorTag) -> tuple[float, ...]:

@@ -198,7 +198,7 @@ class BentSections:
             bounds = self.bounds(number)
             frames = self.frames(number, np.append(0.0, bounds[:-1, None] + shares * np.diff(bounds)[:, None]))
             lines = {
-                tag.name: beside(frames, np.full(len(frames), tag.distance), np.full(len(frames), tag.azimuth))
+                tag.name: frames[:, :3, 3] + tag.distance * outwards(frames, np.full(len(frames), tag.azimuth))
                 for tag in self._structure.lines
                 if tag.segment == number
             }
@@ -207,10 +207,9 @@ class BentSections:
         return tuple(bodies)
 
 
-def beside(frames: FloatArray, distance: FloatArray, azimuth: FloatArray) -> FloatArray:
-    """Return points beside a backbone at polar coordinates in its cross-sections, shapes (n,) [m, rad], shape (n, 3) [m]."""
-    across = np.cos(azimuth)[:, None] * frames[:, :3, 0] + np.sin(azimuth)[:, None] * frames[:, :3, 1]
-    return np.asarray(frames[:, :3, 3] + distance[:, None] * across)
+def outwards(frames: FloatArray, azimuth: FloatArray) -> FloatArray:
+    """Return unit vectors at azimuths in the cross-sections of frames, shape (n,) [rad], shape (n, 3)."""
+    return np.asarray(np.cos(azimuth)[:, None] * frames[:, :3, 0] + np.sin(azimuth)[:, None] * frames[:, :3, 1])
 
 
 def _pose(rotation: FloatArray, position: FloatArray) -> FloatArray:

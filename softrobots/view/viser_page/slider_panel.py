@@ -54,7 +54,7 @@ class SliderPanel:
         self._reset = False
         limits = zip(model.motor_limits.tolist(), model.actuators.units, model.relaxed_motors.tolist(), strict=True)
         ends = [_ends(low, high, unit, relaxed) for (low, high), unit, relaxed in limits]
-        with gui.add_folder("muscles" if model.n_motors == len(model.muscles) > 0 else "motors", visible=model.n_motors > 0):
+        with gui.add_folder("actuators" if model.n_motors == len(model.muscles) > 0 else "motors", visible=model.n_motors > 0):
             rows = zip(model.motor_joints, model.actuators.units, ends, start.q_motors, strict=True)
             self._motors = [self._slider(name, unit, *between, value) for name, unit, between, value in rows]
         with gui.add_folder("load"):
