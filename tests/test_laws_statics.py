@@ -129,7 +129,7 @@ def test_a_material_and_loads_so_many_times_as_strong_leave_the_shape(kind: str,
     factor, robot, force = 10.0**power, model(kind), case.force(kind)
     harder, motors = scaled(robot, factor), case.motors(robot)
     gravity = None if case.gravity is None else factor * np.array(case.gravity)
-    pulls = factor * motors if robot.muscle_input == "forces" and robot.muscles else motors
+    pulls = np.where(np.array(robot.actuators.units) == "N", factor, 1.0) * motors
     one = sr.solve_equilibrium(robot, motors, force, gravity=case.gravity, tolerance=1e-13)
     other = sr.solve_equilibrium(harder, pulls, factor * force, gravity=gravity, tolerance=1e-13)
     assume(one.stable)

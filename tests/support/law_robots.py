@@ -23,6 +23,7 @@ PUSHES = {
     "pcc": 2.0,
     "pulled": 2.0,
     "pcc_lumped": 2.0,
+    "tendons": 0.3,
     "helix": 4.0,
     "helix_lumped": 4.0,
     "mounted": 2.0,
@@ -52,11 +53,14 @@ def model(kind: str) -> sr.SoftModel:
         "pcc": lambda: sr.PccArm(elastic_sections=2),
         "pulled": lambda: sr.PccArm(elastic_sections=2),
         "pcc_lumped": lambda: sr.PccArm(chain="lumped", hinges=3, offset=np.pi),  # its hinges have two planes of symmetry
+        "tendons": lambda: sr.TendonArm(
+            segment_lengths=(0.06, 0.06), elastic_sections=2, tendon_pretension=100.0
+        ),  # never slack
         "helix": lambda: sr.HelixTube(**tube),
         "helix_left": lambda: sr.HelixTube(**tube, handedness="left"),
         "helix_lumped": lambda: sr.HelixTube(**tube, chain="lumped"),
     }[kind]()
-    return sr.load_model(robot, muscles="forces" if kind == "pulled" else "lengths")
+    return sr.load_model(robot, muscles="forces" if kind == "pulled" else None)
 
 
 # --- What is drawn
@@ -93,7 +97,8 @@ class Case(NamedTuple):
         """Motor coordinates of a robot."""
         joints = robot.n_motors - len(robot.muscles)
         each = np.full(robot.n_motors, 2.0)
-        each[joints:] = 10.0 if robot.muscle_input == "forces" else 0.04 * robot.relaxed_motors[joints:]
+        lengths = np.array(robot.actuators.units[joints:]) == "m"
+        each[joints:] = np.where(lengths, 0.04 * robot.relaxed_motors[joints:], 10.0)
         return robot.relaxed_motors + each * self.shares[: robot.n_motors]
 
     def force(self, kind: str) -> np.ndarray:
@@ -111,7 +116,7 @@ def cases(largest: float = 0.3, gravity: st.SearchStrategy[Any] = gravities) -> 
 
 def scaled(robot: sr.SoftModel, factor: float) -> sr.SoftModel:
     """The robot of a material, pressure and muscles so many times as stiff and strong, by its text."""
-    names = "EI|GJ|EA|stiffness|max_moment|pressure|strongest"
+    names = "EI|GJ|EA|stiffness|pretension|max_moment|pressure|max_pressure|weakest|strongest"
     text = re.sub(rf'\b({names})="([^"]+)"', lambda at: f'{at[1]}="{float(at[2]) * factor!r}"', robot.urdf)
     springs = {name: (factor * stiffness, rest) for name, (stiffness, rest) in robot.spring_table.items()}
     return sr.load_model(text, springs=springs, motors=robot.structure.motor_joints, tip=robot.tip, muscles=robot.muscle_input)
@@ -166,7 +171,7 @@ def stored_energy(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray) 
 
 
 def load_energy(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray, force: np.ndarray, gravity: Any) -> float:
-    """Potential of a force on the tip, of weight and of given tensions [J]."""
+    """Potential of a force on the tip, of weight and of given tensions or elastic tendons [J]."""
     pinocchio = robot.pinocchio
     data = pinocchio.createData()
     pin.framesForwardKinematics(pinocchio, data, robot.configuration(motors, springs))
@@ -176,7 +181,12 @@ def load_energy(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray, fo
             body = pinocchio.inertias[joint]
             energy -= body.mass * float(np.dot(gravity, data.oMi[joint].act(body.lever)))
     if robot.muscles and robot.muscle_input == "forces":
-        energy += float(motors[-len(robot.muscles) :] @ muscle_lengths(robot, robot.structure.strains(motors, springs)))
+        inputs = motors[-len(robot.muscles) :]
+        for tag, u, length in zip(robot.muscles, inputs, muscle_lengths(robot, springs), strict=True):
+            if tag.kind == "elastic":
+                energy += max(tag.pretension + tag.stiffness * (length - u), 0.0) ** 2 / (2.0 * tag.stiffness)
+            else:
+                energy += u * length
     return energy
 
 
