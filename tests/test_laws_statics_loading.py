@@ -60,6 +60,8 @@ def test_the_work_of_a_force_that_grows_slowly_is_the_energy_stored(kind: str, c
         assume(well_inside(found))
         springs = found.q_springs
         states.append(found)
+    if kind == "slack":  # where the wall of a link goes slack the path has a kink, which no polynomial has
+        assume(len({tuple(found.link_limits.slack_margins > 0.0) for found in states}) == 1)
     tips = np.array([found.tip_position for found in states])
     work = force @ (tips[-1] - 0.5 * weights @ tips[1:-1])
     stored = [
