@@ -42,6 +42,7 @@ TUBE_MASS = 920.0 * np.pi * 0.0331 * 1e-4 * 1.5  # wall of the helical tube
 LINK_MASS = 1300.0 * 2 * np.pi * 0.055 * 0.0005 * 0.6 + 2 * 0.1  # wall of an inflated link, two caps
 MASSES = dict.fromkeys(("inflatable_arm", "inflatable_arm_two_hinges"), (2.0, 2 * LINK_MASS))
 MASSES |= {"pcc_arm": (2.0, 1.048 * 0.6), "pcc_arm_lumped": (2.0, 1.048 * 0.6)}
+MASSES |= dict.fromkeys(("tendon_arm", "tendon_arm_lumped"), (2.0, 0.05))
 MASSES |= {"helix_tube": (0.5, TUBE_MASS), "helix_tube_lumped": (0.5, TUBE_MASS)}
 """Mass of the base and of what moves [kg]."""
 

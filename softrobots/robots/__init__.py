@@ -20,7 +20,7 @@ ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
     "pcc_arm": PccArm,
     "pcc_arm_lumped": partial(PccArm, chain="lumped"),
     "tendon_arm": TendonArm,
-    "tendon_arm_lumped": partial(TendonArm, chain="lumped"),
+    "tendon_arm_lumped": partial(TendonArm, chain="lumped", hinges=8),  # PyBullet takes at most 127 joints
     "helix_tube": HelixTube,
     "helix_tube_lumped": partial(HelixTube, chain="lumped"),
 }
