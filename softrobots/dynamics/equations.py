@@ -11,7 +11,8 @@ and the power of any motion gives (Featherstone, Rigid Body Dynamics Algorithms,
 
 with the inverse dynamics `ID` of the rigid bodies and their weight, the elastic energy `V`, a constant damping `D` and the
 inertia `A` of rotors. `r` is what has to act on each coordinate from outside: zero on an elastic coordinate, the force of the
-actuator on an actuator. A muscle whose tension is given has the tension as its coordinate, which moves nothing by itself.
+actuator on an actuator. A muscle whose length is free has what it is given as its coordinate, which moves nothing by itself;
+the energy of an elastic tendon is part of `V`.
 """
 
 from __future__ import annotations
@@ -63,7 +64,10 @@ class EquationsOfMotion:
             self.rotor_inertia[: self.n_motors] = drives.rotor_inertia
             self.damping[: self.n_motors, : self.n_motors] += np.diag(drives.damping)
         self._undamped, self._rotorless = not self.damping.any(), not self.rotor_inertia.any()
-        self._tensions = slice(model.actuators.n_placed, self.n_motors)
+        self._laws = model.structure.actuator_laws
+        kinds = () if self._laws is None else self._laws.kinds
+        self._springy = np.array([kind == "elastic" for kind in kinds], dtype=bool)
+        self._pushing = model.actuators.n_placed + np.flatnonzero(~self._springy)
         self._applied: tuple[Any, AppliedLoad] | None = None
         self._last: tuple[bytes, Point] | None = None
         self._motors_move = drives is not None
@@ -143,13 +147,20 @@ class EquationsOfMotion:
             stretch = x[m:] - springs.rest
             strains = structure.strain_springs.at(structure.strains(x[:m], x[m:]))[0]
             elastic += strains - 0.5 * float(springs.stiffness.dot(stretch * stretch))
+        if self._laws is not None and self._springy.any():
+            elongation, inputs = structure.muscle_paths.at(x[m:]).elongation, x[self.model.actuators.n_placed : m]
+            elastic += float(self._laws.at(elongation, inputs).energy[self._springy].sum())
         return kinetic, elastic, float(potential)
 
     def actuator_rates(self, x: FloatArray, rates: FloatArray) -> FloatArray:
-        """Rates with which actuators move, shape (n_motors,): those of the lengths where tensions are given [rad/s, m/s]."""
+        """Rates with which actuators move, shape (n_motors,) [rad/s, m/s].
+
+        They are those of the lengths where tensions or pressures are given, and those of the motors of elastic tendons.
+        """
         moving = np.array(rates[: self.n_motors])
-        if self._tensions.start < self.n_motors:
-            moving[self._tensions] = self.model.structure.muscle_paths.at(x[self.n_motors :]).arms @ rates[self.n_motors :]
+        if len(self._pushing):
+            lengths = self.model.structure.muscle_paths.at(x[self.n_motors :]).arms @ rates[self.n_motors :]
+            moving[self._pushing] = lengths[~self._springy]
         return moving
 
     def _joint_load(self, q: FloatArray, wrenches: Mapping[str, FloatArray]) -> FloatArray:

@@ -20,6 +20,7 @@ from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 
+_GIVEN = {"N": "tension", "m": "motor", "Pa": "pressure"}  # what actuators of free length are given, by its unit
 _TIP = ("tip_x", "tip_y", "tip_z", "tip_turn_x", "tip_turn_y", "tip_turn_z")
 _TIP_UNITS = ("m",) * 3 + ("rad",) * 3
 
@@ -45,8 +46,8 @@ class LinearModel:
     state_units: tuple[str, ...]
     """Unit of each."""
     input_names: tuple[str, ...]
-    """`<motor>_acceleration`, or `<motor>_torque` [N m] and `<motor>_force` [N]; `<muscle>_tension` of muscles of given
-    tension; `tip_force_x`, `_y`, `_z`."""
+    """`<motor>_acceleration`, or `<motor>_torque` [N m] and `<motor>_force` [N]; `<muscle>_tension`, `_motor` [m] (the
+    length at the motor of an elastic tendon) or `_pressure` of those whose length is free; `tip_force_x`, `_y`, `_z`."""
     input_units: tuple[str, ...]
     """Unit of each."""
     output_names: tuple[str, ...]
@@ -92,7 +93,7 @@ def linearize(
       the motors.
 
     The force at the tip is an input of both. Turns of the tip are small, about the axes of the world. A muscle of given length
-    is a motor, and what it exerts along its length is minus its tension; a muscle of given tension is an input.
+    is a motor, and what it exerts along its length is minus its tension; what the others are given are inputs.
 
     Args:
         model: The robot.
@@ -126,7 +127,8 @@ def linearize(
         motor_inputs = tuple(f"{name}_acceleration" for name in placed)
         motor_input_units = tuple(f"{unit}/s^2" for unit in units)
         motor_outputs, motor_output_units = torques, load_units(units)
-    tensions = tuple(f"{name}_tension" for name in model.motor_joints[small.n_placed :])
+    given = model.actuators.units[small.n_placed :]
+    inputs = tuple(f"{name}_{_GIVEN[unit]}" for name, unit in zip(model.motor_joints[small.n_placed :], given, strict=True))
     states, state_units = _with_rates((*placed, *model.spring_joints), (*units, *model.springs.units))
     a, b, c, d = map(read_only, matrices)
     return LinearModel(
@@ -138,8 +140,8 @@ def linearize(
         D=d,
         state_names=states,
         state_units=state_units,
-        input_names=(*motor_inputs, *tensions, *(f"tip_force_{axis}" for axis in "xyz")),
-        input_units=(*motor_input_units, *("N" for _ in tensions), *("N" for _ in "xyz")),
+        input_names=(*motor_inputs, *inputs, *(f"tip_force_{axis}" for axis in "xyz")),
+        input_units=(*motor_input_units, *given, *("N" for _ in "xyz")),
         output_names=(*_TIP, *motor_outputs),
         output_units=(*_TIP_UNITS, *motor_output_units),
     )
