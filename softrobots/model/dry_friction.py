@@ -132,6 +132,13 @@ class DryFriction:
             stiffness += paths.stiffening(pull) + slips.T @ (sticking[:, None] * slips)
         return energy, torque, stiffness
 
+    def sticks(self, strains: FloatArray, memory: FrictionMemory) -> bool:
+        """Return whether nothing slips at strains, shape (count,)."""
+        apart = np.linalg.norm(strains[self._places] - memory.bending, axis=1)
+        if self.guided and np.any(np.abs(self._slipped(self._paths.at(strains).pieces, memory)) > self._stick):
+            return False
+        return not np.any(apart > _BENDING_STICK)
+
     def _slipped(self, pieces: FloatArray, memory: FrictionMemory) -> FloatArray:
         """Displacement of the actuators from the sliders of their guides, shape (n_guides,) [m]."""
         return np.asarray(memory.slip + self._beyond @ (memory.pieces - pieces))

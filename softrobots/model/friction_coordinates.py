@@ -29,10 +29,15 @@ class FrictionCoordinates:
         """What friction remembers."""
         self.grip = grip
         """Friction of each guide that slips, shape (n_guides,) [N]."""
+        self.slides = False
+        """Whether the derivatives are those of slip everywhere where nothing slips."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> FrictionPoint:
         """Return the robot at given coordinates."""
-        return FrictionPoint(self._inner.at(motors, elastic), *self.friction.at(elastic, self.memory, self.grip))
+        energy, torque, stiffness = self.friction.at(elastic, self.memory, self.grip)
+        if self.slides and self.friction.sticks(elastic, self.memory):
+            stiffness = np.zeros_like(stiffness)
+        return FrictionPoint(self._inner.at(motors, elastic), energy, torque, stiffness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +121,12 @@ def remembering(model: SoftModel, memory: FrictionMemory) -> SoftModel:
     return replace(model, coordinates=_rubbed(model.coordinates, memory, np.zeros(friction.n_guides)))
 
 
+def slipping(model: SoftModel) -> SoftModel:
+    """Return the robot with the derivatives of slip where nothing slips, by which a search leaves such a state."""
+    last = _rubbing(model.coordinates)
+    return replace(model, coordinates=_rubbed(model.coordinates, last.memory, last.grip, slides=True))
+
+
 def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: FloatArray) -> tuple[SoftModel, float]:
     """Return the robot with the friction of its guides at given coordinates and loads, and how much that changed [N].
 
@@ -136,10 +147,10 @@ def _rubbing(coordinates: Any) -> FrictionCoordinates:
     return coordinates if isinstance(coordinates, FrictionCoordinates) else _rubbing(coordinates.inner)
 
 
-def _rubbed(coordinates: Any, memory: FrictionMemory, grip: FloatArray) -> Any:
+def _rubbed(coordinates: Any, memory: FrictionMemory, grip: FloatArray, slides: bool = False) -> Any:
     changed = copy.copy(coordinates)
     if isinstance(changed, FrictionCoordinates):
-        changed.memory, changed.grip = memory, grip
+        changed.memory, changed.grip, changed.slides = memory, grip, slides
     else:
-        changed.inner = _rubbed(changed.inner, memory, grip)
+        changed.inner = _rubbed(changed.inner, memory, grip, slides)
     return changed

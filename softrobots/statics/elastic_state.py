@@ -103,13 +103,18 @@ class ElasticProblem:
 
 def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
     """Evaluate residual, tangent stiffness and energy at actuator and elastic coordinates; see `ElasticProblem.state`."""
+    return rubbing_state(model, q_motors, q_springs, load)[1]
+
+
+def rubbing_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> tuple[SoftModel, ElasticState]:
+    """Evaluate the same, and return the robot with the friction that its guides have there; the robot itself without guides."""
     with one_blas_thread(model.n_springs):
         state = ElasticProblem(model, q_motors, load).state(q_springs)
         change = math.inf if model.structure.guided else 0.0
         while change > SAME_FRICTION * float(np.abs(state.load.motors).max(initial=0.0)):
             model, change = gripped(model, q_motors, q_springs, state.load.motors)
             state = ElasticProblem(model, q_motors, load).state(q_springs)
-        return state
+        return model, state
 
 
 def _out_of_range(model: SoftModel, q_springs: FloatArray, q: FloatArray, point: Point) -> ElasticState:

@@ -12,10 +12,10 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.actuators import slack_tendons
-from softrobots.model.friction_coordinates import after_step, gripped
+from softrobots.model.friction_coordinates import after_step
 from softrobots.model.link_limits import LinkLimits, link_limits, link_moments, near_largest_moment
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual, rubbing_state
 from softrobots.statics.elastostatics import METHODS, solve_springs
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
@@ -264,8 +264,8 @@ def equilibrium_from_state(
     stable: bool | None = None,
 ) -> Equilibrium:
     """Result of a state; `stable` if it is already known."""
-    if model.structure.guided:
-        model, _ = gripped(model, q_motors, state.q_springs, state.load.motors)
+    if model.structure.friction is not None:
+        model, state = rubbing_state(model, q_motors, state.q_springs, load)
     return Equilibrium(
         model=model,
         load=load,

@@ -10,8 +10,9 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import ParameterError
+from softrobots.model.friction_coordinates import slipping
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastic_state import ElasticState
+from softrobots.statics.elastic_state import ElasticState, elastic_state
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
@@ -141,6 +142,8 @@ class LoadedTip:
         state = balanced_state(self.model, q_motors, self.load, start, method=self.method)
         if state is None:
             return None
+        if self.model.structure.friction is not None:  # where it sticks, the tip would not move at all
+            state = elastic_state(slipping(self.model), q_motors, state.q_springs, self.load)
         translation, turn = self.goal.missing(self.model, state.q)
         return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)))
 

@@ -234,7 +234,7 @@ def _exact_steps(
                 reached = _jump(tip, target, here.q_motors, tolerance)
             except TargetUnreachable as error:
                 raise _named(error, number, len(goals)) from error
-            if not allow_jumps:
+            if not allow_jumps and model.structure.friction is None:  # friction holds the tip while motors move
                 apart = reached.q_motors - here.q_motors
                 wrist = spherical_wrist(model) if target.rotation is not None else None
                 singular = None if wrist is None else wrist.singularity(here.state.q, NEAR_SINGULAR)
