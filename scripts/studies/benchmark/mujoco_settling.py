@@ -91,7 +91,7 @@ class SettlingArm:
         self.model.dof_damping[:] = damping
 
     def settle(self, q_motors: FloatArray, force: FloatArray) -> tuple[FloatArray, int]:
-        """Simulate from the relaxed springs at rest until nothing moves, weightless.
+        """Simulate from the relaxed springs at rest until nothing moves.
 
         Args:
             q_motors: Motor angles, shape (n_motors,) [rad].
@@ -105,14 +105,10 @@ class SettlingArm:
         """
         mujoco, model, data = self._mujoco, self.model, self.data
         mujoco.mj_resetData(model, data)
-        for (body, axis, placed), angle in zip(self._motors, q_motors.tolist(), strict=True):
-            turn = np.zeros(4)
-            mujoco.mju_axisAngle2Quat(turn, axis, angle)
-            mujoco.mju_mulQuat(model.body_quat[body], placed, turn)
         data.qpos[:] = model.qpos_spring
-        data.xfrc_applied[self._tip, :3] = force
+        moment = self._apply(q_motors, force)
         damping = float(model.dof_damping[0])
-        slow = TOLERANCE * math.sqrt(float(force @ force)) * self._reach / damping
+        slow = TOLERANCE * moment / damping
         steps, speed = 0, math.inf
         while steps < _MOST:
             mujoco.mj_step(model, data, nstep=self.stride)
@@ -124,6 +120,15 @@ class SettlingArm:
                 return data.qpos[self._springs], steps
         message = f"MuJoCo did not settle in {steps} steps of {model.opt.timestep:g} s with damping {damping:g} N m s/rad"
         raise NotConverged(message, best=np.array(data.qpos[self._springs]), residual=damping * speed, iterations=steps)
+
+    def _apply(self, q_motors: FloatArray, force: FloatArray) -> float:
+        """Put motors and load in place; return the size of the moment of the load [N m]."""
+        for (body, axis, placed), angle in zip(self._motors, q_motors.tolist(), strict=True):
+            turn = np.zeros(4)
+            self._mujoco.mju_axisAngle2Quat(turn, axis, angle)
+            self._mujoco.mju_mulQuat(self.model.body_quat[body], placed, turn)
+        self.data.xfrc_applied[self._tip, :3] = force
+        return math.sqrt(float(force @ force)) * self._reach
 
     def tune(
         self,
@@ -171,3 +176,33 @@ class SettlingArm:
         except NotConverged:
             return Tuning(*setting, math.inf, math.inf)
         return Tuning(*setting, (time.process_time() - began) / len(forces), steps / len(forces))
+
+
+class SettlingTendons(SettlingArm):
+    """A robot of hinges in MuJoCo that tendons bend, with its weight; the inputs of its actuators are MuJoCo's `ctrl`."""
+
+    def __init__(self, model: SoftModel, gravity: tuple[float, float, float]) -> None:
+        """Make MuJoCo's model.
+
+        Args:
+            model: A robot with actuators along lumped sections, and no motor joints.
+            gravity: Gravity, world axes [m/s^2].
+
+        Raises:
+            MissingDependency: If MuJoCo is not installed.
+        """
+        try:
+            import mujoco
+        except ImportError as error:
+            raise MissingDependency("mujoco", "interop") from error
+        self._mujoco = mujoco
+        self.model = mujoco.MjModel.from_xml_string(to_mjcf(model, gravity=gravity, limits=False))
+        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        self.data = mujoco.MjData(self.model)
+        self._springs = [int(self.model.joint(name).qposadr[0]) for name in model.spring_joints]
+        weight = float(sum(body.mass for body in model.pinocchio.inertias)) * math.hypot(*gravity)
+        self._moment, self.stride = float(weight * model.reach), STRIDES[0]
+
+    def _apply(self, q_motors: FloatArray, force: FloatArray) -> float:
+        self.data.ctrl[:] = q_motors
+        return self._moment

@@ -200,8 +200,12 @@ def _figure(row: Row) -> str:
 
 
 def _target(row: Row) -> str:
-    unit = {"s": " s", "bytes": " B"}.get(row.unit, "x")
-    return "" if row.target is None else f"{row.bound} {row.target:g}{unit}"
+    if row.target is None:
+        return ""
+    size, unit = 1.0, {"s": " s", "bytes": " B"}.get(row.unit, "x")
+    if row.unit == "s" and row.target < 1.0:
+        size, unit = (1e-3, " ms") if row.target >= 1e-3 else (1e-6, " us")
+    return f"{row.bound} {row.target / size:g}{unit}"
 
 
 def _three(value: float) -> str:
