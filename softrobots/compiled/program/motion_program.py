@@ -25,7 +25,7 @@ def check_motion(unknowns: Unknowns, *, full_damping: bool = False) -> None:
     """Refuse robots whose motion is not compiled.
 
     Raises:
-        ParameterError: If muscle lengths are given, or the damping of a long chain is a matrix.
+        ParameterError: If the motion of its actuators is not compiled, or the damping of a long chain is a matrix.
     """
     what = "a damping matrix (mass_damping)" if full_damping and not unknowns.is_unrolled else ""
     if unknowns.chain.routed:
@@ -39,7 +39,7 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False) -> Pr
     """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix.
 
     Raises:
-        ParameterError: If muscle lengths are given, or the damping of a long chain is a matrix.
+        ParameterError: If the motion of its actuators is not compiled, or the damping of a long chain is a matrix.
     """
     check_motion(unknowns, full_damping=full_damping)
     plan = MotionPlan(unknowns, full_damping)

@@ -74,7 +74,7 @@ class CompiledDynamics(CompiledStatics):
             The motion; its torques and energies are computed when they are first asked for, by Pinocchio.
 
         Raises:
-            ParameterError: If an argument has the wrong shape, is not finite or out of range, or muscle lengths are given.
+            ParameterError: If an argument has the wrong shape, is not finite or out of range, or its actuators are refused.
             NotConverged: If a step fails, however short, or the tolerance is not met; `best` is the motion so far.
         """
         end = positive_number("duration", duration, "s")
@@ -156,7 +156,7 @@ class CompiledDynamics(CompiledStatics):
             The state at the end.
 
         Raises:
-            ParameterError: If an argument has the wrong shape, is not finite or out of range, or muscle lengths are given.
+            ParameterError: If an argument has the wrong shape, is not finite or out of range, or its actuators are refused.
             NotConverged: If the step fails, even in small parts; `best` is None.
         """
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
@@ -218,7 +218,7 @@ class CompiledDynamics(CompiledStatics):
             One motion a case. The status tells which cases failed; a failed case does not affect others.
 
         Raises:
-            ParameterError: If an argument has the wrong shape or is out of range, or muscle lengths are given.
+            ParameterError: If an argument has the wrong shape or is out of range, or its actuators are refused.
             NotConverged: If the tolerance is not met; `best` is the batch so far.
         """
         end = positive_number("duration", duration, "s")

@@ -76,7 +76,7 @@ class CompiledStatics:
             motion: Return the code of motion instead, which always has gravity.
 
         Raises:
-            ParameterError: If motion is asked for and muscle lengths are given.
+            ParameterError: If motion is asked for and that of its actuators is not compiled.
         """
         program = make_motion_program(self._unknowns) if motion else self._run(gravity).program
         return str(program.text + ("\n\n" + program.lane_text if lanes else ""))
@@ -95,8 +95,8 @@ class CompiledStatics:
             motion: Return the code of motion instead of that of statics; it always has gravity.
 
         Raises:
-            ParameterError: If the prefix is not an identifier of C, the robot cannot have poses as targets, or muscle lengths
-                are given and motion is asked for.
+            ParameterError: If the prefix is not an identifier of C, the robot cannot have poses as targets, or motion is asked
+                for and that of its actuators is not compiled.
         """
         from softrobots.compiled.c.source import to_c
 
