@@ -38,6 +38,13 @@ ROUTES: dict[str, list[Piece]] = {
 }
 """A helix through both segments, a cone within the first, a straight chamber from its middle on, and a helical cone."""
 
+
+def coil(azimuth: float) -> str:
+    """A muscle of given length that winds through one and a half segments and comes nearer to the backbone."""
+    on, back = (azimuth, azimuth + 0.6), (azimuth + 0.6, azimuth)
+    return actuator(f"coil_{azimuth}", (1, (0.1, 0.5), (0.04, 0.04), on), (2, (0.0, 0.3), (0.04, 0.03), back), kind="length")
+
+
 ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
     "tendons": lambda: sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.0625), elastic_sections=2)),
     "winding": lambda: routed(*(actuator(kind, *ROUTES[kind], kind=kind, **law) for kind, law in LAWS.items()), **ARM),
@@ -45,6 +52,10 @@ ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
     "lumped": lambda: sr.load_model(
         sr.PccArm(segment_lengths=LENGTHS, chain="lumped", hinges=1, kind=("mckibben", "elastic"), routing="base")
     ),
+    "lengths_on_an_arm": lambda: sr.load_model(
+        sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="length", routing="base"))
+    ),
+    "winding_lengths": lambda: routed(*(coil(place) for place in (0.0, 2.0, 4.0)), **ARM),
     "on_an_arm": lambda: sr.load_model(
         sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="elastic", routing="base"))
     ),
@@ -66,14 +77,12 @@ def searching(name: str, *, gravity: bool = False) -> LoopedSearch:
 
 
 def inputs(model: sr.SoftModel, rng: np.random.Generator) -> np.ndarray:
-    """Motor joints up to a radian; tendons pulled or let go by up to 3 %, so that some are slack; pressures and tensions."""
+    """Motor joints up to a radian; lengths that differ by up to 3 %, so that tendons are slack; pressures and tensions."""
     largest = {"mckibben": 1e5, "pressure": 1e5, "tension": 20.0}
     motors = rng.uniform(-1.0, 1.0, model.n_motors)
     for place, tag in enumerate(model.muscles, start=model.n_motors - len(model.muscles)):
-        pulled = (
-            tag.rest_length * rng.uniform(0.97, 1.03) if tag.kind == "elastic" else rng.uniform(0.0, largest.get(tag.kind, 0))
-        )
-        motors[place] = pulled
+        pulled = tag.rest_length * rng.uniform(0.97, 1.03)
+        motors[place] = rng.uniform(0.0, largest[tag.kind]) if tag.kind in largest else pulled
     return motors
 
 
@@ -101,7 +110,7 @@ def test_equilibria_are_those_of_the_general_engine(name: str, gravity: Any, rng
         assert np.abs(here.tip_position - there.transform_tip_to_world.translation).max() < 1e-9 * model.reach
         assert np.abs(springs - here.q_springs).max() < 1e-9
         slack += int(np.sum(there.muscle_forces == 0.0))
-    assert slack > 0 or name in ("winding", "by_segment")
+    assert slack > 0 or name not in ("tendons", "lumped", "on_an_arm")
 
 
 def slope(function: Callable[[np.ndarray], Any], z: np.ndarray) -> np.ndarray:
@@ -139,7 +148,7 @@ def test_balance_of_curves_in_a_rod(rng: np.random.Generator) -> None:
         assert np.abs(torques).max() < 1e-9  # of springs of 4 N m/rad and tensions of 30 N
 
 
-@pytest.mark.parametrize("name", ["tendons", "winding", "lumped", "on_an_arm"])
+@pytest.mark.parametrize("name", ["tendons", "winding", "lumped", "winding_lengths", "on_an_arm"])
 def test_what_actuators_do_and_feel(name: str, rng: np.random.Generator) -> None:
     """The Jacobian and loads are those of Pinocchio's path; loads change by a force as differences say."""
     model, search = robot(name), searching(name, gravity=True)
@@ -160,7 +169,7 @@ def test_what_actuators_do_and_feel(name: str, rng: np.random.Generator) -> None
 
     size = 1e-5 * float(np.linalg.norm(force))
     assert np.abs(central_difference(felt, np.zeros(3), size) - feeling).max() <= 1e-5 * np.abs(feeling).max()
-    if name == "tendons":  # their energy is u's and the force's alone: tensions by a force are positions by an input
+    if name in ("tendons", "winding_lengths"):  # the tension is the slope of the energy by the input
         assert np.abs(feeling - search.jacobian(state.w).T).max() <= 1e-9 * np.abs(feeling).max()
 
 
@@ -197,12 +206,14 @@ def test_what_is_not_compiled_is_refused_by_name() -> None:
     )
     with pytest.raises(sr.DescriptionError, match=r"\(coil\).*straight ones along lumped sections"):
         sr.compile(winding, backend="python")
+    with pytest.raises(sr.DescriptionError, match="lengths that do not depend on each other"):
+        sr.compile(sr.load_model(sr.PccArm(**ARM, routing="base", muscle_azimuths=(0.0, 1.5, 3.0, 4.5))), backend="python")
     with pytest.raises(sr.ParameterError, match="actuators but those of given tension"):
         solver("tendons").simulate(0.1, robot("tendons").relaxed_motors)
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("name", ["tendons", "winding"])
+@pytest.mark.parametrize("name", ["tendons", "winding_lengths"])
 def test_the_same_in_c(name: str, tmp_path: Path, rng: np.random.Generator) -> None:
     """Equilibria with weight, and the Jacobian from the response of the tip; sine and cosine differ from libm's by an ulp."""
     model, heavy = robot(name), solver(name)._run(True)

@@ -8,6 +8,7 @@ x, y or z, `A` is a signed permutation, so that zeros stay exact.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,8 @@ def read_chain(
 
     Raises:
         DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, the springs of a slack
-            wall are not two that turn, one behind the other, an actuator winds along lumped sections, or given lengths are
-            other than those of three or more that run straight along a whole segment.
+            wall are not two that turn, one behind the other, an actuator winds along lumped sections, or given lengths
+            depend on each other otherwise than those of muscles that run straight along a whole segment.
     """
     _check_actuators(str(pinocchio_model.name), structure)
     tip = pinocchio_model.frames[tip_frame]
@@ -49,7 +50,7 @@ def read_chain(
     tip_rotation, tip_translation = _placed(tip.placement, axes)
     springs, given = structure.strain_springs, structure.muscle_lengths
     count, muscles = len(springs.names), len(structure.muscles)
-    return SerialChain(
+    chain = SerialChain(
         name=str(pinocchio_model.name),
         elements=elements,
         tip_rotation=tip_rotation,
@@ -69,21 +70,22 @@ def read_chain(
         free=read_only(np.eye(count)) if given is None else given.free,
         slack_hinges=_slack_hinges(str(pinocchio_model.name), elements, groups),
     )
+    return replace(chain, constrained=(), constrained_slope=read_only(np.zeros((0, muscles)))) if chain.routed else chain
 
 
 def _check_actuators(name: str, structure: Structure) -> None:
     """Refuse actuators that compiled solvers do not take."""
     paths, held, muscles = structure.muscle_paths, structure.muscle_lengths, structure.muscles
-    unlike = {tag.name for tag in muscles if tag.kind == "length" and (len(tag.segments) > 1 or not tag.straight)}
-    if held is not None and not held.groups:
-        unlike |= {tag.name for tag in muscles}
+    unlike: set[str] = set()
+    if held is not None and len(held.slopes) != len(muscles):
+        unlike = {tag.name for tag in muscles if not held.groups or len(tag.segments) > 1 or not tag.straight}
     if paths.lumped:
         unlike |= {muscles[muscle].name for muscle in paths.muscle[~paths.separable].tolist()}
     if unlike:
         raise DescriptionError(
             f"{name} has actuators that compiled solvers do not take ({', '.join(sorted(unlike))}); required: straight ones "
-            "along lumped sections, and for given lengths three or more along one whole segment each (solve_equilibrium "
-            "accepts the others, too)"
+            "along lumped sections, and given lengths that do not depend on each other, or those of muscles along one whole "
+            "segment each (solve_equilibrium accepts the others, too)"
         )
 
 

@@ -63,10 +63,10 @@ class Layout:
     """Force on the tip, world axes [N] (3)."""
     gravity: int = field(init=False)
     """Gravity, world axes [m/s^2] (3)."""
-    actuators: int = field(init=False)
-    """Input of each muscle whose length is not given: tension [N], length of the motor [m] or pressure [Pa]."""
     held: int = field(init=False)
-    """Multiplier of each constrained sum at the last point, beyond those of the start [N m or N]."""
+    """Multiplier of each constrained sum at the last point, beyond those of the start [N m or N]; of lengths, tensions [N]."""
+    actuators: int = field(init=False)
+    """Input of each muscle, without constrained sums: length, or that of the motor [m], tension [N] or pressure [Pa]."""
     start: int = field(init=False)
     """Start of the search where muscle lengths constrain sums of the unknowns [rad or m]; others start at rest."""
     unknown: int = field(init=False)
@@ -103,7 +103,7 @@ class Layout:
         motors, n = self.motors, self.unknowns
         point = self.varied + n
         before_tip = dict(
-            actuators=self.muscles, held=self.constraints, start=n, unknown=n, step=n, line_origin=n, line_direction=n
+            held=self.constraints, actuators=self.muscles, start=n, unknown=n, step=n, line_origin=n, line_direction=n
         )
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
         searches = dict(tip=3, torques=motors, target=self.target_size, next_target=self.target_size)

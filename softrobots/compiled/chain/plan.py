@@ -31,7 +31,7 @@ class Plan:
     def layout(self) -> Layout:
         """Places of the numbers of a case."""
         unknowns, conditions = self.unknowns, 6 if self.poses else 3
-        counts = unknowns.n_tensions, len(unknowns.chain.constrained)
+        counts = unknowns.n_tensions, unknowns.n_constraints
         return Layout(unknowns.chain.n_motors, len(unknowns.strains), conditions, *counts)
 
     @cached_property

@@ -17,8 +17,9 @@ from softrobots.compiled.settings import LARGEST_NUMBER, LARGEST_POSITION, MAX_U
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
+from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NameNotFound, ParameterError
-from softrobots.model.actuator_laws import ActuatorLaws
+from softrobots.model.actuator_laws import ROUNDING, ActuatorLaws
 from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain, strains_of
 
 STRETCHED = ("elastic", "mckibben")
@@ -54,6 +55,10 @@ class Unknowns:
         for name in self.locked:
             if name not in STRAINS:
                 raise NameNotFound("section strain", name, STRAINS)
+        if self.locked and self.held_lengths:
+            raise ParameterError(
+                "locked_strains", self.locked, "empty for muscles of given length that wind or pass several segments"
+            )
         if set(self.locked) == set(STRAINS):
             raise ParameterError("locked_strains", self.locked, "three strains at most: with all four a section is rigid")
         constrained = {strain for group in self.chain.constrained for strain in group}
@@ -101,7 +106,7 @@ class Unknowns:
         groups = tuple(
             number for number, group in enumerate(chain.constrained) if first <= self.chain.element_of[group[0]] <= last
         )
-        stretched = tuple(one for one in muscles if chain.actuators[one].kind in STRETCHED)
+        stretched = tuple(one for one in muscles if self.held_lengths or chain.actuators[one].kind in STRETCHED)
         ordered = [*stretched, *(one for one in muscles if one not in stretched)] if self.chain.routed else sorted(muscles)
         return Segment(first, last, groups, tuple(ordered), stretched)
 
@@ -198,14 +203,30 @@ class Unknowns:
         return beside
 
     @property
+    def held_lengths(self) -> bool:
+        """Whether given lengths of routed muscles are constraints, each with a tension as multiplier."""
+        return self.chain.routed and self.chain.muscle_input == "lengths"
+
+    @property
+    def n_constraints(self) -> int:
+        """Number of multipliers: of constrained sums, or of lengths of routed muscles."""
+        return len(self.chain.actuators) if self.held_lengths else len(self.chain.constrained)
+
+    @cached_property
+    def length_softness(self) -> FloatArray:
+        """Change of each length at rest by its own tension, shape (n_muscles,) [m/N]."""
+        arms = self.chain.muscle_paths.at(self.chain.rest).arms
+        return np.asarray((arms**2 / self.chain.stiffness).sum(axis=1))
+
+    @property
     def n_tensions(self) -> int:
-        """Number of muscles with given tensions."""
-        return len(self.chain.muscle_paths.rest) if self.chain.muscle_input == "forces" else 0
+        """Number of muscles of which an input is in the workspace: all but those that constrain sums of strains."""
+        return len(self.chain.actuators) if self.chain.muscle_input == "forces" or self.held_lengths else 0
 
     @property
     def least_inputs(self) -> tuple[float, ...]:
         """Least input of each muscle whose length is not given; see `ActuatorLaws.refusal`."""
-        least = {"elastic": float(np.finfo(np.float64).tiny), "mckibben": 0.0}
+        least = {"length": 0.0, "elastic": float(np.finfo(np.float64).tiny), "mckibben": 0.0}
         return tuple(least.get(one.kind, -LARGEST_NUMBER) for one in self.chain.actuators[: self.n_tensions])
 
     @property
@@ -228,8 +249,11 @@ class Unknowns:
     def spring_rounding(self) -> float:
         """Rounding of the torques of springs and stiff tendons [N m], see `SoftModel.rounding`."""
         chain, strains = self.chain, list(self.strains)
-        return ActuatorLaws(chain.actuators).rounding + 8.0 * float(np.finfo(np.float64).eps) * float(
-            np.linalg.norm(chain.stiffness[strains] * chain.rest[strains])
+        held = float(np.linalg.norm(chain.muscle_paths.rest / self.length_softness)) * ROUNDING if self.held_lengths else 0.0
+        return (
+            held
+            + ActuatorLaws(chain.actuators).rounding
+            + 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(chain.stiffness[strains] * chain.rest[strains]))
         )
 
     def multipliers_at(self, row: int) -> int:

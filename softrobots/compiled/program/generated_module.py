@@ -117,7 +117,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "WORKSPACE_SIZE": size,
         "LANE_SIZE": lane_size,
         "LANES": lane_count(lane_size),
-        "N_CONSTRAINTS": len(chain.constrained),
+        "N_CONSTRAINTS": unknowns.n_constraints,
         "N_INPUTS": unknowns.n_tensions,
         "LEAST_INPUT": unknowns.least_inputs,
         **{status.name: status.value for status in Status},
@@ -140,7 +140,9 @@ def _muscle_tables(unknowns: Unknowns, layout: Layout) -> dict[str, object]:
     """Return the tables of `muscle_drivers`: lengths set the start of the unknowns, tensions stay as they are."""
     chain, strains, rest = unknowns.chain, list(unknowns.strains), unknowns.chain.muscle_paths.rest
     slope, base = chain.spread[strains], (chain.free @ chain.elastic @ chain.rest)[strains]
-    if layout.muscles:
+    if unknowns.held_lengths:  # both follow one another
+        slope, base = np.concatenate([np.eye(len(rest)), slope]), np.concatenate([rest, base])
+    elif layout.muscles:
         slope, base, rest = np.eye(len(rest)), np.zeros(len(rest)), np.zeros(len(rest))
     return {
         "N_MUSCLES": len(rest),

@@ -13,8 +13,8 @@ from softrobots.compiled.chain.looped_tip import tip_frame
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import looped_frame
-from softrobots.compiled.routes.ends import keep_lengths, leave_segment, start_lengths
-from softrobots.compiled.routes.loops import COMPONENTS, LENGTHS, PULLS, around, loops_of
+from softrobots.compiled.routes.ends import held_blocks, keep_lengths, leave_segment, start_lengths
+from softrobots.compiled.routes.loops import LENGTHS, PULLS, around, components_text, loops_of
 from softrobots.compiled.routes.terms import component_blocks, form_of, length_blocks, route_forms
 from softrobots.compiled.trace.blocks import Block
 
@@ -114,7 +114,7 @@ def looped_program(plan: Plan) -> LoopedProgram:
     kinds = element_kinds(plan)
     # Before the records stand the share of the step, the bounds of the loops, and the places of routes.
     blocks, sequence, lane_size = _sequence(plan, kinds, plan.routes.end, calls)
-    tip = TipLayout(lane_size, layout.motors, layout.unknowns, len(unknowns.chain.constrained))
+    tip = TipLayout(lane_size, layout.motors, layout.unknowns, unknowns.n_constraints)
     tip_plan = replace(plan, tip=tip)
     tip_blocks, tip_sequence, size = _sequence(tip_plan, element_kinds(tip_plan), tip.end, calls)
     constants: dict[str, object] = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}
@@ -129,8 +129,9 @@ def looped_program(plan: Plan) -> LoopedProgram:
         added, columns = length_blocks(plan, name, form)
         blocks += added + component_blocks(plan, name, form)
         tip_blocks += component_blocks(tip_plan, name, form)
-        loops += [(LENGTHS if columns else PULLS, name), (COMPONENTS, name)]
-        tip_loops.append((COMPONENTS, f"tip_{name}"))
+        components = components_text(held=unknowns.held_lengths)
+        loops += [(LENGTHS if columns else PULLS, name), (components, name)]
+        tip_loops.append((components, f"tip_{name}"))
         if columns:
             constants |= plan.routes.tables(columns.width) | {"POINT_TABLE": tuple(columns.numbers)}
     blocks = looped_frame(plan, len(sequence)) + blocks
@@ -181,6 +182,13 @@ def _sequence(
             outward_calls.append((end, f"keep_lengths_{number}(w)"))
             inward_calls.append((end, f"start_lengths_{infix}{number}(w)"))
             step_calls.append((end, f"leave_segment_{infix}{number}(w)"))
+            if unknowns.held_lengths:
+                ends_of_segment, size = held_blocks(plan, number, segment)
+                blocks += ends_of_segment
+                sequence.insert(segment.first - leading, (base, record, 0, 0, 0))
+                record += size
+                inward_calls.append((base, f"eliminate_lengths_{infix}{number}(w, {at})"))
+                step_calls.append((base, f"solve_lengths_{infix}{number}(w, {at})"))
             continue
         ends_of_segment, size = segment_blocks(plan, number, segment)
         blocks += ends_of_segment

@@ -64,10 +64,10 @@ def _inputs(plan: Plan) -> list[Place]:
         places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
     if layout.muscles:
         places.append(Place("ACTUATORS", layout.muscles, f"{_inputs_of(unknowns)}; put_muscles writes them"))
-    if unknowns.chain.constrained:
+    if unknowns.n_constraints:
         places.append(Place("START", n, "unknowns with the muscle lengths [rad or m]; put_muscles writes them"))
     starts = "for settle_from, reach and follow" if searches else "for settle_from"
-    held = ", with the muscle lengths, as in START" if unknowns.chain.constrained else ""
+    held = ", with the muscle lengths, as in START" if unknowns.n_constraints else ""
     places.append(Place("UNKNOWN", n, f"start of the search [rad or m]; {starts}{held}"))
     if searches:
         places.append(Place("TORQUES", layout.motors, "load on each motor, minus what it exerts [N m or N]; for estimate"))
@@ -116,6 +116,7 @@ def _inputs_of(unknowns: Unknowns) -> str:
     kinds = {
         "tension": "tensions [N]",
         "elastic": "lengths of motors [m]",
+        "length": "lengths [m]",
         "pressure": "pressures [Pa]",
         "mckibben": "pressures [Pa]",
     }

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import constants
+from softrobots.compiled.chain.elements import constants, vector
+from softrobots.compiled.chain.elimination import Outboard, eliminate_multipliers
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Segment
 from softrobots.compiled.routes.laws import tension
-from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar, smaller
+from softrobots.compiled.settings import LARGEST_NUMBER
+from softrobots.compiled.trace.blocks import Block, hoist
+from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, smaller
 
 
 def keep_lengths(plan: Plan, number: int, segment: Segment) -> Block:
@@ -28,6 +30,11 @@ def start_lengths(plan: Plan, number: int, segment: Segment) -> Block:
     square = constants(np.zeros((routes.components, routes.components)))
     energy: Scalar = 0.0
     for place, muscle in enumerate(segment.muscles):
+        if plan.unknowns.held_lengths:  # the tension is the multiplier of the last point
+            tension_held = block.load(layout.held + muscle)
+            block.store(routes.tensions + place, tension_held)
+            block.store(routes.pulled + muscle, tension_held)
+            continue
         beyond = block.load(routes.changes + muscle) + float(chain.muscle_paths.straightened[muscle])
         pull = tension(chain.actuators[muscle], block.load(layout.actuators + muscle), beyond)
         energy = energy + pull.energy
@@ -42,6 +49,64 @@ def start_lengths(plan: Plan, number: int, segment: Segment) -> Block:
     block.store_all(routes.cross, [0.0] * (3 * routes.components))
     block.store_all(routes.sums, [0.0] * (routes.components * len(plan.turns)))
     return block
+
+
+def held_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block], int]:
+    """Trace the functions at the base of a segment that eliminate given lengths, and solve for the changes of their tensions.
+
+    What closing the gaps saves counts in the energy: the tension that the step leads to times the gap, as in Fletcher's penalty
+    function, and the elastic energy of the gap.
+
+    Returns:
+        The functions, and the size of their record.
+    """
+    routes, recursion, layout, tip = plan.routes, plan.recursion, plan.layout, plan.tip
+    count, all_, softness = len(segment.stretched), routes.components, plan.unknowns.length_softness[list(segment.stretched)]
+    eliminate = Block(f"eliminate_lengths_{plan.infix}{number}", "Eliminate the given lengths of a segment.", ("at",))
+    inner, state = plan.load_outboard(eliminate, 3)
+    cross = vector(eliminate.loads(routes.cross, 3 * count)).reshape(count, 3)
+    square = vector(eliminate.loads(routes.square, all_ * all_)).reshape(all_, all_)[:count, :count]
+    sums = [eliminate.loads(routes.sums + all_ * side, count) for side in range(len(plan.turns))]
+    matrix = np.block([[inner.matrix, cross.T], [cross, square]])
+    columns = [vector([*one, *own]) for one, own in zip(inner.columns, sums, strict=True)]
+    gaps: list[Scalar] = [0.0] * count
+    if tip is None:
+        rest = plan.unknowns.chain.muscle_paths.rest
+        gaps = [
+            eliminate.load(routes.changes + one) - (eliminate.load(layout.actuators + one) - float(rest[one]))
+            for one in segment.stretched
+        ]
+    whole = Outboard(matrix, columns, inner.min_pivot, inner.n_negative_pivots)
+    eliminated, beyond = eliminate_multipliers(whole, gaps, softness.tolist())
+    plan.store_outboard(eliminate, beyond)
+    eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
+    solve = Block(f"solve_lengths_{plan.infix}{number}", "Find the tensions that hold given lengths.", ("at",), eliminate.trace)
+    turns = [solve.loads(place, 3) for place in plan.turns]
+    changes = [eliminated.steps(side, vector(turn)).tolist() for side, turn in enumerate(turns)]
+    for side, change in enumerate(changes):
+        solve.store_all(routes.turns + all_ * side, change)
+    held = [solve.load(layout.held + muscle) for muscle in segment.stretched]
+    arriving = [one for turn in turns for one in turn]
+    if tip is None:
+        arriving += [solve.load(recursion.sums), *solve.loads(recursion.steps, 2)]
+        energy: Scalar = arriving[-3]
+        slope: Scalar = arriving[-2]
+        error: Scalar = arriving[-1]
+        for muscle, old, change, gap, soft in zip(segment.stretched, held, changes[0], gaps, softness, strict=True):
+            new, torque = old + change, gap * float(1.0 / soft)
+            energy = energy + gap * (new + torque * 0.5)
+            slope = slope - gap * (change + torque)
+            error = error + torque * torque
+            solve.store(layout.held + muscle, if_less(absolute(new), LARGEST_NUMBER, new, 0.0))
+        solve.store(recursion.sums, energy)
+        solve.store_all(recursion.steps, [slope, error])
+    else:
+        for axis, column in enumerate(changes[1:]):
+            for muscle, value in zip(segment.stretched, column, strict=True):
+                solve.store(tip.constraint_columns + axis * tip.n_constraints + muscle, value)
+    crossing = [*cross.ravel(), *square.ravel(), *(one for side in sums for one in side)]
+    size = hoist([solve], eliminate, arriving, 0, "at", overwritten=[*state, *crossing])
+    return [eliminate, solve], size
 
 
 def leave_segment(plan: Plan, number: int) -> Block:

@@ -55,6 +55,16 @@ def after_FORM(w: Array, element: int, q: int) -> None:
 """Lengths that change tensions, as components of the turn, on the inward and on the step pass."""
 
 
+HOLD = '''def meet_FORM(w: Array, element: int) -> None:
+    """Add the constraints of the lengths beside an element to its elimination."""
+    clear_meeting_FORM(w)
+    for m in range(N_PAST[element]):
+        hold_length_FORM(w, SLOPES[element] + STRIDE * m, MEETINGS[element] + STRIDE * m)
+
+
+'''
+"""The first function of those, where the components are multipliers."""
+
 PULLS = '''def follow_routes_FORM(w: Array, element: int, q: int) -> None:
     """Find the slopes of lengths without actuators beside an element."""
     for m in range(N_ROWS[element]):
@@ -65,6 +75,14 @@ def pull_FORM(w: Array, element: int) -> None:
     """Add nothing to an element without actuators beside it."""
     clear_pulls_FORM(w)'''
 """The same for elements between the parts of a route."""
+
+
+def components_text(*, held: bool) -> str:
+    """Return the loops over lengths; `held`: whether those are given, and steps do not change their multipliers."""
+    if not held:
+        return COMPONENTS
+    text = HOLD + COMPONENTS[COMPONENTS.index("def hand_on_FORM") :]
+    return text.replace("        step_after_FORM(w, SLOPES[element] + STRIDE * m, m, q)", "        pass")
 
 
 def around(name: str, form: str, infix: str) -> tuple[list[str], list[str]]:

@@ -191,6 +191,9 @@ def component_blocks(plan: Plan, name: str, form: Form) -> list[Block]:
     length = Block(f"meet_length{name}", "Add the coupling of a length with another one.", ("other", "to", "pair"))
     add(length, 0, vector(length.loads(0, k, "other")) * length.load(routes.square, "pair"), "to")
 
+    hold = Block(f"hold_length{name}", "Begin the coupling of a given length.", ("at", "to"))
+    hold.store_all(0, [-one for one in hold.loads(0, k, "at")], "to")
+
     own = Block(f"meet_own{name}", "Add the coupling of an element with itself by a length.", ("at", "to"))
     product = outer(vector(own.loads(0, k, "at")), vector(own.loads(0, k, "to")))
     add(own, routes.own, [product[index] for index in upper_triangle(k)])
@@ -234,4 +237,4 @@ def component_blocks(plan: Plan, name: str, form: Form) -> list[Block]:
         )
         step = vector(after.loads(place - layout.unknown, k, "q"))
         add(after, routes.turns + count * side, [vector(after.loads(0, k, "at")) @ step], "m")
-    return [clear, turn, length, own, hand, pair, begin, before, after]
+    return [clear, *([hold] if plan.unknowns.held_lengths else [turn, length, own]), hand, pair, begin, before, after]

@@ -25,9 +25,12 @@ class Actuation:
         self._model, self._chain, self._strains = model, unknowns.chain, list(unknowns.strains)
         chain = unknowns.chain
         self._count = chain.n_motors
-        self._plain = len(chain.constrained) == 0 and len(self._strains) == len(chain.stiffness)
-        self._tensions, self._least = unknowns.n_tensions > 0, np.array(unknowns.least_inputs)
-        self._lengths = len(chain.constrained) > 0
+        self._plain = unknowns.n_constraints == 0 and len(self._strains) == len(chain.stiffness)
+        self._tensions, self._least = (
+            chain.muscle_input == "forces" and len(chain.actuators) > 0,
+            np.array(unknowns.least_inputs),
+        )
+        self._lengths, self._held = unknowns.n_constraints > 0, unknowns.held_lengths
         self._relaxed = chain.free @ model.rest  # strains at rest of elastic coordinates and muscles
         self._shares = np.zeros((len(chain.constrained), len(chain.stiffness)))  # of each strain in the sums
         for row, group in zip(self._shares, map(list, chain.constrained), strict=True):
@@ -37,7 +40,7 @@ class Actuation:
         """Return a workspace of one case: actuators, start, and other numbers by the name of their place in the layout."""
         layout, w = run.layout, run.workspace()
         run.put(w, 0, motors[: self._count])
-        if self._tensions:
+        if self._tensions or self._held:
             run.put(w, layout.actuators, motors[self._count :])
         if self._lengths:
             run.put(w, layout.start, self._starts(motors[None]))
@@ -49,6 +52,8 @@ class Actuation:
         """Return the elastostatic Jacobian of all actuators after `look_at_tip`, shape (3, n_motors)."""
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.jacobian, self._count)
+        if self._held:
+            return np.concatenate([joints, _rows(w, tip.constraint_columns, tip.n_constraints)], axis=1)
         if self._lengths:
             return np.concatenate(
                 [joints, _rows(w, tip.constraint_columns, tip.n_constraints) @ chain.constrained_slope], axis=1
@@ -82,6 +87,8 @@ class Actuation:
         """
         tip, chain = run.program.tip, self._chain
         joints = _rows(w, tip.motor_torques, self._count, 1)[0]
+        if self._held:
+            return np.concatenate([joints, _rows(w, run.layout.held, tip.n_constraints, 1)[0]])
         if self._lengths:
             first = [self._strains.index(group[0]) for group in chain.constrained]
             spread = _rows(w, run.layout.start, len(self._strains), 1)[0] - chain.rest[self._strains]
@@ -94,7 +101,7 @@ class Actuation:
     def rows(self, motors: FloatArray, layout: Layout) -> list[tuple[int, FloatArray]]:
         """Return places in the workspace and values of many cases: motor joints, loads of tensions, starts at the lengths."""
         inputs = [(0, motors[:, : self._count])]
-        if self._tensions:
+        if self._tensions or self._held:
             inputs.append((layout.actuators, np.ascontiguousarray(motors[:, self._count :])))
         if self._lengths:
             starts = self._starts(motors)
@@ -135,6 +142,9 @@ class Actuation:
         """Return the unknown strains of many cases, shape (n, n_unknowns)."""
         if self._plain:
             return elastic
+        if self._held:
+            held: Any = self._model.structure.muscle_lengths
+            return np.array([held.strains(q, y) for q, y in zip(motors, elastic, strict=True)]).reshape(-1, len(self._strains))
         strains = elastic @ self._chain.free.T
         if self._lengths:
             paths, slope = self._chain.muscle_paths, self._chain.constrained_slope

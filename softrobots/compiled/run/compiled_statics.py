@@ -46,7 +46,7 @@ class CompiledStatics:
         self._heavy: Any = None  # the same of the code with weight, once it is made
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
-        self._plain = not self._chain.constrained and backend == "numba"
+        self._plain = not self._unknowns.n_constraints and backend == "numba"
         self._joints = self._chain.n_motors
 
     def __reduce__(self) -> tuple[Any, ...]:
