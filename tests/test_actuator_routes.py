@@ -397,3 +397,48 @@ def test_kinds_are_kept_in_files_and_copies(kind: str, tmp_path: object) -> None
     assert pickle.loads(pickle.dumps(model)) == model
     other = sr.load_model(model.urdf, muscles="forces" if kind == "length" else "lengths")
     assert {tag.kind for tag in other.muscles} == {{"length": "tension", "tension": "length"}.get(kind, kind)}
+
+
+# --- Inputs
+
+
+def test_limits_units_and_rest_follow_the_kind() -> None:
+    numbers = {
+        "length": {"shortest": 0.2, "longest": 0.4},
+        "tension": {"weakest": -2.0, "strongest": 50.0},
+        "elastic": {"stiffness": 3e3, "shortest": 0.25, "strongest": 20.0},
+        "pressure": {"area": 4e-4, "max_pressure": 1e5},
+        "mckibben": {"diameter": 0.02, "braid_angle": 0.4},
+    }
+    expected = {
+        "length": ("m", (0.2, 0.4), 0.3),
+        "tension": ("N", (-2.0, 50.0), 0.0),
+        "elastic": ("m", (0.25, math.inf), 0.3),
+        "pressure": ("Pa", (0.0, 1e5), 0.0),
+        "mckibben": ("Pa", (0.0, math.inf), 0.0),
+    }
+    for kind, (unit, limits, rest) in expected.items():
+        model = routed(actuator("a", *ROUTES["straight"], kind=kind, **numbers[kind]), **FIELDS)
+        assert (model.actuators.units, tuple(model.motor_limits[0])) == ((unit,), limits)
+        assert model.relaxed_motors == pytest.approx([rest], abs=1e-15)
+        drawn = model.actuators.draw(np.random.default_rng(1))
+        assert drawn is None or limits[0] <= drawn[0] <= limits[1]
+    stretched = sr.solve_equilibrium(routed(actuator("a", *ROUTES["straight"], kind="tension", strongest=5), **FIELDS), [6.0])
+    assert not stretched.within_limits
+    slack = sr.solve_equilibrium(routed(actuator("a", *ROUTES["straight"], kind="elastic", stiffness=3e3), **FIELDS), [0.32])
+    assert slack.muscle_forces == [0.0]
+    assert slack.within_limits
+    for kind, value in (("elastic", -0.1), ("mckibben", -1.0), ("length", 0.0)):
+        with pytest.raises(sr.ParameterError, match=r"positive|pressures of McKibben muscles >= 0"):
+            sr.solve_equilibrium(routed(actuator("a", *ROUTES["straight"], kind=kind, **numbers[kind]), **FIELDS), [value])
+
+
+@pytest.mark.parametrize("kind", ["length", "tension", "elastic", "pressure", "mckibben"])
+@pytest.mark.parametrize("route", ["straight", "from_base", "helix"])
+def test_the_scale_of_an_input_is_worth_about_a_radian(kind: str, route: str) -> None:
+    """One part in a hundred of it bends a body that cannot stretch by about 0.01 rad; a helix also twists it."""
+    law = {"elastic": {"stiffness": 3e3}, "pressure": {"area": 4e-4}, "mckibben": {"diameter": 0.02, "braid_angle": 0.4}}
+    model = routed(actuator("a", *ROUTES[route], kind=kind, **law.get(kind, {})), **(FIELDS | {"axial_stiffness": 1e7}))
+    found = sr.solve_equilibrium(model, model.relaxed_motors + 0.01 * model.motor_scale * (-1.0 if kind == "elastic" else 1.0))
+    bend = float(np.hypot(*(found.strains[:, :2] * np.array([length for _, length in SPANS])[:, None]).T).sum())
+    assert bend == pytest.approx(0.01, rel=0.3 if route == "helix" else 0.02)
