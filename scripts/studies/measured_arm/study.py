@@ -97,7 +97,7 @@ def models(compared: Sequence[Compared], plain: Sequence[Compared], whole: Mappi
             {"model": name, "fitted": "nothing here; turns by the source"} | {one.recording.name: one.summary() for one in sets}
         )
     published = {name: {"offset_m": value, "posed_m": None} for name, value in PUBLISHED_ERRORS.items()}
-    result.append({"model": PUBLISHED, "fitted": "pretensions, angles of tendons"} | published)
+    result.append({"model": PUBLISHED, "fitted": "tendons and turns"} | published)
     scatter = {name: rms(repeatability([one], WITHIN).distances) for name, one in whole.items()}
     floor = {name: {"offset_m": value, "posed_m": value} for name, value in scatter.items()}
     result.append({"model": "floor: the robot against itself, without memory", "fitted": ""} | floor)
