@@ -19,6 +19,7 @@ import pytest
 import softrobots as sr
 from softrobots.export import to_mjcf, to_pinocchio, to_pybullet, to_sdf
 from tests.support.mujoco_balance import mujoco_equilibrium
+from tests.support.routed_arms import actuator, curve_length
 
 Tool = Callable[[str], ModuleType]
 
@@ -158,6 +159,62 @@ def test_tendons_change_their_lengths_as_straight_actuators_do(tool: Tool) -> No
             assert abs(first[number] - arms[kind]) < 1e-8
             stiffening = d**2 * hinges / THIN[segment - 1] if kind == "twist" else 0.0
             assert abs(second[number] - stiffening) < 3e-6
+
+
+PIECES = (
+    (1, (0.0, 0.1, 0.3), (0.04, 0.03, 0.03), (0.2, 1.0, 2.5)),
+    (1, (0.07, 0.23), (0.03, 0.03), (1.0, 1.0)),
+)
+"""A winding table and a straight piece, that end within sections."""
+
+
+@pytest.mark.parametrize("robot", [sr.PccArm, sr.HelixTube])
+def test_a_tendon_begins_to_change_its_length_as_its_curve_does(tool: Tool, robot: type) -> None:
+    """Per joint at rest, along straight sections and bent ones, against the curve's length by complex steps.
+
+    Central differences of 1e-5 err by 1e-10 of the third derivatives, and by 1e-11 as the lengths are rounded.
+    """
+    mujoco, step = tool("mujoco"), 1e-5
+    straight = {"segment_lengths": (0.3,), "muscle_azimuths": ()} if robot is sr.PccArm else {}
+    tags = "".join(
+        actuator(f"line_{place}", piece, kind="tension", strongest=10.0) for place, piece in enumerate(PIECES, start=1)
+    )
+    urdf = robot(**straight, chain="lumped", hinges=3).urdf().replace("</robot>", tags + "</robot>")
+    arm = sr.load_model(urdf)
+    rows = arm.structure.section_table
+    spans, rest = [(row.segment, row.length) for row in rows], np.array([row.rest for row in rows])
+    data = mujoco_data(mujoco, to_mjcf(arm))
+    assert np.abs(rest).max() > 0.1 or robot is sr.PccArm
+    for place, joint in enumerate(arm.spring_joints):
+        sides = []
+        for change in (step, -step):
+            data.qpos[:] = change * (np.arange(data.model.nq) == place)
+            mujoco.mj_forward(data.model, data)
+            sides.append(data.ten_length.copy())
+        z = rest.astype(complex)
+        z[int(joint.split("_")[2]) - 1, ("x", "y", "twist", "stretch").index(joint.split("_")[-1])] += 1e-20j
+        slopes = [curve_length([piece], spans, z).imag / 1e-20 for piece in PIECES]
+        assert np.abs((sides[0] - sides[1]) / (2.0 * step) - slopes).max() < 1e-9
+
+
+def test_the_springs_of_mckibben_muscles_pull_by_their_law(tool: Tool) -> None:
+    """Along a straight arm that stretches by so much a hinge each muscle pulls with p pi D^2/4 (a (l / l0)^2 - b), or not."""
+    mujoco = tool("mujoco")
+    if mujoco.__version__ < "4":
+        pytest.skip("springs of MuJoCo 3 are linear")
+    options: dict[str, Any] = {"muscle_diameter": 0.02, "muscle_braid_angle": 0.4, "chain": "lumped", "hinges": 2}
+    arm = sr.load_model(sr.PccArm(segment_lengths=(0.5,), kind="mckibben", **options))
+    square, least = 3.0 / np.tan(0.4) ** 2, 1.0 / np.sin(0.4) ** 2
+    relaxed, pressed = (mujoco_data(mujoco, to_mjcf(arm, 3 * [p], actuators="welded", limits=False)) for p in (0.0, 1e5))
+    for stretch in (0.01, -0.02, -0.1):
+        for data in (relaxed, pressed):
+            data.qpos[:] = [stretch if "stretch" in name else 0.0 for name in arm.spring_joints]
+            mujoco.mj_forward(data.model, data)
+        pull = 1e5 * np.pi * 1e-4 * max(0.0, square * (1.0 + 2.0 * stretch / 0.5) ** 2 - least)
+        assert (pull == 0.0) == (stretch == -0.1)
+        changes = pressed.qfrc_passive - relaxed.qfrc_passive
+        expected = [-3.0 * pull if "stretch" in name else 0.0 for name in arm.spring_joints]
+        assert np.abs(changes - expected).max() < 1e-9
 
 
 def test_the_force_of_an_actuator_is_its_tension(tool: Tool, rng: np.random.Generator) -> None:
