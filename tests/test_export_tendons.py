@@ -273,6 +273,18 @@ def test_servos_of_given_lengths_settle_where_our_statics_says(tool: Tool) -> No
     assert errors[1] < 0.5 * errors[0] < 2e-3
 
 
+def test_servos_of_given_lengths_push_where_statics_does(tool: Tool) -> None:
+    """At the lengths that servos of tendons reach, with six hinges a segment, pulls and pushes are within 2 % of ours."""
+    mujoco = tool("mujoco")
+    arm = sr.load_model(sr.TendonArm(segment_lengths=THIN, kind="length", chain="lumped", hinges=6))
+    wanted = arm.relaxed_motors + 1e-3 * np.array([-2.0, 1.0, 1.0, -1.8, 0.9, 0.9])
+    data = mujoco_data(mujoco, to_mjcf(arm, wanted, gravity=sr.EARTH_GRAVITY))
+    mujoco.mj_step(data.model, data, 1500)
+    found = sr.solve_equilibrium(arm, lengths(data, arm), gravity=sr.EARTH_GRAVITY)
+    assert found.motor_torques.min() < -1.0
+    assert np.abs(data.actuator_force - found.motor_torques).max() < 0.02 * np.abs(found.motor_torques).max()
+
+
 def test_what_a_simulator_does_not_have_is_refused_by_name() -> None:
     elastic, helical, mckibben = (CASES[name].load(chain="lumped", hinges=2) for name in ("elastic", "helical", "mckibben"))
     coupled = {"a tension that follows": elastic, "a winding route": helical, "that follows the length": mckibben}

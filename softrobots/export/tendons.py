@@ -166,14 +166,14 @@ def _drive(tag: ActuatorTag, beyond: float, time: float, servo: Servo | None) ->
     if tag.kind == "pressure":
         return Drive(-tag.area, 0.0, 0.0, 0.0, (-math.inf, math.inf), inputs)
     if tag.kind == "elastic":
-        stiffness, least, damping = tag.stiffness, 0.0, time * tag.stiffness
+        stiffness, damping, limits = tag.stiffness, time * tag.stiffness, (0.0, tag.strongest)
     elif servo is not None:
-        stiffness, least, damping = servo.gain, tag.weakest, servo.damping
+        stiffness, damping, limits = servo.gain, servo.damping, (-servo.force, servo.force)  # it pushes, as in statics
     else:
         requirement = 'actuators="welded": no actuator of MuJoCo pulls by pressure times (a l^2 - b), as McKibben muscles do'
         raise ParameterError("actuators", f"driven, with {tag.name}", requirement)
     constant = tag.pretension + stiffness * beyond
-    return Drive(-stiffness, constant, stiffness, damping, (least, tag.strongest), inputs)
+    return Drive(-stiffness, constant, stiffness, damping, limits, inputs)
 
 
 def _spring(tag: ActuatorTag, value: float, beyond: float, time: float) -> Spring:
