@@ -183,6 +183,27 @@ def actuator_kinds() -> Any:
     return figure
 
 
+def dry_friction() -> Any:
+    """Tip of an arm over the pull of a tendon that goes there and back, without and with friction."""
+    tensions = np.concatenate([np.linspace(0.0, 6.0, 31), np.linspace(5.8, 1.0, 25), np.linspace(1.2, 6.0, 25)])
+    texts = {"xlabel": "tension of the tendon [N]", "ylabel": "tip aside [mm]", "title": "A tendon, pulled, let go and pulled again"}
+    figure, axes = canvas.new_plot((8.0, 5.0), **texts)
+    words = {
+        "no friction": {},
+        "friction of bending: 2 N mm": {"bending_friction": 2e-3},
+        "friction in the guides: 0.4": {"guide_friction": 0.4},
+    }
+    for number, (word, fields) in enumerate(words.items()):
+        arm = sr.TendonArm(segment_lengths=(0.06,), bending_stiffness=2e-3, tendon_azimuths=(0.0,), kind="tension", **fields)
+        model, found, aside = sr.load_model(arm), None, []
+        for tension in tensions:
+            found = sr.solve_equilibrium(model, (tension,), previous=found)
+            aside.append(1e3 * found.tip_position[0])
+        axes.plot(tensions, aside, label=word, **canvas.line_style(number) | {"marker": None})
+    axes.legend(fontsize=9)
+    return figure
+
+
 def motion_release() -> Any:
     """The arm of docs/motion.md that is let go, over its first swing."""
     return motions.strobe(examples.release(0.14), shown=7)
@@ -245,6 +266,7 @@ FIGURES: dict[str, Callable[[], Any]] = {
         vibration_modes,
         finger_grip,
         actuator_kinds,
+        dry_friction,
         motion_release,
         motion_tip,
         motion_energies,
