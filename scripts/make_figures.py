@@ -186,7 +186,7 @@ def actuator_kinds() -> Any:
 def dry_friction() -> Any:
     """Tip of an arm over the pull of a tendon that goes there and back, without and with friction."""
     tensions = np.concatenate([np.linspace(0.0, 6.0, 31), np.linspace(5.8, 1.0, 25), np.linspace(1.2, 6.0, 25)])
-    texts = {"xlabel": "tension of the tendon [N]", "ylabel": "tip aside [mm]", "title": "A tendon, pulled, let go and pulled again"}
+    texts = {"xlabel": "tension of the tendon [N]", "ylabel": "tip aside [mm]", "title": "A tendon pulled and let go twice"}
     figure, axes = canvas.new_plot((8.0, 5.0), **texts)
     words = {
         "no friction": {},
