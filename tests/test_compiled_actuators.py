@@ -18,36 +18,15 @@ from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.run.looped_search import LoopedSearch
 from tests.support.c_libraries import Controller
 from tests.support.oracles import central_difference
-from tests.support.routed_arms import Piece, actuator, curve_length, routed
+from tests.support.routed_arms import actuator, curve_length, routed
 from tests.support.screw_motions import screw_matrix
+from tests.support.serial_chains import ARM, LAWS, LENGTHS, ROUTES
+from tests.support.serial_chains import ROBOTS as SERIAL_CHAINS
 
 GRAVITY = np.array([0.4, -1.0, -9.7])  # [m/s^2]
-LENGTHS = (0.5, 0.4)
-ARM: dict[str, Any] = {"segment_lengths": LENGTHS, "elastic_sections": 1, "offset": 0.0}
-LAWS: dict[str, dict[str, float]] = {
-    "elastic": {"stiffness": 9e3, "pretension": 3.0},
-    "mckibben": {"diameter": 0.008, "braid_angle": 0.5},
-    "pressure": {"area": 1e-4},
-    "tension": {},
-}
-ROUTES: dict[str, list[Piece]] = {
-    "elastic": [(1, (0.0, 0.5), (0.04, 0.04), (0.0, 1.0)), (2, (0.0, 0.25), (0.04, 0.04), (1.0, 0.4))],
-    "mckibben": [(1, (0.1, 0.3, 0.4), (0.04, 0.05, 0.03), (2.0, 2.0, 2.6))],
-    "pressure": [(1, (0.2, 0.5), (0.03, 0.03), (4.2, 4.2)), (2, (0.0, 0.4), (0.03, 0.03), (4.2, 4.2))],
-    "tension": [(2, (0.1, 0.4), (0.03, 0.04), (5.0, 3.5))],
-}
-"""A helix through both segments, a cone within the first, a straight chamber from its middle on, and a helical cone."""
-
-
-def coil(azimuth: float) -> str:
-    """A muscle of given length that winds through one and a half segments and comes nearer to the backbone."""
-    on, back = (azimuth, azimuth + 0.6), (azimuth + 0.6, azimuth)
-    return actuator(f"coil_{azimuth}", (1, (0.1, 0.5), (0.04, 0.04), on), (2, (0.0, 0.3), (0.04, 0.03), back), kind="length")
-
-
 ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
-    "tendons": lambda: sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.0625), elastic_sections=2)),
-    "winding": lambda: routed(*(actuator(kind, *ROUTES[kind], kind=kind, **law) for kind, law in LAWS.items()), **ARM),
+    "tendons": SERIAL_CHAINS["tendons"],
+    "winding": SERIAL_CHAINS["winding"],
     "by_segment": lambda: sr.load_model(sr.PccArm(**ARM, kind=("tension", "pressure"))),
     "lumped": lambda: sr.load_model(
         sr.PccArm(segment_lengths=LENGTHS, chain="lumped", hinges=1, kind=("mckibben", "elastic"), routing="base")
@@ -55,7 +34,7 @@ ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
     "lengths_on_an_arm": lambda: sr.load_model(
         sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="length", routing="base"))
     ),
-    "winding_lengths": lambda: routed(*(coil(place) for place in (0.0, 2.0, 4.0)), **ARM),
+    "winding_lengths": SERIAL_CHAINS["coils"],
     "on_an_arm": lambda: sr.load_model(
         sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="elastic", routing="base"))
     ),

@@ -31,6 +31,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
+from tests.support.routed_arms import actuator, routed
 from tests.support.serial_chains import ROBOTS, drawn
 from tests.support.traced import functions, values
 
@@ -293,6 +294,8 @@ def evaluated(
 def held_loads(model: SoftModel, loads: np.ndarray, start: np.ndarray) -> list[float]:
     """Multipliers of the sums beyond those of the start, from the tensions: `A^T t + k (start - rest)` of one strain a sum."""
     chain = model.chain()
+    if chain.routed and model.muscle_input == "lengths":  # the tensions themselves
+        return list(loads[chain.n_motors :])
     first = [group[0] for group in chain.constrained]
     by_tension = loads[chain.n_motors :] @ chain.muscle_paths.matrix[:, first] if first else np.zeros(0)
     return list(by_tension + chain.stiffness[first] * (start[first] - chain.rest[first]) if first else by_tension)
@@ -304,14 +307,14 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
     force = rng.normal(size=3) * size
     load = Load.of(model, force, gravity=gravity)
     run = program_at(model, motors, force, gravity)
-    actuation, held = run[2], len(model.chain().constrained)
+    actuation = run[2]
     offsets = []
     for _ in range(3):
         springs = model.rest + 0.3 * (drawn(model, rng)[1] - model.rest)
         state = elastic_state(model, motors, springs, load)
         unknown = actuation.unknowns(motors, springs)
         multipliers = held_loads(model, state.load.motors, np.array(run[3][run[0].layout.start :]))
-        found = evaluated(run, unknown, multipliers=multipliers)
+        found, held = evaluated(run, unknown, multipliers=multipliers), len(multipliers)
         step = np.linalg.solve(state.tangent, -state.residual)
         assert np.linalg.norm(model.chain().elastic @ found.step - step) < 1e-10 * np.linalg.norm(step)
         # The residual as numbers of forces on all coordinates, rounding of springs' torques.
@@ -336,12 +339,37 @@ GRAVITY = np.array([0.5, -1.0, -9.6])
 
 
 WEIGHTLESS = ("arm", "helix", "helix_lumped", "odd", "pcc", "uneven")
-HEAVY = ("arm", "helix", "odd", "pcc_forces", "pcc_lumped", "stacked")
+HEAVY = ("arm", "helix", "odd", "pcc_forces", "pcc_lumped", "stacked", "tendons", "winding", "coils")
 
 
 @pytest.mark.parametrize(("kind", "weight"), [*((kind, False) for kind in WEIGHTLESS), *((kind, True) for kind in HEAVY)])
 def test_the_step_is_that_of_the_dense_tangent(kind: str, weight: bool, rng: np.random.Generator) -> None:
     compare_with_pinocchio(robot(kind), GRAVITY if weight else None, rng)
+
+
+def test_steps_to_given_lengths_go_down(rng: np.random.Generator) -> None:
+    """Near an equilibrium, off the given lengths: the step leads back, and its slope is twice the energy that it saves."""
+    model = robot("coils")
+    motors = model.relaxed_motors * (1.0 + rng.uniform(-0.03, 0.03, model.n_motors))
+    force = 0.3 * rng.normal(size=3)
+    settled = sr.solve_equilibrium(model, motors, force)
+    run = program_at(model, motors, force, None)
+    unknown, tensions = run[2].unknowns(motors, settled.q_springs), settled.motor_torques.tolist()
+    here = evaluated(run, unknown, multipliers=tensions)
+    for _ in range(3):
+        off = 1e-5 * rng.normal(size=len(unknown))
+        there = evaluated(run, unknown + off, multipliers=tensions)
+        assert np.linalg.norm(there.step + off) < 1e-3 * np.linalg.norm(off)
+        assert there.energy - here.energy == pytest.approx(-0.5 * there.slope, rel=1e-2)
+
+
+def test_a_route_that_folds_is_out_of_range() -> None:
+    """On the inner side of a bend by `b` at a quarter of a metre: 0.5 m - 0.25 m b is left of half a metre."""
+    wide = actuator("wide", (1, (0.0, 0.5), (0.25, 0.25), (0.0, 0.0)), kind="elastic", stiffness=100.0, pretension=1.0)
+    model = routed(wide, segment_lengths=(0.5,), elastic_sections=1)
+    run = program_at(model, model.relaxed_motors, np.zeros(3), None)
+    margins = [evaluated(run, np.array([0.0, bend, 0.0, 0.0])).range_margin for bend in (1.9, 1.99, 2.01)]
+    assert margins == pytest.approx([0.5 * (1.0 - 1e-3) - 0.25 * bend for bend in (1.9, 1.99, 2.01)], abs=1e-12)
 
 
 @pytest.mark.parametrize("gravity", [None, GRAVITY], ids=["weightless", "gravity"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import softrobots as sr
 from softrobots.model.soft_model import SoftModel
 from tests.support.foreign import INERTIAL, joint
+from tests.support.routed_arms import Piece, actuator, routed
 from tests.support.screw_motions import rotation, screw_matrix
 
 HEAVY = INERTIAL.replace("<inertial>", '<inertial><origin xyz="0.02 -0.03 0.05" rpy="0.3 0 0"/>')  # off its link's origin
@@ -47,6 +49,29 @@ def uneven() -> SoftModel:
     return sr.load_model(alike.urdf, springs=table)
 
 
+LENGTHS = (0.5, 0.4)
+ARM: dict[str, Any] = {"segment_lengths": LENGTHS, "elastic_sections": 1, "offset": 0.0}
+LAWS: dict[str, dict[str, float]] = {
+    "elastic": {"stiffness": 9e3, "pretension": 3.0},
+    "mckibben": {"diameter": 0.008, "braid_angle": 0.5},
+    "pressure": {"area": 1e-4},
+    "tension": {},
+}
+ROUTES: dict[str, list[Piece]] = {
+    "elastic": [(1, (0.0, 0.5), (0.04, 0.04), (0.0, 1.0)), (2, (0.0, 0.25), (0.04, 0.04), (1.0, 0.4))],
+    "mckibben": [(1, (0.1, 0.3, 0.4), (0.04, 0.05, 0.03), (2.0, 2.0, 2.6))],
+    "pressure": [(1, (0.2, 0.5), (0.03, 0.03), (4.2, 4.2)), (2, (0.0, 0.4), (0.03, 0.03), (4.2, 4.2))],
+    "tension": [(2, (0.1, 0.4), (0.03, 0.04), (5.0, 3.5))],
+}
+"""A helix through both segments, a cone within the first, a straight chamber from its middle on, and a helical cone."""
+
+
+def coil(azimuth: float) -> str:
+    """A muscle of given length that winds through one and a half segments and comes nearer to the backbone."""
+    on, back = (azimuth, azimuth + 0.6), (azimuth + 0.6, azimuth)
+    return actuator(f"coil_{azimuth}", (1, (0.1, 0.5), (0.04, 0.04), on), (2, (0.0, 0.3), (0.04, 0.03), back), kind="length")
+
+
 ROBOTS: dict[str, Callable[[], SoftModel]] = {
     "arm": lambda: sr.load_model(sr.InflatableArm()),
     "two_hinges": lambda: sr.load_model(sr.InflatableArm(link_model="two_hinges", torsion=True)),
@@ -58,6 +83,9 @@ ROBOTS: dict[str, Callable[[], SoftModel]] = {
     "odd": odd,
     "stacked": lambda: sr.load_model(sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(elastic_sections=2))),
     "uneven": uneven,
+    "tendons": lambda: sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.0625), elastic_sections=2)),
+    "winding": lambda: routed(*(actuator(kind, *ROUTES[kind], kind=kind, **law) for kind, law in LAWS.items()), **ARM),
+    "coils": lambda: routed(*(coil(place) for place in (0.0, 2.0, 4.0)), **ARM),
 }
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from softrobots.compiled.chain.elements import is_zero, outer, upper_triangle, vector
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar, smaller, square_root
+from softrobots.compiled.trace.expressions import Scalar, larger, smaller, square_root
 from softrobots.compiled.trace.tables import TableColumns
 from softrobots.model.serial_chain import strains_of
 
@@ -135,7 +135,7 @@ def _add_section_point(plan: Plan, form: Form, block: Block, point: _Point) -> N
     across = around * around + radial * radial
     size = along if is_zero(across) else square_root(along * along + across)
     back = 1.0 / size
-    excess = 0.0 if is_zero(across) else across / (size + along)
+    excess = 0.0 if is_zero(across) else across / (size + larger(along, 0.0))
     direction = [along * back, around * back, radial * back]
     slopes = point.arms * direction[0] + point.around * direction[1] + point.radial * direction[2]
     block.store(routes.lengths, block.load(routes.lengths, "number") + (ahead + excess), "number")
