@@ -63,8 +63,8 @@ class ActuatorLaws:
         )
         braided = [tag.kind == "mckibben" for tag in tags]
         self._pull = np.array([pull_factors(tag) if has else (0.0, 0.0) for tag, has in zip(tags, braided, strict=True)])
-        self.rounding = ROUNDING * float(np.linalg.norm(self._stiffness * self._rest))
-        """Rounding of the tensions of stiff tendons [N]: that of a length times the stiffness."""
+        self.rounding = 8.0 * ROUNDING * float(np.linalg.norm(self._stiffness * self._rest))
+        """Rounding of the load of stiff tendons [N]: that of some lengths times the stiffness."""
 
     def at(self, elongations: FloatArray, inputs: FloatArray) -> Tensions:
         """Return the tensions at lengths beyond those at rest [m] and at inputs, each shape (n_muscles,)."""
