@@ -56,7 +56,7 @@ class Layout:
     conditions: int = 3
     """Number of conditions of a target: 3 for a position, 6 for a pose."""
     muscles: int = 0
-    """Number of muscles whose lengths are not given."""
+    """Number of muscles with an input: all but those that constrain sums of unknowns."""
     constraints: int = 0
     """Number of sums that muscle lengths constrain."""
     force: int = field(init=False)

@@ -38,7 +38,7 @@ class Segment(NamedTuple):
     muscles: tuple[int, ...]
     """Its muscles; with `Unknowns.routed` those first whose tension depends on the length, from the tip on."""
     stretched: tuple[int, ...] = ()
-    """Those whose tension depends on the length."""
+    """Those whose tension depends on the length; with `Unknowns.held_lengths` all."""
 
 
 @dataclass(frozen=True, eq=False)
