@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -160,6 +162,35 @@ def test_a_trajectory_remembers_its_way(tmp_path: Path) -> None:
     again = sr.solve_equilibrium(model, tensions[0], previous=loaded.equilibria[-1])
     direct = sr.solve_equilibrium(model, tensions[0], previous=there.equilibria[-1])
     assert again.q_springs == pytest.approx(direct.q_springs, abs=1e-14)
+
+
+def test_a_copy_of_a_result_remembers_what_the_result_does() -> None:
+    """A small step back only sticks, so that what is remembered then is of the step before."""
+    model = sr.load_model(sr.TendonArm(kind="tension", bending_friction=MOMENT, guide_friction=0.1, elastic_sections=2))
+    pulled, stuck = path(model, [np.linspace(0.5, 4.0, 9), np.linspace(0.5, 3.9, 9)])
+    direct = sr.solve_equilibrium(model, np.linspace(0.5, 2.0, 9), previous=stuck)
+    for copied in (pickle.loads(pickle.dumps(stuck)), copy.deepcopy(stuck)):
+        again = sr.solve_equilibrium(model, np.linspace(0.5, 2.0, 9), previous=copied)
+        assert again.q_springs == pytest.approx(direct.q_springs, abs=1e-12)
+    assert np.abs(pulled.q_springs - stuck.q_springs).max() > 1e-7
+
+
+def test_the_robot_of_a_result_comes_from_rest_unless_a_result_is_given() -> None:
+    model = sr.load_model(one_segment(bending_friction=MOMENT))
+    back = path(model, [[2.0], [0.5]])[-1]
+    fresh, again = (sr.solve_equilibrium(robot, [0.5]) for robot in (model, back.model))
+    assert np.array_equal(fresh.q_springs, again.q_springs)
+    assert np.abs(fresh.q_springs - back.q_springs).max() > 1e-3
+
+
+@pytest.mark.parametrize(("moment", "guides"), [(0.1, 0.1), (1e3, 0.0)])
+def test_friction_may_be_large_against_the_load(moment: float, guides: float) -> None:
+    """Given lengths without a load: the friction of bending and guides has its own rounding, beyond the least tolerance."""
+    for chain in ("sections", "lumped"):
+        model = sr.load_model(sr.PccArm(chain=chain, bending_friction=moment, guide_friction=guides))
+        held = sr.solve_equilibrium(model, model.relaxed_motors + (-0.02, 0.01, 0.01, 0.0, 0.0, 0.0))
+        assert held.converged
+        assert held.tolerance < 1e-6
 
 
 def test_what_has_no_friction_refuses_it() -> None:

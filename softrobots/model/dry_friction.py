@@ -26,6 +26,7 @@ from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.description.route_points import RoutePoint, route_points
 from softrobots.description.urdf_tags import ActuatorTag, FrictionTag
+from softrobots.model.actuator_laws import ROUNDING
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.sections import SectionRow
 
@@ -64,6 +65,8 @@ class DryFriction:
         self._paths, self._count, self._relaxed = paths, len(relaxed), relaxed
         self.guided = bool(tags) and bool(guides)
         """Whether an actuator rubs in its guides."""
+        self.rounding = ROUNDING * np.pi * float(np.linalg.norm(self._limit)) / _BENDING_STICK
+        """Rounding of the moments of friction [N m]: that of an angle times the stiffness of the stick."""
         self.n_guides = len(paths.muscle) if self.guided else 0
         """Number of guides, one a path; 0 if there is no friction in guides."""
         if self.guided:

@@ -37,7 +37,7 @@ class FrictionCoordinates:
         energy, torque, stiffness = self.friction.at(elastic, self.memory, self.grip)
         if self.slides and self.friction.sticks(elastic, self.memory):
             stiffness = np.zeros_like(stiffness)
-        return FrictionPoint(self._inner.at(motors, elastic), energy, torque, stiffness)
+        return FrictionPoint(self._inner.at(motors, elastic), energy, torque, stiffness, float(self.grip.sum()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,8 @@ class FrictionPoint:
     """Torque of friction on the strains, shape (count,) [N m or N]."""
     stiffness: FloatArray
     """Derivative of that, shape (count, count)."""
+    grip: float
+    """Friction of all guides that slip [N]."""
 
     @property
     def joints(self) -> FloatArray:
@@ -70,6 +72,7 @@ class FrictionPoint:
             elastic=bare.elastic - self.torque,
             derivative=bare.derivative - self.stiffness,
             potential=bare.potential + self.energy,
+            scale=bare.scale + self.grip,
         )
 
     def columns(self, jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -115,10 +118,21 @@ def after_step(model: SoftModel, motors: FloatArray, elastic: FloatArray) -> Sof
     return remembering(model, friction.after(model.structure.strains(motors, elastic), memory_of(model)))
 
 
-def remembering(model: SoftModel, memory: FrictionMemory) -> SoftModel:
-    """Return the robot with another memory."""
+def untouched(model: SoftModel) -> SoftModel:
+    """Return the robot as it is before anything has moved it; the robot itself without friction."""
+    friction = model.structure.friction
+    return model if friction is None else remembering(model, friction.untouched)
+
+
+def remembering(model: SoftModel, memory: FrictionMemory, grip: FloatArray | None = None) -> SoftModel:
+    """Return the robot with another memory, and the friction of each guide that slips, shape (n_guides,) [N]; none if None."""
     friction = _rubbing(model.coordinates).friction
-    return replace(model, coordinates=_rubbed(model.coordinates, memory, np.zeros(friction.n_guides)))
+    return replace(model, coordinates=_rubbed(model.coordinates, memory, np.zeros(friction.n_guides) if grip is None else grip))
+
+
+def grip_of(model: SoftModel) -> FloatArray:
+    """Return the friction of each guide that slips, shape (n_guides,) [N]; only for a robot with friction."""
+    return _rubbing(model.coordinates).grip
 
 
 def slipping(model: SoftModel) -> SoftModel:

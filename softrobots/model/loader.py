@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copyreg
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,13 +13,15 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.constant_curvature.strain_chain import joint_positions
-from softrobots.core.checks import choice, finite_number, positive_number
+from softrobots.core.checks import FloatArray, choice, finite_number, positive_number
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.description.sources import Robot, read_source
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import RobotTags, SectionTag, SpringTag
 from softrobots.model.assembly import assemble, reassemble
 from softrobots.model.coordinates import rest_coordinates
+from softrobots.model.dry_friction import FrictionMemory
+from softrobots.model.friction_coordinates import grip_of, memory_of, remembering
 from softrobots.model.muscles import MUSCLE_INPUTS
 from softrobots.model.soft_model import SoftModel, check_model
 
@@ -235,7 +237,14 @@ def load_again(urdf: str, *, springs: Mapping[str, tuple[float, float]], **argum
 
 
 def _reduce(model: SoftModel) -> tuple[Any, ...]:
-    return partial(load_again, **load_arguments(model)), (model.urdf,)
+    load = partial(load_again, **load_arguments(model))
+    if model.structure.friction is None:
+        return load, (model.urdf,)
+    return _load_remembering, (load, model.urdf, memory_of(model), grip_of(model))
+
+
+def _load_remembering(load: Callable[[str], SoftModel], urdf: str, memory: FrictionMemory, grip: FloatArray) -> SoftModel:
+    return remembering(load(urdf), memory, grip)
 
 
 copyreg.pickle(SoftModel, _reduce)  # as URDF text and arguments; Pinocchio's workspaces are not pickled

@@ -119,7 +119,8 @@ class SoftModel:
     def rounding(self) -> float:
         """Rounding of the torques [N m]: `k (y - rest)` of a stiff spring with a rest, or a stiff tendon, is no more exact."""
         of_muscles = self.structure.actuator_laws or self.structure.muscle_lengths
-        return (0.0 if of_muscles is None else of_muscles.rounding) + 8.0 * float(np.finfo(np.float64).eps) * float(
+        others = (of_muscles, self.structure.friction)
+        return sum(one.rounding for one in others if one is not None) + 8.0 * float(np.finfo(np.float64).eps) * float(
             np.linalg.norm(self.stiffness * self.rest)
         )
 

@@ -12,7 +12,7 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.actuators import slack_tendons
-from softrobots.model.friction_coordinates import after_step
+from softrobots.model.friction_coordinates import after_step, untouched
 from softrobots.model.link_limits import LinkLimits, link_limits, link_moments, near_largest_moment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual, rubbing_state
@@ -205,8 +205,8 @@ def solve_equilibrium(
         NameNotFound: If a frame does not exist.
         EquilibriumNotFound: If the residual stays above the tolerance; carries the best iterate.
     """
-    check_model(model)
     choice("method", method, METHODS)
+    model = untouched(check_model(model))
     motors = model.checked_motors(q_motors)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
     relaxed = model.rest

@@ -14,7 +14,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
-from softrobots.model.friction_coordinates import after_step
+from softrobots.model.friction_coordinates import after_step, untouched
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
 from softrobots.statics.elastostatics import solve_springs
@@ -167,8 +167,8 @@ def follow_trajectory(
             path straight through it is followed.
         EquilibriumNotFound: If a waypoint has no equilibrium.
     """
-    check_model(model)
     choice("method", method, METHODS)
+    model = untouched(check_model(model))
     goals = Goal.path(targets)
     points = np.array([goal.position for goal in goals])
     orientations = None if goals[0].rotation is None else read_only(np.array([goal.rotation for goal in goals]))
