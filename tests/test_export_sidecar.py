@@ -57,6 +57,8 @@ ROBOTS: dict[str, XacroRobot] = {
     "helix": sr.HelixTube(length=0.6, elastic_sections=4),
     "lumped helix": sr.HelixTube(chain="lumped", hinges=4, handedness="left", torsional_stiffness=0.01),
     "straight tube": sr.HelixTube(contraction=1.0, angle=0.0, elastic_sections=4),
+    "tube with an actuator": sr.HelixTube(length=0.6, elastic_sections=4, actuator="length", handedness="left"),
+    "tube with an elastic actuator": sr.HelixTube(length=0.6, elastic_sections=4, actuator="elastic", bending_stiffness=0.01),
 }
 
 

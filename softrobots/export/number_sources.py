@@ -114,6 +114,9 @@ def _tube_stiffness(robot: HelixTube) -> list[_Row]:
         "torsional": "young_modulus / (2 * (1 + poisson_ratio)) * 2 * pi * radius**3 * wall_thickness",
         "axial": "young_modulus * 2 * pi * radius * wall_thickness",
     }
+    if robot.real:  # what wrinkles along the actuator resists contraction and bending alike
+        bending = walls["bending"] if robot.bending_stiffness is None else robot.bending_stiffness
+        walls["axial"], rules["axial"] = 2.0 * bending / r**2, "2 * EI / radius**2"
     rows: list[_Row] = [("radius", r, "m", "Radius of the tube", "diameter / 2")]
     for name, kind, unit in (("EI", "bending", "N m2"), ("GJ", "torsional", "N m2"), ("EA", "axial", "N")):
         measured, meaning = getattr(robot, f"{kind}_stiffness"), f"{kind.capitalize()} stiffness"
@@ -123,16 +126,21 @@ def _tube_stiffness(robot: HelixTube) -> list[_Row]:
 
 
 def _tube_shape(robot: HelixTube) -> list[_Row]:
-    _, curvature, torsion, _ = robot.strains.tolist()
-    length, rate = robot.centre_length / robot.n_sections, math.hypot(curvature, torsion)
-    count = "elastic_sections" if robot.chain == "sections" else "hinges"
+    strains, whole = robot.rest_chain
+    _, curvature, torsion, _ = strains.tolist()
+    length, rate = whole / robot.n_sections, math.hypot(curvature, torsion)
+    count, sign = "elastic_sections" if robot.chain == "sections" else "hinges", "" if robot.handedness == "right" else "-"
     square = "((1 - contraction)**2 + 4 * contraction * cos(angle)**2)"
-    sign = "" if robot.handedness == "right" else "-"
-    bend, twist = "2 * (1 - contraction**2)", f"{sign}4 * contraction * sin(2 * angle)"
+    line, length_rule = "centre line", f"length * sqrt({square}) / (2 * cos(angle))"
+    bend_rule = f"2 * (1 - contraction**2) / (diameter * {square})"
+    torsion_rule = f"{sign}4 * contraction * sin(2 * angle) / (diameter * {square})"
+    if robot.real:
+        line, length_rule, bend_rule = "line of the actuator", "length / cos(angle)", "(cos(2 * angle) - 1) / diameter"
+        torsion_rule = f"{sign}sin(2 * angle) / diameter"
     rows: list[_Row] = [
-        ("section_length", length, "m", "Rest length of a section", f"length * sqrt({square}) / (2 * cos(angle)) / {count}"),
-        ("curvature", curvature, "rad/m", "Curvature of the centre line", f"{bend} / (diameter * {square})"),
-        ("torsion_rate", torsion, "rad/m", "Torsion of the centre line", f"{twist} / (diameter * {square})"),
+        ("section_length", length, "m", "Rest length of a section", f"{length_rule} / {count}"),
+        ("curvature", curvature, "rad/m", f"Curvature of the {line}", bend_rule),
+        ("torsion_rate", torsion, "rad/m", f"Torsion of the {line}", torsion_rule),
     ]
     if rate == 0.0:
         return [*rows, ("chord", length, "m", "Chord of a section", "section_length")]
@@ -140,7 +148,7 @@ def _tube_shape(robot: HelixTube) -> list[_Row]:
     rule = "sqrt((2 * curvature / rate**2 * sin(rate * section_length / 2))**2 + (torsion_rate * section_length / rate)**2)"
     return [
         *rows,
-        ("rate", rate, "rad/m", "Turning rate of the centre line", "sqrt(curvature**2 + torsion_rate**2)"),
+        ("rate", rate, "rad/m", f"Turning rate of the {line}", "sqrt(curvature**2 + torsion_rate**2)"),
         ("chord", chord, "m", "Chord of a section", rule),
     ]
 
@@ -220,11 +228,27 @@ def _straight_route(robot: ContinuumArm, s: int, m: int) -> Rules:
 def _helix_tube(robot: HelixTube) -> Rules:
     names = {name: name for name in ("EI", "GJ", "EA", "radius", "chord")}
     rules = _chain(robot, 1, names | {"length": "section_length", "rest": "[0.0, curvature, torsion_rate, 1.0]"})
+    if robot.real:
+        return rules | _tube_actuators()
     for j in range(1, robot.n_sections + 1):
         link = f"section_1_{j}_bend_x section_1_{j}_bend_y"
         rules |= {(link, "radius"): "radius", (link, "pressure"): "pressure"}
         rules[link, "wrinkling_moment"] = "pi**2 / 4 * pressure * radius**3"
     return rules | {("actuator", "azimuth"): "0.0", ("actuator", "distance"): "radius"}
+
+
+def _tube_actuators() -> Rules:
+    """Rules of the actuator, the line of the wall opposite and the air of a tube with a real actuator."""
+    rules: Rules = {}
+    line = "length / cos(angle)"
+    for name, rest, distance in (("actuator", line, "0.0"), ("wall", line, "diameter"), ("air", "length", "radius")):
+        rules |= {(name, bound): "0.0" for bound in ("shortest", "weakest", "pretension")}
+        rules[name, "rest_length"] = rest
+        rules[name, "stiffness"] = f"young_modulus * 2 * pi * radius * wall_thickness / ({line})"
+        rules[name, "area"] = "pi * radius**2"
+        rules[f"{name} 1", "at"] = f"[0.0, {line}]"
+        rules[f"{name} 1", "distance"], rules[f"{name} 1", "azimuth"] = f"[{distance}] * 2", "[pi] * 2"
+    return rules
 
 
 def _chain(robot: ContinuumArm | HelixTube, segment: int, names: Mapping[str, str]) -> Rules:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -166,7 +167,8 @@ class HelixTube(XacroRobot):
         if self.upright == "axis" and self.shape is not None and self.shape.centre_radius > _LARGEST_RADIUS * self.length:
             raise ParameterError("upright", self.upright, '"tube" for a helix so wide that the tube hardly bends')
         if self.chain == "sections":
-            self._check_sections(max(fewest_sections(strains, length) for strains, length in self._chains()))
+            chains = (self.rest_chain, *([self._chain_along_actuator(self.contraction)] if self.real else []))
+            self._check_sections(max(itertools.starmap(fewest_sections, chains)))
         if not self.allow_self_contact and self.shape is not None:
             helix.check_self_contact(self.shape, self.turns)
 
@@ -251,6 +253,11 @@ class HelixTube(XacroRobot):
         return np.array([0.0, curvature, torsion, 1.0])
 
     @property
+    def rest_chain(self) -> tuple[FloatArray, float]:
+        """Strains `(kx, ky, tau, stretch)`, shape (4,) [rad/m, rad/m, rad/m, -], and length [m] of the chain at rest."""
+        return self._chain_along_actuator(1.0) if self.real else (self.strains, self.centre_length)
+
+    @property
     def n_sections(self) -> int:
         """Sections of the chain, of constant strain or lumped."""
         return self.elastic_sections if self.chain == "sections" else self.hinges
@@ -278,12 +285,10 @@ class HelixTube(XacroRobot):
         each = {name: min(count, MOST_SECTIONS) for name, count in each.items()}
         return dataclasses.replace(self, length=length, **each)
 
-    def _chains(self) -> list[tuple[FloatArray, float]]:
-        """Strains and rest length of the chain at rest and where its actuator bends it."""
-        if not self.real:
-            return [(self.strains, self.centre_length)]
-        sign, wall = (1.0 if self.handedness == "right" else -1.0), self.length / math.cos(self.angle)
-        return [(actuator_strains(n, self.angle, self.diameter, sign), wall) for n in (1.0, self.contraction)]
+    def _chain_along_actuator(self, contraction: float) -> tuple[FloatArray, float]:
+        """Strains and rest length of the chain of a real actuator at a contraction."""
+        sign = 1.0 if self.handedness == "right" else -1.0
+        return actuator_strains(contraction, self.angle, self.diameter, sign), self.length / math.cos(self.angle)
 
     def _check_sections(self, fewest: int) -> None:
         if fewest > MOST_SECTIONS:
