@@ -19,11 +19,12 @@ from scipy.optimize import brentq
 import softrobots as sr
 from softrobots import constant_curvature
 from softrobots.cli.options.robot_parameters import make_robot
+from softrobots.description.actuator_reader import NUMBERS
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import ActuatorTag
-from softrobots.robots.continuum_arm import FACTS_OF_KINDS, ContinuumArm
+from softrobots.robots.continuum_arm import ATTRIBUTES, ContinuumArm
 from softrobots.robots.fields import facts_of
 from softrobots.robots.parameter_file import read_robot, write_parameters
 from softrobots.statics.kinematics import frame_placement
@@ -393,6 +394,7 @@ def test_bad_arguments_of_the_xacro_files_are_refused(file: str, arguments: dict
 
 
 def test_the_table_of_the_guide_has_the_defaults_and_kinds() -> None:
+    kinds_of = {name: {kind for kind in NUMBERS if number in NUMBERS[kind]} for name, number in ATTRIBUTES.items()}
     page = (CHECKOUT / "docs" / "actuators.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([a-z_]+)` \| (.*?) \| *(?:`(\w+)`)? *\| *(.*?) *\| *(.*?) *\| .* \|$", page, flags=re.MULTILINE)
     shown = {sr.PccArm: [row[0] for row in rows], sr.TendonArm: [row[2] for row in rows if row[2]]}
@@ -406,7 +408,7 @@ def test_the_table_of_the_guide_has_the_defaults_and_kinds() -> None:
                 number = cell.removesuffix(f" {unit}") if unit else cell
                 same = number == ("none" if default is None else default)
                 assert same or float(number) == pytest.approx(default, rel=1e-4), (name, cell)
-                assert set(filter(None, kinds.split(", "))) == set(FACTS_OF_KINDS.get(name.partition("_")[2], ())), name
+                assert set(filter(None, kinds.split(", "))) == kinds_of.get(name.partition("_")[2], set()), name
     for kind, word in ((sr.PccArm, "muscle"), (sr.TendonArm, "tendon")):
-        named = {f"{word}_{name}" for name in (*FACTS_OF_KINDS, "distance")} & facts_of(kind).keys()
+        named = {f"{word}_{name}" for name in (*ATTRIBUTES, "distance")} & facts_of(kind).keys()
         assert set(shown[kind]) == {"kind", "routing", *named}

@@ -13,16 +13,15 @@ from softrobots.description.tag_numbers import described, number, numbers, posit
 from softrobots.description.urdf_tags import KINDS, NAMESPACE, ActuatorTag, AnySectionTag, RouteTag
 
 _TENDON = ("shortest", "longest", "weakest", "strongest")
-OPTIONAL = {
+NUMBERS = {
     "length": _TENDON,
     "tension": _TENDON,
-    "elastic": (*_TENDON, "pretension"),
-    "pressure": ("max_pressure",),
-    "mckibben": ("max_pressure",),
+    "elastic": ("stiffness", *_TENDON, "pretension"),
+    "pressure": ("area", "max_pressure"),
+    "mckibben": ("diameter", "braid_angle", "max_pressure"),
 }
-"""Numbers that an actuator of each kind may state, beside its rest length."""
-REQUIRED = {"elastic": ("stiffness",), "pressure": ("area",), "mckibben": ("diameter", "braid_angle")}
-"""Numbers that an actuator of some kinds must state."""
+"""Numbers that an actuator of each kind has, beside its rest length."""
+_REQUIRED = ("stiffness", "area", "diameter", "braid_angle")  # of those, the ones without a default
 _NOT_NEGATIVE = ("shortest", "pretension")
 _TOUCHING = 1e-9  # between two pieces of a route [m]
 
@@ -56,7 +55,7 @@ def _muscle(element: ElementTree.Element, lengths: Mapping[int, float], source: 
     rest, shortest, longest, strongest = (
         positive(element, key, where) for key in ("rest_length", "shortest", "longest", "strongest")
     )
-    _check_limits(where, shortest, longest, "m")
+    _check_limits(where, shortest, longest)
     azimuth, distance = number(element, "azimuth", where), positive(element, "distance", where)
     segment = _segment(element, where, lengths)
     piece = RouteTag(segment=segment, at=(0.0, lengths[segment]), distance=(distance,) * 2, azimuth=(azimuth,) * 2)
@@ -78,16 +77,15 @@ def _actuator(
     kind = element.get("kind", "")
     if kind not in KINDS:
         raise DescriptionError(f"{where} has kind = {kind[:100]!r}; required: one of {', '.join(KINDS)}")
-    required, optional = REQUIRED.get(kind, ()), OPTIONAL[kind]
+    required, optional = ([key for key in NUMBERS[kind] if (key in _REQUIRED) is needed] for needed in (True, False))
     missing = [key for key in required if key not in element.attrib]
-    allowed = ("name", "kind", "rest_length", *required, *optional)
-    superfluous = [key for key in element.attrib if key not in allowed]
+    superfluous = [key for key in element.attrib if key not in ("name", "kind", "rest_length", *NUMBERS[kind])]
     if missing or superfluous:
         raise DescriptionError(
             f"{where} is of kind {kind} and has {'no ' + ', '.join(missing) if missing else ', '.join(superfluous)[:200]}; "
             f"required: {', '.join(required) or 'no number'}; optional: rest_length, {', '.join(optional)}"
         )
-    given = [key for key in (*required, *optional) if key in element.attrib]
+    given = [key for key in NUMBERS[kind] if key in element.attrib]
     values = {key: (number if key in (*_NOT_NEGATIVE, "weakest") else positive)(element, key, where) for key in given}
     negative = [key for key in _NOT_NEGATIVE if values.get(key, 0.0) < 0.0]
     if negative:
@@ -102,7 +100,7 @@ def _actuator(
         points = route_points(route, [(tag.segment, tag.length) for tag in sections])
         rest = route_length(points, [tag.rest for tag in sections])
     tag = ActuatorTag(name=element.get("name", ""), route=route, kind=kind, rest_length=rest, **values)
-    _check_limits(where, tag.shortest, tag.longest, "m")
+    _check_limits(where, tag.shortest, tag.longest)
     if not tag.weakest < tag.strongest:
         raise DescriptionError(f"{where} is weakest at {tag.weakest} and strongest at {tag.strongest} N")
     return tag
@@ -143,9 +141,9 @@ def _check_order(route: Sequence[RouteTag], lengths: Mapping[int, float], where:
             )
 
 
-def _check_limits(where: str, shortest: float, longest: float, unit: str) -> None:
+def _check_limits(where: str, shortest: float, longest: float) -> None:
     if not shortest < longest:
-        raise DescriptionError(f"{where} is shortest at {shortest} and longest at {longest} {unit}")
+        raise DescriptionError(f"{where} is shortest at {shortest} and longest at {longest} m")
 
 
 def _segment(element: ElementTree.Element, where: str, lengths: Mapping[int, float]) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
 from softrobots.robots import HelixTube, InflatableArm, TendonArm, XacroRobot
-from softrobots.robots.continuum_arm import ContinuumArm
+from softrobots.robots.continuum_arm import ATTRIBUTES, ContinuumArm
 from softrobots.robots.routes import owner
 
 Rules = dict[tuple[str, str], str]
@@ -23,6 +23,7 @@ Rules = dict[tuple[str, str], str]
 
 _Row = tuple[str, float | list[float], str, str, str]  # name, value or one a segment, unit, meaning, expression (of the first)
 _BEND = ("-pi / 2", "pi / 2")
+_LENGTHS = ("shortest", "longest")
 
 
 def number_rules(robot: XacroRobot) -> Rules:
@@ -201,11 +202,10 @@ def _continuum_arm(robot: ContinuumArm) -> Rules:
 
 def _actuator(robot: ContinuumArm, name: str, s: int) -> Rules:
     """Rules of an actuator of segment `s`, from 0, without those of its route."""
-    word, facts = robot.ACTUATOR, ("stiffness", "pretension", "area", "diameter", "braid_angle", "max_pressure")
-    rules = {(name, fact): f"{word}_{fact}[{s}]" for fact in facts}
-    rules[name, "strongest"] = f"{word}_force[{s}]"
-    pushing = "0.0" if robot.kind[s] == "elastic" else f"-{word}_force[{s}]"
-    rules[name, "weakest"] = pushing if getattr(robot, f"{word}_least_tension") is None else f"{word}_least_tension[{s}]"
+    word = robot.ACTUATOR
+    rules = {(name, number): f"{word}_{fact}[{s}]" for fact, number in ATTRIBUTES.items() if number not in _LENGTHS}
+    if getattr(robot, f"{word}_least_tension") is None:
+        rules[name, "weakest"] = "0.0" if robot.kind[s] == "elastic" else f"-{word}_force[{s}]"
     return rules
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from softrobots.core.checks import instance_of
 from softrobots.core.errors import ParameterError, SoftRobotsError
-from softrobots.description.actuator_reader import OPTIONAL, REQUIRED
+from softrobots.description.actuator_reader import NUMBERS
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import FrictionTag, LumpedSectionTag, SectionTag, SpringTag
@@ -64,8 +64,8 @@ _CONVENTIONS = {
     "pressure pi diameter**2 / 4 (3 / tan(braid_angle)**2 (length / rest_length)**2 - 1 / sin(braid_angle)**2))); arms: "
     "change of the length by each coordinate at rest; along a straight route a section has hypot(length without twist, "
     "distance t) with a twist t, a lumped one distance^2 t^2 / (2 length) more; a tension adds the energy tension times "
-    "length, so that it moves the rest of a joint spring by -arm tension / stiffness; muscle_input tells whether lengths or "
-    "forces are given",
+    "length, so that it moves the rest of a joint spring by -arm tension / stiffness; muscle_input: lengths where those "
+    "are given, forces for all other kinds",
     "friction": "dry friction of segments: moment that holds their bending, coefficient of actuators in their guides",
     "lines": "lines along a segment that are drawn and do nothing",
 }
@@ -204,7 +204,7 @@ class _Parts:
                 }
                 for piece in tag.route
             ]
-            stated = ("rest_length", *REQUIRED.get(tag.kind, ()), *OPTIONAL[tag.kind])
+            stated = ("rest_length", *NUMBERS[tag.kind])
             units = {key: unit for key, unit in _ACTUATOR_UNITS.items() if key in stated and math.isfinite(getattr(tag, key))}
             numbers = self._numbers(tag, "actuator", **units)
             entries.append({"name": tag.name, "kind": tag.kind, "route": pieces, **numbers, "arms": arms[tag.name]})

@@ -12,6 +12,7 @@ import numpy as np
 from softrobots.constant_curvature import muscle_residual
 from softrobots.core.checks import finite_array, finite_number
 from softrobots.core.errors import ParameterError
+from softrobots.description.actuator_reader import NUMBERS
 from softrobots.robots.fields import (
     PerPart,
     XacroRobot,
@@ -40,19 +41,11 @@ ROUTING = (
 )
 """What `routing` is."""
 
-FACTS_OF_KINDS = {
-    "contraction": ("length", "tension", "elastic"),
-    "extension": ("length", "tension", "elastic"),
-    "force": ("length", "tension", "elastic"),
-    "least_tension": ("length", "tension", "elastic"),
-    "stiffness": ("elastic",),
-    "pretension": ("elastic",),
-    "area": ("pressure",),
-    "diameter": ("mckibben",),
-    "braid_angle": ("mckibben",),
-    "max_pressure": ("pressure", "mckibben"),
+ATTRIBUTES = {
+    **{"contraction": "shortest", "extension": "longest", "force": "strongest", "least_tension": "weakest"},
+    **{name: name for name in ("stiffness", "pretension", "area", "diameter", "braid_angle", "max_pressure")},
 }
-"""The kinds of actuators for which each of their parameters has an effect."""
+"""The number of an actuator (`softrobots.description.actuator_reader.NUMBERS`) that each of their parameters gives."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +53,7 @@ class ContinuumArm(XacroRobot):
     """Base of an arm of bending segments; the defaults are those of the arm of [PCC paper].
 
     Its actuators are fields of its class that begin with the same word, `ACTUATOR`: the azimuths and distances of those of a
-    segment, and what `FACTS_OF_KINDS` lists.
+    segment, and those of `ATTRIBUTES`.
 
     Raises:
         ParameterError: If a value is out of range or a list has the wrong length; the message names the field.
@@ -220,8 +213,9 @@ class ContinuumArm(XacroRobot):
     def _check_actuators(self) -> None:
         """Refuse parameters of actuators that have no effect, and a least tension above the largest."""
         prefix, facts = f"{self.ACTUATOR}_", facts_of(self)
-        for name, kinds in FACTS_OF_KINDS.items():
-            if prefix + name in facts and not set(kinds) & set(self.kind):
+        used = {number for kind in self.kind for number in NUMBERS[kind]}
+        for name, attribute in ATTRIBUTES.items():
+            if prefix + name in facts and attribute not in used:
                 refuse_given(self, (prefix + name,), f"for kind = {', '.join(dict.fromkeys(self.kind))}")
         if self.routes:
             refuse_given(self, (f"{prefix}azimuths", f"{prefix}distance"), "where routing lists the routes")
