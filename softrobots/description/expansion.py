@@ -7,7 +7,6 @@ import itertools
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.dom import minidom
@@ -99,10 +98,7 @@ def _checked_files() -> Iterator[None]:
     """
     import xacro
 
-    own = {
-        name: getattr(xacro, name)
-        for name in ("parse", "eval_all", "resolve_macro", "replace_node", "eval_text", "is_valid_name")
-    }
+    own = {name: getattr(xacro, name) for name in ("parse", "eval_all", "resolve_macro", "replace_node", "eval_text")}
     steps = 0
 
     def count(more: int) -> None:
@@ -134,8 +130,7 @@ def _checked_files() -> Iterator[None]:
         return text if isinstance(text, str) and "$" not in text else own["eval_text"](text, symbols)
 
     ours = {"parse": checked, "eval_all": evaluated, "resolve_macro": resolved, "replace_node": _replace_node}
-    ours |= {"eval_text": text_of, "is_valid_name": lru_cache(own["is_valid_name"])}
-    vars(xacro).update(ours)
+    vars(xacro).update(ours, eval_text=text_of)
     try:
         yield
     finally:

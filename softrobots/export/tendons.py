@@ -31,7 +31,6 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import Joint
-from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.route_points import RoutePoint, route_points
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.export.damping import mass_matrix
@@ -113,27 +112,27 @@ def tendons_of(model: SoftModel, robot: PreparedRobot, *, welded: bool) -> tuple
         ParameterError: If MuJoCo has no such law: that of a driven McKibben muscle, or of an elastic actuator that is taut at
             any length.
     """
-    structure, joints = model.structure, read_rigid_tree(model.urdf).joints
-    inputs = robot.q_motors[len(structure.motor_joints) :].tolist()
+    sections = model.structure.section_table
+    hinges = [[joint for joint in robot.tree.joints if joint.name in row.joint_names] for row in sections]
+    inputs = robot.q_motors[len(model.structure.motor_joints) :].tolist()
     held = not welded and any(tag.kind == "length" for tag in model.muscles)
     mass = mass_matrix(model, robot.q_motors) if held else np.zeros((0, 0))
-    time, made = robot.damping_time or 0.0, []
+    time, tendons = robot.damping_time or 0.0, []
     for place, (tag, value) in enumerate(zip(model.muscles, inputs, strict=True)):
         if welded and tag.kind not in SPRINGY:
             continue
-        legs = legs_of(tag, structure.section_table, joints)
-        beyond = float(structure.muscle_paths.rest[place]) - math.fsum(leg.rest_length for leg in legs)
+        legs = _legs(tag, sections, hinges)
+        beyond = float(model.structure.muscle_paths.rest[place]) - math.fsum(leg.rest_length for leg in legs)
         if welded:
             law: Drive | Spring = _spring(tag, value, beyond, time)
         else:
             law = _drive(tag, beyond, time, length_servo(model, place, mass) if tag.kind == "length" else None)
-        made.append(Tendon(tag.name, legs, law, value))
-    return tuple(made)
+        tendons.append(Tendon(tag.name, legs, law, value))
+    return tuple(tendons)
 
 
-def legs_of(tag: ActuatorTag, sections: Sequence[SectionRow], joints: Sequence[Joint]) -> tuple[Leg, ...]:
-    """Return the legs of the tendon of an actuator along the lumped sections of a robot with given joints, base to tip."""
-    hinges = [[joint for joint in joints if joint.name in row.joint_names] for row in sections]
+def _legs(tag: ActuatorTag, sections: Sequence[SectionRow], hinges: Sequence[Sequence[Joint]]) -> tuple[Leg, ...]:
+    """Legs of the tendon of an actuator along lumped sections, each with its joints, base to tip."""
     legs = []
     for point in route_points(tag.route, [(row.segment, row.length) for row in sections]):
         hinge, share = hinges[point.section], point.weight / sections[point.section].length
