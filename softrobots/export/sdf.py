@@ -62,7 +62,7 @@ def to_sdf(
 
     Raises:
         ParameterError: If an argument does not fit, muscles are to be driven, or the robot has sections of constant strain,
-            springs that are not linear, or muscles of given length.
+            springs that are not linear, or muscles that are no joint springs when they are welded.
         DescriptionError: If the robot has moving links without mass, a link and a joint of one name or of a name that SDF
             reserves, or more joints than Pinocchio supports.
     """

@@ -75,7 +75,7 @@ class Actuators:
         self.names = (*joints, *(muscle.name for muscle in muscles))
         """Name of each."""
         self.n_placed = len(joints) if lengths is None else len(self.names)
-        """Number of those that have a place, which come first: all but muscles of given tension."""
+        """Number of those that have a place, which come first: all but muscles that pull by their laws."""
         self.limits = read_only(np.concatenate([joint_limits, _pairs(map(input_limits, muscles))]))
         """Lower and upper limits, shape (n_motors, 2) [rad, m, N or Pa]."""
         muscle_scale = [input_scale(tag, *pair) for tag, pair in zip(muscles, worth.tolist(), strict=True)]

@@ -171,7 +171,7 @@ def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
     """Build a model again with another spring at each of its spring joints.
 
     Pinocchio's model and workspace are shared. Only muscles need more than the springs: the free coordinates of given lengths
-    and the scale of given tensions depend on the stiffness.
+    and the scale of other inputs depend on the stiffness.
 
     Args:
         model: The model.

@@ -35,9 +35,9 @@ class ReducedLoad(NamedTuple):
     coupling: FloatArray
     """Derivative of `elastic` with respect to the actuators, shape (n_elastic, n_motors)."""
     potential: float
-    """Potential energy of actuators with given forces [J]; 0 for those with given positions."""
+    """Potential energy of actuators that pull by their laws [J]; 0 for motor joints."""
     scale: float
-    """Size of those forces [N]."""
+    """Size of the tensions [N]."""
 
 
 class Point(Protocol):

@@ -24,6 +24,7 @@ import numpy as np
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.model.actuator_laws import ROUNDING
 from softrobots.model.coordinates import Coordinates
 from softrobots.model.held_directions import held_directions
 from softrobots.model.muscle_length_point import MuscleLengthPoint
@@ -37,7 +38,6 @@ CONSISTENT = 1e-6
 _LEAST_LENGTH = 0.01  # of a section, relative to its rest length
 _CLOSED = 1e-12  # largest remaining difference of the sums [rad or m]
 _ROUNDING = 1e-15  # of the same, below which no step is of use
-_ROUNDED = 8.0 * float(np.finfo(np.float64).eps)  # of lengths, relative
 _STEPS = 30  # of Newton's method, that takes two or three
 
 
@@ -80,11 +80,10 @@ class MuscleLengths:
         """Elastic coordinates of the robot without muscles by those sums, shape (count, n_held)."""
         self.spread = read_only(self.shares @ self.slopes)
         """The same by change of the lengths without twist, shape (count, n_muscles)."""
-        self._to_lengths = paths.matrix @ self.shares
-        self._misfit = np.eye(len(tags)) - self._to_lengths @ self.slopes
+        self._misfit = np.eye(len(tags)) - paths.matrix @ self.spread
         self.sum_stiffness = read_only(np.einsum("ik,i,ik->k", self.shares, springs.stiffness, self.shares))
         """Stiffness of the sums, shape (n_held,) [N m/rad or N/m]."""
-        self.rounding = 0.0 if held.groups else _ROUNDED * float(np.linalg.norm(self.sum_stiffness) * np.max(paths.rest))
+        self.rounding = 0.0 if held.groups else ROUNDING * float(np.linalg.norm(self.sum_stiffness) * np.max(paths.rest))
         """Rounding of the loads that hold winding lengths [N]; 0 where the lengths are linear without twist."""
         self.sum_rest = read_only(self.slopes @ (paths.matrix @ springs.rest))
         """Relaxed sums, shape (n_held,) [rad or m]."""

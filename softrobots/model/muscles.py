@@ -1,7 +1,7 @@
 r"""Actuators along the body; their lengths `l` are in `softrobots.model.muscle_paths`.
 
-- *Lengths given* (`softrobots.model.muscle_lengths`): they fix the sums of bending and elongation over a segment. Free are the
-  differences between its sections, and twist.
+- *Lengths given* (`softrobots.model.muscle_lengths`): they hold some directions of the strains, along straight routes the sums
+  of bending and elongation over a segment. The others are free.
 - All others leave the strains `z` free, and add the energy of their law (`softrobots.model.actuator_laws`): with the tension
   `T(l, u)` at the input `u` the residual has :math:`T\,\partial l/\partial z` more, the tangent
   :math:`T\,\partial^2 l + T_l\,\partial l\,\partial l^T`. The map of the actuators is the transpose of the Jacobian of the

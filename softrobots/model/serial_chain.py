@@ -97,9 +97,9 @@ class SerialChain:
     n_motors: int
     """Number of motor joints, without muscles."""
     limits: FloatArray
-    """Lower and upper limit of the actuators, motor joints and then muscles, shape (n_actuators, 2) [rad, m or N]."""
+    """Lower and upper limit of the actuators, motor joints and then muscles, shape (n_actuators, 2) [rad, m, N or Pa]."""
     muscle_input: str
-    """What `q_motors` holds of the muscles, "lengths" or "forces"."""
+    """See `SoftModel.muscle_input`."""
     actuators: tuple[ActuatorTag, ...]
     """The muscles."""
     muscle_paths: MusclePaths

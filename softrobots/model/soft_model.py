@@ -15,6 +15,7 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.model.actuator_laws import ROUNDING
 from softrobots.model.actuators import Actuators
 from softrobots.model.chain_reader import read_chain
 from softrobots.model.coordinates import Coordinates
@@ -28,7 +29,7 @@ from softrobots.model.structure import Structure
 class SoftModel:
     """A robot with actuators (prescribed) and elastic coordinates (free), ready for statics.
 
-    Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then muscle lengths (or tensions).
+    Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then the inputs of muscles.
     Elastic coordinates, `q_springs`, are joint springs and the free coordinates of the sections of constant strain.
 
     Returned by `softrobots.load_model`. Arrays are ordered base to tip. A model is immutable; do not change `pinocchio` either.
@@ -119,10 +120,8 @@ class SoftModel:
     def rounding(self) -> float:
         """Rounding of the torques [N m]: `k (y - rest)` of a stiff spring with a rest, or a stiff tendon, is no more exact."""
         of_muscles = self.structure.actuator_laws or self.structure.muscle_lengths
-        others = (of_muscles, self.structure.friction)
-        return sum(one.rounding for one in others if one is not None) + 8.0 * float(np.finfo(np.float64).eps) * float(
-            np.linalg.norm(self.stiffness * self.rest)
-        )
+        others = [one.rounding for one in (of_muscles, self.structure.friction) if one is not None]
+        return ROUNDING * float(np.linalg.norm(self.stiffness * self.rest)) + sum(others)
 
     @property
     def rest(self) -> FloatArray:
