@@ -75,6 +75,14 @@ class ActuatorLaws:
                 array[places] = part
         return found
 
+    def taken_up(self, elongations: FloatArray, inputs: FloatArray, tension: float) -> FloatArray:
+        """Return inputs at which slack elastic tendons have a small tension [N] at the same lengths."""
+        places, taut = self._of.get("elastic", np.zeros(0, dtype=np.intp)), np.array(inputs)
+        knee = self._rest[places] + elongations[places] + self._pretension[places] / self._stiffness[places]
+        little = tension / self._stiffness[places]
+        taut[places] = np.where(inputs[places] > knee - 1e-2 * little, knee - little, inputs[places])
+        return taut
+
     def refusal(self, inputs: FloatArray) -> str | None:
         """Return the requirement that inputs fail; None if there is none."""
         if np.any(inputs[self._of.get("elastic", [])] <= 0.0):
@@ -148,6 +156,11 @@ def relaxed_input(tag: ActuatorTag) -> float:
 def length_limits(tag: ActuatorTag) -> tuple[float, float]:
     """Limits of the length itself, where it is not free [m]."""
     return (tag.shortest, tag.longest) if tag.kind in ("length", "tension") else (-math.inf, math.inf)
+
+
+def wanted_tension(tag: ActuatorTag) -> float:
+    """Least tension that a search leaves [N]: the pretension of an elastic tendon, else none, as far as the limits allow."""
+    return min(max(0.0, tag.weakest, tag.pretension if tag.kind == "elastic" else 0.0), tag.strongest)
 
 
 def tension_limits(tag: ActuatorTag) -> tuple[float, float]:

@@ -18,9 +18,11 @@ from softrobots.model.actuator_laws import (
     length_limits,
     relaxed_input,
     tension_limits,
+    wanted_tension,
 )
 from softrobots.model.muscle_lengths import MuscleLengths
 
+_TAUT = 1e-7  # tension of a tendon that is just taut, relative to what is worth a radian
 _LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N", "Pa": "N"}  # by the unit of the coordinate
 
 
@@ -68,6 +70,15 @@ class Actuators:
         """Limits of the muscle lengths, infinite where only the input has some, shape (n_muscles, 2) [m]."""
         self.muscle_forces = _pairs(map(tension_limits, muscles))
         """Limits of the muscle tensions, infinite for pressures, shape (n_muscles, 2) [N]."""
+        self.tension_scale = float(np.mean(1.0 / worth[:, 1])) if len(worth) else 1.0
+        """Tension that is worth about a radian of motion, the mean of all muscles [N]."""
+        inside = [0.0 if muscle.kind == "tension" else _TAUT * self.tension_scale for muscle in muscles]
+        self.sought_tensions = read_only(self.muscle_forces + np.outer(inside, (1.0, -1.0)))
+        """Limits of the tensions for a search, shape (n_muscles, 2) [N]; elastic tendons stay just taut, so that they act."""
+        self.wanted_tensions = read_only(np.array([wanted_tension(muscle) for muscle in muscles]))
+        """Least tensions that a search leaves, shape (n_muscles,) [N]."""
+        self.least_tension = any(muscle.weakest >= 0.0 for muscle in muscles)
+        """Whether a search keeps the limits of tensions and lessens them: of muscles that cannot both pull and push."""
         strongest = np.array([muscle.strongest for muscle in muscles])
         of_muscles = np.concatenate([np.zeros((3, len(muscles))), strongest[None]])
         self.drives = Drives(*map(read_only, np.concatenate([drives, of_muscles], axis=1)))
@@ -125,6 +136,14 @@ class Actuators:
         if self._lengths is not None:
             sample = self._lengths.consistent(sample)
         return sample if self.admit(sample) and np.all((sample >= low) & (sample <= high)) else None
+
+    def taken_up(self, motors: FloatArray, elongations: FloatArray) -> FloatArray:
+        """Return the positions with slack elastic tendons just taut at lengths beyond those at rest, within the limits."""
+        if self._laws is None:
+            return motors
+        taut, count = np.array(motors), len(motors) - len(elongations)
+        taut[count:] = self._laws.taken_up(elongations, motors[count:], _TAUT * self.tension_scale)
+        return np.clip(taut, *self.limits.T)
 
     def go(self, motors: FloatArray, step: FloatArray) -> FloatArray:
         """Return the positions after a step from within the limits that is shortened to them.

@@ -83,9 +83,12 @@ def solve_ik(
 
     Searches from `q_motors0` and from random coordinates within the limits (always the same ones), and returns, of the
     solutions found, the one that changes `q_motors0` least. Of a robot with more actuators than the target has
-    conditions the change is minimal; if it has muscles, the first search that succeeds decides. For full poses of a robot with
-    a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts in the orientation, with both of
-    its solutions (`statics.spherical_wrist`).
+    conditions the change is minimal; if it has muscles, the first search that succeeds decides. Where muscles cannot both pull
+    and push (a least tension of zero or more), the limits of all tensions are kept, too, and redundant ones get the least
+    tension instead: a minimum of the sum of squares beyond their pretension (`statics.tip_steps`).
+
+    For full poses of a robot with a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts
+    in the orientation, with both of its solutions (`statics.spherical_wrist`).
 
     Args:
         model: The robot, with at least one actuator.

@@ -15,9 +15,10 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState, elastic_state
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
-from softrobots.statics.loads import Load
+from softrobots.statics.loads import AppliedLoad, Load
 from softrobots.statics.sensitivity import tip_motion
 from softrobots.statics.tip_search import LEVER, LocalSolution
+from softrobots.statics.tip_steps import Pull, pull
 
 
 class Goal(NamedTuple):
@@ -142,10 +143,20 @@ class LoadedTip:
         state = balanced_state(self.model, q_motors, self.load, start, method=self.method)
         if state is None:
             return None
+        excess, actuators = 0.0, self.model.actuators
+        if actuators.least_tension:
+            structure = self.model.structure
+            elongations = structure.muscle_paths.at(structure.strains(q_motors, state.q_springs)).elongation
+            taut = actuators.taken_up(q_motors, elongations)
+            if not np.array_equal(taut, q_motors):
+                return self.solve(taut, state.q_springs)
+            low, high = actuators.sought_tensions.T
+            tensions = state.load.motors[len(q_motors) - len(low) :]
+            excess = max(0.0, float(np.max([low - tensions, tensions - high])) / actuators.tension_scale)
         if self.model.structure.friction is not None:  # where it sticks, the tip would not move at all
             state = elastic_state(slipping(self.model), q_motors, state.q_springs, self.load)
         translation, turn = self.goal.missing(self.model, state.q)
-        return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)))
+        return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)), excess)
 
     def missing(self, state: ElasticState) -> FloatArray:
         """Return the difference from the tip to the goal, shape (3 or 6,), rotations times the lever [m]."""
@@ -158,6 +169,17 @@ class LoadedTip:
         """Return the derivatives of tip and elastic coordinates by the actuators; see `sensitivity.tip_motion`."""
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
         return tip_motion(self.model, motors, springs, state.tangent, state.load.coupling)
+
+    def pull(self, state: ElasticState, follow: FloatArray) -> Pull | None:
+        """Return the tensions with their derivatives; None of muscles of given length that push."""
+        if not self.model.actuators.least_tension:
+            return None
+        count = len(self.model.muscles)
+        by_motors, by_elastic = state.point.motor_derivatives(AppliedLoad(self.model, self.load).at(state.q))
+        slope = (by_motors + by_elastic @ follow)[-count:]
+        given = [row for row, muscle in enumerate(self.model.muscles) if muscle.kind == "tension"]
+        slope[given, np.array(given, dtype=int) - count] = 1.0
+        return pull(self.model, state.load.motors[-count:], slope)
 
 
 def checked_orientation(value: Any) -> FloatArray | None:

@@ -14,12 +14,16 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.tip_steps import Pull, step_home, step_within
 
 POSITION_TOLERANCE = 1e-9
 """Default tolerance of the position of the tip [m]."""
 
 ANGLE_TOLERANCE = 1e-9
 """Tolerance of the orientation of the tip [rad]."""
+
+TENSION_TOLERANCE = 1e-8
+"""Tolerance of tension limits, relative to the tension that is worth a radian [-]."""
 
 SAME = 1e-6
 """Actuator coordinates closer than this, relative to their scale, are the same [rad]."""
@@ -33,6 +37,7 @@ _WARM_DAMPING = 1e-6  # of the first step of a search that starts from a predict
 _HALVINGS = 6  # of the way between two waypoints
 _LARGEST_STEP = 0.5  # [rad], norm of one step over the scale of the actuators
 _STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as zero: a local minimum
+_JUMP = 1.0  # change of an actuator between two waypoints, relative to its scale, that is no continuous motion
 _NEAR = 0.02  # distance from the goal, relative to the reach, that a step home may cost
 
 
@@ -59,6 +64,8 @@ class LocalSolution(Generic[State]):
     """Distance of the tip from the target [m]."""
     angle: float = 0.0
     """Angle between the tip and its target orientation [rad]; 0 without one."""
+    excess: float = 0.0
+    """Largest tension beyond its limits, relative to `Actuators.tension_scale` [-]; 0 where the search ignores tensions."""
     iterations: int = 0
     """Steps."""
     unsolved: int = 0
@@ -66,11 +73,11 @@ class LocalSolution(Generic[State]):
 
     def arrived(self, tolerance: float) -> bool:
         """Whether the tip is within `tolerance` [m] of the target, in the target orientation."""
-        return self.error <= tolerance and self.angle <= ANGLE_TOLERANCE
+        return self.error <= tolerance and self.angle <= ANGLE_TOLERANCE and self.excess <= TENSION_TOLERANCE
 
     def miss(self, model: SoftModel) -> float:
-        """Return distance and angle as one distance [m]."""
-        return float(np.hypot(self.error, LEVER * model.reach * self.angle))
+        """Return distance, angle and tension beyond its limits as one distance [m]."""
+        return float(np.hypot(self.error, LEVER * model.reach * np.hypot(self.angle, self.excess)))
 
 
 class SoughtTip(Protocol[State]):
@@ -102,6 +109,12 @@ class SoughtTip(Protocol[State]):
             NeutralEquilibrium: If the tangent stiffness is singular.
         """
 
+    def pull(self, state: State, follow: FloatArray) -> Pull | None:
+        """Return the tensions, with the derivative of the elastic coordinates by the actuators.
+
+        None: their limits are no constraints, and the change of the actuators is the least.
+        """
+
 
 def search(
     tip: SoughtTip[State],
@@ -109,6 +122,7 @@ def search(
     q_springs: FloatArray,
     *,
     home: FloatArray | None = None,
+    farthest: float = np.inf,
     tolerance: float = POSITION_TOLERANCE,
     damping: float = _FIRST_DAMPING,
     max_iterations: int = 100,
@@ -119,7 +133,9 @@ def search(
         tip: The robot and its goal.
         q_motors: Start of the actuators, shape (n_motors,), within the limits.
         q_springs: Start of the elastic coordinates, shape (n_springs,).
-        home: Actuator coordinates to stay near where there are more actuators than conditions; None: `q_motors`.
+        home: Actuator coordinates to stay near where there are more actuators than conditions; None: `q_motors`. Robots with a
+            `SoughtTip.pull` have the least tension instead.
+        farthest: Largest change of an actuator from `home`, relative to its scale, once the goal is reached.
         tolerance: Distance at which the search ends [m].
         damping: Damping of the first step, relative to the reach; small for starts near the solution.
         max_iterations: Most steps.
@@ -144,15 +160,25 @@ def search(
             break
         slope = slope @ basis
         arrived = here.arrived(tolerance)
+        if reached is not None and _apart(model, here.q_motors, home) > farthest:
+            here = reached
+            break
         reached = here if arrived else reached
         going_home = redundant and reached is not None
         homeward = inverse @ (home - here.q_motors) if going_home else np.zeros(basis.shape[1])
-        towards, drift, free = _step(model, here.q_motors, slope, missing, mu, homeward)
+        pulled = tip.pull(here.state, follow)
+        if pulled is None:
+            towards, drift, free = step_home(model, here.q_motors, slope, missing, mu, homeward)
+            stationary = float(np.linalg.norm(free @ (slope.T @ missing))) <= _STATIONARY * model.reach * here.miss(model)
+        else:
+            towards, drift = step_within(model, here.q_motors, slope, missing, mu, pulled, reached is not None)
+            nearer = float(np.linalg.norm(slope @ towards))
+            stationary = nearer <= 1e-6 * float(np.linalg.norm(missing)) and pulled.excess <= TENSION_TOLERANCE
         if arrived and float(np.abs(drift).max()) <= SAME:
             return replace(here, iterations=iteration - 1, unsolved=unsolved)
         pace = pace if last is None else _pace(*last, drift)
         miss, last = here.miss(model), None
-        if not arrived and float(np.linalg.norm(free @ (slope.T @ missing))) <= _STATIONARY * model.reach * miss:
+        if not arrived and stationary:
             break
         step = towards + pace * drift
         step *= min(1.0, _LARGEST_STEP / max(float(np.linalg.norm(step)), 1e-300))
@@ -202,12 +228,20 @@ def advance(
     except NeutralEquilibrium:  # about to buckle: there is no linear prediction
         return None
     actuators = tip.model.actuators
-    step = np.linalg.pinv(slope @ actuators.basis, rcond=1e-6) @ there.missing(here.state)
-    if float(np.linalg.norm(step)) <= 0.5:
+    pulled, slope = tip.pull(here.state, follow), slope @ actuators.basis
+    if pulled is None:
+        step = np.linalg.pinv(slope, rcond=1e-6) @ there.missing(here.state)
+    else:
+        damping = _LAST_DAMPING * tip.model.reach
+        missing = there.missing(here.state)
+        step, drift = step_within(tip.model, here.q_motors, slope, missing, damping, pulled, arrived=True)
+        step = step + drift * min(1.0, 0.5 * _LARGEST_STEP / max(float(np.linalg.norm(drift)), 1e-300))
+    if float(np.linalg.norm(step)) <= _LARGEST_STEP:
         motors = actuators.go(here.q_motors, actuators.basis @ step)
         springs = here.state.q_springs + follow @ (motors - here.q_motors)
-        found = search(there, motors, springs, home=here.q_motors, tolerance=tolerance, damping=_WARM_DAMPING)
-        if found is not None and found.arrived(tolerance) and _apart(tip.model, found.q_motors, here.q_motors) <= 1.0:
+        near: dict[str, Any] = {"home": here.q_motors, "farthest": _JUMP}
+        found = search(there, motors, springs, tolerance=tolerance, damping=_WARM_DAMPING, **near)
+        if found is not None and found.arrived(tolerance) and _apart(tip.model, found.q_motors, here.q_motors) <= _JUMP:
             return found
     if halvings == 0:
         return None
@@ -225,44 +259,3 @@ def _pace(step: FloatArray, last_drift: FloatArray, drift: FloatArray) -> float:
     """Length of the drift: the step length of Barzilai and Borwein, which converges in narrow valleys, too."""
     bent = float(step @ (last_drift - drift))
     return float(np.clip(float(step @ step) / bent, 0.1, 100.0)) if bent > 0.0 else 100.0 if step.any() else 1.0
-
-
-def _step(
-    model: SoftModel, motors: FloatArray, slope: FloatArray, missing: FloatArray, damping: float, homeward: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Step towards the goal, and the part of the step home that does not move the tip, within the limits.
-
-    Reached limits that the step would violate are constrained, one set after the other.
-
-    Returns:
-        Both parts, shape (n,), and the projector on the unconstrained steps, shape (n, n).
-    """
-    basis = model.actuators.basis
-    normals, bends = (rows @ basis for rows in model.actuators.active_limits(motors))
-    pull = normals @ (slope.T @ missing) / np.maximum((normals * normals).sum(axis=1), 1e-300)
-    constrained = np.zeros(len(normals), dtype=bool)
-    while True:
-        rows, free, open_slope, whole = normals[constrained], np.eye(basis.shape[1]), slope, slope
-        if len(rows):
-            free -= np.linalg.pinv(rows) @ rows
-            open_slope = slope @ free
-            # A step along a curved limit costs the pull against it times its curvature: additional rows.
-            curved = np.sqrt(np.maximum(pull[constrained], 0.0))[:, None] * bends[constrained] @ free
-            whole = np.concatenate([open_slope, curved[curved.any(axis=1)]])
-        towards = free @ _damped_step(
-            whole, np.concatenate([missing, np.zeros(len(whole) - len(missing))]), damping, 1e-12 * model.reach
-        )
-        drift = homeward
-        if homeward.any():
-            drift = free @ (homeward - np.linalg.pinv(open_slope, rcond=1e-9) @ (open_slope @ homeward))
-        pressed = ~constrained & (normals @ (towards + drift) > 1e-12)
-        if not pressed.any():
-            return towards, drift, free
-        constrained |= pressed
-
-
-def _damped_step(slope: FloatArray, missing: FloatArray, damping: float, negligible: float) -> FloatArray:
-    """Levenberg-Marquardt step; directions that do not move the tip are zero."""
-    left, values, right = np.linalg.svd(slope, full_matrices=False)
-    gains = np.where(values > negligible, values, 0.0) / np.maximum(values**2 + damping**2, negligible**2)
-    return np.asarray(right.T @ (gains * (left.T @ missing)))

@@ -248,6 +248,9 @@ class _SoughtTip:
     def missing(self, state: ChainState) -> FloatArray:
         return np.asarray(self.target - self.chain.tip(state.w))
 
+    def pull(self, state: ChainState, follow: FloatArray) -> None:
+        """Tensions are not sought here: the change of the actuators is the least."""
+
     def motion(self, state: ChainState) -> tuple[FloatArray, FloatArray]:
         """Return the Jacobian of the tip, and zeros for the springs, which follow by their first Newton step."""
         return self.chain.jacobian(state.w), np.zeros((len(state.q_springs), self.model.n_motors))

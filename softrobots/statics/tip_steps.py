@@ -1,0 +1,170 @@
+r"""Steps of inverse kinematics towards the goal, and, of more actuators than conditions, beside it, within all limits.
+
+Beside it the actuators go home (`step_home`), or, where muscles cannot both pull and push, tension limits are constraints, and
+redundant muscles get the least tension (`step_within`). With the tensions `T` and their derivatives by the actuators, springs
+in equilibrium, a step is
+
+1. towards the goal: the least squares of what is missing, damped, within all limits;
+2. beside it, without moving the tip: the least :math:`|T - T_0|^2` within all limits,
+
+with the least tension that is wanted, `T_0`: the pretension of elastic tendons, zero or what the limits allow of others.
+Both are least squares with linear inequalities, which become nonnegative least squares (Lawson and Hanson 1974, chapter 23).
+Where the steps end, the conditions of Karush, Kuhn and Tucker of the least tension at the goal hold.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.model.soft_model import SoftModel
+
+_SHARES = (1.0, 0.5, 0.25, 0.1, 0.0)  # of a violated limit that a step may take back
+_LEAST_DAMPING = 1e-7  # of a step, relative to the largest slope
+_ROUNDING = 1e-12  # of limits, in units of scaled actuators
+
+
+class Pull(NamedTuple):
+    """Tensions of a robot in equilibrium, relative to `Actuators.tension_scale`, and where they should be."""
+
+    beyond: FloatArray
+    """Tension beyond the least that is wanted, shape (n_muscles,) [-]."""
+    slope: FloatArray
+    """Its derivative by the actuators at constant load, shape (n_muscles, n_motors)."""
+    room: FloatArray
+    """Room to the least and to the largest tension, negative beyond them, shape (2, n_muscles) [-]."""
+
+    @property
+    def excess(self) -> float:
+        """Largest tension beyond its limits [-]; 0 within them."""
+        return max(0.0, -float(self.room.min()))
+
+
+def pull(model: SoftModel, tensions: FloatArray, slope: FloatArray) -> Pull:
+    """Return tensions, shape (n_muscles,) [N], and their derivative, shape (n_muscles, n_motors), for a step."""
+    actuators = model.actuators
+    low, high = actuators.sought_tensions.T
+    scale = actuators.tension_scale
+    room = np.array([tensions - low, high - tensions]) / scale
+    return Pull((tensions - actuators.wanted_tensions) / scale, slope / scale, room)
+
+
+def step_within(
+    model: SoftModel, motors: FloatArray, slope: FloatArray, missing: FloatArray, damping: float, pulled: Pull, arrived: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Step towards the goal within the limits, and the step to the least tension that does not move the tip.
+
+    Args:
+        model: The robot.
+        motors: Its actuators, shape (n_motors,).
+        slope: Derivative of the tip by the basis of the actuators, shape (rows, n) [m].
+        missing: What is missing to the goal, shape (rows,) [m].
+        damping: Damping of the step towards the goal [m].
+        pulled: The tensions.
+        arrived: Whether the goal has been reached, from where on the tensions are lessened.
+
+    Returns:
+        Both steps by the basis, shape (n,).
+    """
+    basis = model.actuators.basis
+    count = basis.shape[1]
+    felt = pulled.slope @ basis
+    low, high = model.motor_limits.T
+    units = basis / model.motor_scale[:, None]
+    ranges, _ = model.actuators.active_limits(motors)
+    ends = np.concatenate([-felt, felt, -units, units, ranges @ basis])
+    room = np.concatenate(
+        [*pulled.room, (motors - low) / model.motor_scale, (high - motors) / model.motor_scale, np.zeros(len(ranges))]
+    )
+    kept = np.isfinite(room) & (np.abs(ends).max(axis=1) > _ROUNDING)
+    ends, room = ends[kept], room[kept]
+    least = max(damping, _LEAST_DAMPING * float(np.linalg.norm(slope)))
+    damped, wanted = np.concatenate([slope, least * np.eye(count)]), np.concatenate([missing, np.zeros(count)])
+    for share in _SHARES:
+        allowed = np.where(room < 0.0, share * room, room)
+        towards = least_squares(damped, wanted, ends, allowed)
+        if towards is not None:
+            break
+    else:
+        return np.zeros(count), np.zeros(count)
+    still = np.zeros(count)
+    if not arrived or count <= len(missing):
+        return towards, still
+    _, values, right = np.linalg.svd(slope)
+    null = right[int(np.sum(values > 1e-9 * values[0])) :].T
+    relative = felt @ null
+    lessened = np.concatenate([relative, _LEAST_DAMPING * max(float(np.linalg.norm(relative)), 1.0) * np.eye(null.shape[1])])
+    goal = np.concatenate([-(pulled.beyond + felt @ towards), np.zeros(null.shape[1])])
+    turn = least_squares(lessened, goal, ends @ null, np.maximum(allowed - ends @ towards, 0.0))
+    return towards, still if turn is None else null @ turn
+
+
+def step_home(
+    model: SoftModel, motors: FloatArray, slope: FloatArray, missing: FloatArray, damping: float, homeward: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Step towards the goal, and the part of the step home that does not move the tip, within the limits.
+
+    Reached limits that the step would violate are constrained, one set after the other.
+
+    Returns:
+        Both parts, shape (n,), and the projector on the unconstrained steps, shape (n, n).
+    """
+    basis = model.actuators.basis
+    normals, bends = (rows @ basis for rows in model.actuators.active_limits(motors))
+    pull = normals @ (slope.T @ missing) / np.maximum((normals * normals).sum(axis=1), 1e-300)
+    constrained = np.zeros(len(normals), dtype=bool)
+    while True:
+        rows, free, open_slope, whole = normals[constrained], np.eye(basis.shape[1]), slope, slope
+        if len(rows):
+            free -= np.linalg.pinv(rows) @ rows
+            open_slope = slope @ free
+            # A step along a curved limit costs the pull against it times its curvature: additional rows.
+            curved = np.sqrt(np.maximum(pull[constrained], 0.0))[:, None] * bends[constrained] @ free
+            whole = np.concatenate([open_slope, curved[curved.any(axis=1)]])
+        towards = free @ _damped_step(
+            whole, np.concatenate([missing, np.zeros(len(whole) - len(missing))]), damping, 1e-12 * model.reach
+        )
+        drift = homeward
+        if homeward.any():
+            drift = free @ (homeward - np.linalg.pinv(open_slope, rcond=1e-9) @ (open_slope @ homeward))
+        pressed = ~constrained & (normals @ (towards + drift) > 1e-12)
+        if not pressed.any():
+            return towards, drift, free
+        constrained |= pressed
+
+
+def _damped_step(slope: FloatArray, missing: FloatArray, damping: float, negligible: float) -> FloatArray:
+    """Levenberg-Marquardt step; directions that do not move the tip are zero."""
+    left, values, right = np.linalg.svd(slope, full_matrices=False)
+    gains = np.where(values > negligible, values, 0.0) / np.maximum(values**2 + damping**2, negligible**2)
+    return np.asarray(right.T @ (gains * (left.T @ missing)))
+
+
+def least_squares(matrix: FloatArray, wanted: FloatArray, ends: FloatArray, room: FloatArray) -> FloatArray | None:
+    """Return the least squares of `matrix @ x - wanted` with `ends @ x <= room`; None if the limits contradict each other.
+
+    Shapes (m, n) of full rank n, (m,), (k, n), (k,); the result has shape (n,).
+    """
+    from scipy.optimize import nnls
+
+    orthogonal, upper = np.linalg.qr(matrix)
+    free = np.linalg.solve(upper, orthogonal.T @ wanted)
+    left = room - ends @ free
+    if len(left) == 0 or left.min() >= -_ROUNDING:
+        return np.asarray(free)
+    normals = np.linalg.solve(upper.T, ends.T)  # least |z| with normals^T z <= left
+    size = np.maximum(np.linalg.norm(normals, axis=0), 1e-300)
+    normals, left = normals / size, left / size
+    scale = float(np.abs(left).max())
+    bounds = np.concatenate([-normals, -left[None] / scale])
+    try:
+        multipliers, _ = nnls(bounds, np.concatenate([np.zeros(len(upper)), [1.0]]))
+    except RuntimeError:  # too many steps
+        return None
+    remains = bounds @ multipliers - np.concatenate([np.zeros(len(upper)), [1.0]])
+    if -remains[-1] <= 1e-12:
+        return None
+    nearest = -scale * remains[:-1] / remains[-1]
+    return np.asarray(free + np.linalg.solve(upper, nearest))

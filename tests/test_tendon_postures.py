@@ -1,0 +1,117 @@
+"""Tendons that reach and feel: inverse kinematics with tensions that are limited and least, loads from tensions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+import softrobots as sr
+
+DOWN = sr.EARTH_GRAVITY
+ROBOTS: dict[str, Any] = {
+    "elastic": sr.TendonArm(),
+    "tension": sr.TendonArm(kind="tension"),
+    "length": sr.TendonArm(kind="length"),
+    "least tension": sr.TendonArm(tendon_least_tension=1.0),
+    "mixed": sr.TendonArm(kind=("tension", "elastic", "elastic")),
+    "helical": sr.TendonArm(
+        segment_lengths=(0.2,),
+        elastic_sections=4,
+        routing=[sr.Route(at=(0.0, 0.2), azimuth=(a, a + b), distance=0.0045) for b in (0.0, 1.5) for a in (0.0, 2.1, 4.2)],
+    ),
+    "pressure": sr.PccArm(kind="pressure"),
+    "mckibben": sr.PccArm(kind="mckibben"),
+}
+
+
+def model(name: str) -> sr.SoftModel:
+    return sr.load_model(ROBOTS[name])
+
+
+def reached(arm: sr.SoftModel, rng: np.random.Generator) -> sr.Equilibrium:
+    """An equilibrium with motors that pull at random, within the limits of tensions."""
+    kinds = [muscle.kind for muscle in arm.muscles]
+    share = rng.uniform(0.0, 1.0, arm.n_motors)
+    if "length" in kinds:
+        free = sr.load_model(ROBOTS["tension"])
+        posture = sr.solve_equilibrium(free, 1.0 + 10.0 * share, gravity=DOWN)
+        return sr.solve_equilibrium(arm, posture.muscle_lengths, gravity=DOWN)
+    scale = {"elastic": -0.004, "tension": 10.0, "pressure": 8e4, "mckibben": 8e4}
+    step = np.array([scale[kind] for kind in kinds]) * (0.25 + share)
+    return sr.solve_equilibrium(arm, arm.relaxed_motors + step, gravity=DOWN if arm.reach < 0.5 else None)
+
+
+def differences(arm: sr.SoftModel, at: sr.Equilibrium, step: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
+    """Tip and tensions by independent changes of the motors: central differences of solved equilibria."""
+    tips, tensions = [], []
+    for column in arm.actuators.basis.T:
+        ends = [
+            sr.solve_equilibrium(arm, motors, gravity=at.load.gravity, q_springs0=at.q_springs, tolerance=1e-12)
+            for motors in (at.q_motors + step * column, at.q_motors - step * column)
+            if arm.actuators.admit(motors)  # no negative pressure of a McKibben muscle
+        ] + [at]
+        width = step * (len(ends) - 1)
+        tips.append((ends[0].tip_position - ends[1].tip_position) / width)
+        tensions.append((ends[0].muscle_forces - ends[1].muscle_forces) / width)
+    return np.array(tips).T, np.array(tensions).T
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_targets_are_reached_within_all_limits_with_least_tension(name: str, rng: np.random.Generator) -> None:
+    """The conditions of Karush, Kuhn and Tucker, with differences of solved equilibria as derivatives.
+
+    At the solution the gradient of the squared tensions, beyond pretension, is a sum of gradients of the tip and of reached
+    limits, those with multipliers that are not negative: nonnegative least squares find them. Both differences and the search,
+    which ends at steps of 1e-6, leave a thousandth of the gradient.
+    """
+    arm = model(name)
+    sought = reached(arm, rng)
+    assert sought.within_limits
+    found = sr.solve_ik(arm, sought.tip_position, gravity=sought.load.gravity)
+    at = found.equilibrium
+    assert at.within_limits
+    assert at.stable
+    assert found.error <= 1e-9
+    wanted = np.array([max(tag.weakest, tag.pretension if tag.kind == "elastic" else 0.0) for tag in arm.muscles])
+    wanted[[tag.kind in ("pressure", "mckibben") for tag in arm.muscles]] = 0.0
+    beyond = at.muscle_forces - wanted
+    tip, tension = differences(arm, at)
+    low, high = arm.actuators.muscle_forces.T
+    at_limit = [-tension[at.muscle_forces < low + 1e-5], tension[at.muscle_forces > high - 1e-5]]
+    least, most = arm.motor_limits.T
+    units = arm.actuators.basis / arm.motor_scale[:, None]
+    near = 1e-9 * arm.motor_scale
+    rows = np.concatenate([tip, -tip, *at_limit, -units[at.q_motors < least + near], units[at.q_motors > most - near]])
+    gradient = tension.T @ beyond
+    normals = rows.T / np.maximum(np.linalg.norm(rows, axis=1), 1e-12)
+    assert nnls(normals, -gradient)[1] <= 1e-3 * np.linalg.norm(gradient) + 1e-9
+
+
+@pytest.mark.parametrize("name", ["elastic", "tension", "length"])
+def test_poses_and_directions_are_reached_with_nine_tendons(name: str, rng: np.random.Generator) -> None:
+    """A pose has six conditions, a direction five: both are met within the limits of all tensions."""
+    arm = model(name)
+    sought = sr.solve_equilibrium(model("tension"), rng.uniform(1.0, 8.0, 9), gravity=DOWN)
+    turn = sought.transform_tip_to_world.rotation
+    pose = sr.solve_ik(arm, sought.transform_tip_to_world, gravity=DOWN)
+    pointing = sr.solve_ik(arm, sought.tip_position, orientation=turn[:, 2], gravity=DOWN)
+    for found in (pose, pointing):
+        tip = found.equilibrium.transform_tip_to_world
+        assert found.equilibrium.within_limits
+        assert np.linalg.norm(tip.translation - sought.tip_position) <= 1e-9
+        assert np.linalg.norm(np.cross(tip.rotation[:, 2], turn[:, 2])) <= 1e-9
+    assert np.linalg.norm(pose.equilibrium.transform_tip_to_world.rotation - turn) <= 1e-8
+
+
+@pytest.mark.parametrize("name", ["elastic", "tension"])
+def test_a_closed_path_is_followed_within_all_limits(name: str) -> None:
+    """A round of 40 mm about the axis, on which some tendons are just taut."""
+    turn = np.linspace(0.3, 0.3 + 2.0 * np.pi, 9)
+    path = np.stack([0.04 * np.cos(turn), 0.04 * np.sin(turn), np.full(9, 0.16)], axis=1)
+    followed = sr.follow_trajectory(model(name), path, gravity=DOWN)
+    assert followed.tip_error.max() <= 1e-9
+    assert all(at.within_limits and at.stable for at in followed.equilibria)
+    assert min(at.muscle_forces.min() for at in followed.equilibria) >= 0.0
