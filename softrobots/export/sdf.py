@@ -50,7 +50,7 @@ def to_sdf(
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. For driven
+        q_motors: Motor joints, then tensions or pressures, shape (n_motors,) [rad, m, N or Pa]; relaxed by default. For driven
             motors, they only affect the frequency that sets the damping.
         actuators: "driven", or "welded": motor joints become fixed, tensions become part of the springs.
         damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles

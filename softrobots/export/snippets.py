@@ -53,8 +53,8 @@ def to_pybullet(
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscle tensions, shape (n_motors,) [rad, m or N]; relaxed by default. Tensions become part
-            of the springs.
+        q_motors: Motor joints, then tensions or pressures, shape (n_motors,) [rad, m, N or Pa]; relaxed by default. Tensions
+            become part of the springs.
         actuators: "driven": PyBullet's position control holds the motors, whatever the load; "welded": their joints are fixed.
         damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
             without swinging (`softrobots.export.damping`).
@@ -65,8 +65,8 @@ def to_pybullet(
         Text of the file.
 
     Raises:
-        ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, muscles of given
-            length, springs that are not linear, or more joints than PyBullet supports.
+        ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, springs that are
+            not linear, actuators that are no joint springs when they are held, or more joints than PyBullet supports.
         DescriptionError: If a moving link has no mass.
     """
     held = _held(model, q_motors)
@@ -79,8 +79,7 @@ def to_pybullet(
             "has fewer with fewer hinges, torsion=False or extension=False)"
         )
         raise ParameterError("model", model, requirement)
-    positions = np.array([*held.motors.values(), *held.tensions.values()])
-    frequency = robot.frequency or lowest_frequency(model, mass_matrix(model, positions))
+    frequency = robot.frequency or lowest_frequency(model, mass_matrix(model, robot.q_motors))
     springs = {name: (tag.stiffness, tag.rest, joints[name].damping) for name, tag in held.springs.items()}
     driven = {name: position for name, position in held.motors.items() if joints[name].movable}
     motors = {name: (position, min(joints[name].velocity, _FASTEST)) for name, position in driven.items()}
@@ -113,16 +112,16 @@ def to_pinocchio(model: SoftModel, q_motors: Any = None, *, gravity: Any = None)
 
     Args:
         model: The robot.
-        q_motors: Motor joints, then muscle tensions, that are the default in the file, shape (n_motors,) [rad, m or N]; relaxed
-            by default.
+        q_motors: Motor joints, then tensions or pressures, shape (n_motors,) [rad, m, N or Pa]; relaxed by default; with
+            pressures as tensions, they are the default in the file.
         gravity: Gravity, shape (3,) [m/s^2], world axes, used when the file is run as a script; None: weightless.
 
     Returns:
         Text of the file.
 
     Raises:
-        ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, muscles of given
-            length, or springs that are not linear.
+        ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, springs that are
+            not linear, or actuators that are no joint springs when they are held.
     """
     held = _held(model, q_motors)
     data = [

@@ -156,8 +156,8 @@ def _worth(tags: Sequence[ActuatorTag], rows: Sequence[SectionRow], paths: Muscl
     Of one that bends nothing, as along the backbone, elongation by its length is worth a radian.
     """
     worth = []
+    bends = [[row.places[key] for key in ("bend_x", "bend_y") if key in row.places] for row in rows]
     for tag, arms in zip(tags, paths.matrix, strict=True):
-        bends = [[row.places[key] for key in ("bend_x", "bend_y") if key in row.places] for row in rows]
         bend = sum(float(np.linalg.norm(arms[pair] / springs.stiffness[pair])) for pair in bends)
         reeled = sum(float(arms[pair] @ (arms[pair] / springs.stiffness[pair])) for pair in bends)
         if reeled <= 1e-9 * tag.rest_length * bend:

@@ -37,7 +37,7 @@ def read_chain(
 
     Pinocchio's workspace is not allocated, so the chain may have any length. `load_model` has checked that the six joints of a
     section are the chain of `strain_chain`, one behind the other with the rest shape in their origins. Limits of the actuators,
-    shape (n_motors, 2) [rad, m or N], and reach [m] are copied; `groups` are the springs of the inflated links.
+    shape (n_motors, 2) [rad, m, N or Pa], and reach [m] are copied; `groups` are the springs of the inflated links.
 
     Raises:
         DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, the springs of a slack

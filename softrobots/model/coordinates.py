@@ -77,7 +77,7 @@ class Coordinates(Protocol):
     """A map from actuator and elastic coordinates to joint positions."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> Point:
-        """Return the robot at given coordinates, shapes (n_motors,) and (n_elastic,) [rad, m or N]."""
+        """Return the robot at given coordinates, shapes (n_motors,) and (n_elastic,) [rad, m, N or Pa]."""
 
 
 class DirectCoordinates:

@@ -160,7 +160,7 @@ class SoftModel:
 
     @property
     def motor_limits(self) -> FloatArray:
-        """Lower and upper limit of each actuator, shape (n_motors, 2) [rad, m or N], read-only; infinite if continuous."""
+        """Lower and upper limit of each actuator, shape (n_motors, 2) [rad, m, N or Pa], read-only; infinite if continuous."""
         return self.actuators.limits
 
     @property
@@ -170,7 +170,7 @@ class SoftModel:
 
     @property
     def relaxed_motors(self) -> FloatArray:
-        """Motor joints at zero, muscles at rest or without tension, shape (n_motors,) [rad, m or N], read-only.
+        """Motor joints at zero, muscles at rest or without input, shape (n_motors,) [rad, m, N or Pa], read-only.
 
         Or as near to that as the limits allow.
         """
@@ -195,7 +195,7 @@ class SoftModel:
         """Return actuator coordinates that the robot can have, as a new array.
 
         Args:
-            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa].
             field: Name of the parameter, for the error.
 
         Raises:
@@ -207,7 +207,7 @@ class SoftModel:
         """Pinocchio's configuration vector from actuator and elastic coordinates.
 
         Args:
-            q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N].
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa].
             q_springs: Elastic coordinates, shape (n_springs,) [rad or m]; relaxed by default.
 
         Returns:
