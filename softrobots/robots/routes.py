@@ -10,7 +10,7 @@ import numpy as np
 
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, numbers
+from softrobots.robots.fields import PerPart, argument_text, numbers
 
 ROUTINGS = ("segment", "base")
 """Where the actuators of a segment start: where the segment does, or at the base of the robot."""
@@ -84,11 +84,10 @@ def checked_routing(value: Any, lengths: Sequence[float]) -> Routing:
 
 def routing_text(routing: Routing) -> str:
     """Return a routing as the text of a xacro argument: `[segment,1]`, or `at | azimuth | distance; ...` for routes."""
-    texts = [
-        " | ".join(" ".join(map(repr, values)) for values in vars(item).values()) if isinstance(item, Route) else str(item)
-        for item in routing
-    ]
-    return "; ".join(texts) if isinstance(routing[0], Route) else "[" + ",".join(texts) + "]"
+    routes = [item for item in routing if isinstance(item, Route)]
+    if not routes:
+        return argument_text(routing)
+    return "; ".join(" | ".join(" ".join(map(repr, values)) for values in vars(route).values()) for route in routes)
 
 
 def owner(route: Route, lengths: Sequence[float]) -> int:
