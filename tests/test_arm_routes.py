@@ -258,6 +258,23 @@ def test_the_default_muscles_bend_a_segment_by_about_a_radian(kind: str) -> None
     assert found.within_limits
 
 
+def test_an_elastic_tendon_should_begin_where_a_section_does() -> None:
+    """One strain for a section with a route along a part of it: its length is of first order, as the guide tells."""
+    begin, length = 0.0325, 0.12
+
+    def tip(lengths: tuple[float, ...], sections: int) -> np.ndarray:
+        route = sr.Route(at=(begin, length), azimuth=0.0, distance=0.0045)
+        arm = sr.TendonArm(segment_lengths=lengths, routing=[route], elastic_sections=sections)
+        model = sr.load_model(arm)
+        return sr.solve_equilibrium(model, model.relaxed_motors - 0.003, (0.02, 0.0, 0.0)).tip_position
+
+    divided = (begin, length - begin)
+    fine = tip(divided, 24)
+    off = [np.linalg.norm(tip(lengths, count) - fine) / length for lengths, count in (((length,), 8), (divided, 4))]
+    assert off[0] == pytest.approx(5e-3, rel=0.1)
+    assert off[1] == pytest.approx(2e-4, rel=0.2)
+
+
 def test_an_arm_with_tendons_on_another_robot_bends_as_alone() -> None:
     """Names get the prefix and segments other numbers; without weight its shape is that of the arm alone, from its base."""
     arm = sr.TendonArm(offset=0.3, elastic_sections=1)

@@ -744,6 +744,7 @@ TAGS = [
     (one_section_before, changed("muscle", "muscle_1_1", segment="a"), "a number from 1"),
     (one_section_before, changed("muscle", "muscle_1_1", name="muscle_1_2"), "a muscle name twice.*muscle_1_2"),
     (one_section_before, changed("muscle", "muscle_1_1", name=""), "a muscle name twice or an empty one"),
+    (one_section_before, changed("muscle", "muscle_1_1", name="section_1_1_c"), "both a joint and an actuator.*section_1_1_c"),
 ]
 
 

@@ -66,6 +66,11 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
     check_structure(root, source)
     muscles = read_actuators(root, _base_to_tip(root, tags), source)
     _unique("muscle", [*(tag.name for tag in muscles), *(tag.name for tag in tags.lines)], source)
+    shared = sorted({tag.name for tag in muscles} & {joint.get("name", "") for joint in root.findall("joint")})
+    if shared:
+        raise DescriptionError(
+            f"{source} has both a joint and an actuator called {', '.join(shared)}; names that differ are required"
+        )
     return replace(tags, muscles=muscles)
 
 

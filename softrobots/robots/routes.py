@@ -28,6 +28,9 @@ class Route:
     Between the places `at`, distance and azimuth are linear in the position along the backbone: constant values are a straight
     line parallel to it, an azimuth that changes is a helix around it.
 
+    Where it begins or ends within a section of the chain, its length is of first order in that of the section: let a segment
+    end there.
+
     Raises:
         ParameterError: If a value is out of range or a list has the wrong length; the message names the field.
     """
