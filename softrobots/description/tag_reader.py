@@ -214,17 +214,17 @@ def _check_together(tags: RobotTags, source: str) -> None:
 
 def _base_to_tip(root: ElementTree.Element, tags: RobotTags) -> list[AnySectionTag]:
     """The sections in the order of their joints along the robot, which is a tree."""
-    above: dict[str, tuple[str, str]] = {}
-    links: dict[str, str] = {}
+    parents: dict[str, str] = {}  # links by joint
+    joints: dict[str, str] = {}  # above each link
     for joint in root.findall("joint"):
-        ends = [joint.find(end) for end in ("parent", "child")]
-        parent, child = ("" if end is None else end.get("link", "") for end in ends)
-        above[joint.get("name", "")], links[child] = (parent, child), joint.get("name", "")
+        name = joint.get("name", "")
+        parents[name], child = ("" if end is None else end.get("link", "") for end in map(joint.find, ("parent", "child")))
+        joints[child] = name
 
     def depth(joint: str) -> int:
         count = 0
-        while joint in above:
-            joint, count = links.get(above[joint][0], ""), count + 1
+        while joint in parents:
+            joint, count = joints.get(parents[joint], ""), count + 1
         return count
 
     first = [(tag.joints[0], tag) for tag in tags.sections]

@@ -79,7 +79,6 @@ class DryFriction:
             self._coefficient = np.array([guides.get(row.segment, 0.0) for _, row in pairs])
             turns = [_turn(point, row) for point, row in pairs]
             self._rest, self._slope = (np.array(part) for part in zip(*turns, strict=True))
-            self._places_of_paths = paths.places
 
     @property
     def untouched(self) -> FrictionMemory:
@@ -102,7 +101,7 @@ class DryFriction:
         """Return the friction `L` of each guide that slips, shape (n_guides,) [N], at tensions of the motors, (n_muscles,)."""
         if not self.guided:
             return np.zeros(0)
-        z = np.append(strains, 0.0)[self._places_of_paths]
+        z = np.append(strains, 0.0)[self._paths.places]
         turning, tangent = np.swapaxes(self._rest + (self._slope @ z[:, None, :, None])[..., 0], 0, 1)
         angles = np.linalg.norm(np.cross(turning, tangent), axis=1) / np.linalg.norm(tangent, axis=1)
         slips = self._slipped(self._paths.at(strains).pieces, memory) / self._stick
