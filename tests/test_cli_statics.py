@@ -641,7 +641,7 @@ REFUSED = [
     (("load", "inflatable_arm", "--torques", *"123", "--frame", "nobody"), "no frame is called 'nobody'"),
     (("load", "inflatable_arm", "--torques", *"123", "-o", "x.csv"), "-o must be a file name that ends in .npz"),
     (("load", "helix_tube", "--torques", "1"), "a robot with at least one motor"),
-    (("load", "pcc_arm", "--muscles", "forces", "--torques", "1"), "a robot whose muscle lengths are given"),
+    (("load", "pcc_arm", "--muscles", "forces", "--torques", "1"), "a robot with muscles of given length"),
     (("ik", "inflatable_arm"), "one of the arguments --target --waypoints is required"),
     (("ik", *TARGET, "--waypoints", CSV), "not allowed with argument --target"),
     (("ik", *TARGET, "--start", "1"), "--start must be 3 numbers"),

@@ -769,7 +769,7 @@ def test_noise_of_the_tensions_spreads_as_the_covariance_says(rng: np.random.Gen
 
 
 def test_given_forces_feel_no_load() -> None:
-    with pytest.raises(sr.ParameterError, match="muscle lengths are given"):
+    with pytest.raises(sr.ParameterError, match="muscles of given length"):
         sr.estimate_load(model("forces"), np.zeros(6), np.zeros(6))
 
 

@@ -115,3 +115,67 @@ def test_a_closed_path_is_followed_within_all_limits(name: str) -> None:
     assert followed.tip_error.max() <= 1e-9
     assert all(at.within_limits and at.stable for at in followed.equilibria)
     assert min(at.muscle_forces.min() for at in followed.equilibria) >= 0.0
+
+
+FELT = {
+    "elastic": ROBOTS["elastic"],
+    "length": ROBOTS["length"],
+    "mckibben": ROBOTS["mckibben"],
+    "mixed": ROBOTS["mixed"],
+    "helical": ROBOTS["helical"],
+}
+
+
+def loaded(arm: sr.SoftModel, rng: np.random.Generator) -> tuple[np.ndarray, sr.Equilibrium]:
+    """A random force that moves the tip some per cent of the reach, and the robot under it."""
+    still = reached(arm, rng)
+    force = rng.normal(size=3)
+    tip = sr.compliance(arm, still)[:3, :3]
+    force *= 0.03 * arm.reach / np.linalg.norm(tip @ force)
+    return force, sr.solve_equilibrium(arm, still.q_motors, force, gravity=still.load.gravity, tolerance=1e-12)
+
+
+@pytest.mark.parametrize("name", FELT)
+def test_a_load_is_read_from_tensions(name: str, rng: np.random.Generator) -> None:
+    """Forward and back: the force comes back to the tolerance of the torques, 1e-10, over the least singular value."""
+    arm = model(name)
+    force, under = loaded(arm, rng)
+    measured = np.array(under.muscle_forces)
+    measured[[tag.kind == "tension" for tag in arm.muscles]] = 0.0  # not used
+    found = sr.estimate_load(arm, under.q_motors, measured, gravity=under.load.gravity, restart=False, torque_std=0.1)
+    assert len(found.unobservable_directions) == 0
+    assert np.linalg.norm(found.force - force) <= 1e-6 * np.linalg.norm(force)
+    assert np.abs(found.equilibrium.tip_position - under.tip_position).max() <= 1e-8 * arm.reach
+    # The derivative of the tensions by the force, against differences of solved equilibria.
+    step, slope = 1e-4 * float(np.linalg.norm(force)), []
+    for axis in np.eye(3):
+        ends = [
+            sr.solve_equilibrium(
+                arm, under.q_motors, force + sign * step * axis, gravity=under.load.gravity, tolerance=1e-12
+            ).muscle_forces
+            for sign in (1.0, -1.0)
+        ]
+        slope.append((ends[0] - ends[1]) / (2.0 * step))
+    by_force = np.array(slope).T
+    assert np.allclose(np.linalg.svd(by_force)[1], found.singular_values, rtol=1e-5, atol=1e-7)
+    assert found.covariance is not None
+    expected = 0.1**2 * np.linalg.inv(by_force.T @ by_force)
+    assert np.allclose(found.covariance, expected, rtol=1e-4, atol=1e-6 * np.abs(expected).max())
+
+
+def test_slack_tendons_feel_nothing(rng: np.random.Generator) -> None:
+    """Two taut tendons of three feel two directions at most; of three slack ones none is left."""
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), tendon_pretension=0.0))
+    motors = arm.relaxed_motors + (-0.004, 0.006, -0.002)
+    under = sr.solve_equilibrium(arm, motors, (0.01, 0.02, 0.0))
+    assert under.muscle_slack == (False, True, False)
+    found = sr.estimate_load(arm, motors, under.muscle_forces, restart=False)
+    assert len(found.unobservable_directions) >= 1
+    assert found.singular_values[2] == 0.0
+
+
+@pytest.mark.parametrize("name", ["tension", "pressure"])
+def test_given_forces_feel_no_load(name: str) -> None:
+    arm = model(name)
+    with pytest.raises(sr.ParameterError, match=r"elastic tendons or McKibben muscles: given forces feel no load"):
+        sr.estimate_load(arm, np.zeros(arm.n_motors), np.zeros(arm.n_motors))

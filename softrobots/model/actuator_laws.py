@@ -28,6 +28,9 @@ from softrobots.description.urdf_tags import ActuatorTag
 UNITS = {"length": "m", "tension": "N", "elastic": "m", "pressure": "Pa", "mckibben": "Pa"}
 """Unit of the input of each kind."""
 
+UNFELT = ("tension", "pressure")
+"""Kinds whose tension does not depend on the length: they feel no load."""
+
 IntArray = NDArray[np.intp]
 
 ROUNDING = 8.0 * float(np.finfo(np.float64).eps)

@@ -11,6 +11,7 @@ from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.actuator_laws import (
+    UNFELT,
     UNITS,
     ActuatorLaws,
     input_limits,
@@ -103,6 +104,9 @@ class Actuators:
         relaxed = np.concatenate([np.zeros(len(joints)), [relaxed_input(muscle) for muscle in muscles]])
         self.relaxed = read_only(np.clip(relaxed, *self.limits.T))
         """Joints at zero, muscles at rest or without tension or pressure, as near as the limits allow, shape (n_motors,)."""
+        kinds = [muscle.kind for muscle in muscles]
+        self.feels = np.array([*(True for _ in joints), *(kind not in UNFELT for kind in kinds)], dtype=bool)
+        """Which of them feel a load on the robot: all but given tensions and pressures, shape (n_motors,), truth values."""
         self._unit = ", ".join(dict.fromkeys(self.units[len(joints) :])) or "rad"
 
     def checked(self, value: Any, field: str) -> FloatArray:

@@ -98,6 +98,9 @@ def estimate_load(
     "newton" solves `tau_m(f) = motor_torques` with the springs in equilibrium at every step, by damped Newton with the exact
     derivative :math:`d\tau_m/df = J_m^T + d(J_m^T f - g_m)/dy K_t^{-1} J_k^T`. "alternation" is [Troise 2021] Figure 5:
     `f = (J_m,lin^T)^-1 (tau_m + g_m)` and `y = rest + (J_k^T f - g_k)/k` in turn; it fails in a few per cent of cases at 18 N.
+    Muscles of given length, elastic tendons and McKibben muscles feel a load by their tensions; given tensions and pressures
+    feel none, and their numbers are not used. A slack tendon feels none, either.
+
     With more than three motors the fit is least squares; with fewer the force is the one that the damped search finds from
     zero, close to the smallest.
 
@@ -108,8 +111,8 @@ def estimate_load(
     Args:
         model: The robot, with at least one motor.
         q_motors: Motor coordinates, shape (n_motors,) [rad or m].
-        motor_torques: Load on each motor, shape (n_motors,) [N m], with the sign of `Equilibrium.motor_torques`:
-            minus what the motor exerts.
+        motor_torques: Load on each motor, shape (n_motors,) [N m or N], with the sign of `Equilibrium.motor_torques`:
+            minus what the motor exerts; of a muscle its tension.
         method: "newton" or "alternation".
         frame: Frame at which the force acts; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
@@ -126,8 +129,8 @@ def estimate_load(
         The force with conditioning, unobservable directions, covariance and alternatives.
 
     Raises:
-        ParameterError: If an argument has the wrong shape, is not finite or out of range, the robot has no motors, or it has
-            muscles and `stiffness_std` or `motor_angle_std` is given.
+        ParameterError: If an argument has the wrong shape, is not finite or out of range, the robot has no motors, none of them
+            feels a load, or it has muscles and `stiffness_std` or `motor_angle_std` is given.
         NameNotFound: If the frame does not exist.
         LoadNotFound: If no force explains the torques; carries the best estimate.
         NeutralEquilibrium: If the search meets a load at which the tangent stiffness is singular.
@@ -161,12 +164,13 @@ def check_feels(model: SoftModel) -> None:
     """Refuse robots whose actuators feel no load.
 
     Raises:
-        ParameterError: If there are none, or muscle tensions are given.
+        ParameterError: If there are none, or all of them are given tensions or pressures.
     """
     if model.n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor")
-    if model.muscles and model.muscle_input == "forces":
-        raise ParameterError("model", model, "a robot whose muscle lengths are given: given forces feel no load")
+    if not model.actuators.feels.any():
+        requirement = "a robot with muscles of given length, elastic tendons or McKibben muscles: given forces feel no load"
+        raise ParameterError("model", model, requirement)
 
 
 def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others: list[Explanation]) -> LoadEstimate:

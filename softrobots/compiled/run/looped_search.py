@@ -214,7 +214,8 @@ class _MeasuredTorques:
         return self.looked_at(state) if status == Status.CERTIFIED else None
 
     def unexplained(self, state: ChainState) -> FloatArray:
-        return np.asarray(self.torques - self.chain.actuation.loads(self.chain.run, state.w))
+        loads = self.chain.actuation.loads(self.chain.run, state.w)
+        return np.where(self.chain.model.actuators.feels, self.torques - loads, 0.0)
 
     def directions(self, state: ChainState) -> Directions:
         return Directions.of(self.chain.actuation.feeling(self.chain.run, state.w), self.chain.model.reach)

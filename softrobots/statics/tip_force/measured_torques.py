@@ -15,7 +15,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian
-from softrobots.statics.loads import Load
+from softrobots.statics.loads import AppliedLoad, Load
 from softrobots.statics.sensitivity import tip_motion
 from softrobots.statics.tip_force.force_search import HIDDEN, OBSERVABLE, Directions, search_force, sphere, torque_tolerance
 from softrobots.statics.tip_force.load_errors import FIVE, MeasurementErrors
@@ -77,8 +77,8 @@ class MeasuredTorques:
         return balanced_state(self.model, self.motors, self.load(force), near.q_springs, tolerance=_INNER)
 
     def unexplained(self, state: ElasticState) -> FloatArray:
-        """Return the measured torques minus those of a state."""
-        return np.asarray(self.torques - state.load.motors)
+        """Return the measured torques minus those of a state; zero for actuators that feel no load."""
+        return np.where(self.model.actuators.feels, self.torques - state.load.motors, 0.0)
 
     def residual(self, state: ElasticState) -> float:
         """Return the norm of the torques that a state does not explain [N m]."""
@@ -87,7 +87,10 @@ class MeasuredTorques:
     def directions(self, state: ElasticState) -> Directions:
         """Decompose the derivative of the torques with respect to the force."""
         motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
-        moved, _ = tip_motion(self.model, motors, springs, state.tangent, state.load.coupling)
+        felt = state.load.coupling
+        if self.model.structure.actuator_laws is not None:  # a tension by law is not conjugate to its input
+            felt = state.point.motor_derivatives(AppliedLoad(self.model, self.base).at(state.q))[1].T
+        moved, _ = tip_motion(self.model, motors, springs, state.tangent, felt)
         return Directions.of(moved.T, self.model.reach)
 
     def explanation(self, force: FloatArray, state: ElasticState, iterations: int) -> Explanation:
