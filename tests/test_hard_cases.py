@@ -63,10 +63,11 @@ def drawn(kind: str, rng: np.random.Generator) -> tuple[sr.SoftModel, Case, np.n
     joints = len(robot.structure.motor_joints)
     motors = np.tile(np.array(robot.relaxed_motors), (3, 1))
     motors[:, :joints] = rng.uniform(-3.0, 3.0, (3, joints))
-    if robot.muscle_input == "forces":
-        motors[:, joints:] = rng.uniform(-10.0, 10.0, (3, motors.shape[1] - joints))
-    else:
-        motors[:, joints:] *= 1.0 + rng.uniform(-0.03, 0.03, (3, motors.shape[1] - joints))
+    given = motors[:, joints:]
+    tensions = np.array(robot.actuators.units[joints:]) == "N"
+    motors[:, joints:] = np.where(
+        tensions, rng.uniform(-10.0, 10.0, given.shape), given * (1.0 + rng.uniform(-0.03, 0.03, given.shape))
+    )
     vectors = rng.normal(size=(3, 3, 3)) * np.array([5.0, 3.0, 0.3])[:, None, None]
     spread = 0.3 if kind in ("arm", "limp", "three_links", "foreign") else 0.03
     return robot, Case(motors, *vectors), robot.rest + rng.uniform(-spread, spread, (3, robot.n_springs))

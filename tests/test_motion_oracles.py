@@ -162,8 +162,8 @@ def test_random_runs_end_with_numbers(engine: str) -> None:
         model = law_robots.model(kind)
         simulate: Any = partial(sr.simulate, model)
         if engine == "compiled":
-            if kind in ("limp", "foreign") or (model.muscles and model.muscle_input == "lengths"):
-                continue  # plateaus, side branches and lengths of muscles are refused there
+            if kind in ("limp", "foreign", "tendons") or (model.muscles and model.muscle_input == "lengths"):
+                continue  # plateaus, side branches, elastic tendons and lengths of muscles are refused there
             simulate = sr.compile(model).simulate
         for _ in range(1600 if engine == "compiled" else 100):
             runs += 1

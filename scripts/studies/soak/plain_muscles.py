@@ -34,6 +34,14 @@ class PlainMuscles:
                     if strain in lumped.joints:
                         row[self._names.index(lumped.joints[strain])] = arm
 
+    def tensions(self, lengths: FloatArray, given: FloatArray) -> FloatArray:
+        """Return the tensions at lengths and at what is given, tensions or lengths at the motors, shape (n, n_muscles) [N]."""
+        tensions = np.array(given)
+        for m, muscle in enumerate(self._tags.muscles):
+            if muscle.kind == "elastic":
+                tensions[:, m] = np.maximum(0.0, muscle.pretension + muscle.stiffness * (lengths[:, m] - given[:, m]))
+        return tensions
+
     def at(self, strains: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the lengths, shape (n, n_muscles), and their derivatives by the strains, shape (n, n_muscles, n_strains).
 

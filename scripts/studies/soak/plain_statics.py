@@ -145,8 +145,9 @@ class PlainStatics:
                 residual = rows @ self._free.T - np.einsum("ns,sm,nmi->ni", rows, back, share)
                 rows = rows - np.einsum("nm,nms->ns", np.einsum("ns,nsm->nm", rows, np.linalg.pinv(slopes)), slopes)
             else:
-                residual = rows = rows + np.einsum("nm,nms->ns", given, slopes)
-                size = size + np.abs(given).sum(axis=1) * self.model.reach
+                tensions = self._muscles.tensions(lengths, given)
+                residual = rows = rows + np.einsum("nm,nms->ns", tensions, slopes)
+                size = size + np.abs(tensions).sum(axis=1) * self.model.reach
         imbalance = np.linalg.norm(rows, axis=1)
         return Balance(residual, imbalance, size, torques[:, self._motor_columns], tip, rounding, held)
 
