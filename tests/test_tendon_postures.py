@@ -179,3 +179,39 @@ def test_given_forces_feel_no_load(name: str) -> None:
     arm = model(name)
     with pytest.raises(sr.ParameterError, match=r"elastic tendons or McKibben muscles: given forces feel no load"):
         sr.estimate_load(arm, np.zeros(arm.n_motors), np.zeros(arm.n_motors))
+
+
+@pytest.mark.parametrize("name", ["elastic", "mixed", "mckibben"])
+def test_jacobian_and_compliance_are_derivatives_of_equilibria(name: str, rng: np.random.Generator) -> None:
+    """Against central differences, to their error of second order."""
+    arm = model(name)
+    at = reached(arm, rng)
+    expected, _ = differences(arm, at)
+    jacobian = sr.elastostatic_jacobian(arm, at) @ arm.actuators.basis
+    assert np.abs(jacobian - expected).max() <= 1e-7 * np.abs(expected).max()
+    tip = sr.compliance(arm, at)[:3, :3]
+    step, moved = 1e-3 * arm.reach / np.abs(tip).max(), []
+    for axis in np.eye(3):
+        ends = [
+            sr.solve_equilibrium(arm, at.q_motors, sign * step * axis, gravity=at.load.gravity, q_springs0=at.q_springs)
+            for sign in (1.0, -1.0)
+        ]
+        moved.append((ends[0].tip_position - ends[1].tip_position) / (2.0 * step))
+    assert np.abs(np.array(moved).T - tip).max() <= 1e-5 * np.abs(tip).max()
+
+
+def test_a_pushed_arm_buckles_where_its_last_tendons_go_slack() -> None:
+    """Knees on the path of a load: the push shortens the arm until its tendons are slack.
+
+    All slack, the arm is a column of Euler's load EI pi^2 / (4 L^2), to the order of its sections. Tendons along the first
+    segment, of length h, go slack at the push T0 EA / (k h); where that is above Euler's load, stability ends there.
+    """
+    arm = sr.TendonArm(tendon_pretension=0.001)
+    modulus, radius, length = 50e9, 0.0005, 0.1865
+    euler = modulus * np.pi * radius**4 / 4.0 * np.pi**2 / (4.0 * length**2)
+    bare = sr.load_model(arm)
+    assert sr.critical_load(bare, bare.relaxed_motors, (0, 0, -1)) == pytest.approx(euler, rel=2e-3)
+    held = sr.load_model(sr.TendonArm(tendon_pretension=0.004))
+    knee = 0.004 * modulus * np.pi * radius**2 / (8e3 * 0.060)
+    assert knee > 1.5 * euler
+    assert sr.critical_load(held, held.relaxed_motors, (0, 0, -1)) == pytest.approx(knee, rel=1e-6)

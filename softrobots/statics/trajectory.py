@@ -239,9 +239,10 @@ def _exact_steps(
                 wrist = spherical_wrist(model) if target.rotation is not None else None
                 singular = None if wrist is None else wrist.singularity(here.state.q, NEAR_SINGULAR)
                 solution = equilibrium_from_state(model, reached.q_motors, load, reached.state, method=method, iterations=0)
+                units = ", ".join(dict.fromkeys(model.actuators.units))
                 raise TargetUnreachable(
                     f"waypoint {number} of {len(goals)}: no continuous motion reaches it from the previous one; the nearest "
-                    f"solution is a jump of the motors by {apart.round(4).tolist()} rad (allow_jumps=True takes it)"
+                    f"solution is a jump of the motors by {apart.round(4).tolist()} {units} (allow_jumps=True takes it)"
                     + (f"; {singular}" if singular else ""),
                     best=IkSolution(
                         target.position, target.rotation, solution, reached.error, reached.angle, reached.iterations, ()
