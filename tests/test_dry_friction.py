@@ -146,6 +146,7 @@ def test_muscles_of_given_length_have_hysteresis_too() -> None:
     assert further.stable
 
 
+@pytest.mark.study
 def test_a_trajectory_remembers_its_way(tmp_path: Path) -> None:
     """Out and back along a line: other tensions at the same tip, as those of single steps from point to point."""
     model = sr.load_model(sr.TendonArm(kind="tension", bending_friction=MOMENT, elastic_sections=2))
