@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,13 @@ def _answer(estimate: LoadEstimate) -> dict[str, Any]:
         Fact("force_std", _deviations(estimate), "N"),
         Fact("covariance", estimate.covariance, "N^2"),
         Fact("covariance_parts", dict(estimate.covariance_parts), "N^2"),
-        *attributes(estimate, singular_values="m", condition_number="-", unobservable_directions="-", measured_torques=torques),
+        *attributes(
+            estimate,
+            singular_values=_per_newton(motors),
+            condition_number="-",
+            unobservable_directions="-",
+            measured_torques=torques,
+        ),
         *attributes(estimate, torque_std=torques, stiffness_std="-", motor_angle_std=joined_units(motors)),
         *attributes(estimate, residual=torques, iterations="-", frame="", method=""),
     ]
@@ -115,6 +122,11 @@ def _answer(estimate: LoadEstimate) -> dict[str, Any]:
         for other in estimate.alternatives
     ]
     return {**answer_of(facts), "equilibrium": equilibrium_answer(estimate.equilibrium), "alternatives": others}
+
+
+def _per_newton(motors: Sequence[str]) -> str:
+    """Unit of what actuators of these units feel of a force, over the force."""
+    return joined_units([{"N m": "m", "N": "-"}[unit] for unit in load_units(motors)])
 
 
 def _deviations(estimate: LoadEstimate) -> Any:
@@ -131,8 +143,11 @@ def _lines(estimate: LoadEstimate) -> list[str]:
         for name, part in estimate.covariance_parts.items():
             rows.append((f"    by {name.replace('_', ' ')}", f"{formatted(np.sqrt(np.diag(part)))} N"))
     rows += [("  explained as well by", f"{formatted(other.force)} N") for other in estimate.alternatives]
-    rows += [("singular values", f"{formatted(estimate.singular_values)} m (condition number {estimate.condition_number:.3g})")]
+    motors = estimate.equilibrium.model.actuators.units
+    felt = f"{formatted(estimate.singular_values)} {_per_newton(motors)}"
+    rows.append(("singular values", f"{felt} (condition number {estimate.condition_number:.3g})"))
     directions = [("NOT FELT along", formatted(direction)) for direction in estimate.unobservable_directions]
     rows += directions or [("not felt along", "no direction")]
-    rows.append(("torques unexplained", f"{estimate.residual:.2g} N m, {estimate.iterations} iterations by {estimate.method}"))
+    left = f"{estimate.residual:.2g} {joined_units(load_units(motors))}"
+    rows.append(("torques unexplained", f"{left}, {estimate.iterations} iterations by {estimate.method}"))
     return aligned(rows)
