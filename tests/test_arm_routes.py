@@ -183,6 +183,7 @@ def test_routes_and_words_on_the_command_line() -> None:
     assert make_robot("pcc_arm", words) == sr.PccArm(routing=[route], kind=("elastic", "mckibben"))
     assert make_robot("tendon_arm", ["routing=[base,2,segment]"]).routing == ("base", 2, "segment")
     assert make_robot("pcc_arm", ["routing=base"]).routing == ("base", "base")
+    assert sr.TendonArm(routing=(np.int64(1), np.str_("base"), 2)).routing == (1, "base", 2)
     with pytest.raises(sr.ParameterError, match="routing must be 'segment' or 'base'"):
         make_robot("pcc_arm", ["routing=[{at: 1"])
 

@@ -215,3 +215,19 @@ def test_a_pushed_arm_buckles_where_its_last_tendons_go_slack() -> None:
     knee = 0.004 * modulus * np.pi * radius**2 / (8e3 * 0.060)
     assert knee > 1.5 * euler
     assert sr.critical_load(held, held.relaxed_motors, (0, 0, -1)) == pytest.approx(knee, rel=1e-6)
+
+
+@pytest.mark.parametrize(("chain", "fields"), [("sections", {"elastic_sections": 2}), ("lumped", {"hinges": 4})])
+def test_an_arm_snaps_where_a_tendon_goes_slack(chain: str, fields: dict[str, int]) -> None:
+    """Pushed from above, the bent arm is stable until a tendon goes slack: there the tangent jumps, and it snaps aside."""
+    model = sr.load_model(sr.TendonArm(chain=chain, **fields))
+    motors = model.relaxed_motors - np.array([0.3e-3, *[0.0] * 8])
+    critical = sr.critical_load(model, motors, (0.0, 0.0, -1.0))
+    springs, taut = None, None
+    for share in (0.5, 0.8, 0.95, 0.99, 0.999, 0.9999):
+        found = sr.solve_equilibrium(model, motors, (0.0, 0.0, -share * critical), q_springs0=springs)
+        assert found.stable
+        springs, taut = found.q_springs, min(found.muscle_forces)
+    assert 0.0 < taut < 0.02
+    beyond = sr.solve_equilibrium(model, motors, (0.0, 0.0, -1.0005 * critical), q_springs0=springs)
+    assert np.abs(beyond.q_springs - springs).max() > 0.3

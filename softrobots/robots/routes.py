@@ -118,10 +118,11 @@ def _of_mapping(item: Mapping[str, Any], value: Any) -> Route:
 
 
 def _start(item: Any, value: Any, segment: int, count: int) -> str | int:
-    if isinstance(item, str) and item in ROUTINGS:
-        return item
-    if isinstance(item, int) and not isinstance(item, bool) and 1 <= item <= segment:
-        return item
+    plain = item.item() if isinstance(item, np.generic) else item
+    if isinstance(plain, str) and plain in ROUTINGS:
+        return plain
+    if isinstance(plain, int) and not isinstance(plain, bool) and 1 <= plain <= segment:
+        return plain
     raise ParameterError("routing", value, _requirement(count))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, unit_vector
 from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.knees import knees_between
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual, scaled
 from softrobots.statics.kinematics import frame_jacobian
@@ -283,18 +284,16 @@ class ForcePath:
         return [] if point is None else [point]
 
     def _behind_knee(self, last: list[PathPoint], way: FloatArray) -> FloatArray | None:
-        """Direction of the path behind the knee of a link, at either end of its plateau; None if there is no knee.
+        """Direction of the path behind the knee of a link or a tendon (`softrobots.model.knees`); None if there is no knee.
 
-        The tangent stiffness jumps there. The direction is in the null space behind the knee, with the link bending on as
-        before.
+        The tangent stiffness jumps there. The direction is in the null space behind the knee, with the link or the tendon
+        going on as before.
         """
-        here, law = last[-1], self.model.springs
+        here = last[-1]
         beyond = here.springs + _OVER * way[:-1]
-        places = sorted(law.saturated(last[0].springs) ^ law.saturated(beyond))
+        rows = knees_between(self.model, self.motors, last[0].springs, beyond)
         ahead = self.point(beyond, here.force)
-        if not places or not math.isfinite(ahead.state.error):
+        if not len(rows) or not math.isfinite(ahead.state.error):
             return None
         turned = np.linalg.svd(np.column_stack([ahead.state.tangent, -self.force * ahead.push]))[2][-1]
-        bend = (here.springs - law.rest)[places]
-        same = float(bend @ way[places]) * float(bend @ turned[places])
-        return np.asarray(math.copysign(1.0, same) * turned)
+        return np.asarray(math.copysign(1.0, (rows @ way[:-1]) @ (rows @ turned[:-1])) * turned)
