@@ -146,16 +146,15 @@ def test_muscles_of_given_length_have_hysteresis_too() -> None:
     assert further.stable
 
 
-@pytest.mark.study
 def test_a_trajectory_remembers_its_way(tmp_path: Path) -> None:
     """Out and back along a line: other tensions at the same tip, as those of single steps from point to point."""
     model = sr.load_model(sr.TendonArm(kind="tension", bending_friction=MOMENT, elastic_sections=2))
     start = sr.solve_equilibrium(model, np.full(9, 1.0))
-    line = start.tip_position + np.linspace(0.3, 1.0, 3)[:, None] * (0.02, 0.01, -0.003)
+    line = start.tip_position + np.linspace(0.3, 0.8, 2)[:, None] * (0.02, 0.01, -0.003)
     there = sr.follow_trajectory(model, np.concatenate([line, line[-2::-1]]), q_motors0=np.full(9, 1.0))
     assert there.tip_error.max() < 1e-6
     tensions = there.q_motors
-    assert np.abs(tensions[1] - tensions[-2]).max() > 0.05
+    assert np.abs(tensions[0] - tensions[-1]).max() > 0.05
     for before, after in zip(there.equilibria, there.equilibria[1:], strict=False):
         again = sr.solve_equilibrium(model, after.q_motors, previous=before)
         assert again.tip_position == pytest.approx(after.tip_position, abs=1e-9)

@@ -165,7 +165,7 @@ def test_random_runs_end_with_numbers(engine: str) -> None:
             if kind in ("limp", "foreign", "tendons") or (model.muscles and model.muscle_input == "lengths"):
                 continue  # plateaus, side branches, elastic tendons and lengths of muscles are refused there
             simulate = sr.compile(model).simulate
-        for _ in range(1600 if engine == "compiled" else 100):
+        for _ in range(1600 if engine == "compiled" else 50):
             runs += 1
             push = law_robots.PUSHES[kind] * 10.0 ** rng.uniform(-2.0, 0.5) * rng.normal(size=3)
             step = 10.0 ** rng.uniform(-4.0, -1.5)
