@@ -140,14 +140,14 @@ def actuators_of(tags: Sequence[ActuatorTag], muscle_input: str | None) -> tuple
         DescriptionError: If some then have given lengths and others not.
     """
     swapped = {"lengths": {"tension": "length"}, "forces": {"length": "tension"}}.get(muscle_input or "", {})
-    made = tuple(replace(tag, kind=swapped.get(tag.kind, tag.kind)) for tag in tags)
-    held, others = ([tag.name for tag in made if (tag.kind == "length") is given] for given in (True, False))
+    actuators = tuple(replace(tag, kind=swapped.get(tag.kind, tag.kind)) for tag in tags)
+    held, others = ([tag.name for tag in actuators if (tag.kind == "length") is given] for given in (True, False))
     if held and others:
         raise DescriptionError(
             f"the lengths of {', '.join(held)} are given, and not those of {', '.join(others)}; required: given lengths for "
             "all or none (kind elastic with a high stiffness is nearly a given length)"
         )
-    return made
+    return actuators
 
 
 def _worth(tags: Sequence[ActuatorTag], rows: Sequence[SectionRow], paths: MusclePaths, springs: Springs) -> FloatArray:

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import MissingDependency, SoftRobotsError
+from softrobots.core.errors import SoftRobotsError
 from softrobots.export import to_mjcf
 from softrobots.statics.equilibrium import Equilibrium
+from studies.benchmark.mujoco_settling import require_mujoco
 
 INTEGRATORS = ("RK4", "implicitfast", "Euler")
 """Integrators to try, by MuJoCo's names."""
@@ -45,10 +46,7 @@ class MujocoMotion:
     """
 
     def __init__(self, released: Released) -> None:
-        try:
-            import mujoco
-        except ImportError as error:
-            raise MissingDependency("mujoco", "interop") from error
+        mujoco = require_mujoco()
         start = released.start
         text = to_mjcf(start.model, start.q_motors, actuators="welded", damping=released.damping_time, limits=False)
         self._mujoco, self._released = mujoco, released

@@ -15,7 +15,7 @@ import itertools
 import math
 import time
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,6 +55,15 @@ class Tuning(NamedTuple):
     """Mean number of steps a case."""
 
 
+def require_mujoco() -> Any:
+    """Import MuJoCo, or raise MissingDependency."""
+    try:
+        import mujoco
+    except ImportError as error:
+        raise MissingDependency("mujoco", "interop") from error
+    return mujoco
+
+
 class SettlingArm:
     """A robot in MuJoCo, whose motors stand where they are put."""
 
@@ -67,10 +76,7 @@ class SettlingArm:
         Raises:
             MissingDependency: If MuJoCo is not installed.
         """
-        try:
-            import mujoco
-        except ImportError as error:
-            raise MissingDependency("mujoco", "interop") from error
+        mujoco = require_mujoco()
         self._mujoco = mujoco
         driven = mujoco.MjModel.from_xml_string(to_mjcf(model, limits=False))
         self.model = mujoco.MjModel.from_xml_string(to_mjcf(model, actuators="welded", limits=False))
@@ -191,10 +197,7 @@ class SettlingTendons(SettlingArm):
         Raises:
             MissingDependency: If MuJoCo is not installed.
         """
-        try:
-            import mujoco
-        except ImportError as error:
-            raise MissingDependency("mujoco", "interop") from error
+        mujoco = require_mujoco()
         self._mujoco = mujoco
         self.model = mujoco.MjModel.from_xml_string(to_mjcf(model, gravity=gravity, limits=False))
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from softrobots.description.composition import fix_joints, mount
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.dynamics.motion import Motion
 from softrobots.model.loader import load_model
+from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube, InflatableArm, PccArm, Route, TendonArm
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
@@ -92,6 +93,23 @@ def pointing_wrist(duration: float = 6.0, steps: int = 90) -> Viewer:
     return viewer
 
 
+def _round(azimuths: Sequence[float], frames: int) -> FloatArray:
+    """How much each actuator of a segment is on the side of a direction that goes around once, shape (frames + 1, n) [-]."""
+    turns = 2.0 * np.pi * np.arange(frames + 1)[:, None] / frames
+    return np.asarray(np.cos(np.array(azimuths) - turns))
+
+
+def _led(model: SoftModel, motors: FloatArray, duration: float, force: Sequence[float] | None = None) -> Viewer:
+    """Show a robot under its weight and a force on the tip [N] that is led through actuators, one row an equilibrium."""
+    states: list[Equilibrium] = []
+    for row in motors:
+        start = states[-1].q_springs if states else None
+        states.append(solve_equilibrium(model, row, force, gravity=EARTH_GRAVITY, q_springs0=start))
+    tips = np.array([state.tip_position for state in states])
+    times = np.linspace(0.0, duration, len(states))
+    return view(model, Trajectory(read_only(times), read_only(tips), tuple(states), "newton"))
+
+
 def moving_pcc_arm(duration: float = 6.0, frames: int = 90) -> Viewer:
     """The arm of pneumatic muscles under its weight and a force, led through muscle lengths that bend it all around.
 
@@ -106,17 +124,10 @@ def moving_pcc_arm(duration: float = 6.0, frames: int = 90) -> Viewer:
         ViewerError: If its server does not start.
     """
     robot = PccArm()
-    model = load_model(robot)
-    azimuths = np.array(robot.muscle_azimuths)
-    states: list[Equilibrium] = []
-    for turn in 2.0 * np.pi * np.arange(frames + 1) / frames:
-        low = 0.515 - 0.02 * np.cos(azimuths - turn)
-        high = 0.515 - 0.03 * np.cos(azimuths - turn)  # in axes turned by the offset of the second segment
-        start = states[-1].q_springs if states else None
-        states.append(solve_equilibrium(model, (*low, *high), (3.0, 2.0, -3.0), gravity=EARTH_GRAVITY, q_springs0=start))
-    tips = np.array([state.tip_position for state in states])
-    times = np.linspace(0.0, duration, len(states))
-    viewer = view(model, Trajectory(read_only(times), read_only(tips), tuple(states), "newton"))
+    aside = _round(robot.muscle_azimuths, frames)
+    # The azimuths of the second segment are in axes turned by its offset.
+    motors = np.concatenate([0.515 - 0.02 * aside, 0.515 - 0.03 * aside], axis=1)
+    viewer = _led(load_model(robot), motors, duration, force=(3.0, 2.0, -3.0))
     viewer.look_from((0.5, -1.0, 0.8), (0.05, 0.0, 0.42))
     return viewer
 
@@ -144,16 +155,9 @@ def moving_tendon_arm(duration: float = 6.0, frames: int = 90) -> Viewer:
         ViewerError: If its server does not start.
     """
     robot = TendonArm(elastic_sections=2)  # a smaller page
-    model, azimuths = load_model(robot), np.array(robot.tendon_azimuths)
-    states: list[Equilibrium] = []
-    for turn in 2.0 * np.pi * np.arange(frames + 1) / frames:
-        ways = [way * np.cos(azimuths - turn) for way in (0.002, 0.004, 0.009)]
-        start = states[-1].q_springs if states else None
-        motors = model.relaxed_motors - np.concatenate(ways)
-        states.append(solve_equilibrium(model, motors, gravity=EARTH_GRAVITY, q_springs0=start))
-    tips = np.array([state.tip_position for state in states])
-    times = np.linspace(0.0, duration, len(states))
-    viewer = view(model, Trajectory(read_only(times), read_only(tips), tuple(states), "newton"))
+    model, aside = load_model(robot), _round(robot.tendon_azimuths, frames)
+    pulled = np.concatenate([way * aside for way in (0.002, 0.004, 0.009)], axis=1)
+    viewer = _led(model, model.relaxed_motors - pulled, duration)
     viewer.look_from((0.10, -0.21, 0.17), (0.0, 0.0, 0.075))
     return viewer
 
