@@ -6,6 +6,7 @@ The law is in `softrobots.model.dry_friction`. A model carries the memory of the
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,14 @@ from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
 from softrobots.model.dry_friction import DryFriction, FrictionMemory
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel, check_model
+
+MOST_ROUNDS = 60
+"""Most changes of the friction of guides on the way to the one that stays."""
+
+SAME_FRICTION = 1e-13
+"""Change of that friction that is none, relative to the largest load on an actuator."""
+
+_RUNAWAY = 1e6  # change that it does not come back from, likewise
 
 
 class FrictionCoordinates:
@@ -142,7 +151,9 @@ def slipping(model: SoftModel) -> SoftModel:
 
 
 def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: FloatArray) -> tuple[SoftModel, float]:
-    """Return the robot with the friction of its guides at given coordinates and loads, and how much that changed [N].
+    """Return the robot with the friction of its guides at given coordinates and loads, and how much that changed.
+
+    The change is relative to the largest load; infinite where the friction runs away: that of given lengths answers to itself.
 
     Args:
         model: The robot, with friction of guides.
@@ -151,9 +162,13 @@ def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: Fl
         loads: Load on each actuator; of muscles the tension at the motor, shape (n_motors,) [N m or N].
     """
     last, tensions = _rubbing(model.coordinates), loads[len(model.structure.motor_joints) :]
-    grip = last.friction.grip(model.structure.strains(motors, elastic), tensions, last.memory)
-    change = float(np.abs(grip - last.grip).max(initial=0.0))
-    return replace(model, coordinates=_rubbed(model.coordinates, last.memory, grip)), change
+    with np.errstate(over="ignore", invalid="ignore"):
+        grip = last.friction.grip(model.structure.strains(motors, elastic), tensions, last.memory)
+        change = float(np.abs(grip - last.grip).max(initial=0.0))
+    largest = float(np.abs(loads).max(initial=0.0))
+    if not change <= _RUNAWAY * largest:
+        return model, math.inf
+    return replace(model, coordinates=_rubbed(model.coordinates, last.memory, grip)), change / max(largest, 1e-300)
 
 
 def _rubbing(coordinates: Any) -> FrictionCoordinates:

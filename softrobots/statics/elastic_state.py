@@ -17,7 +17,7 @@ from eigenpy import ComputationInfo
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.model.coordinates import Point, ReducedLoad
-from softrobots.model.friction_coordinates import gripped
+from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, gripped
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.loads import AppliedLoad, Load
 
@@ -26,9 +26,6 @@ TOLERANCE = 1e-10
 
 MOMENT_FLOOR = 1e-3
 """Least scale of the residual, for vanishing loads [N m]."""
-
-SAME_FRICTION = 1e-13
-"""Change of the friction of guides that is none, relative to the largest tension."""
 
 ENERGY_ROUNDING = 1e-14
 """Energies this close, relative to their terms, cannot be told apart."""
@@ -56,7 +53,7 @@ class ElasticState(NamedTuple):
     energy: float
     """Elastic energy plus potential of the load [J]; infinite where a section is beyond its range."""
     error: float
-    """Norm of the residual; infinite where a section is beyond its range."""
+    """Norm of the residual; infinite where a section is beyond its range, or the friction of guides does not settle."""
 
 
 class ElasticProblem:
@@ -110,11 +107,11 @@ def rubbing_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
     """Evaluate the same, and return the robot with the friction that its guides have there; the robot itself without guides."""
     with one_blas_thread(model.n_springs):
         state = ElasticProblem(model, q_motors, load).state(q_springs)
-        change = math.inf if model.structure.guided else 0.0
-        while change > SAME_FRICTION * float(np.abs(state.load.motors).max(initial=0.0)):
+        change, rounds = math.inf if model.structure.guided else 0.0, 0
+        while change > SAME_FRICTION and rounds < MOST_ROUNDS:
             model, change = gripped(model, q_motors, q_springs, state.load.motors)
-            state = ElasticProblem(model, q_motors, load).state(q_springs)
-        return model, state
+            state, rounds = ElasticProblem(model, q_motors, load).state(q_springs), rounds + 1
+        return model, state if change <= SAME_FRICTION else state._replace(error=math.inf)
 
 
 def _out_of_range(model: SoftModel, q_springs: FloatArray, q: FloatArray, point: Point) -> ElasticState:

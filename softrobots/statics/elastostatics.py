@@ -18,11 +18,10 @@ from eigenpy import LDLT
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
-from softrobots.model.friction_coordinates import gripped
+from softrobots.model.friction_coordinates import SAME_FRICTION, gripped
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import (
-    SAME_FRICTION,
     TOLERANCE,
     ElasticProblem,
     ElasticState,
@@ -72,10 +71,12 @@ def solve_springs(
     solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
     with one_blas_thread(model.n_springs):
         state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)
-        while model.structure.guided and spent < most:  # the friction of guides follows the tensions
+        while model.structure.guided:  # the friction of guides follows the tensions
             model, change = gripped(model, q_motors, state.q_springs, state.load.motors)
-            if change <= SAME_FRICTION * float(np.abs(state.load.motors).max()):
+            if change <= SAME_FRICTION:
                 break
+            if spent >= most or math.isinf(change):
+                return state._replace(error=math.inf), spent, False
             state, used, stable = solve(ElasticProblem(model, q_motors, load, tolerance), state.q_springs, most - spent)
             spent += used
     return state, spent, stable
