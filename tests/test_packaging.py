@@ -94,10 +94,12 @@ ROOMS = {
     "model": "core inflated_beam constant_curvature description",
     "statics": "core inflated_beam model",
     "dynamics": "core constant_curvature model statics",
-    "compiled": "core inflated_beam constant_curvature description model statics dynamics",
+    "identification": "core inflated_beam constant_curvature description robots model statics dynamics",
+    "compiled": "core inflated_beam constant_curvature description model statics dynamics identification",
     "export": "core inflated_beam constant_curvature description robots model",
-    "view": "core inflated_beam constant_curvature helix description robots model statics dynamics",
-    "cli": "core inflated_beam constant_curvature helix description robots model statics dynamics compiled export view",
+    "view": "core inflated_beam constant_curvature helix description robots model statics dynamics identification",
+    "cli": "core inflated_beam constant_curvature helix description robots model statics dynamics identification compiled"
+    " export view",
 }
 """Every folder of the package, and the rooms that it may import."""
 TO_CODE = ("trace", "chain", "routes", "drivers", "program", "c", "run", "sweeps")

@@ -1,0 +1,1 @@
+"""Parameters of a robot: derivatives by them, and identification from measurements."""
