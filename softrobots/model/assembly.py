@@ -39,6 +39,7 @@ def assemble(
     muscle_input: str | None = None,
     locked: Sequence[str] = (),
     like: SoftModel | None = None,
+    robot: Any = None,
 ) -> SoftModel:
     """Build the model of a robot; `softrobots.load_model` has checked the arguments.
 
@@ -52,6 +53,7 @@ def assemble(
         muscle_input: Whether actuators of given length or tension become "lengths" or "forces"; None: as their tags say.
         locked: Names of the movable joints of the text that are fixed in `rigid`.
         like: A model that differs in its springs alone, for what it can share.
+        robot: The dataclass of parameters behind the text, if there is one.
 
     Returns:
         The model.
@@ -130,6 +132,7 @@ def assemble(
         springs=_grouped(elastic, structure),
         data=data,
         reach=chain_length(rigid, data.frame_ids[tip], inside) if like is None else like.reach,
+        robot=robot,
     )
 
 
@@ -192,6 +195,7 @@ def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
             muscle_input=model.muscle_input,
             locked=structure.locked_joints,
             like=model,
+            robot=model.robot,
         )
     stiffness, rest = structure.strain_springs.stiffness.copy(), structure.strain_springs.rest.copy()
     for place, name in enumerate(structure.spring_joints):

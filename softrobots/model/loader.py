@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copyreg
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -114,6 +114,7 @@ def load_model(
         tip=_tip(model, tags.tip if tip is None else tip, label),
         muscle_input=muscles,
         locked=locked,
+        robot=source if is_dataclass(source) else None,
     )
 
 
@@ -231,13 +232,14 @@ def load_arguments(model: SoftModel) -> dict[str, Any]:
     return {"springs": model.spring_table, "motors": motors, "tip": model.tip, "muscles": model.muscle_input}
 
 
-def load_again(urdf: str, *, springs: Mapping[str, tuple[float, float]], **arguments: Any) -> SoftModel:
+def load_again(urdf: str, *, springs: Mapping[str, tuple[float, float]], robot: Any = None, **arguments: Any) -> SoftModel:
     """Return the model of URDF text and `load_arguments`: its springs are all in `springs`, those of the text do not count."""
-    return load_model(urdf, springs=dict.fromkeys(read_tags(urdf).springs) | dict(springs), **arguments)
+    model = load_model(urdf, springs=dict.fromkeys(read_tags(urdf).springs) | dict(springs), **arguments)
+    return replace(model, robot=robot)
 
 
 def _reduce(model: SoftModel) -> tuple[Any, ...]:
-    load = partial(load_again, **load_arguments(model))
+    load = partial(load_again, robot=model.robot, **load_arguments(model))
     if model.structure.friction is None:
         return load, (model.urdf,)
     return _load_remembering, (load, model.urdf, memory_of(model), grip_of(model))

@@ -61,6 +61,8 @@ class SoftModel:
 
     A slide without limits counts as 1 m.
     """
+    robot: Any = None
+    """The dataclass of parameters that the model was loaded from; None for a file or text, and for what `load_result` loads."""
 
     def __repr__(self) -> str:
         """Name, motors, springs and tip in one line."""

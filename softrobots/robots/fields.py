@@ -56,6 +56,8 @@ class Facts:
     """How many values there are."""
     in_xacro: bool = True
     """Whether the xacro file has an argument of this name."""
+    in_force: str = ""
+    """Property of the robot with the values that hold where the field is None; empty if it has none."""
 
     @property
     def bounds(self) -> str:

@@ -72,6 +72,7 @@ class InflatedLinks(XacroRobot):
         "Stiffness of each spring that bends a link; without it, that of young_modulus",
         "Troise 2021, section 4 (without both, the mean of Table 3, 172.71, or the modulus that it implies)",
         above=0.0,
+        in_force="spring_stiffness",
     )
     young_modulus: PerPart | None = per_part(
         None,
@@ -86,6 +87,7 @@ class InflatedLinks(XacroRobot):
         "Shear modulus of the wall, for young_modulus or link_model = two_hinges, else of no effect",
         "assumed, without it: that of an isotropic wall with a Poisson ratio of 0.3, young_modulus / 2.6; a weave has its own",
         above=0.0,
+        in_force="wall_shear_modulus",
     )
     rest_side: PerPart = per_part(
         0.0,

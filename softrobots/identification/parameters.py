@@ -1,0 +1,206 @@
+"""Parameters of a robot by name: what is fitted to measurements, and what derivatives are taken by.
+
+| name | stands for | scalars |
+|---|---|---|
+| `stiffness` | a numeric field of the dataclass; of one with a value per part, one value for all parts | 1 |
+| `link[2].stiffness`, `segment[1].young_modulus`, `tendon[4].tendon_pretension` | the value of one part | 1 |
+| `link[1,2].stiffness` | one value for these parts | 1 |
+| `link[*].stiffness` | a value for each part | one each |
+| `stiffness[2]`, `muscle_azimuths[*]` | entries of a field, whatever its parts are called | 1, one each |
+| `joint[spring_1_side].stiffness`, `joint[NAME].rest` | a joint spring of any file; `[A,B]` and `[*]` as above | 1 |
+| `base.position`, `base.rotation` | pose of the base in the frame of the measurements, rotation vector | 3 |
+| `base.position.x` | one component | 1 |
+| `marker.NAME.offset` | place of a marker in the frame that it sits on | 3 |
+| `motor[2].offset`, `motor[1,2].offset`, `motor[*].offset` | true minus commanded actuator coordinate | 1, one each |
+| `motor[2]`, `force`, `wrench`, `gravity` | one actuator, a load at the tip, gravity: only for derivatives | 1, 3, 6, 3 |
+
+Parts, actuators and entries are counted from 1. Names, units and bounds are those of the fields (`softrobots.robots.fields`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.errors import ParameterError
+from softrobots.identification.parameter_names import Kind, Parameter, Registry
+from softrobots.model.loader import load_model, with_springs
+from softrobots.model.soft_model import SoftModel
+from softrobots.robots import AssumedStiffnessWarning
+
+OF_MODEL = ("field", "spring")
+"""Kinds of parameters that change the model."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterSet:
+    """Named parameters of a robot, in order, with the robot that has given values of them."""
+
+    present: SoftModel
+    """The robot with its present values; it says with which springs, motors, tip and muscles it was loaded."""
+    parameters: tuple[Parameter, ...]
+    """The scalar parameters."""
+    markers: Mapping[str, str]
+    """Frame of each marker."""
+
+    @classmethod
+    def of(cls, robot: Any, names: str | Sequence[str], markers: Mapping[str, str] | None = None) -> ParameterSet:
+        """Find parameters of a robot.
+
+        Args:
+            robot: A dataclass of parameters (a robot of this package or one's own), or a `SoftModel`.
+            names: Names as in the table of this module, each number once.
+            markers: Frame by name of marker.
+
+        Raises:
+            NameNotFound: If there is no such parameter; with all that there are. If a frame does not exist.
+            ParameterError: If the robot is neither, no name is given, a number is named twice, or a field has no numbers, or
+                none that the robot accepts.
+            DescriptionError: If the robot cannot be loaded.
+        """
+        if not isinstance(robot, SoftModel) and not (dataclasses.is_dataclass(robot) and not isinstance(robot, type)):
+            raise ParameterError("robot", robot, "a robot (a dataclass of parameters) or a SoftModel")
+        model = robot if isinstance(robot, SoftModel) else load_model(robot)  # type: ignore[arg-type]
+        marked = {} if markers is None else dict(markers)
+        for frame in marked.values():
+            model.frame_id(frame)
+        listed = [names] if isinstance(names, str) else list(names)
+        if not listed or not all(isinstance(name, str) for name in listed):
+            raise ParameterError("parameters", names, 'names of parameters, e.g. ("stiffness", "hinge_offset")')
+        registry = Registry(model.robot, model, marked)
+        found = cls(model, tuple(one for name in listed for one in registry.find(name.strip())), marked)
+        found._check()
+        return found
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each scalar."""
+        return tuple(one.name for one in self.parameters)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each."""
+        return tuple(one.unit for one in self.parameters)
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Present values, shape (P,)."""
+        return read_only(np.array([one.value for one in self.parameters]))
+
+    @cached_property
+    def lower(self) -> FloatArray:
+        """Lower bounds, shape (P,)."""
+        return read_only(np.array([one.lower for one in self.parameters]))
+
+    @cached_property
+    def upper(self) -> FloatArray:
+        """Upper bounds, shape (P,)."""
+        return read_only(np.array([one.upper for one in self.parameters]))
+
+    @cached_property
+    def logarithmic(self) -> Any:
+        """Which are fitted by their logarithm, shape (P,), truth values."""
+        return np.array([one.logarithmic for one in self.parameters], dtype=bool)
+
+    @cached_property
+    def of_model(self) -> Any:
+        """Which change the model, shape (P,), truth values; the others change base, markers, actuator offsets or loads."""
+        return np.array([one.place.kind in OF_MODEL for one in self.parameters], dtype=bool)
+
+    def places(self, kind: Kind) -> list[tuple[int, Parameter]]:
+        """Return the parameters of a kind with their numbers, from 0."""
+        return [(number, one) for number, one in enumerate(self.parameters) if one.place.kind == kind]
+
+    def robot(self, values: Any) -> Any:
+        """Return the dataclass with values, shape (P,), of the parameters that are fields; None without a dataclass.
+
+        Raises:
+            ParameterError: If the shape differs, or the robot refuses a value.
+        """
+        numbers, robot = finite_array("values", values, (len(self.parameters),)).tolist(), self.present.robot
+        changed: dict[str, Any] = {}
+        for number, one in self.places("field"):
+            (field,), entries = one.place.names, one.place.parts
+            if not entries:
+                changed[field] = numbers[number]
+                continue
+            row = changed.setdefault(field, list(one.place.row))
+            for entry in entries:
+                row[entry] = numbers[number]
+        if not changed:
+            return robot
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AssumedStiffnessWarning)  # told when the robot was made
+            return replace(robot, **{name: tuple(row) if isinstance(row, list) else row for name, row in changed.items()})
+
+    def model(self, values: Any) -> SoftModel:
+        """Return the robot with values, shape (P,), loaded as the present one was.
+
+        Raises:
+            ParameterError: If the shape differs, or the robot refuses a value.
+            DescriptionError: If the robot with these values cannot be described, e.g. with parts too light.
+        """
+        robot = self.robot(values)
+        model = self.present if robot is self.present.robot else load_model(robot, **self._told)
+        springs = dict(model.spring_table)
+        for number, one in self.places("spring"):
+            for joint in one.place.names:
+                stiffness, rest = springs[joint]
+                springs[joint] = (stiffness, float(values[number])) if one.place.parts[0] else (float(values[number]), rest)
+        return with_springs(model, springs) if self.places("spring") else model
+
+    def base(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return position [m] and rotation vector [rad] of the base in the frame of the measurements, each shape (3,)."""
+        pose = {"position": np.zeros(3), "rotation": np.zeros(3)}
+        for number, one in self.places("base"):
+            pose[one.place.names[0]][one.place.parts[0]] = values[number]
+        return pose["position"], pose["rotation"]
+
+    def marker_offset(self, values: FloatArray, marker: str) -> FloatArray:
+        """Return the place of a marker in its frame, shape (3,) [m]."""
+        offset = np.zeros(3)
+        for number, one in self.places("marker"):
+            if one.place.names[0] == marker:
+                offset[one.place.parts[0]] = values[number]
+        return offset
+
+    def motor_offsets(self, values: FloatArray) -> FloatArray:
+        """Return true minus commanded actuator coordinates, shape (n_motors,) [rad, m, N or Pa]."""
+        offsets = np.zeros(self.present.n_motors)
+        for number, one in self.places("offset"):
+            offsets[list(one.place.parts)] += values[number]
+        return offsets
+
+    @cached_property
+    def _told(self) -> dict[str, Any]:
+        """Arguments of `load_model` with which the present robot was loaded."""
+        model = self.present
+        given: dict[str, Any] = dict.fromkeys(name for name in model.structure.tags.springs if name not in model.spring_table)
+        given |= {name: model.spring_table[name] for name, role in model.joint_roles.items() if role == "given spring"}
+        told = {"motors": model.structure.motor_joints, "tip": model.tip, "muscles": model.muscle_input}
+        return told | {"springs": given or None}
+
+    def _check(self) -> None:
+        """Refuse numbers that are named twice, and present values that the robot refuses."""
+        rows: dict[str, int] = {}
+        for _, one in self.places("field"):
+            if rows.setdefault(one.place.names[0], len(one.place.row)) != len(one.place.row):
+                raise ParameterError("parameters", one.name, f"of the same parts as the other names of {one.place.names[0]}")
+        seen: dict[tuple[Any, ...], str] = {}
+        for one in self.parameters:
+            for name in one.place.names or ("",):
+                for part in one.place.parts or (-1,):
+                    first = seen.setdefault((one.place.kind, name, part), one.name)
+                    if first != one.name:
+                        raise ParameterError("parameters", one.name, f"of numbers that no other names, as {first} does")
+        if len(set(self.names)) < len(self.names):
+            twice = next(name for name in self.names if self.names.count(name) > 1)
+            raise ParameterError("parameters", twice, "named once")
+        self.robot(self.values)
