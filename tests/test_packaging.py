@@ -355,7 +355,7 @@ def test_dev_installs_the_tools_of_the_gate() -> None:
     if not gate.is_file():
         pytest.skip("a source distribution has no gate")
     tools = set(re.findall(r"\.venv/bin/(?:python -m )?(?!python\b)(\w+)", gate.read_text(encoding="utf-8")))
-    assert {"pytest", "ruff", "mypy", "build", "twine"} <= tools <= extras()["dev"] | extras()["test"]
+    assert {"pytest", "ruff", "mypy", "build", "twine"} <= tools <= extras()["dev"] | extras()["test"] | {"pip"}
 
 
 def test_the_version_stands_in_one_place() -> None:
