@@ -13,6 +13,7 @@ from xml.dom import minidom
 
 from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import parse_xml, read_xml
+from softrobots.description.number_tape import Tape
 from softrobots.description.paths import xacro_folder
 
 XACRO_NAMESPACE = "http://www.ros.org/wiki/xacro"
@@ -36,7 +37,7 @@ def declared_arguments(xacro_file: str | Path) -> dict[str, str | None]:
     return {arg.get("name", ""): arg.get("default") for arg in root.iter(f"{{{XACRO_NAMESPACE}}}arg")}
 
 
-def expand(xacro_file: str | Path, arguments: Mapping[str, str] | None = None) -> str:
+def expand(xacro_file: str | Path, arguments: Mapping[str, str] | None = None, tape: Tape | None = None) -> str:
     """Expand a xacro file to URDF text.
 
     The text is what the `xacro` command prints for the same arguments, without its banner. A xacro file is a program: its
@@ -47,6 +48,7 @@ def expand(xacro_file: str | Path, arguments: Mapping[str, str] | None = None) -
         xacro_file: Path of the file; its includes are found relative to it.
         arguments: Text by argument name; others have the defaults of the file. An argument `softrobots` that the file declares
             is by default the folder of the macros of this package.
+        tape: Records what is done with its numbers, whose marks stand in the arguments and in the text that is returned.
 
     Returns:
         URDF text.
@@ -66,7 +68,7 @@ def expand(xacro_file: str | Path, arguments: Mapping[str, str] | None = None) -
     if MACROS in declared and MACROS not in texts:
         texts[MACROS] = glob.escape(str(xacro_folder()))  # xacro expands brackets in names of included files
     try:
-        with _XACRO_LOCK, _checked_files():
+        with _XACRO_LOCK, _checked_files(), _recorded(tape):
             return _expanded(path, texts)
     except DescriptionError:
         raise
@@ -135,6 +137,29 @@ def _checked_files() -> Iterator[None]:
         yield
     finally:
         vars(xacro).update(own)
+
+
+@contextmanager
+def _recorded(tape: Tape | None) -> Iterator[None]:
+    """Let expressions write on a tape what they do with its numbers."""
+    import xacro
+
+    if tape is None:
+        yield
+        return
+    symbols, literal, functions = xacro.create_global_symbols(), xacro.Table._eval_literal, tape.functions()
+    for table in (symbols, symbols["math"], symbols["python"]):
+        table.update({name: function for name, function in functions.items() if name in table})
+
+    def traced(text: Any) -> Any:
+        number = tape.literal(text)
+        return literal(text) if number is None else number
+
+    own, xacro._global_symbols, xacro.Table._eval_literal = xacro._global_symbols, symbols, staticmethod(traced)
+    try:
+        yield
+    finally:
+        xacro._global_symbols, xacro.Table._eval_literal = own, staticmethod(literal)
 
 
 class _Attribute(NamedTuple):

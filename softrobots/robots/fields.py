@@ -181,6 +181,7 @@ class XacroRobot:
 
     XACRO: ClassVar[str | Path]
     """The file that describes the robot: a name in xacro/, or a path."""
+    _text: ClassVar[str | None] = None  # its URDF text, where a robot was made together with it
 
     @property
     def n_joints(self) -> int:
@@ -204,7 +205,7 @@ class XacroRobot:
         Raises:
             DescriptionError: If xacro refuses the parameters, e.g. parts too light to cut tiny links from them.
         """
-        return _expanded(self.XACRO, tuple(self.xacro_arguments().items()))
+        return _expanded(self.XACRO, tuple(self.xacro_arguments().items())) if self._text is None else self._text
 
     def _each(self, name: str) -> tuple[Any, ...]:
         """Values of a field, one a part."""
