@@ -428,5 +428,5 @@ def test_the_table_of_the_guide_has_the_defaults_and_kinds() -> None:
                 assert same or float(number) == pytest.approx(default, rel=1e-4), (name, cell)
                 assert set(filter(None, kinds.split(", "))) == kinds_of.get(name.partition("_")[2], set()), name
     for kind, word in ((sr.PccArm, "muscle"), (sr.TendonArm, "tendon")):
-        named = {f"{word}_{name}" for name in (*ATTRIBUTES, "distance")} & facts_of(kind).keys()
+        named = {f"{word}_{name}" for name in (*ATTRIBUTES, "distance", "azimuth_deviation")} & facts_of(kind).keys()
         assert set(shown[kind]) == {"kind", "routing", *named}

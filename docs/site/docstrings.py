@@ -39,7 +39,7 @@ class SiteDocstrings(griffe.Extension):
 
     def on_class(self, *, cls: Any, **_: Any) -> None:
         """Describe the fields of a robot: meaning, unit, bounds and source; show their defaults as values."""
-        if "parameter(" not in cls.source and "per_part(" not in cls.source:
+        if "parameter(" not in cls.source and "per_part(" not in cls.source and "per_actuator(" not in cls.source:
             return
         kind = getattr(importlib.import_module(cls.module.path), cls.name)
         for field in dataclasses.fields(kind) if dataclasses.is_dataclass(kind) else ():

@@ -137,7 +137,8 @@ def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]
         )
     ei, gj, ea = (positive(element, key, where) for key in ("EI", "GJ", "EA"))
     facts = _facts_of_section(element, where)
-    return SectionTag(joints=joints, bending_stiffness=ei, torsional_stiffness=gj, axial_stiffness=ea, **facts)
+    relaxed = _strains(element, "relaxed", where) if "relaxed" in element.attrib else facts["rest"]
+    return SectionTag(joints=joints, bending_stiffness=ei, torsional_stiffness=gj, axial_stiffness=ea, relaxed=relaxed, **facts)
 
 
 def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[str, SpringTag]) -> LumpedSectionTag:
@@ -154,16 +155,24 @@ def _lumped_section(element: ElementTree.Element, source: str, springs: Mapping[
 
 def _facts_of_section(element: ElementTree.Element, where: str) -> dict[str, Any]:
     """The fields of `AnySectionTag`."""
-    rest = element.get("rest", "").split()
-    strains = tuple(number_in(text) for text in rest)
-    if len(strains) != 4 or any(map(math.isnan, strains)) or strains[3] <= 0.0:
-        raise DescriptionError(f"{where} has rest = {' '.join(rest)[:99]!r}; kx, ky, twist and a positive stretch are required")
+    rest = _strains(element, "rest", where)
     facts: dict[str, Any] = {key: positive(element, key, where) for key in ("length", "radius")}
     if "middle" in element.attrib:
         facts["middle"] = numbers(element, "middle", where)
         if len(facts["middle"]) != 2:
             raise DescriptionError(f"{where} has {len(facts['middle'])} numbers as its middle; x and y are required")
-    return {"name": element.get("name", ""), "segment": segment_number(element, where), "rest": strains, **facts}
+    return {"name": element.get("name", ""), "segment": segment_number(element, where), "rest": rest, **facts}
+
+
+def _strains(element: ElementTree.Element, key: str, where: str) -> tuple[float, ...]:
+    """The four strains of an attribute."""
+    texts = element.get(key, "").split()
+    strains = tuple(number_in(text) for text in texts)
+    if len(strains) != 4 or not all(map(math.isfinite, strains)) or strains[3] <= 0.0:
+        raise DescriptionError(
+            f"{where} has {key} = {' '.join(texts)[:99]!r}; kx, ky, twist and a positive stretch are required"
+        )
+    return strains
 
 
 def _line(element: ElementTree.Element, source: str) -> LineTag:

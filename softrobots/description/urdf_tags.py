@@ -83,6 +83,8 @@ class SectionTag(AnySectionTag):
     """GJ [N m^2]."""
     axial_stiffness: float
     """EA [N]."""
+    relaxed: tuple[float, ...]
+    """Strains where it carries nothing, as `rest`."""
 
 
 @dataclass(frozen=True, kw_only=True)

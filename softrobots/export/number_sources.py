@@ -16,7 +16,7 @@ import numpy as np
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
 from softrobots.robots import HelixTube, InflatableArm, TendonArm, XacroRobot
 from softrobots.robots.continuum_arm import ATTRIBUTES, ContinuumArm
-from softrobots.robots.routes import owner
+from softrobots.robots.fields import facts_of
 
 Rules = dict[tuple[str, str], str]
 """Expression by the name of a part (joint, section, muscle, link) and of one of its numbers."""
@@ -176,6 +176,7 @@ def _inflatable_arm(robot: InflatableArm) -> Rules:
     return rules
 
 
+_RELAXED = {"bend_x": "rest_bend_x", "bend_y": "rest_bend_y", "twist": "rest_twist"}
 _FRICTION = {"bending": "bending_friction", "guides": "guide_friction"}
 
 
@@ -186,48 +187,51 @@ def _continuum_arm(robot: ContinuumArm) -> Rules:
     for s in range(robot.n_segments):
         names = {name: f"{rule}[{s}]" for name, rule in zip(kinds, stiffness, strict=True)}
         names |= {"length": f"section_lengths[{s}]", "radius": f"radius[{s}]", "chord": f"section_lengths[{s}]"}
-        rules |= _chain(robot, s + 1, names | {"rest": "[0.0, 0.0, 0.0, 1.0]"})
+        relaxed = [f"{name}[{s}] / segment_lengths[{s}]" for name in _RELAXED.values()]
+        rules |= _chain(robot, s + 1, names | {"rest": "[0.0, 0.0, 0.0, 1.0]", "relaxed": f"[{', '.join(relaxed)}, 1.0]"})
+        hinges = {(f"section_{s + 1}_{j + 1}_{kind}", name) for j in range(robot.hinges) for kind, name in _RELAXED.items()}
+        rules |= {(joint, "rest"): f"{name}[{s}] / hinges" for joint, name in hinges if robot.chain == "lumped"}
         rules |= {(f"friction {s + 1}", name): f"{fact}[{s}]" for name, fact in _FRICTION.items()}
-    counts = [0] * robot.n_segments
-    for route in robot.routes:  # its table, and what follows from that, is in the URDF
-        s = owner(route, robot.segment_lengths) - 1
-        counts[s] += 1
-        rules |= _actuator(robot, f"{robot.ACTUATOR}_{s + 1}_{counts[s]}", s)
-    if not robot.routes:
-        for s in range(robot.n_segments):
-            for m in range(len(getattr(robot, f"{robot.ACTUATOR}_azimuths"))):
-                rules |= _actuator(robot, f"{robot.ACTUATOR}_{s + 1}_{m + 1}", s) | _straight_route(robot, s, m)
+    owners = robot.actuator_segments
+    for i, s in enumerate(owners):
+        m, word = owners[:i].count(s), robot.ACTUATOR
+        fields = [name for name, facts in facts_of(robot).items() if facts.form == "per_actuator" and getattr(robot, name)]
+        own = {name.removeprefix(f"{word}_"): f"{name}[{robot.place_of(name, i)}]" for name in fields}
+        rules |= _actuator(robot, f"{word}_{s + 1}_{m + 1}", s, own)
+        if not robot.routes:  # the table of a route that is listed, and what follows from that, is in the URDF
+            rules |= _straight_route(robot, s, m, own)
     return rules
 
 
-def _actuator(robot: ContinuumArm, name: str, s: int) -> Rules:
-    """Rules of an actuator of segment `s`, from 0, without those of its route."""
-    word = robot.ACTUATOR
-    rules = {(name, number): f"{word}_{fact}[{s}]" for fact, number in ATTRIBUTES.items() if number not in _LENGTHS}
-    if getattr(robot, f"{word}_least_tension") is None:
-        rules[name, "weakest"] = "0.0" if robot.kind[s] == "elastic" else f"-{word}_force[{s}]"
+def _actuator(robot: ContinuumArm, name: str, s: int, own: Mapping[str, str]) -> Rules:
+    """Rules of an actuator of segment `s`, from 0, without those of its route; `own` are its values of the fields."""
+    numbers = {fact: number for fact, number in ATTRIBUTES.items() if number not in _LENGTHS and fact in own}
+    rules = {(name, number): own[fact] for fact, number in numbers.items()}
+    if "least_tension" not in own:
+        rules[name, "weakest"] = "0.0" if robot.kind[s] == "elastic" else f"-{own['force']}"
     return rules
 
 
-def _straight_route(robot: ContinuumArm, s: int, m: int) -> Rules:
+def _straight_route(robot: ContinuumArm, s: int, m: int, own: Mapping[str, str]) -> Rules:
     """Rules of the route and of the lengths of actuator `m` of segment `s`, from 0."""
     word, start = robot.ACTUATOR, robot.starts[s]
     name = f"{word}_{s + 1}_{m + 1}"
     rest = " + ".join(f"segment_lengths[{k}]" for k in range(start, s + 1))
     rules = {(name, "rest_length"): rest}
-    rules[name, "shortest"] = f"({rest}) * (1 - {word}_contraction[{s}])"
-    rules[name, "longest"] = f"({rest}) * (1 + {word}_extension[{s}])"
+    rules[name, "shortest"] = f"({rest}) * (1 - {own['contraction']})"
+    rules[name, "longest"] = f"({rest}) * (1 + {own['extension']})"
     for k in range(start, s + 1):
-        piece = f"{name} {k + 1}"
-        azimuth = " + ".join([f"{word}_azimuths[{m}]", *(f"offset[{turn}]" for turn in range(k + 1, s + 1))])
+        piece, turns = f"{name} {k + 1}", [f"offset[{turn}]" for turn in range(k + 1, s + 1)]
+        azimuth = " + ".join([f"{word}_azimuths[{m}]", own["azimuth_deviation"], *turns])
         rules[piece, "at"] = f"[0.0, segment_lengths[{k}]]"
-        rules[piece, "distance"], rules[piece, "azimuth"] = f"[{word}_distance[{s}]] * 2", f"[{azimuth}] * 2"
+        rules[piece, "distance"], rules[piece, "azimuth"] = f"[{own['distance']}] * 2", f"[{azimuth}] * 2"
     return rules
 
 
 def _helix_tube(robot: HelixTube) -> Rules:
     names = {name: name for name in ("EI", "GJ", "EA", "radius", "chord")}
-    rules = _chain(robot, 1, names | {"length": "section_length", "rest": "[0.0, curvature, torsion_rate, 1.0]"})
+    rest = "[0.0, curvature, torsion_rate, 1.0]"
+    rules = _chain(robot, 1, names | {"length": "section_length", "rest": rest, "relaxed": rest})
     if robot.real:
         return rules | _tube_actuators()
     for j in range(1, robot.n_sections + 1):
@@ -269,7 +273,7 @@ def _chain(robot: ContinuumArm | HelixTube, segment: int, names: Mapping[str, st
         place_of = {1: "11 / 24", count: "13 / 24"}
     for j in range(1, count + 1):
         section = f"section_{segment}_{j}"
-        rules |= {(section, name): names[name] for name in ("length", "rest", "radius", "EI", "GJ", "EA")}
+        rules |= {(section, name): names[name] for name in ("length", "rest", "relaxed", "radius", "EI", "GJ", "EA")}
         rules[section, "hinge"] = f"{length} * ({place_of.get(j, '1 / 2')})"
         for kind, tag in kinds.items():
             joint, stiffness = f"{section}_{kind}", f"{names[tag]} / {length}"

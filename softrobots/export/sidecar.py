@@ -186,7 +186,9 @@ class _Parts:
             values = {"hinge": (tag.hinge, "m")}
         values |= {"length": (tag.length, "m"), "radius": (tag.radius, "m")}
         entry |= {key: self._number(tag.name, key, *value, kind) for key, value in values.items()}
-        return entry | {"rest": self._number(tag.name, "rest", list(tag.rest), "rad/m, rad/m, rad/m, -", kind)}
+        for key in ("rest", "relaxed") if isinstance(tag, SectionTag) else ("rest",):
+            entry[key] = self._number(tag.name, key, list(getattr(tag, key)), "rad/m, rad/m, rad/m, -", kind)
+        return entry
 
     def _friction(self, tag: FrictionTag) -> dict[str, Any]:
         part, kind = f"friction {tag.segment}", "softrobots:friction"

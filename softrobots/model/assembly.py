@@ -271,7 +271,7 @@ def _strain_springs(rigid: Any, tags: Sequence[SpringTag], joints: tuple[str, ..
         moduli = [(t.bending_stiffness, t.bending_stiffness, t.torsional_stiffness, t.axial_stiffness) for t in sections]
         by_section = np.array(moduli) / np.array([[tag.length] for tag in sections])
         stiffness = np.concatenate([stiffness, by_section.ravel()])
-        rest = np.concatenate([rest, rest_coordinates(sections).ravel()])
+        rest = np.concatenate([rest, rest_coordinates(sections, strains="relaxed").ravel()])
         turning += [name != "stretch" for name in STRAINS] * len(sections)
     names = (*joints, *(f"{tag.name}_{strain}" for tag in sections for strain in STRAINS))
     return Springs(names, read_only(stiffness), read_only(rest), np.array(turning, dtype=bool))

@@ -137,11 +137,11 @@ class DirectPoint(NamedTuple):
         return np.zeros_like(self.joints)
 
 
-def rest_coordinates(tags: Sequence[SectionTag | LumpedSectionTag]) -> FloatArray:
-    """Section coordinates at rest, shape (n, 4) [rad, rad, rad, m]: strains times rest length."""
-    strains = np.array([tag.rest for tag in tags], dtype=np.float64)
-    strains[:, 3] -= 1.0
-    return np.asarray(strains * np.array([[tag.length] for tag in tags]))
+def rest_coordinates(tags: Sequence[SectionTag | LumpedSectionTag], *, strains: str = "rest") -> FloatArray:
+    """Section coordinates at rest, or without load (`relaxed`), shape (n, 4) [rad, rad, rad, m]: strains times rest length."""
+    values = np.array([getattr(tag, strains) for tag in tags], dtype=np.float64)
+    values[:, 3] -= 1.0
+    return np.asarray(values * np.array([[tag.length] for tag in tags]))
 
 
 class SectionCoordinates:

@@ -16,6 +16,7 @@ from softrobots.description.actuator_reader import NUMBERS
 from softrobots.robots.fields import (
     PerPart,
     XacroRobot,
+    check_actuator_parameters,
     check_parameters,
     facts_of,
     numbers,
@@ -23,7 +24,7 @@ from softrobots.robots.fields import (
     per_part,
     refuse_given,
 )
-from softrobots.robots.routes import Route, Routing, checked_routing, routing_text
+from softrobots.robots.routes import Route, Routing, checked_routing, owner, routing_text
 
 CHAINS = ("sections", "lumped")
 """Forms of the equivalent rigid chain."""
@@ -33,6 +34,9 @@ HINGE_RULES = ("corrected", "midpoint")
 
 MOST_SECTIONS = 1000
 """Sections or hinges that a segment may have; an arm has at most twice as many."""
+
+QUARTER_TURN = {"at_least": -math.pi / 2, "at_most": math.pi / 2}
+"""Bounds of angles at rest."""
 
 ROUTING = (
     "Where the actuators of a segment start: segment (where it does), base (at the base, through the segments before it) "
@@ -108,6 +112,9 @@ class ContinuumArm(XacroRobot):
     guide_friction: PerPart = per_part(
         0.0, "-", "Coefficient of dry friction of actuators in the guides of a segment", at_least=0.0
     )
+    rest_bend_x: PerPart = per_part(0.0, "rad", "Bend of a segment about its x axis where it carries no moment", **QUARTER_TURN)
+    rest_bend_y: PerPart = per_part(0.0, "rad", "Bend of a segment about its y axis where it carries no moment", **QUARTER_TURN)
+    rest_twist: PerPart = per_part(0.0, "rad", "Twist of a segment where it carries no moment", **QUARTER_TURN)
     routing: str | int | Sequence[str | int] | Sequence[Route] = parameter(
         "segment",
         "",
@@ -135,6 +142,7 @@ class ContinuumArm(XacroRobot):
         object.__setattr__(self, "routing", checked_routing(self.routing, self.segment_lengths))
         object.__setattr__(self, "kind", self._checked_kinds(count))
         object.__setattr__(self, azimuths, self._checked_azimuths(azimuths))
+        check_actuator_parameters(self, count, "segments", self.n_actuators)
         most = max(1, 2 * MOST_SECTIONS // count)
         for name in ("elastic_sections", "hinges"):
             if getattr(self, name) > most:
@@ -160,6 +168,23 @@ class ContinuumArm(XacroRobot):
     def n_actuators(self) -> int:
         """Number of actuators of the whole arm."""
         return len(self.routes) or self.n_segments * len(getattr(self, f"{self.ACTUATOR}_azimuths"))
+
+    @property
+    def actuator_segments(self) -> tuple[int, ...]:
+        """Number, from 0, of the segment that each actuator is of: in which it ends."""
+        if self.routes:
+            return tuple(owner(route, self.segment_lengths) - 1 for route in self.routes)
+        each = len(getattr(self, f"{self.ACTUATOR}_azimuths"))
+        return tuple(segment for segment in range(self.n_segments) for _ in range(each))
+
+    def by_actuator(self, name: str) -> tuple[float, ...]:
+        """Values of a field of actuators, one for each, whether it has one a segment or one for each actuator."""
+        values = self._each(name)
+        return tuple(values[self.place_of(name, number)] for number in range(self.n_actuators))
+
+    def place_of(self, name: str, number: int) -> int:
+        """Where in a field of actuators the value of one is, `number` from 0."""
+        return self.actuator_segments[number] if len(self._each(name)) == self.n_segments else number
 
     @property
     def routes(self) -> tuple[Route, ...]:
@@ -218,7 +243,10 @@ class ContinuumArm(XacroRobot):
             if prefix + name in facts and attribute not in used:
                 refuse_given(self, (prefix + name,), f"for kind = {', '.join(dict.fromkeys(self.kind))}")
         if self.routes:
-            refuse_given(self, (f"{prefix}azimuths", f"{prefix}distance"), "where routing lists the routes")
-        least: Any = getattr(self, f"{prefix}least_tension")
-        if least is not None and any(low >= high for low, high in zip(least, self._each(f"{prefix}force"), strict=True)):
-            raise ParameterError(f"{prefix}least_tension", least, f"below {prefix}force, {self._each(f'{prefix}force')} N")
+            names = (f"{prefix}azimuths", f"{prefix}azimuth_deviation", f"{prefix}distance")
+            refuse_given(self, names, "where routing lists the routes")
+        least, most = f"{prefix}least_tension", f"{prefix}force"
+        if getattr(self, least) is not None and any(
+            low >= high for low, high in zip(self.by_actuator(least), self.by_actuator(most), strict=True)
+        ):
+            raise ParameterError(least, getattr(self, least), f"below {most}, {self._each(most)} N")

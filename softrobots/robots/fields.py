@@ -26,8 +26,9 @@ MOST_PARTS = 1000
 PerPart = float | Sequence[float]
 """One number for all links or segments, or one for each, base to tip."""
 
-Form = Literal["single", "per_part", "colour", "special"]
-"""One value; one for all parts or one for each; likewise a colour; checked by the robot itself."""
+Form = Literal["single", "per_part", "per_actuator", "colour", "special"]
+"""One value; one for all parts or one for each; that or one for each actuator; a colour for all parts or each; checked by the
+robot itself."""
 
 Value = TypeVar("Value")
 
@@ -93,6 +94,11 @@ def per_part(default: Value, *facts: Any, **more_facts: Any) -> Value:
     return parameter(default, *facts, form="per_part", **more_facts)
 
 
+def per_actuator(default: Value, *facts: Any, **more_facts: Any) -> Value:
+    """Return such a field with one number for all parts, one for each, or one for each actuator of the robot."""
+    return parameter(default, *facts, form="per_actuator", **more_facts)
+
+
 def facts_of(robot: Any) -> dict[str, Facts]:
     """Return the facts of the parameters of a robot, or of its class, by name."""
     return {field.name: field.metadata["facts"] for field in dataclasses.fields(robot)}
@@ -100,6 +106,8 @@ def facts_of(robot: Any) -> dict[str, Facts]:
 
 def check_parameters(robot: Any, parts: str = "parts", lengths: str | None = None) -> int:
     """Check every field of a robot against its facts and store it in its final type; values per part become tuples.
+
+    Those of actuators are left to `check_actuator_parameters`.
 
     Args:
         robot: A frozen dataclass of fields by `parameter`.
@@ -120,9 +128,22 @@ def check_parameters(robot: Any, parts: str = "parts", lengths: str | None = Non
             raise ParameterError(lengths, value, f"at least one length [m], at most {MOST_PARTS}")
     for field in dataclasses.fields(robot):
         value, facts = getattr(robot, field.name), field.metadata["facts"]
-        if facts.form != "special" and not (value is None and field.default is None):
+        if facts.form not in ("special", "per_actuator") and not (value is None and field.default is None):
             object.__setattr__(robot, field.name, _checked(field, facts, value, count, parts))
     return count
+
+
+def check_actuator_parameters(robot: Any, count: int, parts: str, actuators: int) -> None:
+    """Check the fields with values per actuator and store them as tuples, of `count` parts or of all actuators.
+
+    Raises:
+        ParameterError: If a value is not finite or out of bounds, or a list has neither length; names the field.
+    """
+    for field in dataclasses.fields(robot):
+        value, facts = getattr(robot, field.name), field.metadata["facts"]
+        if facts.form == "per_actuator" and not (value is None and field.default is None):
+            given = numbers(field.name, value, count, facts.unit, parts, actuators)
+            object.__setattr__(robot, field.name, _within(field.name, facts, given))
 
 
 def refuse_given(robot: Any, names: Sequence[str], requirement: str) -> None:
@@ -134,15 +155,21 @@ def refuse_given(robot: Any, names: Sequence[str], requirement: str) -> None:
             raise ParameterError(field.name, getattr(robot, field.name), f"left out {requirement}; it has no effect there")
 
 
-def numbers(name: str, value: Any, count: int | None, unit: str, parts: str = "parts") -> tuple[float, ...]:
-    """Return numbers as a tuple of `count`, a single one repeated, of any length without `count`; or raise ParameterError."""
+def numbers(
+    name: str, value: Any, count: int | None, unit: str, parts: str = "parts", actuators: int | None = None
+) -> tuple[float, ...]:
+    """Return numbers as a tuple of `count`, a single one repeated, of any length without `count`; or raise ParameterError.
+
+    A list may have as many as there are `actuators`, too.
+    """
     if isinstance(value, str | bytes):
         raise ParameterError(name, value, f"a number or a list of numbers [{unit}]")
     if count is not None and not isinstance(value, Sequence) and getattr(value, "ndim", 0) == 0:
         return (finite_number(name, value, unit),) * count
     values = tuple(finite_array(name, value, (None,), unit).tolist())
-    if count is not None and len(values) != count:
-        raise ParameterError(name, value, f"one number, or one for each of the {count} {parts} [{unit}]")
+    if count is not None and len(values) not in (count, actuators):
+        each = "" if actuators is None else f" or of the {actuators} actuators"
+        raise ParameterError(name, value, f"one number, or one for each of the {count} {parts}{each} [{unit}]")
     return values
 
 
@@ -158,9 +185,14 @@ def _checked(field: Field[Any], facts: Facts, value: Any, count: int, parts: str
         return _colours(name, value, count, parts)
     each = facts.form == "per_part"
     values = numbers(name, value, count, facts.unit, parts) if each else (finite_number(name, value, facts.unit),)
-    if not facts.allow(values):
+    return _within(name, facts, values) if each else _within(name, facts, values)[0]
+
+
+def _within(name: str, facts: Facts, values: tuple[float, ...]) -> tuple[float, ...]:
+    """The numbers, if there are none or all are within the bounds."""
+    if values and not facts.allow(values):
         raise ParameterError(name, values if len(values) > 1 else values[0], f"{facts.bounds} [{facts.unit}]")
-    return values if each else values[0]
+    return values
 
 
 def _colours(name: str, value: Any, count: int, parts: str) -> tuple[tuple[float, ...], ...]:

@@ -11,7 +11,7 @@ from softrobots.constant_curvature import AZIMUTHS
 from softrobots.core.checks import positive_array
 from softrobots.core.errors import ParameterError
 from softrobots.robots.continuum_arm import ContinuumArm
-from softrobots.robots.fields import PerPart, numbers, parameter, per_part
+from softrobots.robots.fields import PerPart, numbers, parameter, per_actuator, per_part
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,8 @@ class PccArm(ContinuumArm):
       which leaves an error of fourth order while it bends little.
 
     The muscles of a segment run along it, through segments before it, or on routes of their own (`routing`); `kind` says what
-    is given of them. Every per-segment field accepts one number for all segments or one for each, and is stored as a tuple.
+    is given of them. Every per-segment field accepts one number for all segments or one for each, and is stored as a tuple; a
+    field of muscles also one for each muscle, in the order of the segments.
 
     Raises:
         ParameterError: If a value is out of range or a list has the wrong length; the message names the field.
@@ -40,32 +41,35 @@ class PccArm(ContinuumArm):
         "PCC paper, section 3 (120 degrees apart)",
         form="special",
     )
-    muscle_distance: PerPart = per_part(
+    muscle_distance: PerPart = per_actuator(
         0.04, "m", "Distance of the muscles from the backbone", "assumed; not published", above=0.0
     )
-    muscle_contraction: PerPart = per_part(
+    muscle_azimuth_deviation: PerPart = per_actuator(
+        0.0, "rad", "By how much a muscle is turned about the backbone from muscle_azimuths", at_least=-0.5, at_most=0.5
+    )
+    muscle_contraction: PerPart = per_actuator(
         0.15, "-", "Largest contraction of a muscle, relative to its rest length", "assumed", above=0.0, below=1.0
     )
-    muscle_extension: PerPart = per_part(
+    muscle_extension: PerPart = per_actuator(
         0.15, "-", "Largest extension of a muscle, relative to its rest length", "assumed", above=0.0
     )
-    muscle_force: PerPart = per_part(400.0, "N", "Largest pull or push of a muscle", "assumed", above=0.0)
-    muscle_least_tension: PerPart | None = per_part(
+    muscle_force: PerPart = per_actuator(400.0, "N", "Largest pull or push of a muscle", "assumed", above=0.0)
+    muscle_least_tension: PerPart | None = per_actuator(
         None,
         "N",
         "Least tension of a muscle, negative where it may push; without it minus muscle_force, and 0 for kind = elastic",
     )
-    muscle_stiffness: PerPart = per_part(10e3, "N/m", "Stiffness of a muscle, for kind = elastic", "assumed", above=0.0)
-    muscle_pretension: PerPart = per_part(
+    muscle_stiffness: PerPart = per_actuator(10e3, "N/m", "Stiffness of a muscle, for kind = elastic", "assumed", above=0.0)
+    muscle_pretension: PerPart = per_actuator(
         10.0, "N", "Tension of a muscle where all is at rest, for kind = elastic", "assumed", at_least=0.0
     )
-    muscle_area: PerPart = per_part(
+    muscle_area: PerPart = per_actuator(
         3e-4, "m^2", "Section of a chamber, for kind = pressure", "assumed; a radian at max_pressure", above=0.0
     )
-    muscle_diameter: PerPart = per_part(
+    muscle_diameter: PerPart = per_actuator(
         0.01, "m", "Diameter of a McKibben muscle at rest, for kind = mckibben", "assumed; a radian at max_pressure", above=0.0
     )
-    muscle_braid_angle: PerPart = per_part(
+    muscle_braid_angle: PerPart = per_actuator(
         math.radians(25.0),
         "rad",
         "Angle of its braid to its axis at rest, below 0.9553, at which it does not pull; for kind = mckibben",
@@ -73,7 +77,7 @@ class PccArm(ContinuumArm):
         above=0.0,
         below=math.atan(math.sqrt(2.0)),
     )
-    muscle_max_pressure: PerPart = per_part(
+    muscle_max_pressure: PerPart = per_actuator(
         3e5, "Pa", "Largest gauge pressure, for kind = pressure and mckibben", "assumed", above=0.0
     )
     bending_stiffness: PerPart = per_part(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from softrobots.robots.continuum_arm import ROUTING, ContinuumArm
-from softrobots.robots.fields import PerPart, parameter, per_part
+from softrobots.robots.fields import PerPart, parameter, per_actuator, per_part
 from softrobots.robots.routes import Route
 
 
@@ -20,7 +20,8 @@ class TendonArm(ContinuumArm):
     Backbone, tendons and sizes are those of a published robot with recordings, `docs/measured.md`.
 
     The disks are mass, spread evenly along the backbone; one is drawn at the end of each section. Every per-segment field
-    accepts one number for all segments or one for each, and is stored as a tuple.
+    accepts one number for all segments or one for each, and is stored as a tuple; a field of tendons also one for each tendon,
+    in the order of the segments.
 
     Raises:
         ParameterError: If a value is out of range or a list has the wrong length; the message names the field.
@@ -62,21 +63,24 @@ class TendonArm(ContinuumArm):
         "OpenCR, published configuration (120 degrees apart)",
         form="special",
     )
-    tendon_distance: PerPart = per_part(
+    tendon_distance: PerPart = per_actuator(
         0.0045, "m", "Distance of the tendons from the backbone", "OpenCR, published configuration", above=0.0
     )
-    tendon_contraction: PerPart = per_part(
+    tendon_azimuth_deviation: PerPart = per_actuator(
+        0.0, "rad", "By how much a tendon is turned about the backbone from tendon_azimuths", at_least=-0.5, at_most=0.5
+    )
+    tendon_contraction: PerPart = per_actuator(
         0.2, "-", "How far a motor can pull, relative to the rest length of the tendon", "assumed", above=0.0, below=1.0
     )
-    tendon_extension: PerPart = per_part(
+    tendon_extension: PerPart = per_actuator(
         0.2, "-", "How far a motor can let go, relative to the rest length of the tendon", "assumed", above=0.0
     )
-    tendon_force: PerPart = per_part(60.0, "N", "Largest tension of a tendon", "assumed", above=0.0)
-    tendon_least_tension: PerPart = per_part(0.0, "N", "Least tension of a tendon", at_least=0.0)
-    tendon_stiffness: PerPart = per_part(
+    tendon_force: PerPart = per_actuator(60.0, "N", "Largest tension of a tendon", "assumed", above=0.0)
+    tendon_least_tension: PerPart = per_actuator(0.0, "N", "Least tension of a tendon", at_least=0.0)
+    tendon_stiffness: PerPart = per_actuator(
         8e3, "N/m", "Stiffness of a tendon with its motor, for kind = elastic", "assumed, as the recordings have it", above=0.0
     )
-    tendon_pretension: PerPart = per_part(
+    tendon_pretension: PerPart = per_actuator(
         2.0, "N", "Tension of a tendon where all is at rest, for kind = elastic", "assumed; not published", at_least=0.0
     )
     backbone_radius: PerPart = per_part(
