@@ -36,12 +36,20 @@ JOBS = {
 """Marks of tests that run in jobs of their own, and what these tests are."""
 SYSTEM_FIXTURES = {"browser", "site"}
 """Fixtures that make a test one of the system."""
+SHORTENED = "shortened(gate, all): a study by random cases: how many the gate tries, and how many --all-cases does"
+"""The mark of studies that the fixture `cases` asks."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let the studies that the gate shortens try all their cases."""
+    parser.addoption("--all-cases", action="store_true", help="studies try all their cases, as scripts/long_proofs.py does")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Leave out what has a job of its own, unless files or marks are named; one thread of linear algebra a process."""
     for mark, meaning in JOBS.items():
         config.addinivalue_line("markers", f"{mark}: {meaning}")
+    config.addinivalue_line("markers", SHORTENED)
     if config.args_source != pytest.Config.ArgsSource.ARGS and not config.option.markexpr:
         config.option.markexpr = f"not ({' or '.join(JOBS)})"
     if getattr(config.option, "numprocesses", None):
@@ -186,6 +194,15 @@ def told(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, st
         return status, *capsys.readouterr()
 
     return run
+
+
+@pytest.fixture
+def cases(request: pytest.FixtureRequest, record_property: Callable[[str, object], None]) -> int:
+    """How many cases a study that is marked `shortened` tries; reports of the tests say so, too."""
+    gate, every = request.node.get_closest_marker("shortened").args
+    for name, number in (("gate", gate), ("all", every)):
+        record_property(name, number)
+    return every if request.config.getoption("--all-cases") else gate
 
 
 @pytest.fixture(scope="session")

@@ -77,12 +77,13 @@ def test_the_oracle_sees_a_branch_that_is_left_out() -> None:
 
 
 @pytest.mark.study
+@pytest.mark.shortened(6, 25)
 @pytest.mark.parametrize("seed", range(8))
-def test_no_branch_of_200_random_arms_is_missed(seed: int) -> None:
+def test_no_branch_of_200_random_arms_is_missed(seed: int, cases: int) -> None:
     """In every other arm each link has a plateau."""
     rng, bent = np.random.default_rng([20, seed]), 0
-    for case in range(25):
+    for case in range(cases):
         found, on_branches = missed(rng, case % 2 == 1, 200)
         assert not found, (case, found)
         bent += on_branches
-    assert bent > 100
+    assert bent > 4 * cases

@@ -22,10 +22,11 @@ def true_case(
 
 
 @pytest.mark.study
-def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel) -> None:
+@pytest.mark.shortened(2_000, 10_000)
+def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel, cases: int) -> None:
     """1e-6 relative in at least 99 % of 10 000 cases at 18 N; each miss is a pose near a singular one."""
     rng, found = np.random.default_rng(0), 0
-    for _ in range(10_000):
+    for _ in range(cases):
         motors, force, truth = true_case(arm, rng, 18.0)
         estimate = sr.estimate_load(arm, motors, truth.motor_torques, restart=False)
         close = np.linalg.norm(estimate.force - force) <= 1e-6 * 18.0
@@ -34,7 +35,7 @@ def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel) -> N
             explained = estimate.equilibrium.motor_torques - truth.motor_torques
             assert len(estimate.unobservable_directions) or np.abs(explained).max() < 1e-8
         assert estimate.equilibrium.converged
-    assert found >= 9_900
+    assert found >= 0.99 * cases
 
 
 @pytest.mark.study
@@ -312,10 +313,11 @@ def test_the_force_is_within_its_errors(arm: sr.SoftModel) -> None:
 
 
 @pytest.mark.study
+@pytest.mark.shortened(1500, 6000)
 @pytest.mark.parametrize("kind", ["arm", "two hinges", "three links"])
-def test_the_force_is_within_its_errors_in_95_of_100_cases(kind: str) -> None:
-    """6000 repetitions, standard error 0.28 %: 94 to 96 %."""
-    assert 0.94 <= coverage(measured_robot(kind), 6000, 1) <= 0.96
+def test_the_force_is_within_its_errors_in_95_of_100_cases(kind: str, cases: int) -> None:
+    """6000 repetitions, standard error 0.28 %: 94 to 96 %; twice that of the 1500 of the gate."""
+    assert coverage(measured_robot(kind), cases, 1) == pytest.approx(0.95, abs=0.01 * np.sqrt(6000 / cases))
 
 
 def test_muscles_have_no_angles() -> None:

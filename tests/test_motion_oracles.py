@@ -154,8 +154,14 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off() -> None:
 
 @pytest.mark.study
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("engine", ["general", "compiled"])
-def test_random_runs_end_with_numbers(engine: str) -> None:
+@pytest.mark.parametrize(
+    "engine",
+    [
+        pytest.param("general", marks=pytest.mark.shortened(10, 50)),
+        pytest.param("compiled", marks=pytest.mark.shortened(200, 1600)),
+    ],
+)
+def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
     """More than ten thousand with random loads, motors, damping and steps, most of them compiled: each ends, with numbers."""
     rng, failed, runs = np.random.default_rng(21), 0, 0
     for kind in law_robots.ROBOTS:
@@ -165,7 +171,7 @@ def test_random_runs_end_with_numbers(engine: str) -> None:
             if kind in ("limp", "foreign", "tendons") or (model.muscles and model.muscle_input == "lengths"):
                 continue  # plateaus, side branches, elastic tendons and lengths of muscles are refused there
             simulate = sr.compile(model).simulate
-        for _ in range(1600 if engine == "compiled" else 50):
+        for _ in range(cases):
             runs += 1
             push = law_robots.PUSHES[kind] * 10.0 ** rng.uniform(-2.0, 0.5) * rng.normal(size=3)
             step = 10.0 ** rng.uniform(-4.0, -1.5)

@@ -179,11 +179,12 @@ def test_springs_that_are_nearly_equal_have_all_four_stable_branches(difference:
 
 
 @pytest.mark.study
+@pytest.mark.shortened(10, 50)
 @pytest.mark.parametrize("seed", range(4))
-def test_no_stable_branch_of_a_random_arm_is_missed(seed: int) -> None:
+def test_no_stable_branch_of_a_random_arm_is_missed(seed: int, cases: int) -> None:
     """200 arms; in every other one the springs of a link are nearly equal."""
     rng = np.random.default_rng(seed)
-    for case in range(50):
+    for case in range(cases):
         stiffness = 172.71 * np.exp(rng.uniform(-0.7, 0.7, 4))
         if case % 2:
             stiffness[1::2] = stiffness[::2] * (1.0 + 10.0 ** rng.uniform(-9.0, -2.0, 2))
@@ -307,26 +308,28 @@ PLATEAUS = (*np.linspace(3.0, 25.0, 20).tolist(), 14.99, 21.76)
 """Largest moments of a link [N m]; the last two are [Troise 2021]'s Table 3 at two pressures."""
 
 
-@pytest.mark.parametrize(
-    ("links", "plateaus"),
-    [
-        (1, (25.0,)),
-        (2, (21.76,)),
-        (3, (14.99,)),
-        *(pytest.param(links, PLATEAUS, marks=pytest.mark.study) for links in (1, 2, 3)),
-    ],
-)
-def test_no_branch_is_lost_at_a_plateau(links: int, plateaus: tuple[float, ...]) -> None:
+def check_branches_at_a_plateau(links: int, plateau: float) -> None:
     """Wherever the points of a branch lie before its links come onto their plateaus, it goes on to the largest force."""
-    lengths = (0.6, 0.6, 0.5)[:links]
-    for plateau in plateaus:
-        model = sr.load_model(sr.InflatableArm(link_lengths=lengths, max_moment=plateau))
-        found = by_label(sr.post_buckling_branches(model, (0,) * model.n_motors, PUSH, largest_step=0.1))
-        assert len(found) == 9
-        for branch in found.values():
-            assert branch.ended == "largest force"
-            assert all(one.converged for one in branch.equilibria)
-            assert np.linalg.norm(np.diff(springs_of(branch), axis=0), axis=1).max() <= 0.1 / 0.95 + 1e-9  # no jump
+    model = sr.load_model(sr.InflatableArm(link_lengths=(0.6, 0.6, 0.5)[:links], max_moment=plateau))
+    found = by_label(sr.post_buckling_branches(model, (0,) * model.n_motors, PUSH, largest_step=0.1))
+    assert len(found) == 9
+    for branch in found.values():
+        assert branch.ended == "largest force"
+        assert all(one.converged for one in branch.equilibria)
+        assert np.linalg.norm(np.diff(springs_of(branch), axis=0), axis=1).max() <= 0.1 / 0.95 + 1e-9  # no jump
+
+
+@pytest.mark.parametrize(("links", "plateau"), [(1, 25.0), (2, 21.76), (3, 14.99)])
+def test_no_branch_is_lost_at_a_plateau(links: int, plateau: float) -> None:
+    check_branches_at_a_plateau(links, plateau)
+
+
+@pytest.mark.study
+@pytest.mark.shortened(8, len(PLATEAUS))
+@pytest.mark.parametrize("links", [1, 2, 3])
+def test_no_branch_is_lost_at_any_plateau(links: int, cases: int) -> None:
+    for plateau in PLATEAUS[:: -round(len(PLATEAUS) / cases)]:
+        check_branches_at_a_plateau(links, plateau)
 
 
 @pytest.mark.parametrize(

@@ -91,6 +91,47 @@ def test_a_machine_without_any_python_proves_nothing(tmp_path: Path, monkeypatch
     assert not (tmp_path / "out").exists()
 
 
+# --- Studies with all their cases
+
+
+REPORT = """<testsuites><testsuite>
+<testcase classname="tests.test_b" name="test_y[0]"><properties>
+<property name="gate" value="2"/><property name="all" value="10"/></properties></testcase>
+<testcase classname="tests.test_b" name="test_y[1]"><properties>
+<property name="gate" value="3"/><property name="all" value="20"/></properties><failure/></testcase>
+<testcase classname="tests.test_a" name="test_x"><properties>
+<property name="gate" value="1"/><property name="all" value="4"/></properties></testcase>
+</testsuite></testsuites>"""
+
+
+@pytest.mark.parametrize("status", [0, 1, 2])
+def test_all_cases_are_counted_and_recorded_if_they_pass(
+    status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    proofs = load_script("long_proofs")
+    (tmp_path / "docs").mkdir()
+    page = tmp_path / "docs" / "validation.md"
+    page.write_text("<!-- long_proofs:begin -->\n<!-- long_proofs:end -->\n", encoding="utf-8")
+
+    def run(asked: list[str], **_: object) -> SimpleNamespace:
+        assert "--all-cases" in asked
+        file = next(word.partition("=")[2] for word in asked if word.startswith("--junitxml="))
+        Path(file).write_text(REPORT if status else REPORT.replace("<failure/>", ""), encoding="utf-8")
+        return SimpleNamespace(returncode=status)
+
+    monkeypatch.setattr(proofs, "subprocess", SimpleNamespace(run=run))
+    assert proofs.main(["--docs", str(tmp_path)]) == status
+    out, err = capsys.readouterr()
+    assert (f"| `test_b::test_y` | 5 | 30 | {status} |" in out) == (status < 2)
+    assert ("| `test_a::test_x` | 1 | 4 | 0 |" in page.read_text(encoding="utf-8")) == (status == 0)
+    assert ("" if status == 0 else "not recorded" if status == 1 else "ended early, with status 2") in err
+
+
+def test_no_process_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_script("long_proofs", ["--processes", "0"]) == 2
+    assert "at least 1" in capsys.readouterr().err
+
+
 # --- Coverage
 
 
