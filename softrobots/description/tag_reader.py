@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -38,7 +39,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
             malformed.
     """
     root = urdf_root(urdf_text, source)
-    if any(str(element.tag).startswith(f"{{{XACRO_NAMESPACE}}}") for element in root.iter()):
+    if any(element.tag.startswith(f"{{{XACRO_NAMESPACE}}}") for element in root.iter()):
         raise DescriptionError(
             f"{source} is an unexpanded xacro file; expand it first (softrobots.description.expansion.expand)"
         )
@@ -242,6 +243,6 @@ def _base_to_tip(root: ElementTree.Element, tags: RobotTags) -> list[AnySectionT
 
 
 def _unique(what: str, names: Sequence[str], source: str) -> None:
-    twice = {name for name in names if names.count(name) > 1}
+    twice = [name for name, count in Counter(names).items() if count > 1]
     if twice or "" in names:
         raise DescriptionError(f"{source} has a {what} name twice or an empty one: {', '.join(sorted(twice)) or '(empty)'}")

@@ -8,6 +8,7 @@ masses; and a chain of 4000 links ends the process.
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -40,6 +41,9 @@ _OF_SHAPES: Mapping[str, Mapping[str, int]] = {
     "sphere": {"radius": 1},
     "mesh": {"scale": 0},  # of any length: some files have four numbers, which is harmless
 }
+_PLAIN = r"[+-]?\d{1,20}(?:\.\d{0,40})?(?:[eE](?:-\d{1,3}|\+?\d))?"  # at most 1e30 in size
+_ROWS = {count: re.compile(rf"{_PLAIN}(?: {_PLAIN}){{{count - 1}}}", re.ASCII) for count in (1, 3)}
+"""Nearly all rows of numbers, which need no closer look."""
 _RESERVED = "universe"  # Pinocchio's name of the world
 
 
@@ -74,11 +78,11 @@ def check_structure(root: ElementTree.Element, source: str) -> None:
         for element in link:
             if element.tag == "inertial":
                 _check_numbers(where, element, _OF_LINKS)
+                for mass in element.findall("mass"):
+                    if number_in(mass.get("value")) < 0.0:
+                        raise DescriptionError(f"{where} has the mass {mass.get('value')}; it is negative")
             elif element.tag in ("visual", "collision"):
                 _check_numbers(where, element.iter(), _OF_SHAPES)
-        for mass in link.findall("inertial/mass"):
-            if number_in(mass.get("value")) < 0.0:
-                raise DescriptionError(f"{where} has the mass {mass.get('value')}; it is negative")
     for joint in joints:
         where = f"joint {joint.get('name')} of {source}"
         _check_numbers(where, joint, _OF_JOINTS)
@@ -111,9 +115,9 @@ def _check_names(kind: str, elements: Iterable[ElementTree.Element], source: str
 
 def _check_numbers(where: str, elements: Iterable[ElementTree.Element], table: Mapping[str, Mapping[str, int]]) -> None:
     for element in elements:
-        for attribute, count in table.get(str(element.tag), {}).items():
+        for attribute, count in table.get(element.tag, {}).items():
             text = element.get(attribute)
-            if text is None:
+            if text is None or (count and _ROWS[count].fullmatch(text)):
                 continue
             parts, most = text.split(), math.inf if element.tag == "limit" else LARGEST  # very large limits mean none
             if (count and len(parts) != count) or any(math.isnan(number_in(part, most)) for part in parts):

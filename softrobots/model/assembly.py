@@ -76,8 +76,9 @@ def assemble(
     elastic_limits: FloatArray = np.tile([-np.inf, np.inf], (rigid.nv, 1))
     elastic_limits[spring_indices] = _joint_limits(rigid, spring_joints)
     if sections:
-        indices = np.array([velocity_indices(rigid, row.joint_names) for row in sections])
-        elastic_limits[indices] = [_joint_limits(rigid, row.joint_names) for row in sections]
+        names = [name for row in sections for name in row.joint_names]
+        indices = velocity_indices(rigid, names).reshape(len(sections), -1)
+        elastic_limits[indices] = _joint_limits(rigid, names).reshape(*indices.shape, 2)
         lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("length", "rest_joints"))
         coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
     friction = None
@@ -158,16 +159,16 @@ def _worth(tags: Sequence[ActuatorTag], rows: Sequence[SectionRow], paths: Muscl
 
     Of one that bends nothing, as along the backbone, elongation by its length is worth a radian.
     """
-    worth = []
-    bends = [[row.places[key] for key in ("bend_x", "bend_y") if key in row.places] for row in rows]
-    for tag, arms in zip(tags, paths.matrix, strict=True):
-        bend = sum(float(np.linalg.norm(arms[pair] / springs.stiffness[pair])) for pair in bends)
-        reeled = sum(float(arms[pair] @ (arms[pair] / springs.stiffness[pair])) for pair in bends)
-        if reeled <= 1e-9 * tag.rest_length * bend:
-            reeled = float(arms @ (arms / springs.stiffness)) or 1.0
-            bend = reeled / tag.rest_length
-        worth.append((reeled / bend, bend))
-    return np.array(worth).reshape(-1, 2)
+    bends = np.array([[row.places[key] for key in ("bend_x", "bend_y")] for row in rows], dtype=np.intp).reshape(-1, 2)
+    arms = paths.matrix[:, bends]
+    compliant = arms / springs.stiffness[bends]
+    bend, reeled = np.linalg.norm(compliant, axis=2).sum(axis=1), (arms * compliant).sum(axis=(1, 2))
+    lengths = np.array([tag.rest_length for tag in tags])
+    straight = reeled <= 1e-9 * lengths * bend
+    pulled = (paths.matrix**2 / springs.stiffness).sum(axis=1)
+    reeled = np.where(straight, np.where(pulled > 0.0, pulled, 1.0), reeled)
+    bend = np.where(straight, reeled / lengths, bend)
+    return np.stack([reeled / bend, bend], axis=1)
 
 
 def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
@@ -214,7 +215,8 @@ def _grouped(elastic: Springs, structure: Structure) -> Springs:
 
 def velocity_indices(rigid: Any, names: Sequence[str]) -> Any:
     """Return the places of joints in Pinocchio's velocity vector, read-only."""
-    indices = np.array([rigid.joints[rigid.getJointId(name)].idx_v for name in names], dtype=np.intp)
+    joints = rigid.joints
+    indices = np.array([joints[rigid.getJointId(name)].idx_v for name in names], dtype=np.intp)
     indices.setflags(write=False)
     return indices
 
@@ -226,10 +228,11 @@ def _kind(rigid: Any, name: str) -> str:
 def _joint_limits(rigid: Any, names: Sequence[str]) -> FloatArray:
     """Lower and upper limits of joints, shape (n, 2) [rad or m]; infinite for continuous ones and beyond `LARGEST`."""
     limits = np.zeros((len(names), 2))
+    joints, lower, upper = rigid.joints, rigid.lowerPositionLimit, rigid.upperPositionLimit
     for row, name in enumerate(names):
-        joint = rigid.joints[rigid.getJointId(name)]
+        joint = joints[rigid.getJointId(name)]
         place = joint.idx_q
-        limits[row] = (-np.inf, np.inf) if joint.nq == 2 else (rigid.lowerPositionLimit[place], rigid.upperPositionLimit[place])
+        limits[row] = (-np.inf, np.inf) if joint.nq == 2 else (lower[place], upper[place])
     limits[limits <= -LARGEST], limits[limits >= LARGEST] = -np.inf, np.inf  # URDF has no slide without limits
     return read_only(limits)
 

@@ -7,6 +7,7 @@ x, y or z, `A` is a signed permutation, so that zeros stay exact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
@@ -95,10 +96,11 @@ def chain_length(pinocchio_model: Any, tip_frame: int, strained: Collection[str]
     A slide without limits counts as 1 m. The travel of `strained` joints, those of sections, is strain and does not count.
     """
     frame = pinocchio_model.frames[tip_frame]
-    length = float(np.linalg.norm(frame.placement.translation))
+    length = math.hypot(*frame.placement.translation.tolist())
+    joints, placements = pinocchio_model.joints, pinocchio_model.jointPlacements
     for number in list(pinocchio_model.supports[frame.parentJoint])[:0:-1]:
-        length += float(np.linalg.norm(pinocchio_model.jointPlacements[number].translation))
-        joint = pinocchio_model.joints[number]
+        length += math.hypot(*placements[number].translation.tolist())
+        joint = joints[number]
         if joint.shortname().startswith("JointModelP") and pinocchio_model.names[number] not in strained:
             low, high = pinocchio_model.lowerPositionLimit[joint.idx_q], pinocchio_model.upperPositionLimit[joint.idx_q]
             length += float(high - low) if high - low < LARGEST else 1.0

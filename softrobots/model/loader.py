@@ -100,8 +100,8 @@ def load_model(
     if locked:
         model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], pin.neutral(model))
     _check_joints(model, label)
-    for section in tags.sections:
-        _check_section(model, section, label)
+    if tags.sections:
+        _check_sections(model, tags.sections, label)
     lumped = tuple(tag for tag in tags.lumped_sections if all(name in spring_tags for name in tag.joints.values()))
     if tags.muscles and len(lumped) < len(tags.lumped_sections):
         raise DescriptionError(f"{label} has muscles along lumped sections; each joint of those needs a spring")
@@ -179,44 +179,51 @@ def _motor_names(motors: Any, movable: Sequence[str], springs: Mapping[str, Spri
 
 
 def _check_joints(model: Any, label: str) -> None:
-    for name in list(model.names)[1:]:  # the first is the universe
-        joint = model.joints[model.getJointId(name)]
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:  # the first is the universe
         if joint.nv != 1 or joint.nq not in (1, 2):
             raise DescriptionError(
                 f"joint {name} of {label} is a {joint.shortname()}; revolute, continuous and prismatic joints are supported"
             )
-        low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+        low, high = lower[joint.idx_q], upper[joint.idx_q]
         if joint.nq == 1 and low > high:
             raise DescriptionError(f"joint {name} of {label} has the lower limit {low} above the upper one, {high}")
 
 
-def _check_section(model: Any, section: SectionTag, label: str) -> None:
-    """Refuse six joints that are not the chain of `strain_chain` with the rest shape of the section in its origins."""
-    numbers = [model.getJointId(name) for name in section.joints]
-    _, u2, chord, r1, r2, r3 = joint_positions(rest_coordinates([section]), np.array([section.length]))[0]
-    origins = [None, pin.SE3(pin.rpy.rpyToMatrix(0.0, u2, 0.0), np.zeros(3)), pin.SE3(np.eye(3), np.array([0.0, 0.0, chord]))]
-    origins += [pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.zeros(3)) for rpy in ((r1, 0.0, 0.0), (0.0, r2, 0.0), (0.0, 0.0, r3))]
-    kinds = ("RX", "RY", "PZ", "RX", "RY", "RZ")
-    for place, (number, kind, origin) in enumerate(zip(numbers, kinds, origins, strict=True)):
-        name = section.joints[place]
-        if model.joints[number].shortname() != f"JointModel{kind}":
-            problem = f"a {model.joints[number].shortname()}, required: JointModel{kind}"
-        elif place > 0 and model.parents[number] != numbers[place - 1]:
-            problem = f"not a child of joint {section.joints[place - 1]}"
-        elif origin is not None and not model.jointPlacements[number].isApprox(origin, 1e-9):
-            problem = "not where the rest shape of the section puts it"
-        else:
-            continue
-        raise DescriptionError(f"joint {name} of section {section.name} of {label} is {problem}")
+def _check_sections(model: Any, sections: Sequence[SectionTag], label: str) -> None:
+    """Refuse six joints that are not the chain of `strain_chain` with the rest shape of their section in its origins."""
+    places = joint_positions(rest_coordinates(sections), np.array([section.length for section in sections]))
+    origins = np.tile(np.eye(4), (*places.shape, 1, 1))
+    for place, axis in ((1, 1), (3, 0), (4, 1), (5, 2)):
+        sine, cosine, (one, two) = np.sin(places[:, place]), np.cos(places[:, place]), ((axis + 1) % 3, (axis + 2) % 3)
+        origins[:, place, one, one] = origins[:, place, two, two] = cosine
+        origins[:, place, two, one], origins[:, place, one, two] = sine, -sine
+    origins[:, 2, 2, 3] = chords = places[:, 2]
+    numbers = [[model.getJointId(name) for name in section.joints] for section in sections]
+    joints, parents, placements = model.joints, model.parents, model.jointPlacements
+    found = np.array([[placements[number].homogeneous for number in row] for row in numbers])
+    scale = np.where(np.arange(4) < 3, 1.0, chords[:, None])[:, None, None, :]  # of columns: three axes, one place
+    there = np.all(np.abs(found - origins) <= 1e-9 * scale, axis=(2, 3))
+    for section, row, as_told in zip(sections, numbers, there.tolist(), strict=True):
+        for place, (number, kind) in enumerate(zip(row, ("RX", "RY", "PZ", "RX", "RY", "RZ"), strict=True)):
+            if joints[number].shortname() != f"JointModel{kind}":
+                problem = f"a {joints[number].shortname()}, required: JointModel{kind}"
+            elif place > 0 and parents[number] != row[place - 1]:
+                problem = f"not a child of joint {section.joints[place - 1]}"
+            elif place > 0 and not as_told[place]:
+                problem = "not where the rest shape of the section puts it"
+            else:
+                continue
+            raise DescriptionError(f"joint {section.joints[place]} of section {section.name} of {label} is {problem}")
 
 
 def _tip(model: Any, tip: str | None, label: str) -> str:
-    bodies = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
     if tip is not None:
         if not isinstance(tip, str) or not model.existFrame(tip):
+            bodies = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
             raise NameNotFound("frame", str(tip), bodies)
         return tip
-    if "tip" in bodies:
+    if model.existBodyName("tip"):
         return "tip"
     parents = {frame.parentFrame for frame in model.frames}
     leaves = [frame.name for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY and i not in parents]
