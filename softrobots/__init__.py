@@ -3,7 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 import softrobots.dynamics.saved_modes
-import softrobots.dynamics.saved_motion  # noqa: F401  (adds the kinds of results that can be saved)
+import softrobots.dynamics.saved_motion
+import softrobots.identification.saved_measurements  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.core.errors import (
     ClusterError,
@@ -34,6 +35,7 @@ from softrobots.dynamics.linear_model import LinearModel, linearize
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
+from softrobots.identification.measurements import Measurements
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
@@ -80,6 +82,7 @@ __all__ = [
     "LinkLimits",
     "LoadEstimate",
     "LoadNotFound",
+    "Measurements",
     "MissingDependency",
     "Motion",
     "MotionState",

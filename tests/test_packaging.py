@@ -35,7 +35,8 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
 PUBLIC = """
 EARTH_GRAVITY PD ROBOTS AssumedStiffnessWarning ClosedLoop ClusterError DescriptionError Equilibrium EquilibriumBranch
 EquilibriumNotFound FileFormatError HelixTube IkSolution ImposedDisplacement InflatableArm InputShaper LinearModel LinkLimits
-LoadEstimate LoadNotFound MissingDependency Motion MotionState NameNotFound NeutralEquilibrium NoCriticalLoad NotConverged
+LoadEstimate LoadNotFound Measurements MissingDependency Motion MotionState NameNotFound NeutralEquilibrium NoCriticalLoad
+NotConverged
 OutputError OutputExists ParameterError Path3D PccArm Route SelfIntersection ShapedTrajectory SoftModel SoftRobotsError
 SpringGroup Stability StraightTube TargetUnreachable TendonArm Trajectory VibrationModes Viewer ViewerError Workspace
 __version__ compliance constant_curvature critical_load damping_time_from_decrement distributed_force elastostatic_jacobian

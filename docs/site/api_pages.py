@@ -94,6 +94,11 @@ PAGES = {
             *_top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),
         ),
     ),
+    "identification": ApiPage(
+        "Identification",
+        "What was measured of a robot, and the parameters that explain it.",
+        (*_top("Measurements"), "softrobots.identification.measurement_columns.read_columns"),
+    ),
     "inflated_beam": ApiPage("inflated_beam", "One inflated link as a beam.", _top("inflated_beam")),
     "constant_curvature": ApiPage(
         "constant_curvature", "Segments of constant curvature in closed form.", _top("constant_curvature")

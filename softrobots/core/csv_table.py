@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
+import sys
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,12 +32,22 @@ class Table(NamedTuple):
     columns: tuple[str, ...]
     """Names of the columns."""
     numbers: FloatArray
-    """Values, all finite, shape (n_rows, n_columns)."""
+    """Values, finite or missing (not a number), shape (n_rows, n_columns)."""
     lines: Sequence[int]
     """Line number of the end of each row, from 1."""
+    words: dict[str, list[str]]
+    """Columns of words by name."""
 
 
-def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()) -> Table:
+def read_table(
+    path: Path,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    *,
+    gaps: Container[str] = (),
+    words: Sequence[str] = (),
+    comments: bool = False,
+) -> Table:
     """Read columns of a CSV file by name.
 
     Other columns and empty lines are ignored. Every other line must have as many cells as the first: one with more or fewer is
@@ -46,6 +57,9 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()
         path: The file, in UTF-8.
         required: Columns that the file must have, each once.
         optional: Columns that the file may have, at most once.
+        gaps: Which of these may have cells that are empty or `nan`.
+        words: Columns of words that the file must have, each once.
+        comments: Ignore lines that begin with `#`, too.
 
     Returns:
         The columns present, those of `optional` first.
@@ -56,11 +70,13 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()
     """
     numbers, lines = array("d"), array("q")
     with opened(path) as file, io.TextIOWrapper(file, encoding="utf-8-sig", newline="") as text:
-        reader = csv.reader(_lines(path, text), skipinitialspace=True)
+        reader = csv.reader(_lines(path, text, comments), skipinitialspace=True)
         try:
-            names = [name.strip() for name in next(reader, [])]
-            columns = _columns(path, names, required, optional)
-            places = [names.index(name) for name in columns]
+            names = [name.strip() for name in next((cells for cells in reader if cells or not comments), [])]
+            columns = _columns(f"{path}, line {max(reader.line_num, 1)}", names, (*required, *words), optional)
+            columns = columns[: len(columns) - len(words)]
+            places = [(names.index(name), name in gaps) for name in columns]
+            texts = {name: (names.index(name), list[str]()) for name in words}
             for cells in reader:
                 if not any(cell.strip() for cell in cells):
                     continue
@@ -69,16 +85,18 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str] = ()
                     raise FileFormatError(f"{where}: {len(cells)} cells; {len(names)} are required")
                 if len(lines) == MOST_ROWS:
                     raise FileFormatError(f"{where}: more than {MOST_ROWS} rows; at most {MOST_ROWS} are read")
-                numbers.extend(_number(f"{where}: {names[place]}", cells[place]) for place in places)
+                numbers.extend(_number(f"{where}: {names[place]}", cells[place], gap) for place, gap in places)
+                for place, column in texts.values():
+                    column.append(sys.intern(cells[place].strip()))
                 lines.append(reader.line_num)
         except csv.Error as error:
             raise FileFormatError(f"{path}, line {reader.line_num}: {error}") from error
     table = np.array(numbers, dtype=np.float64).reshape(len(lines), len(columns))
-    return Table(columns, table, lines)
+    return Table(columns, table, lines, {name: column for name, (_, column) in texts.items()})
 
 
-def _lines(path: Path, file: io.TextIOWrapper) -> Iterator[str]:
-    """Yield the lines of a text with their ends, up to the limits of a line and of the file."""
+def _lines(path: Path, file: io.TextIOWrapper, comments: bool) -> Iterator[str]:
+    """Yield the lines of a text with their ends, comments as empty lines, up to the limits of a line and of the file."""
     size = 0
     while line := file.readline(_LONGEST_LINE + 1):
         size += len(line)
@@ -88,21 +106,23 @@ def _lines(path: Path, file: io.TextIOWrapper) -> Iterator[str]:
             raise FileFormatError(f"{path} has more than {LARGEST_FILE} characters, the most that is read")
         if "\0" in line:
             raise FileFormatError(f"{path} is not text in UTF-8: it contains a NUL character")
-        yield line
+        yield "\n" if comments and line.startswith("#") else line
 
 
-def _columns(path: Path, names: Sequence[str], required: Sequence[str], optional: Sequence[str]) -> tuple[str, ...]:
+def _columns(where: str, names: Sequence[str], required: Sequence[str], optional: Sequence[str]) -> tuple[str, ...]:
     """Names of the columns present, checked to occur as often as they must."""
     if any(names.count(name) != 1 for name in required) or any(names.count(name) > 1 for name in optional):
         named = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
         allowed = [f"{', '.join(required)} are required, each once"] if required else []
         allowed += [f"{', '.join(optional)} at most once"] if optional else []
-        raise FileFormatError(f"{path}, line 1: it names {named[:500] or 'nothing'}; {', and '.join(allowed)}")
+        raise FileFormatError(f"{where}: it names {named[:500] or 'nothing'}; {', and '.join(allowed)}")
     return (*(name for name in optional if name in names), *required)
 
 
-def _number(what: str, cell: str) -> float:
-    """Return a cell as a number; unlike `float`, without `1_000` and digits of other scripts."""
+def _number(what: str, cell: str, gap: bool) -> float:
+    """Return a cell as a number; unlike `float`, without `1_000` and other scripts' digits; NaN for a gap."""
+    if gap and cell.strip().lower() in ("", "nan"):
+        return math.nan
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:

@@ -12,13 +12,17 @@ from softrobots.core.checks import LARGEST, FloatArray
 from softrobots.core.csv_table import Table, read_table
 from softrobots.core.errors import FileFormatError
 from softrobots.core.files import as_path
+from softrobots.core.units import UNITS as SI_UNITS
 from softrobots.inflated_beam.bending_test import BendingTest
 
 UNITS = {
-    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0},
-    "moment": {"N m": 1.0, "N mm": 1e-3},
-    "displacement": {"m": 1.0, "mm": 1e-3},
-    "force": {"N": 1.0},
+    quantity: {unit: SI_UNITS[kind][unit] for unit in units}
+    for quantity, kind, units in (
+        ("angle", "angle", ("rad", "mrad", "deg")),
+        ("moment", "torque", ("N m", "N mm")),
+        ("displacement", "length", ("m", "mm")),
+        ("force", "force", ("N",)),
+    )
 }
 """Quantities of a bending test, with the units that a file may have and what they are in radians, newtons and metres."""
 

@@ -21,6 +21,7 @@ from softrobots import inflated_beam
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace
 from softrobots.core.checkpoint import CASE, Checkpoint
 from softrobots.helix import ActuatorTable, HelixDesign, design_grasp
+from softrobots.identification.measurement_columns import read_columns
 from softrobots.robots.parameter_file import read_parameters, read_robot, write_parameters
 from softrobots.view.live.commands import Wanted, read_commands
 from softrobots.view.live.input import WatchedFile
@@ -84,6 +85,48 @@ def read_table(file: Path) -> None:
     finite(shares, table.pressure_for(shares))
     if not np.all((shares > 0.0) & (shares <= 1.0)):
         raise ArithmeticError("a contraction that is none")
+
+
+@cache
+def measurement_corpus() -> list[bytes]:
+    """Files that tell their own columns: with gaps, labels and standard deviations, and with poses."""
+    poses = np.tile(np.eye(4), (2, 1, 1))
+    rows = (
+        results()["measurements"],
+        sr.Measurements(np.ones((2, 1)), poses={"tip": poses}, mass=[0.0, 1.0], gravity=(0, 0, -9.8)),
+    )
+    with TemporaryDirectory() as folder:
+        return [one.to_csv(Path(folder) / f"{k}.csv").read_bytes() for k, one in enumerate(rows)]
+
+
+def read_measurements(file: Path) -> None:
+    """Measured rows."""
+    rows = sr.Measurements.from_csv(file)
+    finite(rows.q_motors, *rows.loads.values(), *rows.std.values())
+    if any(np.isinf(values).any() for values in rows.measured.values()):
+        raise ArithmeticError("an infinite measurement")
+
+
+def column_corpus() -> list[bytes]:
+    """Every entry of a mapping of columns."""
+    whole = b"""actuators: {columns: [a, b], unit: [deg, mm], relative: false, scale: [-1, 1]}
+gravity: {columns: [gx, gy, gz], unit: m/s^2}
+mass: {columns: m, unit: g}
+wrench: {tip: {columns: [fx, fy, fz, mx, my, mz], unit: [N, N mm]}}
+positions: {tip: {columns: [x, y, z], unit: mm, std: [1.0, 1, s]}}
+poses: {elbow: {columns: [u, v, w], unit: m, roll_pitch_yaw: [r, p, q], angle_unit: deg, std: [0.001, 0.5]}}
+labels: {column: pattern, without_suffix: _hold}
+markers: {ball: elbow}
+mask: used
+"""
+    return [whole, b"actuators: {columns: a, unit: Pa}\ngravity: [0, 0, -9.81]\nlabels: b\n"]
+
+
+def read_column_file(file: Path) -> None:
+    """A mapping of columns, and a row that it reads."""
+    layout = read_columns(file)
+    row = {name: np.ones(1) for name in layout.numbers}
+    layout.arguments(row.__getitem__, lambda _: ["word"])
 
 
 @cache
@@ -239,6 +282,9 @@ def results() -> dict[str, Any]:
         "motion": sr.simulate(
             model, 0.02, (0.3, 0.6, -0.8), start=held, gravity=(0, 0, -9.81), time_step=0.01, output_step=0.01
         ),
+        "measurements": sr.Measurements(
+            np.array([[0.1, 0.2], [0.3, 0.4]]), tip_position=[[1.0, 2.0, np.nan], [3.0, 4.0, 5.0]], std=0.1, labels=["a", "b"]
+        ),
     }
 
 
@@ -268,6 +314,9 @@ def read_result(file: Path) -> None:
         return
     if isinstance(result, WorkspaceMap):
         finite(result.payload, result.q_motors, result.q_springs)
+        return
+    if isinstance(result, sr.Measurements):
+        finite(result.q_motors, *result.loads.values(), *result.std.values())
         return
     if isinstance(result, tuple):
         finite(*(branch.forces for branch in result), *(branch.energy for branch in result))
@@ -343,6 +392,8 @@ READERS: dict[str, tuple[Callable[[], list[bytes]], Damage, Callable[[Path], obj
     "waypoints CSV": (waypoint_corpus, damaged_bytes, read_path, ".csv"),
     "actuator CSV": (table_corpus, damaged_bytes, read_table, ".csv"),
     "characterisation CSV": (bending_corpus, damaged_bytes, read_bending, ".csv"),
+    "measurements CSV": (measurement_corpus, damaged_bytes, read_measurements, ".csv"),
+    "columns YAML": (column_corpus, damaged_bytes, read_column_file, ".yaml"),
     "results NPZ": (result_corpus, damaged_archive, read_result, ".npz"),
     "results JSON": (result_json_corpus, damaged_bytes, read_result, ".json"),
     "design JSON": (design_corpus, damaged_bytes, read_design, ".json"),

@@ -1,0 +1,41 @@
+"""What measurements say of a certain robot: its actuator coordinates, the loads on it, and the frames they are told of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.identification.measurement_checks import TIP
+from softrobots.model.soft_model import SoftModel
+
+
+def frame_of(model: SoftModel, name: str, markers: Mapping[str, str]) -> str:
+    """Return the frame of a robot that the name of a frame or marker stands for.
+
+    Raises:
+        NameNotFound: If there is no such frame.
+    """
+    frame = markers.get(name, name)
+    if frame == TIP and frame not in model.data.frame_ids:
+        return model.tip
+    model.frame_id(frame)
+    return frame
+
+
+def wrenches_on(model: SoftModel, loads: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return all loads but gravity by frame, force, wrench and mass together, each shape (n, 6) [N, N m], measured axes.
+
+    Raises:
+        NameNotFound: If there is no such frame.
+    """
+    total: dict[str, FloatArray] = {}
+    for key, values in loads.items():
+        frame = frame_of(model, key.removeprefix("wrench."), {}) if key.startswith("wrench.") else model.tip
+        if key in ("force", "mass"):
+            force = values if key == "force" else values[:, None] * loads["gravity"]
+            values = np.hstack([force, np.zeros_like(force)])
+        if key != "gravity":
+            total[frame] = total.get(frame, 0.0) + values
+    return total
