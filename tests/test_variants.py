@@ -36,6 +36,9 @@ SMALL: dict[str, Callable[[], XacroRobot]] = {
     ),
     "mckibben": lambda: sr.PccArm(segment_lengths=(0.5,), elastic_sections=1, kind="mckibben"),
     "tendons": lambda: sr.TendonArm(elastic_sections=1, bending_friction=1e-3, guide_friction=0.1, offset=(0.1, 0.2, 0.3)),
+    "single tendons": lambda: sr.TendonArm(
+        segment_lengths=(0.1, 0.08), elastic_sections=1, tendon_pretension=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), rest_bend_x=0.1
+    ),
     "routes": lambda: sr.TendonArm(elastic_sections=1, routing=[HELIX], bending_stiffness=2e-3),
     "tube": lambda: sr.HelixTube(length=0.3, elastic_sections=5, axial_stiffness=900.0),
     "tube with hinges": lambda: sr.HelixTube(length=0.3, chain="lumped", hinges=3, upright="axis"),
@@ -104,7 +107,7 @@ def check(robot: XacroRobot, random: np.random.Generator, count: int) -> None:
     assert variants.values.tolist() == present.tolist()
     for _ in range(count):
         share = random.choice([0.0, 1e-9, 0.01], len(fields), p=[0.4, 0.1, 0.5])
-        values = present * (1.0 + share * random.uniform(-1.0, 1.0, len(fields)))
+        values = present + share * np.where(present == 0.0, 0.1, present * random.uniform(-1.0, 1.0, len(fields)))
         other = changed(robot, fields, values.tolist())
         assert variants.robot(values) == other
         assert variants.urdf(values) == fresh(other)
@@ -278,6 +281,25 @@ def test_expressions_are_followed_without_xacro(tmp_path: Path, expansions: list
         expected = fresh(robot(single=1.5 + change, pair=(1.25 - change, 2.0)))
         assert variants.urdf([1.5 + change, 1.25 - change]) == expected
     assert len(expansions) == 1
+
+
+def test_arguments_may_be_computed_from_fields(tmp_path: Path, expansions: list[str]) -> None:
+    """Python in `xacro_arguments` is followed as expressions are; NumPy is not."""
+    robot = calculator(tmp_path, ["a", "b"])
+
+    class Doubled(robot):  # type: ignore[misc]
+        def xacro_arguments(self) -> dict[str, str]:
+            return {"single": repr(2.0 * self.single), "pair": str(list(self.pair))}
+
+    class Rooted(robot):  # type: ignore[misc]
+        def xacro_arguments(self) -> dict[str, str]:
+            return {"single": repr(float(np.sqrt(self.single))), "pair": str(list(self.pair))}
+
+    for kind, count in ((Doubled, 1), (Rooted, 1)):
+        variants = Variants(kind(), [("single", None)])
+        for single in (1.5, 2.5, 3.5):
+            assert variants.urdf([single]) == fresh(kind(single=single))
+        assert len(expansions) == count
 
 
 def test_text_that_takes_a_number_apart_is_left_to_xacro(tmp_path: Path) -> None:

@@ -120,7 +120,13 @@ class Variants:
         try:
             arguments = self._with(robot, tape.numbers).xacro_arguments()
             followed = tape.keep(expand(xacro_folder() / robot.XACRO, arguments, tape), *arguments.values())
-        except (DescriptionError, ArithmeticError, ValueError, TypeError):  # xacro may refuse the numbers themselves
+        except (
+            DescriptionError,
+            ArithmeticError,
+            ValueError,
+            TypeError,
+            AttributeError,
+        ):  # xacro may refuse the numbers themselves
             return False
         if followed:
             self._tapes.appendleft(tape)
