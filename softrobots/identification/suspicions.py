@@ -1,0 +1,149 @@
+"""What a bad fit smells of: wrong units, swapped or mirrored axes, shifted rows, commands of wrong sign or order.
+
+Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.identification.measurements import Measurements
+from softrobots.model.soft_model import SoftModel, check_model
+
+FACTORS = (
+    (1e3, "mm (N mm, g)", "m (N m, kg)"),
+    (1e2, "cm", "m"),
+    (1e1, "mm", "cm"),
+    (180.0 / math.pi, "degrees", "radians"),
+    (25.4, "mm", "inches"),
+    (1.0 / 0.0254, "inches", "m"),
+    (1e6, "um", "m"),
+)
+"""Ratios of units that are mistaken for each other: so many of the first are one of the second."""
+
+UNEXPLAINED = 0.02
+"""Share of the variance above which a fit is suspected: residuals of a seventh of the motion."""
+FAR_LESS = 0.25
+"""What a remedy must leave of it to be told: residuals of at most half the size."""
+
+_FEWEST = 4  # rows
+_SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
+_EARTH = (9.76, 9.84)  # gravity on the ground [m/s^2]
+
+
+def suspicions(
+    measured: Any, predicted: Any, q_motors: Any = None, *, name: str = "measured", components: Sequence[str] = ("x", "y", "z")
+) -> list[str]:
+    """Return what may be wrong with measured numbers that a robot explains badly, in plain sentences; empty if nothing is.
+
+    With m and p the measured and predicted numbers without their means, the unexplained share is |m - p|^2 / |m|^2. The best
+    order and signs of columns minimise it exactly: they maximise the sum of |m_i . p_j| over pairs, an assignment problem. For
+    commands the same is done with the slopes of m and p by the commands.
+
+    Args:
+        measured: Measured numbers, NaN where missing, shape (n, k).
+        predicted: What the robot predicts, shape (n, k).
+        q_motors: Commands, shape (n, m); None: they are not looked at.
+        name: What is measured, for the sentences.
+        components: Names of the columns; of others than three, their numbers from 1.
+    """
+    m, p = np.asarray(measured, dtype=float), np.asarray(predicted, dtype=float)
+    known = np.isfinite(m).all(axis=1) & np.isfinite(p).all(axis=1)
+    if np.count_nonzero(known) < _FEWEST:
+        return []
+    mine, theirs = _centred(m[known]), _centred(p[known])
+    before = _share(mine, theirs)
+    if not before > UNEXPLAINED or not np.any(theirs):
+        return []
+    found: list[str] = []
+
+    def tell(after: float, text: str, start: float = before) -> bool:
+        if after < FAR_LESS * start:
+            shares = f"{100.0 * after:.2g} % of the variance unexplained instead of {100.0 * start:.2g} %"
+            found.append(f"{name}: {text} leaves {shares}")
+        return after < FAR_LESS * start
+
+    names = tuple(components) if len(components) == m.shape[1] else tuple(map(str, range(1, m.shape[1] + 1)))
+    turned, axes = _reordered(mine, theirs, names)
+    factor, words = _factor(mine, turned)
+    scaled, swapped = f"dividing it by {factor:.4g} ({words})", f"taking its {', '.join(names)} for {axes}"
+    if not tell(_share(mine, factor * theirs), scaled) and not tell(_share(mine, turned), swapped):
+        tell(_share(mine, factor * turned), f"{scaled} and {swapped}")
+    for late, text in ((1, "the row before"), (-1, "the row after")):
+        rows = np.flatnonzero(known[max(late, 0) : len(m) + min(late, 0)] & known[max(-late, 0) : len(m) + min(-late, 0)])
+        if len(rows) >= _FEWEST:
+            here, there = _centred(m[rows + max(late, 0)]), _centred(p[rows + max(-late, 0)])
+            tell(_share(here, there), f"comparing each row with {text}", _share(here, _centred(p[rows + max(late, 0)])))
+    q = None if q_motors is None else _centred(np.asarray(q_motors, dtype=float)[known])
+    if q is not None and np.linalg.matrix_rank(q) == q.shape[1] and len(q) > 2 * q.shape[1]:
+        slopes, expected = (np.linalg.lstsq(q, values, rcond=None)[0].T for values in (mine, theirs))
+        actuators = tuple(map(str, range(1, q.shape[1] + 1)))
+        moved, order = _reordered(slopes, expected, actuators)
+        tell(_share(mine, theirs + q @ (moved - expected).T), f"taking the actuators as {order}")
+    return found
+
+
+def doubtful_sizes(measurements: Measurements, model: SoftModel) -> list[str]:
+    """Return what may be wrong with the size of measured numbers before any fit: positions, actuators, gravity."""
+    found: list[str] = []
+    reach = check_model(model).reach
+    for name, values in measurements.measured.items():
+        if not name.startswith(("positions.", "poses.")):
+            continue
+        points = values if values.ndim == 2 else values[:, :3, 3]
+        points = points[np.isfinite(points).all(axis=1)]
+        extent = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+        if extent > 4.0 * reach or (len(points) > 1 and extent < 3e-3 * reach):
+            found.append(f"{name} spreads over {extent:.3g} m, but the robot has a reach of {reach:.3g} m: is the unit right?")
+    motors, units = measurements.motor_coordinates(model), model.actuators.units
+    outside = (motors < model.motor_limits[:, 0]) | (motors > model.motor_limits[:, 1])
+    for place, (joint, unit) in enumerate(zip(model.motor_joints, units, strict=True)):
+        low, high = motors[:, place].min(), motors[:, place].max()
+        if outside[:, place].any() or (unit == "rad" and max(-low, high) > 4.0 * math.pi):
+            lower, upper = model.motor_limits[place]
+            rows = np.count_nonzero(outside[:, place])
+            found.append(
+                f"{joint} goes from {low:.4g} to {high:.4g} {unit}, in {rows} rows outside of its limits {lower:.4g} to "
+                f"{upper:.4g} {unit}: are unit, sign and order of the actuators right?"
+            )
+    if "gravity" in measurements.loads:
+        size = float(np.linalg.norm(measurements.loads["gravity"], axis=1).max())
+        if size and not _EARTH[0] < size < _EARTH[1]:
+            found.append(f"gravity is {size:.4g} m/s^2, on the ground 9.81: is the unit right?")
+    return found
+
+
+def _centred(values: FloatArray) -> FloatArray:
+    return np.asarray(values - values.mean(axis=0))
+
+
+def _share(measured: FloatArray, predicted: FloatArray) -> float:
+    """Unexplained share of the variance."""
+    whole = float(np.sum(measured**2))
+    return float(np.sum((measured - predicted) ** 2)) / whole if whole > 0.0 else 0.0
+
+
+def _factor(measured: FloatArray, predicted: FloatArray) -> tuple[float, str]:
+    """The ratio of units nearest to the ratio of sizes, and which units; 1 if none is near."""
+    ratio = math.sqrt(float(np.sum(measured**2)) / float(np.sum(predicted**2)))
+    both = [*FACTORS, *((1.0 / factor, large, small) for factor, small, large in FACTORS)]
+    factor, given, wanted = min(both, key=lambda one: abs(math.log(ratio / one[0])))
+    if abs(math.log(ratio / factor)) > _SAME_FACTOR:
+        return 1.0, ""
+    return factor, f"{given} taken for {wanted}; measured over predicted size is {ratio:.4g}"
+
+
+def _reordered(measured: Any, predicted: Any, names: Sequence[str]) -> tuple[Any, str]:
+    """The columns of a prediction in the order and with the signs that explain most, and these in words."""
+    from scipy.optimize import linear_sum_assignment
+
+    products = measured.T @ predicted
+    order = linear_sum_assignment(-np.abs(products))[1]
+    signs = np.where(products[np.arange(len(order)), order] < 0.0, -1.0, 1.0)
+    words = [f"{'-' if sign < 0.0 else ''}{names[column]}" for column, sign in zip(order.tolist(), signs.tolist(), strict=True)]
+    return predicted[:, order] * signs, ", ".join(words)

@@ -1,0 +1,121 @@
+"""Hints at wrong units, axes, rows and commands: each mistake is found with its numbers, and nothing else is."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import softrobots as sr
+from softrobots.identification.suspicions import doubtful_sizes, suspicions
+from tests.conftest import CHECKOUT
+from tests.support.tables import each_row
+
+RNG = np.random.default_rng(5)
+MOTORS = RNG.uniform(-0.4, 0.4, (40, 3))
+
+
+@pytest.fixture(scope="module")
+def tips() -> Any:
+    """Tip of an arm whose three motors differ in what they move, bent by gravity."""
+    arm = sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.3)))
+    return np.array([sr.solve_equilibrium(arm, q, gravity=(0, 0, -9.81)).tip_position for q in MOTORS])
+
+
+MISTAKES: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "mm for m": (lambda x: 1e3 * x, r"dividing it by 1000 \(mm"),
+    "m for mm": (lambda x: 1e-3 * x, r"dividing it by 0\.001 \(m"),
+    "cm for m": (lambda x: 1e2 * x, r"dividing it by 100 \(cm taken for m;"),
+    "degrees": (lambda x: x * 180 / math.pi, r"dividing it by 57\.3 \(degrees taken for radians"),
+    "radians": (lambda x: x * math.pi / 180, r"dividing it by 0\.01745 \(radians taken for degrees"),
+    "inches": (lambda x: x / 0.0254, r"dividing it by 39\.37 \(inches taken for m;"),
+    "swapped axes": (lambda x: x[:, [1, 0, 2]], "taking its x, y, z for y, x, z leaves"),
+    "mirrored axis": (lambda x: x * (1, 1, -1), "taking its x, y, z for x, y, -z leaves"),
+    "turned camera": (lambda x: x[:, [2, 0, 1]] * (1, -1, 1), "taking its x, y, z for z, -x, y leaves"),
+    "mm and axes": (lambda x: 1e3 * x[:, [2, 1, 0]], r"dividing it by 1000 .* and taking its x, y, z for z, y, x leaves"),
+    "late rows": (lambda x: np.roll(x, 1, axis=0), "comparing each row with the row before"),
+    "early rows": (lambda x: np.roll(x, -1, axis=0), "comparing each row with the row after"),
+}
+
+
+@each_row("name", MISTAKES)
+def test_a_mistake_is_found_and_nothing_else_said(name: str, tips: Any) -> None:
+    """With noise of 5 % of the motion, a stiffness that is off by a tenth of the motion, an offset, and missing cells."""
+    mistake, words = MISTAKES[name]
+    noise = 0.05 * tips.std() * np.random.default_rng(7).normal(size=tips.shape)
+    measured = mistake(tips + noise) + 0.3
+    measured[::13, 1] = np.nan
+    predicted = tips + 0.1 * (tips - tips.mean(axis=0))
+    found = suspicions(measured, predicted, name="positions.tip")
+    assert len(found) == 1
+    assert re.match(f"positions.tip: {words}", found[0])
+    told = re.search(r"leaves ([\d.]+) % of", found[0])
+    assert told is not None
+    assert 0.0 < float(told[1]) < 25.0  # noise and stiffness: (0.05^2 to 0.1^2) of the motion, more of a still axis
+
+
+def test_commands_of_another_order_or_sign_are_told(tips: Any) -> None:
+    """The robot was moved with motors 1 and 2 exchanged, the third mirrored; the prediction is that of the columns."""
+    arm = sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.3)))
+    true = MOTORS[:, [1, 0, 2]] * (1, 1, -1)
+    measured = np.array([sr.solve_equilibrium(arm, q, gravity=(0, 0, -9.81)).tip_position for q in true])
+    found = suspicions(measured, tips, MOTORS)
+    assert [text for text in found if "taking the actuators as 2, 1, -3" in text]
+    assert not suspicions(tips, tips, MOTORS)
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.6), rows=st.integers(3, 30))
+def test_noise_alone_is_no_suspicion(seed: int, share: float, rows: int) -> None:
+    """Independent columns with errors up to six tenths of the motion: no unit, axis or row explains them better."""
+    rng = np.random.default_rng(seed)
+    predicted = rng.normal(size=(rows, 3))
+    assert suspicions(predicted + share * rng.normal(size=(rows, 3)), predicted, rng.normal(size=(rows, 2))) == []
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_best_order_and_signs_are_those_of_a_search_through_all(seed: int) -> None:
+    """All 48 signed orders of three columns, written out."""
+    rng = np.random.default_rng(seed)
+    m, p = rng.normal(size=(2, 12, 3))
+    m = p[:, rng.permutation(3)] * rng.choice([-1.0, 1.0], 3) + 0.3 * m
+    m, p = m - m.mean(axis=0), p - p.mean(axis=0)
+
+    def left(order: Any, signs: Any) -> float:
+        return float(np.sum((m - p[:, list(order)] * signs) ** 2) / np.sum(m**2))
+
+    choices = itertools.product(itertools.permutations(range(3)), itertools.product([1.0, -1.0], repeat=3))
+    order, signs = min(choices, key=lambda one: left(*one))
+    found = [text for text in suspicions(m, p) if "taking its" in text]
+    before, after = left((0, 1, 2), 1.0), left(order, signs)
+    words = ", ".join(f"{'-' if sign < 0 else ''}{'xyz'[place]}" for place, sign in zip(order, signs, strict=True))
+    if before > 0.02 and after < 0.25 * before:
+        assert f"for {words} leaves {100 * after:.2g} % of the variance unexplained instead of {100 * before:.2g} %" in found[0]
+    else:
+        assert found == []
+
+
+def test_sizes_are_doubted_before_a_fit(tips: Any) -> None:
+    arm = sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.3)))
+    good = sr.Measurements(MOTORS, tip_position=tips, gravity=(0, 0, -9.81))
+    assert doubtful_sizes(good, arm) == []
+    bad = sr.Measurements(np.degrees(MOTORS), tip_position=1e3 * tips, gravity=(0, 0, -9810.0))
+    said = "\n".join(doubtful_sizes(bad, arm))
+    assert re.search(r"positions\.tip spreads over \d+ m, but the robot has a reach of \d", said)
+    assert re.search(r"motor_1 goes from -2\d\.\d+ to 2\d\.\d+ rad", said)
+    assert "gravity is 9810 m/s^2, on the ground 9.81" in said
+    assert "spreads over 0.000976 m" in doubtful_sizes(sr.Measurements(MOTORS, tip_position=1e-3 * tips), arm)[0]
+
+
+def test_the_recordings_are_not_doubted() -> None:
+    folder = CHECKOUT / "docs" / "examples" / "tdcr_v4"
+    rows = sr.Measurements.from_csv(folder / "train.csv", folder / "columns.yaml")
+    assert doubtful_sizes(rows, sr.load_model(sr.TendonArm())) == []
