@@ -73,19 +73,20 @@ def check_structure(root: ElementTree.Element, source: str) -> None:
         raise DescriptionError(f"{source} has no links; from 1 to {MOST_LINKS} are required")
     for kind, elements in (("link", links), ("joint", joints)):
         _check_names(kind, elements, source)
+    known: dict[int, set[str]] = {0: set(), 1: set(), 3: set()}
     for link in links:
         where = f"link {link.get('name')} of {source}"
         for element in link:
             if element.tag == "inertial":
-                _check_numbers(where, element, _OF_LINKS)
+                _check_numbers(where, element, _OF_LINKS, known)
                 for mass in element.findall("mass"):
                     if number_in(mass.get("value")) < 0.0:
                         raise DescriptionError(f"{where} has the mass {mass.get('value')}; it is negative")
             elif element.tag in ("visual", "collision"):
-                _check_numbers(where, element.iter(), _OF_SHAPES)
+                _check_numbers(where, element.iter(), _OF_SHAPES, known)
     for joint in joints:
         where = f"joint {joint.get('name')} of {source}"
-        _check_numbers(where, joint, _OF_JOINTS)
+        _check_numbers(where, joint, _OF_JOINTS, known)
         axis = joint.find("axis")
         moves = axis is not None and joint.get("type") != "fixed" and "xyz" in axis.attrib
         if axis is not None and moves and math.hypot(*map(float, axis.get("xyz", "").split())) < 1.0 / LARGEST:
@@ -113,11 +114,20 @@ def _check_names(kind: str, elements: Iterable[ElementTree.Element], source: str
         raise DescriptionError(f"{source} has a joint called {_RESERVED!r}, Pinocchio's name of the world; rename it")
 
 
-def _check_numbers(where: str, elements: Iterable[ElementTree.Element], table: Mapping[str, Mapping[str, int]]) -> None:
+def _check_numbers(
+    where: str,
+    elements: Iterable[ElementTree.Element],
+    table: Mapping[str, Mapping[str, int]],
+    known: Mapping[int, set[str]],
+) -> None:
+    """Check the attributes in a table; `known` are the rows found good so far, by how many numbers they have."""
     for element in elements:
         for attribute, count in table.get(element.tag, {}).items():
             text = element.get(attribute)
-            if text is None or (count and _ROWS[count].fullmatch(text)):
+            if text is None or text in known[count]:
+                continue
+            if count and _ROWS[count].fullmatch(text):
+                known[count].add(text)
                 continue
             parts, most = text.split(), math.inf if element.tag == "limit" else LARGEST  # very large limits mean none
             if (count and len(parts) != count) or any(math.isnan(number_in(part, most)) for part in parts):
