@@ -60,13 +60,16 @@ class DryFriction:
         bending = {tag.segment: tag.bending for tag in friction if tag.bending > 0.0}
         guides = {tag.segment: tag.guides for tag in friction if tag.guides > 0.0}
         rubbing = [row for row in sections if row.segment in bending]
-        self._limit = np.array([bending[row.segment] for row in rubbing])
+        self.limit = read_only(np.array([bending[row.segment] for row in rubbing]))
+        """Moment of the friction of each section that has some, shape (n_sections,) [N m]."""
         self._places = np.array([[row.places[name] for name in STRAINS[:2]] for row in rubbing], dtype=np.intp).reshape(-1, 2)
         self._paths, self._count, self._relaxed = paths, len(relaxed), relaxed
         self.guided = bool(tags) and bool(guides)
         """Whether an actuator rubs in its guides."""
-        self.rounding = ROUNDING * np.pi * float(np.linalg.norm(self._limit)) / _BENDING_STICK
+        self.rounding = ROUNDING * np.pi * float(np.linalg.norm(self.limit)) / _BENDING_STICK
         """Rounding of the moments of friction [N m]: that of an angle times the stiffness of the stick."""
+        self.coefficient = np.zeros(0)
+        """Coefficient of friction of each guide, shape (n_guides,) [-]."""
         self.n_guides = len(paths.muscle) if self.guided else 0
         """Number of guides, one a path; 0 if there is no friction in guides."""
         if self.guided:
@@ -76,7 +79,7 @@ class DryFriction:
             self._before = np.tril(same, -1).astype(np.float64)
             spans = [(row.segment, row.length) for row in sections]
             pairs = [(point, sections[point.section]) for tag in tags for point in route_points(tag.route, spans)]
-            self._coefficient = np.array([guides.get(row.segment, 0.0) for _, row in pairs])
+            self.coefficient = np.array([guides.get(row.segment, 0.0) for _, row in pairs])
             turns = [_turn(point, row) for point, row in pairs]
             self._rest, self._slope = (np.array(part) for part in zip(*turns, strict=True))
 
@@ -105,7 +108,7 @@ class DryFriction:
         turning, tangent = np.swapaxes(self._rest + (self._slope @ z[:, None, :, None])[..., 0], 0, 1)
         angles = np.linalg.norm(np.cross(turning, tangent), axis=1) / np.linalg.norm(tangent, axis=1)
         slips = self._slipped(self._paths.at(strains).pieces, memory) / self._stick
-        exponent = self._coefficient * angles
+        exponent = self.coefficient * angles
         along = exponent * np.clip(slips, -1.0, 1.0)
         before = np.abs(tensions)[self._paths.muscle] * np.exp(-self._before @ along)
         small = np.abs(along) < 1e-8
@@ -116,11 +119,11 @@ class DryFriction:
         apart = strains[self._places] - memory.bending
         size = np.linalg.norm(apart, axis=1)
         reach = np.maximum(size, _BENDING_STICK)
-        energy = float(self._limit @ _dissipated(size, _BENDING_STICK))
+        energy = float(self.limit @ _dissipated(size, _BENDING_STICK))
         torque, stiffness = np.zeros(self._count), np.zeros((self._count, self._count))
-        torque[self._places] = apart * (self._limit / reach)[:, None]
+        torque[self._places] = apart * (self.limit / reach)[:, None]
         along = apart / reach[:, None] * (size > _BENDING_STICK)[:, None]
-        blocks = (np.eye(2) - along[:, :, None] * along[:, None, :]) * (self._limit / reach)[:, None, None]
+        blocks = (np.eye(2) - along[:, :, None] * along[:, None, :]) * (self.limit / reach)[:, None, None]
         stiffness[self._places[:, :, None], self._places[:, None, :]] = blocks
         if self.guided:
             paths = self._paths.at(strains)

@@ -44,6 +44,12 @@ class MuscleLengthPoint(MusclePoint):
         by_lengths = np.asarray(np.linalg.solve(held.gap_slope(paths), held.slopes), dtype=np.float64)
         return by_lengths, -by_lengths @ (paths.slopes @ held.free)
 
+    @property
+    def strain_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the strains by the lengths, shape (n_strains, n_muscles), and by the free coordinates."""
+        by_lengths, by_free = self._sum_slopes
+        return self.held.shares @ by_lengths, self.held.free + self.held.shares @ by_free
+
     def reduce(self, joints: JointLoad) -> ReducedLoad:
         """Transform to lengths and free coordinates; the load on a muscle is its tension, that of the springs included.
 
@@ -51,8 +57,8 @@ class MuscleLengthPoint(MusclePoint):
         """
         load, held, paths = self.inner.reduce(joints), self.held, self.paths
         by_lengths, by_free = self._sum_slopes
+        to_lengths, to_free = self.strain_slopes
         stiffness, tensions = held.sum_stiffness, self._tensions(load.elastic)
-        to_free, to_lengths = held.free + held.shares @ by_free, held.shares @ by_lengths
         half = to_free.T @ (load.derivative - paths.curvature(tensions))
         stiff = stiffness[:, None] * by_free
         change, middle = self.sums - self.given, 0.5 * (self.sums + self.given) - held.sum_rest
@@ -79,8 +85,7 @@ class MuscleLengthPoint(MusclePoint):
         """
         inner, held, paths = self.inner.reduce(load), self.held, self.paths
         by_motors, by_strains = self.inner.motor_derivatives(load)
-        by_lengths, by_free = self._sum_slopes
-        to_lengths, to_free = held.shares @ by_lengths, held.free + held.shares @ by_free
+        to_lengths, to_free = self.strain_slopes
         stiffness = np.diag(held.strain_springs.stiffness)
         stiffening = to_lengths.T @ (inner.derivative - paths.curvature(self._tensions(inner.elastic)) - stiffness)
         return (

@@ -1,0 +1,112 @@
+r"""How the numbers of a model change with parameters, by differences of models loaded with other values.
+
+Central differences at :math:`p \pm h`, with `h` of 1e-5 of the scale of the parameter, are exact to 1e-10, of fourth order to
+1e-12; at a bound they are one-sided, of second order. All that follows from the numbers is in closed form. A change may serve
+many states of a model, and those of models nearby while a fit is on its way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError, SoftRobotsError
+from softrobots.identification.parameters import ParameterSet
+from softrobots.model.numbers import Numbers, model_numbers
+from softrobots.model.soft_model import SoftModel
+
+Stencil = tuple[float, dict[int, float]]
+"""Step, relative to the scale of a parameter, and weights of the changes after so many steps."""
+
+_CENTRAL: Stencil = (1e-5, {-1: -0.5, 1: 0.5})
+_FOURTH_ORDER: Stencil = (1e-3, {-2: 1.0 / 12.0, -1: -2.0 / 3.0, 1: 2.0 / 3.0, 2: -1.0 / 12.0})
+_UPWARDS: Stencil = (1e-5, {1: 2.0, 2: -0.5})
+_DOWNWARDS: Stencil = (1e-5, {-1: -2.0, -2: 0.5})
+_TYPICAL = {"m": 0.1, "Pa": 1e3}  # scales of parameters that may be zero, by unit; else 1
+_PLACED = ("placements", "frames")
+
+
+@lru_cache(maxsize=64)
+def numbers_of(model: SoftModel) -> Numbers:
+    """Return `model_numbers`, read once."""
+    return model_numbers(model)
+
+
+class ModelChange(NamedTuple):
+    """Derivatives of the numbers of a model by parameters."""
+
+    n_parameters: int
+    """Number of parameters, P."""
+    by_number: Mapping[str, FloatArray]
+    """Derivative of each array of `model_numbers`, flat, shape (size, P); those that do not change are left out.
+
+    `placements` and `frames` change by twists of six rows each, in the joint before: linear part at its origin, then angular.
+    """
+
+    def along(self, name: str, rows: FloatArray) -> FloatArray | float:
+        """Return the change of rows of outputs, shape (N, L, P), from their derivatives by a number, shape (N, L, ...)."""
+        if name not in self.by_number:
+            return 0.0
+        change = self.by_number[name]
+        return np.asarray(rows.reshape(*rows.shape[:2], len(change)) @ change)
+
+
+def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: bool = False) -> ModelChange:
+    """Differentiate the numbers of a model by parameters; those that do not change the model have zeros.
+
+    Args:
+        parameters: The parameters.
+        values: Their values, shape (P,); the present ones by default.
+        fourth_order: Whether to load four models for each rather than two.
+
+    Raises:
+        ParameterError: If the structure of the robot changes with a parameter about its value: a route that begins to wind, or
+            friction that begins.
+    """
+    at = np.array(parameters.values if values is None else values, dtype=np.float64)
+    base, columns = numbers_of(parameters.model(at)), dict[str, FloatArray]()
+    for place in np.flatnonzero(parameters.of_model).tolist():
+        for name, slope in _slopes(parameters, at, place, base, _FOURTH_ORDER if fourth_order else _CENTRAL).items():
+            if np.any(slope):
+                column = _twists(base[name], slope) if name in _PLACED else slope.ravel()
+                columns.setdefault(name, np.zeros((column.size, len(at))))[:, place] = column
+    return ModelChange(len(at), columns)
+
+
+def _slopes(parameters: ParameterSet, values: FloatArray, place: int, base: Numbers, stencil: Stencil) -> Numbers:
+    """Derivatives of all numbers by one parameter."""
+    one, value = parameters.parameters[place], float(values[place])
+    scale = abs(value) if one.logarithmic else max(abs(value), _TYPICAL.get(one.unit, 1.0))
+    for step, weights in (stencil, _UPWARDS, _DOWNWARDS):
+        tried = {number: value + number * step * scale for number in weights}
+        if not one.lower <= min(tried.values()) <= max(tried.values()) <= one.upper:
+            continue
+        try:
+            moved = {number: _numbers_at(parameters, values, place, other) for number, other in tried.items()}
+        except SoftRobotsError:
+            continue
+        if all(other[name].shape == base[name].shape for other in moved.values() for name in base):
+            each = [(weight / (step * scale), moved[number]) for number, weight in weights.items()]
+            return {name: np.sum([weight * (other[name] - base[name]) for weight, other in each], axis=0) for name in base}
+    requirement = "a value about which the structure of the robot stays as it is, so that it has derivatives"
+    raise ParameterError(one.name, value, requirement)
+
+
+def _numbers_at(parameters: ParameterSet, values: FloatArray, place: int, value: float) -> Numbers:
+    changed = values.copy()
+    changed[place] = value
+    return model_numbers(parameters.model(changed))
+
+
+def _twists(placements: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Twists, flat, of the changes of placements, both of shape (n, 3, 4), seen from the frame that these are in."""
+    spin = slopes[:, :, :3] @ np.swapaxes(placements[:, :, :3], -1, -2)
+    angular = 0.5 * np.stack(
+        [spin[:, 2, 1] - spin[:, 1, 2], spin[:, 0, 2] - spin[:, 2, 0], spin[:, 1, 0] - spin[:, 0, 1]], axis=1
+    )
+    linear = slopes[:, :, 3] - np.cross(angular, placements[:, :, 3])
+    return np.concatenate([linear, angular], axis=1).ravel()

@@ -1,0 +1,255 @@
+r"""Derivatives of equilibria by the numbers of a model, for many states at once, by adjoint rows.
+
+An output `o` of an equilibrium (a component of a pose, of the load on an actuator) changes with a parameter `p` by
+
+.. math:: \frac{do}{dp} = \frac{\partial o}{\partial p} - \lambda^T \frac{\partial r}{\partial p}, \qquad
+          K_t^T \lambda = \Bigl(\frac{\partial o}{\partial y}\Bigr)^T
+
+with the residual `r`, the tangent stiffness `K_t` and the elastic coordinates `y`. A row :math:`\lambda` is a virtual motion,
+and :math:`-\lambda^T r` the virtual work of loads, springs and tensions in it; its derivatives at fixed coordinates by all
+numbers of `softrobots.model.numbers` are closed forms, at a cost that does not grow with the number of parameters. Where
+lengths `l` of actuators are given, their tensions `T` are the multipliers: the residual of the strains `z` has
+:math:`T\,\partial l/\partial z` more, and an actuator that is longer at the same strains is like a shorter given length.
+
+At a knee (the end of a plateau, a tendon that goes slack) they are the derivatives of the side that the state is on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.constant_curvature.strain_chain import SectionChain
+from softrobots.core.checks import FloatArray
+from softrobots.identification.actuator_derivatives import ActuatorStates
+from softrobots.identification.loaded_tree import LoadedTree
+from softrobots.identification.model_change import ModelChange, numbers_of
+from softrobots.identification.spring_derivatives import SpringStates
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.sensitivity import inverse_stiffness
+
+
+class States(NamedTuple):
+    """Equilibria of one robot, arrays with a row each."""
+
+    q_motors: FloatArray
+    """Actuators, shape (N, n_motors)."""
+    q_springs: FloatArray
+    """Elastic coordinates, shape (N, n_springs)."""
+    loads: Mapping[str, FloatArray]
+    """Wrench by frame, shape (N, 6), and gravity, by the name "", shape (N, 3), world axes."""
+    actuator_loads: FloatArray
+    """Load on each actuator, shape (N, n_motors)."""
+    tangent: FloatArray
+    """Tangent stiffness, shape (N, n_springs, n_springs)."""
+    coupling: FloatArray
+    """Derivative of the load on the elastic coordinates by the actuators, shape (N, n_springs, n_motors)."""
+
+    @classmethod
+    def of(cls, equilibria: Sequence[Equilibrium]) -> States:
+        """Stack equilibria of one robot."""
+        names = dict.fromkeys(name for one in equilibria for name in one.load.wrenches)
+        nothing = np.zeros(6)
+        loads = {name: np.array([one.load.wrenches.get(name, nothing) for one in equilibria]) for name in names}
+        if any(one.load.gravity is not None for one in equilibria):
+            loads[""] = np.array([one.load.gravity or (0.0, 0.0, 0.0) for one in equilibria])
+        fields = ("q_motors", "q_springs", "motor_torques", "tangent_stiffness", "coupling")
+        motors, springs, torques, tangent, coupling = (np.array([getattr(one, name) for one in equilibria]) for name in fields)
+        return cls(motors, springs, loads, torques, tangent, coupling)
+
+
+class Outputs(NamedTuple):
+    """Rows of outputs of each state; None where they do not depend on it."""
+
+    frame: str = ""
+    """Frame of which they are components of the pose."""
+    pose: FloatArray | None = None
+    """Weights of its position and rotation (world axes), shape (N, L, 6)."""
+    loads: FloatArray | None = None
+    """Weights of the loads on the actuators, shape (N, L, n_motors)."""
+    springs: FloatArray | None = None
+    """Weights of the elastic coordinates, shape (N, L, n_springs)."""
+
+
+class EquilibriumDerivatives:
+    """N equilibria of a robot without dry friction, and what the derivatives of all outputs need of them."""
+
+    def __init__(self, model: SoftModel, states: States) -> None:
+        """Evaluate the robot at the states."""
+        structure, held = model.structure, model.structure.muscle_lengths
+        self.model, self.states, self.numbers, self._sections = model, states, numbers_of(model), _section_joints(model)
+        self.n_joint_motors, self._n_singles = len(structure.motor_joints), len(structure.spring_joints)
+        self.inputs, self.strains = states.q_motors[:, self.n_joint_motors :], states.q_springs
+        """Inputs of the actuators along the body, shape (N, n_muscles), and strains, shape (N, n_strains)."""
+        self.slopes: tuple[FloatArray, FloatArray] | None = None
+        """Derivatives of the strains by given lengths, (N, n_strains, n_muscles), and by elastic coordinates; None: 0 and 1."""
+        if held is not None:
+            points: list[Any] = [held.at(u, y) for u, y in zip(states.q_motors, states.q_springs, strict=True)]
+            self.strains = np.array([point.strains for point in points])
+            by_lengths, by_free = zip(*(point.strain_slopes for point in points), strict=True)
+            self.slopes = np.array(by_lengths), np.array(by_free)
+        joints = np.zeros((len(self.strains), model.pinocchio.nv))
+        joints[:, structure.motor_indices] = states.q_motors[:, : self.n_joint_motors]
+        joints[:, structure.spring_indices] = self.strains[:, : self._n_singles]
+        if self._sections is not None:
+            z = self.strains[:, self._n_singles :].reshape(len(joints), -1, 4)
+            self._chain = SectionChain(z, self.numbers["section_lengths"])
+            joints[:, self._sections] = self._chain.positions - self.numbers["section_joints"]
+        self.tree = LoadedTree(model, self.numbers, joints, states.loads)
+        """The joints under the loads."""
+        self.springs = SpringStates(model, self.numbers, self.strains)
+        """The springs."""
+        self.actuators: ActuatorStates | None = None
+        """The actuators along the body, if there are any."""
+        if model.muscles:
+            tensions = states.actuator_loads[:, self.n_joint_motors :]
+            self.actuators = ActuatorStates(model, self.numbers, self.strains, self.inputs, tensions)
+
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Inverse of the tangent stiffness, shape (N, n_springs, n_springs).
+
+        Raises:
+            NeutralEquilibrium: If one is singular, see `inverse_stiffness`.
+        """
+        return np.array([inverse_stiffness(self.model, one) for one in self.states.tangent])
+
+    def joint_rates(self, motors: FloatArray, strains: FloatArray) -> FloatArray:
+        """Rates of the joints, shape (N, L, n_joints), at those of motor joints and of the strains, shape (N, L, ...)."""
+        structure = self.model.structure
+        rates: FloatArray = np.zeros((*strains.shape[:2], self.model.pinocchio.nv))
+        rates[..., structure.motor_indices] = motors
+        rates[..., structure.spring_indices] = strains[..., : self._n_singles]
+        if self._sections is not None:
+            rates[..., self._sections] = (self._chain.first[:, None] @ self._by_section(strains)[..., None])[..., 0]
+        return rates
+
+    def by_coordinates(self, by_twist: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Derivatives of rows that twists change by motor joints, strains, and what the map of the sections depends on.
+
+        Args:
+            by_twist: Derivatives by the twist of what is from each joint on, shape (N, L, n_joints, 6).
+            rates: The rates of the strains in which loads work, shape (N, L, n_strains): the map turns with the strains.
+
+        Returns:
+            Shapes (N, L, n_joint_motors) and (N, L, n_strains), and arrays by the names of `model_numbers`.
+        """
+        structure, at_joints = self.model.structure, self.tree.at_joints(by_twist)
+        motors, strains = at_joints[..., structure.motor_indices], at_joints[..., structure.spring_indices]
+        if self._sections is None:
+            return motors, strains, {}
+        at_sections = at_joints[..., self._sections]
+        bending = self._chain.curvature(self.tree.torque[:, self._sections])
+        by_section = (at_sections[..., None, :] @ self._chain.first[:, None])[..., 0, :]
+        by_section += (bending[:, None] @ self._by_section(rates)[..., None])[..., 0]
+        strains = np.concatenate([strains, by_section.reshape(*strains.shape[:2], 4 * len(self._sections))], axis=-1)
+        return motors, strains, {"section_lengths": by_section[..., 3], "section_joints": -at_sections}
+
+    def _by_section(self, strains: FloatArray) -> FloatArray:
+        return strains[..., self._n_singles :].reshape(*strains.shape[:2], len(self._sections), 4)
+
+
+class AdjointRows:
+    """Rows of outputs of N equilibria, with their derivatives by everything, the equilibria following."""
+
+    def __init__(self, at: EquilibriumDerivatives, outputs: Outputs) -> None:
+        """Solve for the rows.
+
+        Raises:
+            NeutralEquilibrium: If the tangent stiffness of a state is singular.
+        """
+        self._at, self._outputs, count = at, outputs, at.n_joint_motors
+        given = next(one for one in (outputs.pose, outputs.loads, outputs.springs) if one is not None)
+        shape = given.shape[:2]
+        self._weights = np.zeros((*shape, at.model.n_motors)) if outputs.loads is None else outputs.loads
+        self._by_pose, self._of_frame = np.zeros((*shape, at.model.pinocchio.nv, 6)), np.zeros((*shape, 6))
+        if outputs.pose is not None:
+            self._by_pose, self._of_frame = at.tree.pose_slopes(outputs.frame, outputs.pose)
+        strains = np.zeros((*shape, at.strains.shape[1]))
+        if at.slopes is not None:
+            strains = self._weights[..., count:] @ np.swapaxes(at.slopes[0], -1, -2)
+        self._lengths = np.zeros_like(self._weights[..., count:])  # weights of the lengths of actuators at the same strains
+        motors, elastic = self._differentiate(strains, works=outputs.loads is not None)
+        by_actuators = np.zeros_like(self._weights)
+        by_actuators[..., :count] = motors
+        if at.slopes is not None:
+            by_actuators[..., count:], elastic = elastic @ at.slopes[0], elastic @ at.slopes[1]
+        elif at.actuators is not None:
+            by_actuators[..., count:] = self._weights[..., count:] * at.actuators.by_input[:, None]
+        if outputs.springs is not None:
+            elastic = elastic + outputs.springs
+        virtual = elastic @ at.compliance
+        self.by_actuators = by_actuators + virtual @ at.states.coupling
+        """Derivatives of the outputs by the actuators, shape (N, L, n_motors)."""
+        if at.slopes is not None:
+            self._lengths = -self.by_actuators[..., count:]
+        self._differentiate(strains + (virtual if at.slopes is None else virtual @ np.swapaxes(at.slopes[1], -1, -2)))
+
+    def _differentiate(self, strains: FloatArray, *, works: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of pose and work, by motor joints and strains, at fixed virtual rates of strains, (N, L, n_strains)."""
+        at, by_twist = self._at, self._by_pose
+        self._virtual, self._others, self._of_actuators = strains, dict[str, FloatArray](), dict[str, FloatArray]()
+        if works:
+            rates = at.joint_rates(self._weights[..., : at.n_joint_motors], strains)
+            of_work, self._others = at.tree.work_slopes(rates)
+            by_twist = by_twist + of_work
+        motors, by_strains, of_sections = at.by_coordinates(by_twist, strains)
+        self._by_twist, self._others = by_twist, self._others | of_sections
+        if works:
+            by_strains = by_strains - at.springs.tangent(strains)
+        if works and at.actuators is not None:
+            tensions = self._weights[..., at.n_joint_motors :]
+            of_actuators, self._of_actuators = at.actuators.slopes(self._lengths, tensions, strains)
+            by_strains = by_strains + of_actuators
+        return motors, by_strains
+
+    def by_numbers(self, change: ModelChange) -> FloatArray:
+        """Derivatives of the outputs by the parameters of a change of the model, shape (N, L, P)."""
+        at, total = self._at, np.zeros((*self._virtual.shape[:2], change.n_parameters))
+        found = self._others | self._of_actuators
+        if "placements" in change.by_number:
+            found["placements"] = at.tree.at_placements(self._by_twist)
+        if not change.by_number.keys().isdisjoint(("stiffness", "rest", "moments")):
+            found |= at.springs.slopes(self._virtual)
+        if at.slopes is not None and at.actuators is not None:
+            found |= self._of_held_directions(at.actuators)
+        for name in found.keys() & change.by_number.keys():
+            total += change.along(name, found[name])
+        if "frames" in change.by_number:
+            frames = change.by_number["frames"].reshape(-1, 6, change.n_parameters)
+            moved = {name: found[f"frame {name}"] for name in at.states.loads if f"frame {name}" in found}
+            total += sum(rows @ frames[at.model.frame_id(name)] for name, rows in moved.items())
+            if self._outputs.pose is not None:
+                total += self._of_frame @ frames[at.model.frame_id(self._outputs.frame)]
+        return total
+
+    def by_loads(self) -> dict[str, FloatArray]:
+        """Derivatives of the outputs by the wrench at each frame, shape (N, L, 6), and by gravity, "", shape (N, L, 3)."""
+        return {name: self._others[f"wrench {name}" if name else "gravity"] for name in self._at.states.loads}
+
+    def _of_held_directions(self, actuators: ActuatorStates) -> dict[str, FloatArray]:
+        """By the numbers that tell which strains lengths hold: sums of more lengths than needed, and the names of the rest."""
+        at = self._at
+        inverse = np.linalg.pinv(at.numbers["held_slopes"])
+        missed = at.numbers["path_rest"] + actuators.changes - at.inputs
+        sums = at.states.actuator_loads[:, at.n_joint_motors :] @ inverse
+        felt = self._weights[..., at.n_joint_motors :] - actuators.arms(self._virtual)
+        slopes = sums[:, None, :, None] * felt[..., None, :] + (self._lengths @ inverse)[..., None] * missed[:, None, None]
+        if self._outputs.springs is None:
+            return {"held_slopes": slopes}
+        return {"held_slopes": slopes, "elastic": self._outputs.springs[..., None] * at.strains[:, None, None]}
+
+
+@lru_cache(maxsize=64)
+def _section_joints(model: SoftModel) -> Any:
+    """Places of the joints of each section of constant strain in Pinocchio's velocity vector; None without such sections."""
+    if not model.structure.constant_strain:
+        return None
+    rigid = model.pinocchio
+    return np.array(
+        [[rigid.joints[rigid.getJointId(name)].idx_v for name in row.joint_names] for row in model.structure.section_table]
+    )
