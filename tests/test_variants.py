@@ -178,7 +178,7 @@ def test_what_a_robot_refuses_is_refused(expansions: list[str]) -> None:
     for bad in (
         [("mass", 0)],
         [("stiffness", 1)],
-        [("stiffness", -2)],
+        [("stiffness", -1)],
         [("stiffness", None)],
         [("torsion", None)],
         [("payload", 0)],

@@ -120,13 +120,7 @@ class Variants:
         try:
             arguments = self._with(robot, tape.numbers).xacro_arguments()
             followed = tape.keep(expand(xacro_folder() / robot.XACRO, arguments, tape), *arguments.values())
-        except (
-            DescriptionError,
-            ArithmeticError,
-            ValueError,
-            TypeError,
-            AttributeError,
-        ):  # xacro may refuse the numbers themselves
+        except (DescriptionError, ArithmeticError, ValueError, TypeError, AttributeError):  # or xacro refuses the numbers
             return False
         if followed:
             self._tapes.appendleft(tape)
@@ -136,9 +130,11 @@ class Variants:
 def _number(value: Any, path: Sequence[Any]) -> Any:
     """The number at a path; None where the path leads nowhere."""
     for step in path:
-        try:
-            value = getattr(value, step) if isinstance(step, str) else value[range(len(value))[step]]
-        except (AttributeError, IndexError, TypeError):
+        if isinstance(step, str):
+            value = getattr(value, step, None)
+        elif isinstance(value, tuple) and 0 <= step < len(value):
+            value = value[step]
+        else:
             return None
     return value
 
@@ -157,8 +153,6 @@ def _replaced(value: Any, path: Sequence[Any], number: Any) -> Any:
 
 def _checked(value: Any) -> Any:
     """A field in which routes are checked again."""
-    return (
-        tuple(dataclasses.replace(item) if isinstance(item, Route) else item for item in value)
-        if type(value) is tuple
-        else value
-    )
+    if not isinstance(value, tuple):
+        return value
+    return tuple(dataclasses.replace(item) if isinstance(item, Route) else item for item in value)
