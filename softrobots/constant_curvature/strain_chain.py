@@ -34,6 +34,7 @@ LARGEST_BENDING = np.deg2rad(170.0)
 """Largest bending of a section by muscle lengths [rad]. The chain is singular at 180 degrees; above 120 use more sections."""
 
 _LARGEST_TURN = 0.999 * 4.0 * np.pi**2  # squared rotation of a section; at a whole turn it has no chord
+_WELL_WITHIN = 0.25 * np.pi**2  # squared rotation, a quarter of a turn, that is always in range
 _UPPER = np.triu(np.ones((6, 6)), 1)  # pairs of joints, the first closer to the base
 
 
@@ -42,11 +43,25 @@ class SectionChain:
 
     def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
         """Evaluate the map at section coordinates `z`, shape (..., 4) [rad, rad, rad, m], and rest lengths, shape (...) [m]."""
-        self._screw = Screw(z, rest_length)
-        self.positions = _positions(self._screw.rotation, self._screw.position)
+        self._z, self._rest_length = z, np.asarray(rest_length)
+
+    @cached_property
+    def _screw(self) -> Screw:
+        return Screw(self._z, self._rest_length)
+
+    @cached_property
+    def positions(self) -> FloatArray:
         """Joint positions `m`, shape (..., 6), in the order of `JOINTS` [rad, rad, m, rad, rad, rad]."""
-        self.valid = _in_range(z, np.asarray(rest_length), self._screw, self.positions)
+        return _positions(self._screw.rotation, self._screw.position)
+
+    @cached_property
+    def valid(self) -> bool:
         """Whether all sections are in range, see `in_range`; otherwise the other attributes have no meaning."""
+        z, length = self._z, self._rest_length
+        if not np.all(length + z[..., 3] > 1e-3 * length):  # also for NaN
+            return False
+        turn = (z[..., :3] * z[..., :3]).sum(axis=-1)
+        return bool(np.all(turn < _WELL_WITHIN)) or _in_range(z, turn, self._screw, self.positions)
 
     @cached_property
     def first(self) -> FloatArray:
@@ -109,9 +124,8 @@ def in_range(z: FloatArray, rest_length: FloatArray | float) -> bool:
     return SectionChain(z, rest_length).valid
 
 
-def _in_range(z: FloatArray, rest_length: FloatArray, end: Screw, positions: FloatArray) -> bool:
-    turn, twist = (z[..., :3] * z[..., :3]).sum(axis=-1), np.abs(z[..., 2])
-    if not (np.all(turn < _LARGEST_TURN) and np.all(twist < np.pi) and np.all(rest_length + z[..., 3] > 1e-3 * rest_length)):
+def _in_range(z: FloatArray, turn: FloatArray, end: Screw, positions: FloatArray) -> bool:
+    if not (np.all(turn < _LARGEST_TURN) and np.all(np.abs(z[..., 2]) < np.pi)):
         return False  # also for NaN
     if not np.all(np.abs(positions[..., 5] - z[..., 2]) < np.pi):  # r3 has gone past half a turn to the other side
         return False

@@ -10,13 +10,14 @@ angle, so that the straight configuration is no special case.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, read_only
 
 _SERIES_UP_TO = 40.0  # largest x for the series; its terms decrease from the first on
-_TERMS = ((1.0, 9), (_SERIES_UP_TO, 24))  # (largest x, number of terms)
+_TERMS = ((1.0, 9), (8.0, 14), (_SERIES_UP_TO, 24))  # (largest x, number of terms)
 
 
 def stumpff(x: FloatArray, highest: int) -> FloatArray:
@@ -28,12 +29,12 @@ def stumpff(x: FloatArray, highest: int) -> FloatArray:
     values = np.zeros((highest + 1, *x.shape))
     small = np.minimum(x, _SERIES_UP_TO)
     largest = float(small.max(initial=0.0))
-    terms = _TERMS[0][1] if largest <= _TERMS[0][0] else _TERMS[1][1]
-    for k in (highest, highest - 1):
-        total = np.ones_like(small)
-        for j in range(terms, 0, -1):
-            total = 1.0 - small / ((2 * j + k) * (2 * j + k - 1)) * total
-        values[k] = total / math.factorial(k)
+    terms = next((count for bound, count in _TERMS if largest <= bound), _TERMS[-1][1])
+    total = np.ones((2, small.size))
+    for ratio in small.ravel() / _divisors(highest, terms):
+        total = 1.0 - ratio * total
+    for one, k in zip(total, (highest, highest - 1), strict=True):
+        values[k] = one.reshape(small.shape) / math.factorial(k)
     for k in range(highest - 2, -1, -1):
         values[k] = 1.0 / math.factorial(k) - small * values[k + 2]
     large = x > _SERIES_UP_TO
@@ -44,3 +45,10 @@ def stumpff(x: FloatArray, highest: int) -> FloatArray:
             upwards.append((1.0 / math.factorial(k) - upwards[k]) / x[large])
         values[:, large] = upwards
     return values
+
+
+@lru_cache(maxsize=64)
+def _divisors(highest: int, terms: int) -> FloatArray:
+    """Of each term of the series of the two highest functions by the term before it, last term first, shape (terms, 2, 1)."""
+    rows = [[[(2 * j + k) * (2 * j + k - 1)] for k in (highest, highest - 1)] for j in range(terms, 0, -1)]
+    return read_only(np.array(rows, dtype=np.float64))

@@ -13,6 +13,7 @@ dt/dq` becomes `M^T t` in these coordinates, and its derivative :math:`M^T D M +
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -189,17 +190,27 @@ class SectionPoint:
         self._c = coordinates
         n = len(coordinates.spring_indices)
         self._chain = SectionChain(elastic[n:].reshape(-1, 4), coordinates.lengths)
-        self.valid = self._chain.valid
+        self._motors, self._springs = motors, elastic[:n]
+
+    @property
+    def valid(self) -> bool:
         """Whether every section is in range."""
-        self.joints: FloatArray = np.zeros(coordinates.count)
+        return self._chain.valid
+
+    @cached_property
+    def joints(self) -> FloatArray:
         """Joint positions."""
-        self.joints[coordinates.motor_indices] = motors
-        self.joints[coordinates.spring_indices] = elastic[:n]
-        self.joints[coordinates.section_indices] = self._chain.positions - coordinates.rest_joints
+        joints: FloatArray = np.zeros(self._c.count)
+        joints[self._c.motor_indices], joints[self._c.spring_indices] = self._motors, self._springs
+        joints[self._c.section_indices] = self._chain.positions - self._c.rest_joints
+        return joints
 
     def reduce(self, load: JointLoad) -> ReducedLoad:
         """Transform a joint load by the chain rule."""
-        derivative, n = self._derivative(load), len(self._c.motor_indices)
+        m, n = len(self._c.before), len(self._c.motor_indices)
+        if load.none:
+            return ReducedLoad(np.zeros(n), np.zeros(m - n), np.zeros((m - n, m - n)), np.zeros((m - n, n)), 0.0, 0.0)
+        derivative = self._derivative(load)
         return ReducedLoad(*self.loads(load.torque), derivative[n:, n:], derivative[n:, :n], 0.0, 0.0)
 
     def loads(self, torque: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -52,6 +52,11 @@ class JointLoad(NamedTuple):
     scale: float
     """Size of the load, `sum |f| reach + |moment|` plus the norm of the gravity torque [N m]."""
 
+    @property
+    def none(self) -> bool:
+        """Whether there is no wrench and no gravity."""
+        return self.gravity_derivative is None and len(self.angular) == 0
+
     def derivative(self, entries: Entries) -> FloatArray:
         """Return entries of the derivative of `torque` with respect to the joint coordinates, shape of `entries`."""
         matrix: FloatArray = self.angular.T.dot(self.by_force).take(entries.ordered)

@@ -36,8 +36,8 @@ class ElasticState(NamedTuple):
 
     q_springs: FloatArray
     """Elastic coordinates, shape (n_springs,) [rad or m]."""
-    q: FloatArray
-    """Pinocchio's configuration, shape (nq,)."""
+    model: SoftModel
+    """The robot."""
     point: Point
     """Joint positions and their derivatives."""
     load: ReducedLoad
@@ -55,6 +55,11 @@ class ElasticState(NamedTuple):
     error: float
     """Norm of the residual; infinite where a section is beyond its range, or the friction of guides does not settle."""
 
+    @property
+    def q(self) -> FloatArray:
+        """Pinocchio's configuration, shape (nq,)."""
+        return self.model.embed(self.point.joints)
+
 
 class ElasticProblem:
     """The residual of the springs of one robot under one load, as a function of the elastic coordinates."""
@@ -68,17 +73,16 @@ class ElasticProblem:
     def state(self, q_springs: FloatArray) -> ElasticState:
         """Evaluate residual, tangent stiffness and energy at elastic coordinates, shape (n_springs,) [rad or m]."""
         point = self._coordinates.at(self.q_motors, q_springs)
-        q = self.model.embed(point.joints)
         if not point.valid:
-            return _out_of_range(self.model, q_springs, q, point)
-        joints = self._applied.at(q)
+            return _out_of_range(self.model, q_springs, point)
+        joints = self._applied.nothing or self._applied.at(self.model.embed(point.joints))
         reduced = point.reduce(joints)
         stored, torques, stiffness = self._springs.at(q_springs)
         residual = torques - reduced.elastic
         tangent = stiffness - reduced.derivative
         energy = stored + joints.potential + reduced.potential
         scale = joints.scale + reduced.scale * self._reach
-        return ElasticState(q_springs, q, point, reduced, torques, scale, residual, tangent, energy, norm(residual))
+        return ElasticState(q_springs, self.model, point, reduced, torques, scale, residual, tangent, energy, norm(residual))
 
     def balanced(self, state: ElasticState) -> bool:
         """Whether the residual meets the tolerance."""
@@ -114,12 +118,12 @@ def rubbing_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
         return model, state if change <= SAME_FRICTION else state._replace(error=math.inf)
 
 
-def _out_of_range(model: SoftModel, q_springs: FloatArray, q: FloatArray, point: Point) -> ElasticState:
+def _out_of_range(model: SoftModel, q_springs: FloatArray, point: Point) -> ElasticState:
     """State of infinite energy, which no solver accepts: a section is beyond its range."""
     n, m = model.n_springs, model.n_motors
     load = ReducedLoad(np.zeros(m), np.zeros(n), np.zeros((n, n)), np.zeros((n, m)), 0.0, 0.0)
     _, torques, _ = model.springs.at(q_springs)
-    return ElasticState(q_springs, q, point, load, torques, 0.0, np.zeros(n), np.zeros((n, n)), math.inf, math.inf)
+    return ElasticState(q_springs, model, point, load, torques, 0.0, np.zeros(n), np.zeros((n, n)), math.inf, math.inf)
 
 
 def largest_residual(model: SoftModel, scale: float, tolerance: float) -> float:
